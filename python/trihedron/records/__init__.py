@@ -1,0 +1,30 @@
+"""The nouns of the workflow: frozen, validated when made, understood by every stage.
+
+One file per noun. A stage takes records and returns records; it never imports another stage.
+"""
+
+from trihedron.records.calibration import (
+    PARAMETER_NAMES,
+    Calibration,
+    FitQuality,
+    Observability,
+    SensorCalibration,
+)
+from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.recording import Recording
+from trihedron.records.segments import Hold, Move, Segments
+
+__all__ = [
+    "PARAMETER_NAMES",
+    "Calibration",
+    "Finding",
+    "FindingCode",
+    "FitQuality",
+    "Hold",
+    "Move",
+    "Observability",
+    "Recording",
+    "Segments",
+    "SensorCalibration",
+    "Severity",
+]

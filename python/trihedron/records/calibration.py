@@ -1,0 +1,140 @@
+"""A calibration: the linear model of both sensors with the certainty of every number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records.finding import Finding, Severity
+
+FloatArray = npt.NDArray[np.float64]
+
+Frame = Literal["lower", "symmetric", "case"]
+"""Instrument trihedron Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
+
+PARAMETER_NAMES: tuple[str, ...] = (*(f"S{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)), "b1", "b2", "b3")
+"""Order of a sensor's 12 parameters in every covariance: S row by row, then b."""
+
+
+@dataclass(frozen=True, eq=False)
+class Observability:
+    """How well the motion determines the parameters.
+
+    ``singular_values`` of the whitened, column-scaled Jacobian (largest first), ``condition`` their ratio, ``rank`` the
+    number above rounding, ``n_parameters`` how many were asked for; ``weakest`` says in words what is seen worst and
+    ``advice`` which poses or turns to add. ``correlated`` lists parameter pairs with |correlation| > 0.9.
+    """
+
+    rank: int
+    n_parameters: int
+    condition: float
+    singular_values: FloatArray
+    weakest: str = ""
+    advice: tuple[str, ...] = ()
+    correlated: tuple[tuple[str, str, float], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class FitQuality:
+    """Residuals of one sensor's fit, in sample and held out, next to the predicted noise.
+
+    ``residual`` (m,) or (m, k) in ``unit`` per pose (accelerometer: norm minus |g|) or per move (gyro: predicted minus
+    measured gravity, 3 components); ``sigma`` of the same shape is what the noise alone predicts for it.
+    ``held_out`` has the shape of ``residual``: the same quantity predicted by a fit that did not see that pose or move
+    (k-fold), ``held_out_sigma`` its prediction error. ``rms_dof`` is the rms per degree of freedom, ``floor`` the rms
+    that noise alone would give. ``angle_deg`` (m,), gyro only: angle between predicted and measured gravity after each
+    move, in sample; ``held_out_angle_deg`` (m,) the same held out.
+    """
+
+    unit: str
+    residual: FloatArray
+    sigma: FloatArray
+    chi2: float
+    dof: int
+    rms: float
+    rms_dof: float
+    floor: float
+    held_out: FloatArray | None = None
+    held_out_sigma: FloatArray | None = None
+    held_out_rms: float | None = None
+    angle_deg: FloatArray | None = None
+    held_out_angle_deg: FloatArray | None = None
+    weights: FloatArray | None = None
+    n_iterations: int = 0
+    stopped_because: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorCalibration:
+    """Direct model of one sensor: ``truth = S raw + b``, raw unit → SI.
+
+    ``covariance`` (12, 12) in the order of :data:`PARAMETER_NAMES`; rows of parameters fixed by the choice of frame are
+    zero. ``sigma_S`` (3, 3) and ``sigma_b`` (3,) are its diagonal's roots.
+    """
+
+    S: FloatArray
+    b: FloatArray
+    covariance: FloatArray
+    raw_unit: str
+    si_unit: str
+    method: str
+    quality: FitQuality | None = None
+    observability: Observability | None = None
+
+    def __post_init__(self) -> None:
+        for name, shape in (("S", (3, 3)), ("b", (3,)), ("covariance", (12, 12))):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            if array.shape != shape or not np.all(np.isfinite(array)):
+                raise ValueError(f"{name} must be finite with shape {shape}, got shape {array.shape}")
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def sigma_S(self) -> FloatArray:
+        """(3, 3) standard errors of S."""
+        sigma: FloatArray = np.sqrt(np.maximum(np.diag(self.covariance)[:9], 0.0)).reshape(3, 3)
+        return sigma
+
+    @property
+    def sigma_b(self) -> FloatArray:
+        """(3,) standard errors of b."""
+        sigma: FloatArray = np.sqrt(np.maximum(np.diag(self.covariance)[9:], 0.0))
+        return sigma
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Both sensors in one instrument trihedron, with what they were determined from.
+
+    ``covariance`` (24, 24): accelerometer's 12 parameters, then the gyro's, with cross terms; (12, 12) without.
+    """
+
+    accelerometer: SensorCalibration
+    gyroscope: SensorCalibration | None
+    covariance: FloatArray
+    frame: Frame
+    gravity_m_s2: float
+    gravity_source: str
+    recording_source: str = ""
+    recording_sha256: str = ""
+    findings: tuple[Finding, ...] = ()
+    extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        n = 12 if self.gyroscope is None else 24
+        covariance = np.array(self.covariance, dtype=np.float64)
+        if covariance.shape != (n, n):
+            raise ValueError(f"covariance must have shape ({n}, {n}), got {covariance.shape}")
+        covariance.setflags(write=False)
+        object.__setattr__(self, "covariance", covariance)
+        if not 1.0 < self.gravity_m_s2 < 100.0:
+            raise ValueError(f"gravity must be in m/s², got {self.gravity_m_s2}")
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No finding says that the answer is not to be trusted."""
+        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)

@@ -1,0 +1,87 @@
+"""Findings: what the tool noticed, as a closed list of codes, each with its likely cause and the next action."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from types import MappingProxyType
+
+
+class Severity(str, Enum):
+    """How far a finding reaches.
+
+    ``NOTE``: stated so that nobody has to guess. ``WARNING``: the answer stands, with less weight than it looks.
+    ``SERIOUS``: the answer is not to be trusted (exit status 2 on the command line).
+    """
+
+    NOTE = "note"
+    WARNING = "warning"
+    SERIOUS = "serious"
+
+
+class FindingCode(str, Enum):
+    """The closed list. A code once published keeps its meaning. Sorted by the stage that reports it."""
+
+    # read
+    UNIT_ASSUMED = "unit-assumed"
+    RATE_ASSUMED = "rate-assumed"
+    TIME_UNIT_DETECTED = "time-unit-detected"
+    TIME_GAP = "time-gap"
+    TIME_JITTER = "time-jitter"
+    TIME_DUPLICATE = "time-duplicate"
+    TIME_BACKWARD = "time-backward"
+    CLOCKS_MERGED = "clocks-merged"
+    STUCK_VALUES = "stuck-values"
+    CLIPPING = "clipping"
+    REPEATED_ROWS = "repeated-rows"
+    NON_FINITE = "non-finite"
+    COARSE_RESOLUTION = "coarse-resolution"
+    # segment
+    NO_INITIAL_REST = "no-initial-rest"
+    HOLD_CREEPS = "hold-creeps"
+    HOLD_BUMPED = "hold-bumped"
+    FEW_POSES = "few-poses"
+    NOT_STATIC = "not-static"
+    # calibrate
+    GRAVITY_DEFAULTED = "gravity-defaulted"
+    LEFT_HANDED = "left-handed"
+    NOT_OBSERVABLE = "not-observable"
+    WEAKLY_OBSERVABLE = "weakly-observable"
+    RESIDUAL_ABOVE_NOISE = "residual-above-noise"
+    HELD_OUT_WORSE = "held-out-worse"
+    OUTLIER_POSE = "outlier-pose"
+    OUTLIER_MOVE = "outlier-move"
+    TABLE_TILT = "table-tilt"
+    TURN_NOT_A_MULTIPLE = "turn-not-a-multiple"
+    GYRO_BIAS_DRIFT = "gyro-bias-drift"
+    NOT_CONVERGED = "not-converged"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing noticed.
+
+    ``seen`` is one sentence with the number and the place; ``cause`` the likely reason; ``action`` what to do next.
+    ``numbers`` repeats the figures of the sentence for machines (SI units, the unit ends the key: ``gap_s``).
+    """
+
+    code: FindingCode
+    severity: Severity
+    seen: str
+    cause: str = ""
+    action: str = ""
+    numbers: MappingProxyType[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    def to_dict(self) -> dict[str, object]:
+        """As plain JSON types."""
+        return {
+            "code": self.code.value,
+            "severity": self.severity.value,
+            "seen": self.seen,
+            "cause": self.cause,
+            "action": self.action,
+            "numbers": dict(self.numbers),
+        }
+
+    def __str__(self) -> str:
+        return f"{self.severity.value}: {self.seen}" + (f" {self.action}" if self.action else "")

@@ -1,0 +1,113 @@
+"""A recording: raw readings of one IMU on one time base, as they were logged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records.finding import Finding
+from trihedron.units import AccelerationUnit, RateUnit
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:
+    out: FloatArray = np.array(array, dtype=np.float64, order="C", copy=True)
+    if out.ndim != len(shape) or any(
+        want is not None and got != want for got, want in zip(out.shape, shape, strict=True)
+    ):
+        wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ")"
+        raise ValueError(f"{name} must have shape {wanted}, got {out.shape}")
+    out.setflags(write=False)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Raw readings on a common time base.
+
+    Parameters
+    ----------
+    time_s : (n,)
+        Seconds since the first sample, non-decreasing. As the clock said: gaps and jitter are kept.
+    accelerometer, gyroscope : (n, 3) or None
+        Raw readings in ``accelerometer_unit`` / ``gyroscope_unit``. At least one sensor is present. Rows that the log
+        lost hold NaN in the sensor that lost them; stages skip them.
+    rate_hz : float
+        Median sampling rate.
+    temperature_degc, supply_v : (n,) or None
+        Auxiliary channels where the log has them.
+    source, sha256 : str
+        Where it came from, for people; and the hash of the bytes that were read (of the arrays when made in memory).
+    findings : tuple of Finding
+        The audit of the log.
+    auxiliary : mapping of name to (n,) array
+        Every other numeric column, untouched.
+
+    Raises
+    ------
+    ValueError
+        When shapes disagree or time runs backward.
+    """
+
+    time_s: FloatArray
+    accelerometer: FloatArray | None
+    gyroscope: FloatArray | None
+    rate_hz: float
+    accelerometer_unit: AccelerationUnit = AccelerationUnit.M_S2
+    gyroscope_unit: RateUnit = RateUnit.RAD_S
+    temperature_degc: FloatArray | None = None
+    supply_v: FloatArray | None = None
+    start_epoch_s: float = 0.0
+    source: str = "memory"
+    sha256: str = ""
+    findings: tuple[Finding, ...] = ()
+    auxiliary: MappingProxyType[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        time_s = _readonly(self.time_s, "time_s", (None,))
+        n = len(time_s)
+        if n == 0:
+            raise ValueError("a recording needs at least one sample")
+        if not np.all(np.isfinite(time_s)) or np.any(np.diff(time_s) < 0):
+            raise ValueError("time_s must be finite and non-decreasing")
+        object.__setattr__(self, "time_s", time_s)
+        if self.accelerometer is None and self.gyroscope is None:
+            raise ValueError("a recording needs an accelerometer or a gyroscope")
+        for name in ("accelerometer", "gyroscope"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _readonly(value, name, (n, 3)))
+        for name in ("temperature_degc", "supply_v"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _readonly(value, name, (n,)))
+        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise ValueError(f"rate_hz must be a positive number, got {self.rate_hz}")
+        object.__setattr__(self, "accelerometer_unit", AccelerationUnit(self.accelerometer_unit))
+        object.__setattr__(self, "gyroscope_unit", RateUnit(self.gyroscope_unit))
+
+    @property
+    def n_samples(self) -> int:
+        """Number of rows."""
+        return len(self.time_s)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the last sample, plus one sample step."""
+        return float(self.time_s[-1] - self.time_s[0]) + 1.0 / self.rate_hz
+
+    def __repr__(self) -> str:
+        sensors = " + ".join(
+            f"{name} [{unit.value}]"
+            for name, value, unit in (
+                ("accelerometer", self.accelerometer, self.accelerometer_unit),
+                ("gyroscope", self.gyroscope, self.gyroscope_unit),
+            )
+            if value is not None
+        )
+        size = f"{self.n_samples} samples, {self.duration_s:.1f} s at {self.rate_hz:.4g} Hz"
+        return f"<Recording {self.source}: {size}, {sensors}>"

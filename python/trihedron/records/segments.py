@@ -1,0 +1,96 @@
+"""Where a recording stands still and where it moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records.finding import Finding
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Hold:
+    """One still pose.
+
+    ``[start, stop)`` are the samples that may be averaged: edges trimmed, so that no motion leaks in.
+    ``[outer_start, outer_stop)`` is the stretch as detected, before trimming. ``disturbed`` are sub-ranges
+    ``(start, stop)`` inside ``[start, stop)`` that were bumped and are left out of means.
+    """
+
+    index: int
+    start: int
+    stop: int
+    outer_start: int
+    outer_stop: int
+    disturbed: tuple[tuple[int, int], ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.outer_start <= self.start < self.stop <= self.outer_stop:
+            raise ValueError(
+                f"hold {self.index} is not a range: {self.outer_start}..{self.start}..{self.stop}..{self.outer_stop}"
+            )
+
+    def samples(self) -> npt.NDArray[np.intp]:
+        """Indices that may be averaged: the range without its disturbed parts."""
+        keep = np.ones(self.stop - self.start, dtype=bool)
+        for first, last in self.disturbed:
+            keep[max(first - self.start, 0) : max(last - self.start, 0)] = False
+        return np.flatnonzero(keep) + self.start
+
+
+@dataclass(frozen=True)
+class Move:
+    """The samples between two neighbouring holds: from the trimmed end of one to the trimmed start of the next.
+
+    Integration over ``[start, stop)`` therefore contains the whole motion whatever its duration; nothing is cut.
+    """
+
+    index: int
+    hold_before: int
+    hold_after: int
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Holds and moves of one recording, and the sensor noise that decided them.
+
+    ``accelerometer_sigma`` and ``gyroscope_sigma`` (3,) are the white noise of one sample in raw units, measured inside
+    the holds; ``accelerometer_mean`` / ``gyroscope_mean`` (n_holds, 3) the mean raw reading of each hold, with
+    ``accelerometer_sigma_mean`` / ``gyroscope_sigma_mean`` (n_holds, 3) the standard error of each mean (not assuming
+    whiteness: slow noise inside a hold raises it). ``n_averaged`` (n_holds,) counts the samples behind each mean,
+    ``time_mid_s`` (n_holds,) and ``duration_s`` (n_holds,) say when and how long.
+    """
+
+    holds: tuple[Hold, ...]
+    moves: tuple[Move, ...]
+    accelerometer_sigma: FloatArray | None
+    gyroscope_sigma: FloatArray | None
+    accelerometer_mean: FloatArray | None
+    gyroscope_mean: FloatArray | None
+    accelerometer_sigma_mean: FloatArray | None
+    gyroscope_sigma_mean: FloatArray | None
+    n_averaged: npt.NDArray[np.int64]
+    time_mid_s: FloatArray
+    duration_s: FloatArray
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.holds)
+        for name in ("accelerometer_mean", "gyroscope_mean", "accelerometer_sigma_mean", "gyroscope_sigma_mean"):
+            value = getattr(self, name)
+            if value is not None and value.shape != (n, 3):
+                raise ValueError(f"{name} must have shape ({n}, 3), got {value.shape}")
+        for move in self.moves:
+            if not (0 <= move.hold_before < n and 0 <= move.hold_after < n and move.start <= move.stop):
+                raise ValueError(f"move {move.index} does not join two holds")
+
+    @property
+    def n_holds(self) -> int:
+        """Number of still poses."""
+        return len(self.holds)

@@ -1,0 +1,64 @@
+"""Units: the only place where a number changes its unit.
+
+Inside the package everything is SI (m/s², rad/s, s, °C) except *raw* sensor readings, which stay in the unit of the
+log so that a calibration maps exactly what the sensor wrote.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+
+STANDARD_GRAVITY_M_S2 = 9.80665
+"""Conventional value that defines the unit ``g``. It is not the gravity at anybody's desk."""
+
+
+class AccelerationUnit(str, Enum):
+    """Unit of raw accelerometer readings."""
+
+    M_S2 = "m/s^2"
+    G = "g"
+    MG = "mg"
+    COUNTS = "counts"
+
+
+class RateUnit(str, Enum):
+    """Unit of raw gyro readings."""
+
+    RAD_S = "rad/s"
+    MRAD_S = "mrad/s"
+    DEG_S = "deg/s"
+    COUNTS = "counts"
+
+
+_ACCELERATION_TO_SI = {
+    AccelerationUnit.M_S2: 1.0,
+    AccelerationUnit.G: STANDARD_GRAVITY_M_S2,
+    AccelerationUnit.MG: STANDARD_GRAVITY_M_S2 / 1000.0,
+}
+_RATE_TO_SI = {RateUnit.RAD_S: 1.0, RateUnit.MRAD_S: 1e-3, RateUnit.DEG_S: math.pi / 180.0}
+
+
+def acceleration_to_si(unit: AccelerationUnit) -> float | None:
+    """Nominal m/s² per unit; ``None`` for counts, whose scale only a calibration can tell."""
+    return _ACCELERATION_TO_SI.get(unit)
+
+
+def rate_to_si(unit: RateUnit) -> float | None:
+    """Nominal rad/s per unit; ``None`` for counts."""
+    return _RATE_TO_SI.get(unit)
+
+
+def degrees_from_radians(angle_rad: float) -> float:
+    """Angle or rate, rad → deg."""
+    return math.degrees(angle_rad)
+
+
+def radians_from_degrees(angle_deg: float) -> float:
+    """Angle or rate, deg → rad."""
+    return math.radians(angle_deg)
+
+
+def mg_from_m_s2(acceleration_m_s2: float) -> float:
+    """Acceleration in thousandths of standard gravity."""
+    return 1000.0 * acceleration_m_s2 / STANDARD_GRAVITY_M_S2

@@ -1,0 +1,12 @@
+//! The mathematics of `trihedron`: slices and nalgebra in, plain structs out.
+//!
+//! No module here reads files, prints, or knows Python; `python` (feature `python`) is the only seam.
+//! Vocabulary: `S`, `b` are the direct form `f = S a' + b` (raw to SI), `Mz` is the instrument trihedron.
+
+pub mod error;
+pub mod rotation;
+
+#[cfg(feature = "python")]
+mod python;
+
+pub use error::{Error, Result};

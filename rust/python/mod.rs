@@ -1,0 +1,29 @@
+//! THE SEAM: the only place that may name `pyo3` or `numpy`. One file per room of the mathematics.
+//!
+//! Every entry converts its arrays to owned memory, then calls [`run`], which releases the interpreter and
+//! turns a kernel's refusal into a `ValueError` with the kernel's own sentence.
+
+// pyo3 hands arguments over by value; that is its calling convention, not a choice of ours.
+#![allow(clippy::needless_pass_by_value)]
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::error::Result as KernelResult;
+
+mod rotation;
+
+/// The one doorway: run a kernel without holding the interpreter, map its refusal to `ValueError`.
+pub(crate) fn run<T: Send>(
+    py: Python<'_>,
+    kernel: impl FnOnce() -> KernelResult<T> + Send,
+) -> PyResult<T> {
+    py.detach(kernel)
+        .map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    rotation::register(module)?;
+    Ok(())
+}

@@ -1,0 +1,89 @@
+//! Rotations by vectors: exponential, logarithm and their derivatives.
+//!
+//! Convention: `exp(v)` is the active rotation by angle `|v|` about `v`, so `exp(v) x` turns `x`.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// The cross-product matrix `[v]x`, so that `skew(v) * x == v × x`.
+#[must_use]
+pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
+}
+
+/// Below this squared angle the closed forms lose digits and three Taylor terms are exact to 1e-16.
+const SMALL_ANGLE_SQUARED: f64 = 1e-4;
+
+/// `(sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³)` with Taylor series near zero.
+fn series(theta2: f64) -> (f64, f64, f64) {
+    if theta2 < SMALL_ANGLE_SQUARED {
+        (
+            1.0 - theta2 / 6.0 * (1.0 - theta2 / 20.0 * (1.0 - theta2 / 42.0)),
+            0.5 - theta2 / 24.0 * (1.0 - theta2 / 30.0 * (1.0 - theta2 / 56.0)),
+            1.0 / 6.0 - theta2 / 120.0 * (1.0 - theta2 / 42.0 * (1.0 - theta2 / 72.0)),
+        )
+    } else {
+        let theta = theta2.sqrt();
+        let half = (0.5 * theta).sin();
+        (
+            theta.sin() / theta,
+            2.0 * half * half / theta2,
+            (theta - theta.sin()) / (theta2 * theta),
+        )
+    }
+}
+
+/// Rotation matrix of a rotation vector (Rodrigues), exact for any angle.
+#[must_use]
+pub fn exp(v: &Vector3<f64>) -> Matrix3<f64> {
+    let (a, b, _) = series(v.norm_squared());
+    let k = skew(v);
+    Matrix3::identity() + k * a + k * k * b
+}
+
+/// Left Jacobian of [`exp`]: `exp(v + δ) ≈ exp(J δ) exp(v)`.
+#[must_use]
+pub fn left_jacobian(v: &Vector3<f64>) -> Matrix3<f64> {
+    let (_, b, c) = series(v.norm_squared());
+    let k = skew(v);
+    Matrix3::identity() + k * b + k * k * c
+}
+
+/// Rotation vector (angle in `[0, π]`) of a rotation matrix; robust at zero and at π.
+#[must_use]
+pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {
+    // Through the unit quaternion: Shepperd's choice of the largest component keeps every angle well conditioned.
+    let t = r.trace();
+    let d = [t, r[(0, 0)], r[(1, 1)], r[(2, 2)]];
+    let mut largest = 0;
+    for i in 1..4 {
+        if d[i] > d[largest] {
+            largest = i;
+        }
+    }
+    let mut q = [0.0; 4];
+    q[largest] = 0.5 * (1.0 + 2.0 * d[largest] - t).max(0.0).sqrt();
+    if largest == 0 {
+        let s = 0.25 / q[0];
+        q[1] = (r[(2, 1)] - r[(1, 2)]) * s;
+        q[2] = (r[(0, 2)] - r[(2, 0)]) * s;
+        q[3] = (r[(1, 0)] - r[(0, 1)]) * s;
+    } else {
+        let i = largest - 1;
+        let j = (i + 1) % 3;
+        let k = (i + 2) % 3;
+        let s = 0.25 / q[largest];
+        q[0] = (r[(k, j)] - r[(j, k)]) * s;
+        q[1 + j] = (r[(j, i)] + r[(i, j)]) * s;
+        q[1 + k] = (r[(k, i)] + r[(i, k)]) * s;
+    }
+    if q[0] < 0.0 {
+        q = q.map(|c| -c);
+    }
+    let v = Vector3::new(q[1], q[2], q[3]);
+    let n = v.norm();
+    if n < 1e-8 {
+        v * 2.0
+    } else {
+        v * (2.0 * n.atan2(q[0]) / n)
+    }
+}
