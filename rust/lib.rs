@@ -4,6 +4,7 @@
 //! Vocabulary: `S`, `b` are the direct form `f = S a' + b` (raw to SI), `Mz` is the instrument trihedron.
 
 pub mod error;
+pub mod gauss_newton;
 pub mod rotation;
 
 #[cfg(feature = "python")]
