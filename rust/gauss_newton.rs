@@ -95,7 +95,7 @@ impl Loss {
 
     /// Factor that turns `(JᵀWJ)⁻¹` into the covariance of the estimate for Gaussian noise.
     ///
-    /// For blocks of `k` residuals, `E[w] E[ψ²] / E[ψ']²` with ψ = ρ'(|r|²) r averaged over the χ_k distribution
+    /// For blocks of `k` residuals, `E[w] E[ψ²] / E[ψ']²` with ψ = ρ'(|r|²) r averaged over the `χ_k` distribution
     /// (Huber 1981, eq. 6.4.2); one for least squares.
     #[must_use]
     pub fn covariance_factor(self, block: usize) -> f64 {

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 use trihedron::Result;
 use trihedron::gauss_newton::{Linear, Loss, Options, Solution, Stop, certainty, minimise};
 
+#[allow(clippy::unnecessary_wraps)] // the solver's signature
 fn rosenbrock(x: &DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>)> {
     Ok((
         DVector::from_vec(vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]]),
