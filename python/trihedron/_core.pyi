@@ -1,9 +1,6 @@
 """Signatures of the compiled core. A test compares this stub with the runtime."""
 
-import numpy as np
-import numpy.typing as npt
-
-FloatArray = npt.NDArray[np.float64]
+from trihedron.records.calibration import FloatArray
 
 # rotation
 def rotation_from_vector(vectors: FloatArray) -> FloatArray: ...

@@ -25,5 +25,7 @@ pub(crate) fn run<T: Send>(
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     rotation::register(module)?;
+    // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
+    module.delattr("__all__")?;
     Ok(())
 }
