@@ -48,6 +48,18 @@ pub fn left_jacobian(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + k * b + k * k * c
 }
 
+/// [`exp`] and [`left_jacobian`] of one vector, for the price of one series.
+#[must_use]
+pub fn exp_and_left_jacobian(v: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+    let (a, b, c) = series(v.norm_squared());
+    let k = skew(v);
+    let k2 = k * k;
+    (
+        Matrix3::identity() + k * a + k2 * b,
+        Matrix3::identity() + k * b + k2 * c,
+    )
+}
+
 /// Rotation vector (angle in `[0, π]`) of a rotation matrix; robust at zero and at π.
 #[must_use]
 pub fn log(r: &Matrix3<f64>) -> Vector3<f64> {

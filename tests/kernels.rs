@@ -2,5 +2,7 @@
 
 #[path = "kernels/gauss_newton.rs"]
 mod gauss_newton;
+#[path = "kernels/poisson.rs"]
+mod poisson;
 #[path = "kernels/rotation.rs"]
 mod rotation;

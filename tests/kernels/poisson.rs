@@ -1,0 +1,305 @@
+//! Poisson integration: closed forms, order of convergence, sensitivities against differences, bad input.
+
+use nalgebra::{Matrix3, Vector3};
+use trihedron::poisson::{MoveRange, PreparedMove, RateModel, RateNoise, Turn, prepare};
+use trihedron::rotation::{exp, log};
+
+const MODELS: [RateModel; 3] = [RateModel::Constant, RateModel::Linear, RateModel::Coning];
+const QUIET: RateNoise = RateNoise {
+    density: Vector3::new(0.0, 0.0, 0.0),
+    sigma_time_s: 0.0,
+    nominal_step_s: f64::INFINITY,
+};
+
+/// Deterministic numbers in (−1, 1).
+fn noise(k: usize) -> f64 {
+    let x = (k as f64 * 12.9898 + 4.1).sin() * 43758.5453;
+    2.0 * (x - x.floor()) - 1.0
+}
+
+fn stamps(n: usize, span: f64, jitter: f64) -> Vec<f64> {
+    let h = span / (n - 1) as f64;
+    (0..n)
+        .map(|k| {
+            let inner = k > 0 && k < n - 1;
+            h * (k as f64 + if inner { jitter * noise(k) } else { 0.0 })
+        })
+        .collect()
+}
+
+fn range(time: &[f64]) -> MoveRange {
+    MoveRange {
+        start: 0,
+        stop: time.len(),
+        anchor_before_s: time[0] - 1.5,
+        anchor_after_s: time[time.len() - 1] + 2.5,
+    }
+}
+
+fn prepared(time: &[f64], raw: &[Vector3<f64>], model: RateModel) -> PreparedMove {
+    prepare(time, raw, &range(time), model).expect("a valid move")
+}
+
+fn run(p: &PreparedMove, s: &Matrix3<f64>, b0: &Vector3<f64>, b1: &Vector3<f64>) -> Turn {
+    p.integrate(s, b0, b1, &QUIET)
+}
+
+/// A rate whose direction wanders, so that the commutator matters.
+fn wandering(t: f64) -> Vector3<f64> {
+    Vector3::new(
+        (2.0 * t).sin(),
+        1.5 * (1.3 * t + 0.4).cos(),
+        0.7 * (2.9 * t).sin(),
+    )
+}
+
+fn sampled(time: &[f64], magnitude: f64) -> Vec<Vector3<f64>> {
+    time.iter().map(|&t| wandering(t) * magnitude).collect()
+}
+
+fn scale() -> Matrix3<f64> {
+    Matrix3::new(1.1, 0.02, -0.03, 0.01, 0.9, 0.04, -0.05, 0.02, 1.05)
+}
+
+#[test]
+fn a_constant_rate_gives_the_exact_exponential_under_every_model() {
+    let time = stamps(40, 3.0, 0.3);
+    let w = Vector3::new(0.7, -1.1, 0.4);
+    for model in MODELS {
+        let turn = run(
+            &prepared(&time, &vec![w; 40], model),
+            &scale(),
+            &Vector3::zeros(),
+            &Vector3::zeros(),
+        );
+        let truth = exp(&(-(scale() * w) * 3.0));
+        // 39 products of rotations: some tens of ulp.
+        assert!((turn.rotation - truth).norm() < 1e-13, "{model:?}");
+    }
+}
+
+#[test]
+fn each_model_converges_at_its_order_on_irregular_stamps() {
+    let reference = {
+        let time = stamps(40_001, 2.0, 0.0);
+        let raw = sampled(&time, 1.0);
+        run(
+            &prepared(&time, &raw, RateModel::Coning),
+            &scale(),
+            &Vector3::zeros(),
+            &Vector3::zeros(),
+        )
+        .rotation
+    };
+    for (model, order) in MODELS.into_iter().zip([1.0, 2.0, 4.0]) {
+        let error = |n: usize| {
+            let time = stamps(n, 2.0, 0.2);
+            let p = prepared(&time, &sampled(&time, 1.0), model);
+            let b = run(&p, &scale(), &Vector3::zeros(), &Vector3::zeros()).rotation;
+            log(&(b * reference.transpose())).norm()
+        };
+        let seen = (error(101) / error(1601)).log2() / 4.0;
+        // Jitter scatters the leading coefficient by some ten per cent: a quarter of an order over four octaves.
+        assert!(
+            (seen - order).abs() < 0.3,
+            "{model:?} converges with order {seen}"
+        );
+    }
+}
+
+#[test]
+fn sensitivities_match_differences_at_zero_tiny_and_ordinary_rates() {
+    for model in MODELS {
+        for magnitude in [0.0, 1e-7, 1.0] {
+            let time = stamps(60, 2.5, 0.2);
+            let p = prepared(&time, &sampled(&time, magnitude), model);
+            let (b0, b1) = (
+                Vector3::new(0.01, -0.02, 0.005) * magnitude,
+                Vector3::new(-0.03, 0.01, 0.02) * magnitude,
+            );
+            let turn = run(&p, &scale(), &b0, &b1);
+            let step = 1e-5;
+            // Central differences: truncation ~ step² |∫w'|³ < 1e-9, rounding 1e-15/step = 1e-10.
+            let check =
+                |plus: Matrix3<f64>, minus: Matrix3<f64>, theta: Vector3<f64>, what: &str| {
+                    let numeric = (plus - minus) / (2.0 * step);
+                    let gap = (numeric - turn.derivative(&theta)).norm();
+                    assert!(
+                        gap < 3e-9,
+                        "{model:?} at {magnitude}: {what} is off by {gap}"
+                    );
+                };
+            for i in 0..3 {
+                for j in 0..3 {
+                    let mut d = Matrix3::zeros();
+                    d[(i, j)] = step;
+                    check(
+                        run(&p, &(scale() + d), &b0, &b1).rotation,
+                        run(&p, &(scale() - d), &b0, &b1).rotation,
+                        turn.wrt_scale.column(3 * i + j).into(),
+                        "S",
+                    );
+                }
+                let mut d = Vector3::zeros();
+                d[i] = step;
+                check(
+                    run(&p, &scale(), &(b0 + d), &b1).rotation,
+                    run(&p, &scale(), &(b0 - d), &b1).rotation,
+                    turn.wrt_bias_before.column(i).into(),
+                    "bias before",
+                );
+                check(
+                    run(&p, &scale(), &b0, &(b1 + d)).rotation,
+                    run(&p, &scale(), &b0, &(b1 - d)).rotation,
+                    turn.wrt_bias_after.column(i).into(),
+                    "bias after",
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_same_bias_at_both_anchors_is_a_constant_rate() {
+    let time = stamps(80, 2.0, 0.3);
+    let b = Vector3::new(0.3, -0.2, 0.5);
+    let p = prepared(&time, &vec![Vector3::zeros(); 80], RateModel::Coning);
+    let turn = run(&p, &scale(), &b, &b);
+    assert!((turn.rotation - exp(&(-b * 2.0))).norm() < 1e-13);
+    // Both anchors together move the rate by one for the whole time: the angle per unit of rate is Δt along b.
+    let along = (turn.wrt_bias_before + turn.wrt_bias_after) * b;
+    assert!((along - b * 2.0).norm() < 1e-12);
+}
+
+#[test]
+fn a_turn_there_and_back_returns_to_the_identity() {
+    let there: Vec<f64> = stamps(200, 2.0, 0.0);
+    let n = there.len();
+    let mut raw = sampled(&there, 1.0);
+    let mut time = there.clone();
+    for k in (0..n - 1).rev() {
+        raw.push(-raw[k]);
+        time.push(4.0 - there[k]);
+    }
+    // The reading jumps from w to −w at the turning point: the constant and the linear model see it symmetrically.
+    raw[n - 1] = Vector3::zeros();
+    let turn = run(
+        &prepared(&time, &raw, RateModel::Linear),
+        &scale(),
+        &Vector3::zeros(),
+        &Vector3::zeros(),
+    );
+    assert!((turn.rotation - Matrix3::identity()).norm() < 1e-12);
+}
+
+#[test]
+fn white_noise_of_the_rate_gives_the_predicted_covariance() {
+    let time = stamps(200, 2.0, 0.0);
+    let h = 2.0 / 199.0;
+    let clean = sampled(&time, 1.0);
+    let sigma = 0.02;
+    let noisy = RateNoise {
+        density: Vector3::repeat(sigma * f64::sqrt(h)),
+        ..QUIET
+    };
+    let p = prepared(&time, &clean, RateModel::Linear);
+    let zero = Vector3::zeros();
+    let predicted = p.integrate(&scale(), &zero, &zero, &noisy);
+    let trials = 2000;
+    let mut sum = Matrix3::zeros();
+    for trial in 0..trials {
+        // Sum of twelve uniforms: variance 12/3, so a standard normal after division by two.
+        let normal = |k: usize| {
+            (0..12)
+                .map(|m| noise(trial * 9973 + k * 13 + m + 1))
+                .sum::<f64>()
+                / 2.0
+        };
+        let raw: Vec<_> = clean
+            .iter()
+            .enumerate()
+            .map(|(k, w)| {
+                w + Vector3::new(normal(3 * k), normal(3 * k + 1), normal(3 * k + 2)) * sigma
+            })
+            .collect();
+        let b = run(
+            &prepared(&time, &raw, RateModel::Linear),
+            &scale(),
+            &zero,
+            &zero,
+        )
+        .rotation;
+        let theta = log(&(predicted.rotation.transpose() * b));
+        sum += theta * theta.transpose();
+    }
+    let seen = sum / f64::from(u32::try_from(trials).expect("small"));
+    for i in 0..3 {
+        let ratio = seen[(i, i)] / predicted.cov_noise[(i, i)];
+        // Relative standard error of a variance from 2000 trials is √(2/2000) = 3.2 %: four of them.
+        assert!((ratio - 1.0).abs() < 0.13, "axis {i}: {ratio}");
+    }
+}
+
+#[test]
+fn lost_rows_and_repeated_stamps_are_bridged() {
+    let time = stamps(101, 2.0, 0.0);
+    let w = Vector3::new(0.4, 0.1, -0.2);
+    let mut raw = vec![w; 101];
+    raw[40] = Vector3::repeat(f64::NAN);
+    let mut stamped = time.clone();
+    stamped[60] = stamped[59];
+    for model in MODELS {
+        let turn = run(
+            &prepared(&stamped, &raw, model),
+            &Matrix3::identity(),
+            &Vector3::zeros(),
+            &Vector3::zeros(),
+        );
+        assert!(
+            (turn.rotation - exp(&(-w * 2.0))).norm() < 1e-13,
+            "{model:?}"
+        );
+    }
+}
+
+#[test]
+fn a_lost_sample_widens_the_covariance() {
+    let mut time = stamps(101, 2.0, 0.0);
+    let mut raw = sampled(&time, 1.0);
+    let noise = RateNoise {
+        nominal_step_s: 0.02,
+        ..QUIET
+    };
+    let cov = |time: &[f64], raw: &[Vector3<f64>]| {
+        let zero = Vector3::zeros();
+        prepared(time, raw, RateModel::Coning)
+            .integrate(&scale(), &zero, &zero, &noise)
+            .cov_noise
+            .trace()
+    };
+    assert!(cov(&time, &raw) == 0.0);
+    time.drain(50..55);
+    raw.drain(50..55);
+    assert!(cov(&time, &raw) > 0.0);
+}
+
+#[test]
+fn a_range_outside_the_record_is_refused() {
+    let time = stamps(10, 1.0, 0.0);
+    let raw = vec![Vector3::zeros(); 10];
+    let mut wrong = range(&time);
+    wrong.stop = 11;
+    assert!(prepare(&time, &raw, &wrong, RateModel::Linear).is_err());
+    let mut backward = time.clone();
+    backward.swap(3, 4);
+    assert!(prepare(&backward, &raw, &range(&time), RateModel::Linear).is_err());
+    let mut merged = range(&time);
+    merged.anchor_after_s = merged.anchor_before_s;
+    assert!(prepare(&time, &raw, &merged, RateModel::Linear).is_err());
+}
+
+#[test]
+fn only_three_degrees_of_the_rate_polynomial_exist() {
+    assert!(RateModel::of_degree(1).is_ok_and(|model| model == RateModel::Linear));
+    assert!(RateModel::of_degree(2).is_err());
+}
