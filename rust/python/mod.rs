@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 
 use crate::error::Result as KernelResult;
 
+mod poisson;
 mod rotation;
 
 /// The one doorway: run a kernel without holding the interpreter, map its refusal to `ValueError`.
@@ -24,6 +25,7 @@ pub(crate) fn run<T: Send>(
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    poisson::register(module)?;
     rotation::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
     module.delattr("__all__")?;

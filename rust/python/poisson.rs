@@ -68,8 +68,11 @@ pub(crate) fn ranges(
         .zip(anchors_s.as_array().rows())
         .map(|(edge, anchor)| {
             let index = |value: i64| {
-                usize::try_from(value)
-                    .map_err(|_| PyValueError::new_err(format!("a move has the edge {value}: sample numbers start at 0")))
+                usize::try_from(value).map_err(|_| {
+                    PyValueError::new_err(format!(
+                        "a move has the edge {value}: sample numbers start at 0"
+                    ))
+                })
             };
             Ok(MoveRange {
                 start: index(edge[0])?,
@@ -163,7 +166,8 @@ fn integrate_raw_rate<'py>(
     let raw = rows3("gyroscope", &gyroscope)?;
     let shape = moves.shape().to_vec();
     // The raw integral does not involve the bias: any two ordered instants serve as anchors.
-    let anchors_s = numpy::PyArray::from_vec(py, [0.0, 1.0].repeat(shape[0])).reshape([shape[0], 2])?;
+    let anchors_s =
+        numpy::PyArray::from_vec(py, [0.0, 1.0].repeat(shape[0])).reshape([shape[0], 2])?;
     let ranges = ranges(&moves, &anchors_s.readonly())?;
     let prepared = super::run(py, || {
         poisson::prepare_all(&time_s, &raw, &ranges, RateModel::of_degree(rate_degree)?)
@@ -174,6 +178,9 @@ fn integrate_raw_rate<'py>(
         .collect();
     Ok((
         angles.to_pyarray(py).reshape([prepared.len(), 3])?,
-        prepared.iter().map(poisson::PreparedMove::duration_s).collect(),
+        prepared
+            .iter()
+            .map(poisson::PreparedMove::duration_s)
+            .collect(),
     ))
 }
