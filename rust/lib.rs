@@ -7,6 +7,7 @@ pub mod error;
 pub mod gauss_newton;
 pub mod poisson;
 pub mod rotation;
+pub mod simulate;
 
 #[cfg(feature = "python")]
 mod python;

@@ -29,3 +29,12 @@ def integrate_raw_rate(
     moves: npt.NDArray[np.int64],
     rate_degree: int,
 ) -> tuple[FloatArray, list[float]]: ...
+# simulate
+def simulate_motion(
+    segments: FloatArray,
+    wobble: FloatArray,
+    shake: FloatArray,
+    time_s: FloatArray,
+    gravity_m_s2: float,
+    earth_rate_rad_s: tuple[float, float, float],
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]: ...

@@ -13,6 +13,7 @@ use crate::error::Result as KernelResult;
 
 mod poisson;
 mod rotation;
+mod simulate;
 
 /// The one doorway: run a kernel without holding the interpreter, map its refusal to `ValueError`.
 pub(crate) fn run<T: Send>(
@@ -29,5 +30,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     rotation::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
     module.delattr("__all__")?;
+    simulate::register(module)?;
     Ok(())
 }

@@ -13,6 +13,7 @@ from trihedron.records.calibration import (
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Hold, Move, Segments
+from trihedron.records.truth import TrueSegment, Truth
 
 __all__ = [
     "PARAMETER_NAMES",
@@ -27,4 +28,6 @@ __all__ = [
     "Segments",
     "SensorCalibration",
     "Severity",
+    "TrueSegment",
+    "Truth",
 ]

@@ -1,0 +1,93 @@
+"""The truth behind a simulated recording, kept apart from the log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+SegmentKind = Literal["hold", "move", "turn", "disturbance", "vibration", "oscillation", "table-turn"]
+"""What the body did: stood still; went to another pose; turned about a body axis; was pushed; was shaken; swung;
+was carried on a turning table."""
+
+
+@dataclass(frozen=True)
+class TrueSegment:
+    """One labelled stretch: samples ``[start, stop)`` of the recording, and what the person or the table did.
+
+    ``name`` says which pose or turn; ``turn_rad`` is the true angle about ``axis`` (body frame) where it is a turn.
+    """
+
+    kind: SegmentKind
+    name: str
+    start: int
+    stop: int
+    start_s: float
+    stop_s: float
+    axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn_rad: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What the instrument was really exposed to and made of.
+
+    Parameters
+    ----------
+    accelerometer_time_s, gyroscope_time_s : (n,)
+        True instants of every row, on the motion's clock: the log's own stamps may lie.
+    specific_force_m_s2, angular_rate_rad_s : (n, 3)
+        At the body's reference point, in Mz, each at its own sensor's instants. The rate is inertial.
+    attitude : (n, 4)
+        Quaternion (w, x, y, z), Mz to level, at the accelerometer's instants.
+    segments : tuple of TrueSegment
+        Everything that was done, in order.
+    accelerometer_S, accelerometer_b, gyroscope_S, gyroscope_b
+        Direct form, ``truth = S raw + b`` (raw unit to SI), of the instrument without its further effects.
+    gravity_m_s2 : float
+        Magnitude at the place.
+    effects : mapping of catalogue id to parameters
+        Every effect that is switched on, with its physical parameters (SI, or the unit named in the key).
+    noise : mapping
+        Terms per sensor: name to three values.
+    temperature_degc, supply_v : (n,) or None
+        True values, whether or not they were logged.
+    kept : (n,) of int
+        For every row the index of the sample instant it came from: gaps are lost samples.
+    """
+
+    accelerometer_time_s: FloatArray
+    gyroscope_time_s: FloatArray
+    specific_force_m_s2: FloatArray
+    angular_rate_rad_s: FloatArray
+    attitude: FloatArray
+    segments: tuple[TrueSegment, ...]
+    accelerometer_S: FloatArray
+    accelerometer_b: FloatArray
+    gyroscope_S: FloatArray
+    gyroscope_b: FloatArray
+    gravity_m_s2: float
+    scenario: str = ""
+    seed: int = 0
+    effects: MappingProxyType[str, MappingProxyType[str, object]] = field(default_factory=lambda: MappingProxyType({}))
+    noise: MappingProxyType[str, MappingProxyType[str, tuple[float, ...]]] = field(
+        default_factory=lambda: MappingProxyType({})
+    )
+    temperature_degc: FloatArray | None = None
+    supply_v: FloatArray | None = None
+    kept: npt.NDArray[np.int64] | None = None
+
+    @property
+    def holds(self) -> tuple[TrueSegment, ...]:
+        """The stretches in which the body stood still."""
+        return tuple(segment for segment in self.segments if segment.kind == "hold")
+
+    @property
+    def moves(self) -> tuple[TrueSegment, ...]:
+        """Everything between holds."""
+        return tuple(segment for segment in self.segments if segment.kind != "hold")

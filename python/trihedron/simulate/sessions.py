@@ -1,0 +1,117 @@
+"""Calibration sessions as people perform them, as motions."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from trihedron.simulate.motion import Hold, Motion, MoveTo, Step, Turn, attitude_with_up
+from trihedron.simulate.noise import stream
+
+FACES: tuple[tuple[float, float, float], ...] = (
+    (0.0, 0.0, 1.0),
+    (0.0, 0.0, -1.0),
+    (1.0, 0.0, 0.0),
+    (-1.0, 0.0, 0.0),
+    (0.0, 1.0, 0.0),
+    (0.0, -1.0, 0.0),
+)
+"""Body direction that points up when the cube stands on the opposite face."""
+
+EDGES: tuple[tuple[float, float, float], ...] = tuple(
+    (a, b, c) for a, b, c in itertools.product((0.0, 1.0, -1.0), repeat=3) if [a, b, c].count(0.0) == 1
+)
+"""Body direction that points up when the cube balances on one of its 12 edges."""
+
+
+def hand_session(
+    n_poses: int = 24,
+    hold_s: float = 4.0,
+    move_s: float = 2.0,
+    first_hold_s: float = 20.0,
+    wobble_deg: float = 6.0,
+    travel_m: float = 0.1,
+    arm_m: float = 0.0,
+    layout: int = 0,
+) -> Motion:
+    """Faces, edges, then arbitrary tilts held by turns, moved by hand with wobble, travel and a change of heading.
+
+    ``layout`` seeds the order, the tilts, durations and headings: the protocol, apart from the noise. ``arm_m`` puts
+    the wrist that far behind the case.
+    """
+    rng = stream(layout, "hand session")
+    fixed = [*FACES, *(EDGES[i] for i in rng.permutation(len(EDGES)))]
+    directions = [np.array(d) for d in fixed[:n_poses]]
+    while len(directions) < n_poses:
+        directions.append(rng.normal(size=3))
+    order = [0, *(1 + rng.permutation(n_poses - 1))]
+    steps: list[Step] = []
+    for count, k in enumerate(order):
+        d = directions[k]
+        up = (float(d[0]), float(d[1]), float(d[2]))
+        if count:
+            travel = travel_m * rng.normal(size=3)
+            steps.append(
+                MoveTo(
+                    up,
+                    duration_s=move_s * float(rng.uniform(0.7, 1.5)),
+                    heading_deg=float(rng.uniform(-120.0, 120.0)),
+                    wobble_deg=wobble_deg,
+                    travel_m=(float(travel[0]), float(travel[1]), 0.3 * float(travel[2])),
+                    arm_m=(arm_m, 0.0, 0.0),
+                )
+            )
+        duration = first_hold_s if count == 0 else hold_s * float(rng.uniform(0.8, 1.3))
+        steps.append(Hold(duration, name=f"pose {count + 1}"))
+    return Motion(tuple(steps), start=attitude_with_up(directions[order[0]]))
+
+
+def six_faces(repeats: int = 1, hold_s: float = 5.0, move_s: float = 3.0) -> Motion:
+    """The cube on each of its faces in turn, ``repeats`` times round."""
+    steps: list[Step] = []
+    for count, face in enumerate(FACES * repeats):
+        if count:
+            steps.append(MoveTo(face, move_s, wobble_deg=3.0))
+        steps.append(Hold(hold_s, name="face " + " ".join(f"{c:+.0f}" for c in face)))
+    return Motion(tuple(steps), start=attitude_with_up(FACES[0]))
+
+
+def table_turns(
+    turns_deg: tuple[float, ...] = (90.0, -90.0, 180.0, -180.0, 360.0, -360.0),
+    hold_s: float = 3.0,
+    speed_deg_s: float = 90.0,
+    faces: tuple[tuple[float, float, float], ...] = FACES[::2],
+) -> Motion:
+    """Turns on a table against a wall about the vertical, the cube on each of ``faces`` in turn."""
+    steps: list[Step] = [Hold(10.0, name="rest")]
+    for count, face in enumerate(faces):
+        if count:
+            steps += [MoveTo(face, 3.0, wobble_deg=3.0), Hold(hold_s, name="rest")]
+        for turn in turns_deg:
+            duration = max(1.0, abs(turn) / speed_deg_s * 1.25)
+            steps += [Turn(face, turn, duration, name=f"turn {turn:+g} deg"), Hold(hold_s, name="rest")]
+    return Motion(tuple(steps), start=attitude_with_up(faces[0]))
+
+
+def dividing_head(hold_s: float = 2.0, move_s: float = 1.0) -> Motion:
+    """The 324 poses of an optical dividing head: pitch 0..350 deg by 10, roll 0..80 deg by 10.
+
+    Hold ``pitch P roll R``: up in the body is ``(-sin P, cos P sin R, cos P cos R)``.
+    """
+    steps: list[Step] = []
+    start = (0.0, 0.0, 1.0)
+    for roll in range(0, 90, 10):
+        for pitch in range(0, 360, 10):
+            p, r = math.radians(pitch), math.radians(roll)
+            up = (-math.sin(p), math.cos(p) * math.sin(r), math.cos(p) * math.cos(r))
+            if steps:
+                steps.append(MoveTo(up, move_s))
+            steps.append(Hold(hold_s, name=f"pitch {pitch} roll {roll}"))
+    return Motion(tuple(steps), start=attitude_with_up(start))
+
+
+def long_rest(duration_s: float = 3600.0, up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Motion:
+    """Stand still, for Allan variance."""
+    return Motion((Hold(duration_s, name="rest"),), start=attitude_with_up(up))
