@@ -13,11 +13,7 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 }
 
 /// Rows of an `(n, columns)` array.
-fn table(
-    name: &str,
-    array: &PyReadonlyArray2<'_, f64>,
-    columns: usize,
-) -> PyResult<Vec<Vec<f64>>> {
+fn table(name: &str, array: &PyReadonlyArray2<'_, f64>, columns: usize) -> PyResult<Vec<Vec<f64>>> {
     let view = array.as_array();
     if view.ncols() != columns {
         return Err(PyValueError::new_err(format!(
