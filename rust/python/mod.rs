@@ -28,8 +28,8 @@ pub(crate) fn run<T: Send>(
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     poisson::register(module)?;
     rotation::register(module)?;
+    simulate::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
     module.delattr("__all__")?;
-    simulate::register(module)?;
     Ok(())
 }
