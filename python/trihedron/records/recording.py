@@ -15,7 +15,9 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:
-    out: FloatArray = np.array(array, dtype=np.float64, order="C", copy=True)
+    # An array that nobody can write to is shared, not copied: a log of 1e8 rows must not exist twice.
+    frozen = isinstance(array, np.ndarray) and not array.flags.writeable and array.base is None
+    out: FloatArray = np.array(array, dtype=np.float64, order="C", copy=None if frozen else True)
     if out.ndim != len(shape) or any(
         want is not None and got != want for got, want in zip(out.shape, shape, strict=True)
     ):
@@ -37,7 +39,7 @@ class Recording:
         Raw readings in ``accelerometer_unit`` / ``gyroscope_unit``. At least one sensor is present. Rows that the log
         lost hold NaN in the sensor that lost them; stages skip them.
     rate_hz : float
-        Median sampling rate.
+        Sampling rate: samples per second outside gaps (a median step would believe stamps rounded to a millisecond).
     temperature_degc, supply_v : (n,) or None
         Auxiliary channels where the log has them.
     source, sha256 : str

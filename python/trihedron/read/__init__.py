@@ -1,0 +1,11 @@
+"""READ: logs of any common layout in, one audited :class:`~trihedron.records.Recording` out.
+
+The file's first bytes tell its format; names, then readings tell its columns and units; every choice that was made is
+stated as a finding. A file that cannot become a recording raises :class:`ReadError` with one sentence.
+"""
+
+from trihedron.read.errors import ReadError
+from trihedron.read.recording import read_recording
+from trihedron.read.table import Progress
+
+__all__ = ["Progress", "ReadError", "read_recording"]

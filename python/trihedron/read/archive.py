@@ -1,0 +1,112 @@
+"""NumPy files: ``.npz`` archives and memory-mapped ``.npy`` arrays."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.table import FloatArray, Table, check_memory, file_sha256
+
+_BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
+_DAMAGE = (ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error, NotImplementedError, MemoryError, TypeError)
+
+
+def read_npy(path: Path) -> Table:
+    """An array (n, k) or a structured array (n,), memory-mapped while it is taken apart."""
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except OSError as error:
+        raise from_os_error(path, error) from None
+    except _DAMAGE as error:
+        raise ReadError(f"{path}: this .npy file is damaged or holds Python objects ({_first(error)}).") from None
+    return _from_arrays(path, {"data": array}, None)
+
+
+def read_npz(path: Path, device: int | None) -> Table:
+    """Named arrays: one per column, or a block ``counts`` (n, k) or (n, units, k), ``t_s``, ``fs_hz``."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except OSError as error:
+        raise from_os_error(path, error) from None
+    except _DAMAGE as error:
+        raise ReadError(f"{path}: this .npz archive is damaged or holds Python objects ({_first(error)}).") from None
+    return _from_arrays(path, arrays, device)
+
+
+def _first(error: BaseException) -> str:
+    return (str(error).strip().split("\n")[0] or type(error).__name__)[:120]
+
+
+def _numeric(array: npt.NDArray[np.generic]) -> bool:
+    return array.dtype.kind in "iufb"
+
+
+def _column(array: npt.NDArray[np.generic]) -> FloatArray:
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def _pick_device(path: Path, name: str, block: npt.NDArray[np.generic], device: int | None) -> npt.NDArray[np.generic]:
+    n_units = block.shape[1]
+    if device is None:
+        raise ReadError(
+            f"{path}: array '{name}' holds {n_units} devices (shape {block.shape}); "
+            f"say which one with --device, 1 to {n_units}."
+        )
+    if not 1 <= device <= n_units:
+        raise ReadError(f"{path}: there is no device {device}; array '{name}' holds devices 1 to {n_units}.")
+    chosen: npt.NDArray[np.generic] = block[:, device - 1, :]
+    return chosen
+
+
+def _from_arrays(path: Path, arrays: dict[str, npt.NDArray[Any]], device: int | None) -> Table:
+    names: list[str] = []
+    columns: list[FloatArray] = []
+    metadata: dict[str, str] = {}
+    lengths = [a.shape[0] for a in arrays.values() if a.ndim >= 1 and a.shape[0] > 12]
+    n_rows = max(lengths, default=max((a.shape[0] for a in arrays.values() if a.ndim >= 1), default=0))
+    used_device = False
+    for name, given in arrays.items():
+        array = given
+        if array.dtype.names:
+            if array.ndim == 1 and array.shape[0] == n_rows:
+                for key in array.dtype.names:
+                    if _numeric(array[key]) and array[key].ndim == 1:
+                        names.append(key)
+                        columns.append(_column(array[key]))
+            continue
+        if not _numeric(array):
+            if array.size == 1 and array.dtype.kind in "US":
+                metadata[name] = str(array.reshape(-1)[0])
+            continue
+        if array.ndim == 0 or array.shape[0] != n_rows:
+            metadata[name] = " ".join(f"{value:.12g}" for value in np.ravel(array)[:64].astype(float))
+            continue
+        if array.ndim == 3:
+            array = _pick_device(path, name, array, device)
+            used_device = True
+        if array.ndim > 2:
+            raise ReadError(f"{path}: array '{name}' has {array.ndim} dimensions; save rows x columns.")
+        if array.ndim == 1:
+            names.append(name)
+            columns.append(_column(array))
+            continue
+        check_memory(path, n_rows, array.shape[1])
+        block = name in _BLOCK_NAMES or array.shape[1] > 3
+        # Columns of a block have no names of their own: the order is judged as in a text log without a header.
+        names += ["" if block else f"{name}[{i}]" for i in range(array.shape[1])]
+        columns += [_column(array[:, i]) for i in range(array.shape[1])]
+    if device is not None and not used_device:
+        raise ReadError(f"{path}: a device was asked for but the file holds one device only; leave --device out.")
+    if not columns:
+        raise ReadError(
+            f"{path}: there is no numeric array of rows in this file (it holds {', '.join(arrays) or 'nothing'})."
+        )
+    only_block = not any(names)
+    return Table(path, None if only_block else tuple(names), tuple(columns), file_sha256(path), metadata)

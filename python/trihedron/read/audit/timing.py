@@ -1,0 +1,135 @@
+"""Rate, jitter, gaps, duplicate stamps, lost packets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.table import FloatArray
+from trihedron.records import Finding, FindingCode, Severity
+
+Place = Callable[[int], str]
+
+GAP_STEPS = 1.5
+"""A step this much longer than usual has lost at least half a sample."""
+JITTER_STEPS = 0.03
+"""Jitter below three per cent of a step is the clock's rounding, not worth a sentence."""
+SERIOUS_LOSS = 0.05
+
+
+def audit_timing(time_s: FloatArray, rate_hz: float, place: Place) -> list[Finding]:
+    """Findings on time stamps that were in the log. ``place(i)`` names sample i for people."""
+    if len(time_s) < 3:
+        return []
+    step = np.diff(time_s)
+    positive = step[step > 0]
+    if not len(positive):
+        return []
+    usual = float(np.median(positive))
+    findings = _duplicates(step, place)
+    batched = bool(findings) and np.count_nonzero(step == 0) > 0.2 * len(step)
+    gaps = np.flatnonzero(step > (5.0 if batched else GAP_STEPS) * usual)
+    if len(gaps):
+        findings.append(_gap(step, gaps, usual, place))
+    inside = step[(step <= GAP_STEPS * usual) & (step > 0)]
+    jitter = float(inside.std())
+    mean = float(inside.mean())
+    if jitter > JITTER_STEPS * mean:
+        findings.append(
+            Finding(
+                FindingCode.TIME_JITTER,
+                Severity.NOTE if jitter < 0.2 * mean else Severity.WARNING,
+                f"Steps between stamps vary by {1e3 * jitter:.3g} ms rms (median {1e3 * usual:.5g} ms = "
+                f"{1 / usual:.5g} Hz, mean {1e3 * mean:.5g} ms = {1 / mean:.5g} Hz, {1e3 * float(inside.min()):.3g} to "
+                f"{1e3 * float(inside.max()):.3g} ms); the rate used is {rate_hz:.5g} Hz.",
+                "Stamps taken when the data arrived, or rounded.",
+                "Stamp in the sensor's own interrupt if turns matter.",
+                MappingProxyType(
+                    {
+                        "jitter_s": jitter,
+                        "median_step_s": usual,
+                        "mean_step_s": mean,
+                        "median_rate_hz": 1 / usual,
+                        "rate_hz": rate_hz,
+                    }
+                ),
+            )
+        )
+    return findings
+
+
+def _duplicates(step: FloatArray, place: Place) -> list[Finding]:
+    same = np.flatnonzero(step == 0)
+    if not len(same):
+        return []
+    fraction = len(same) / len(step)
+    return [
+        Finding(
+            FindingCode.TIME_DUPLICATE,
+            Severity.WARNING,
+            f"{len(same)} samples ({100 * fraction:.3g} %) carry the same time as the one before "
+            f"(first: {place(int(same[0]) + 1)}).",
+            "Several samples stamped in one go, a stamp of too few digits, or rows written twice.",
+            "With samples stamped in batches, read with --columns time=none and --rate.",
+            MappingProxyType({"count": float(len(same)), "fraction": fraction, "sample": float(same[0] + 1)}),
+        )
+    ]
+
+
+def _gap(step: FloatArray, gaps: npt.NDArray[np.intp], usual: float, place: Place) -> Finding:
+    longest = int(gaps[np.argmax(step[gaps])])
+    lost = int(np.sum(np.maximum(np.rint(step[gaps] / usual) - 1, 0)))
+    fraction = lost / (len(step) + 1 + lost)
+    worst = sorted((int(g) for g in gaps[np.argsort(step[gaps])[::-1][:3]]), key=int)
+    listed = "; ".join(f"{step[g]:.4g} s before {place(g + 1)}" for g in worst)
+    return Finding(
+        FindingCode.TIME_GAP,
+        Severity.SERIOUS if fraction > SERIOUS_LOSS else Severity.WARNING,
+        f"{len(gaps)} gaps longer than {GAP_STEPS:g} steps, about {lost} samples lost ({100 * fraction:.2g} %); the "
+        f"longest lasts {step[longest]:.4g} s. Where: {listed}{' ...' if len(gaps) > 3 else ''}.",
+        "Lost packets, a full buffer, or a stamp that came late.",
+        "Turns that fall into a gap are integrated wrongly; repeat them.",
+        MappingProxyType(
+            {
+                "count": float(len(gaps)),
+                "longest_s": float(step[longest]),
+                "sample": float(longest + 1),
+                "lost_samples": float(lost),
+                "fraction": fraction,
+            }
+        ),
+    )
+
+
+def audit_counter(counter: FloatArray, label: str, place: Place) -> list[Finding]:
+    """Packets the log's own counter says are missing; a counter that wraps is continued."""
+    if len(counter) < 3 or not np.all(np.isfinite(counter)):
+        return []
+    step = np.diff(counter)
+    back = step < 0
+    for modulus in (2.0**8, 2.0**16, 2.0**32):
+        if counter.max() < modulus and counter.min() >= 0:
+            step = np.where(back, step + modulus, step)
+            break
+    if np.any(step < 0):
+        return []
+    usual = float(np.median(step))
+    # A counter that ticks with the sensor's inner rate (3 or 4 per row) loses nothing at 4.
+    lost = np.flatnonzero(step > max(1.5 * usual, usual + 1.0))
+    if usual <= 0 or not len(lost):
+        return []
+    missing = int(np.sum(np.rint(step[lost] / usual) - 1))
+    return [
+        Finding(
+            FindingCode.SAMPLES_LOST,
+            Severity.WARNING if missing <= SERIOUS_LOSS * len(counter) else Severity.SERIOUS,
+            f"The counter {label} skips at {len(lost)} places, {missing} samples are missing "
+            f"(first: {place(int(lost[0]) + 1)}).",
+            "Lost packets.",
+            "Turns that fall into a gap are integrated wrongly; repeat them.",
+            MappingProxyType({"count": float(len(lost)), "lost_samples": float(missing), "sample": float(lost[0] + 1)}),
+        )
+    ]

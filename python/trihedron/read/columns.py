@@ -1,0 +1,283 @@
+"""What each column is: recognised by name, mapped by hand, or taken by position."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from trihedron.read.errors import ReadError
+from trihedron.read.names import ColumnName, parse_name
+from trihedron.read.table import Table
+from trihedron.records import Finding, FindingCode, Severity
+
+Sensor = Literal["accelerometer", "gyroscope"]
+Triad = tuple[int, int, int]
+
+_ALIASES = {
+    **{"t": "time", "time": "time", "timestamp": "time"},
+    **{f"{p}{a}": f"a{a}" for p in ("a", "acc", "acc_", "accel_", "f") for a in "xyz"},
+    **{f"{p}{a}": f"g{a}" for p in ("g", "w", "gyr", "gyr_", "gyro_", "omega_") for a in "xyz"},
+    **{"temp": "temperature", "temperature": "temperature", "supply": "supply", "voltage": "supply", "v": "supply"},
+}
+_SKIP = {"-", "_", "skip", ""}
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Column numbers (from 0) by role, units where a name states them, and what there is to say about the choice."""
+
+    time: int | None = None
+    accelerometer: Triad | None = None
+    gyroscope: Triad | None = None
+    temperature: int | None = None
+    supply: int | None = None
+    counter: int | None = None
+    accelerometer_unit: str = ""
+    gyroscope_unit: str = ""
+    time_unit: str = ""
+    positional: bool = False
+    findings: tuple[Finding, ...] = field(default=())
+
+    def used(self) -> set[int]:
+        """Columns that are not auxiliary."""
+        single = {c for c in (self.time, self.temperature, self.supply) if c is not None}
+        return single | set(self.accelerometer or ()) | set(self.gyroscope or ())
+
+
+def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Columns:
+    """Roles of the columns of a table.
+
+    ``mapping`` is ``"time=t,ax=3,..."`` (names or numbers from 1) or ``"t,ax,ay,az,-,gx,gy,gz"`` (roles in file order);
+    ``sensor`` says what bare ``x y z`` columns are.
+
+    Raises
+    ------
+    ReadError
+        When no sensor is found, or the mapping names a column that does not exist.
+    """
+    explicit = _mapped(table, mapping) if mapping is not None and mapping.strip() else None
+    if explicit is not None and (explicit.accelerometer or explicit.gyroscope):
+        chosen = explicit
+    elif table.names is not None:
+        chosen = _named(table, sensor)
+        if explicit is not None:
+            chosen = replace(
+                chosen,
+                time=chosen.time if explicit.time is None else explicit.time,
+                time_unit=chosen.time_unit if explicit.time is None else explicit.time_unit,
+                temperature=chosen.temperature if explicit.temperature is None else explicit.temperature,
+                supply=chosen.supply if explicit.supply is None else explicit.supply,
+            )
+    else:
+        chosen = _positional(table, sensor)
+    if mapping is not None and re.search(r"(?:^|,)\s*(?:t|time)\s*=\s*(?:none|-)\s*(?:,|$)", mapping):
+        chosen = replace(chosen, time=None)
+    if chosen.accelerometer is None and chosen.gyroscope is None:
+        listed = ", ".join(table.names) if table.names else f"{len(table.columns)} columns without names"
+        raise ReadError(
+            f"{table.path}: no accelerometer and no gyro columns recognised among: {listed[:300]}; "
+            "name them, for example --columns time=1,ax=2,ay=3,az=4."
+        )
+    return replace(chosen, findings=(*chosen.findings, _statement(table, chosen)))
+
+
+def _statement(table: Table, columns: Columns) -> Finding:
+    parts = []
+    for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
+        value = getattr(columns, role)
+        if value is not None:
+            which = value if isinstance(value, tuple) else (value,)
+            parts.append(f"{role} from {' '.join(table.label(c) for c in which)}")
+    rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
+    seen = f"Columns: {', '.join(parts)}" + (f"; kept aside: {' '.join(rest[:24])}." if rest else ".")
+    return Finding(FindingCode.COLUMNS_RECOGNISED, Severity.NOTE, seen)
+
+
+def _mapped(table: Table, mapping: str) -> Columns:
+    roles: dict[str, int] = {}
+    for position, item in enumerate(part.strip() for part in mapping.split(",")):
+        role_text, equals, column_text = item.partition("=")
+        role_key = role_text.strip().lower()
+        if not equals:
+            if role_key in _SKIP:
+                continue
+            column_text = str(position + 1)
+        role = _ALIASES.get(role_key)
+        if role is None:
+            raise ReadError(
+                f"--columns: '{role_text.strip()}' is not a role; "
+                "the roles are time, ax ay az, gx gy gz, temperature, supply."
+            )
+        if column_text.strip().lower() in {"none", "-"}:
+            continue
+        if role in roles:
+            raise ReadError(f"--columns: {role} is given twice; give each role once.")
+        roles[role] = _column_number(table, column_text.strip(), role)
+    triads: dict[str, Triad | None] = {}
+    units: dict[str, str] = {}
+    for sensor, letter in (("accelerometer", "a"), ("gyroscope", "g")):
+        axes = [roles.get(f"{letter}{axis}") for axis in "xyz"]
+        given = [axis for axis in axes if axis is not None]
+        if given and len(given) < 3:
+            missing = " ".join(f"{letter}{n}" for n, axis in zip("xyz", axes, strict=True) if axis is None)
+            raise ReadError(f"--columns: the {sensor} needs three columns; {missing} is missing.")
+        triads[sensor] = (given[0], given[1], given[2]) if given else None
+        units[sensor] = _unit_from_name(table, given[0] if given else None, sensor)
+    time = roles.get("time")
+    return Columns(
+        time=time,
+        accelerometer=triads["accelerometer"],
+        gyroscope=triads["gyroscope"],
+        temperature=roles.get("temperature"),
+        supply=roles.get("supply"),
+        accelerometer_unit=units["accelerometer"],
+        gyroscope_unit=units["gyroscope"],
+        time_unit=parse_name(table.names[time]).time_unit if table.names and time is not None else "",
+    )
+
+
+def _unit_from_name(table: Table, column: int | None, sensor: str) -> str:
+    if table.names is None or column is None:
+        return ""
+    parsed = parse_name(table.names[column])
+    return parsed.unit if parsed.role == sensor else ""
+
+
+def _column_number(table: Table, text: str, role: str) -> int:
+    if table.names is not None:
+        exact = [i for i, name in enumerate(table.names) if name.strip().lower() == text.lower()]
+        if exact:
+            return exact[0]
+    if re.fullmatch(r"\d+", text) and 1 <= int(text) <= len(table.columns):
+        number = int(text) - 1
+    else:
+        listed = ", ".join(table.names)[:300] if table.names else f"1 to {len(table.columns)}"
+        raise ReadError(f"{table.path}: there is no column '{text}' for {role}; the columns are {listed}.")
+    return number
+
+
+def _positional(table: Table, sensor: Sensor | None) -> Columns:
+    """No names: the usual orders by number of columns."""
+    filled = [i for i, column in enumerate(table.columns) if len(column) and not (table.names and table.names[i])]
+    n = len(filled)
+    if n in (3, 4):
+        time = filled[0] if n == 4 else None
+        triad = (filled[-3], filled[-2], filled[-1])
+        if sensor == "gyroscope":
+            return Columns(time=time, gyroscope=triad, positional=True)
+        assumed = () if sensor else (_assumed(f"The {n} columns have no names and were taken as an accelerometer."),)
+        return Columns(time=time, accelerometer=triad, positional=True, findings=assumed)
+    if n in (6, 7):
+        at = n - 6
+        first: Triad = (filled[at], filled[at + 1], filled[at + 2])
+        second: Triad = (filled[at + 3], filled[at + 4], filled[at + 5])
+        return Columns(time=filled[0] if at else None, accelerometer=first, gyroscope=second, positional=True)
+    raise ReadError(
+        f"{table.path}: {n} columns without names could mean anything; "
+        "say which is which, for example --columns time=1,ax=2,ay=3,az=4,gx=5,gy=6,gz=7."
+    )
+
+
+def _assumed(seen: str) -> Finding:
+    return Finding(
+        FindingCode.COLUMNS_ASSUMED,
+        Severity.WARNING,
+        seen,
+        "A log without a header.",
+        "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4.",
+    )
+
+
+def _named(table: Table, sensor: Sensor | None) -> Columns:
+    assert table.names is not None
+    parsed = [parse_name(n) if len(table.columns[i]) else ColumnName() for i, n in enumerate(table.names)]
+    notes: list[Finding] = []
+    triads: dict[str, Triad | None] = {}
+    units: dict[str, str] = {}
+    for role in ("accelerometer", "gyroscope"):
+        groups = _triads(parsed, role)
+        triads[role], units[role] = _choose(table, parsed, groups, role, notes)
+    if triads["accelerometer"] is None and triads["gyroscope"] is not None:
+        tilt = _triads(parsed, "translation")  # tx ty tz beside wx wy wz
+        if tilt:
+            triads["accelerometer"] = tilt[0]
+    unnamed = sum(1 for i, name in enumerate(table.names) if not name and len(table.columns[i]))
+    if triads["accelerometer"] is None and triads["gyroscope"] is None and unnamed in (3, 6):
+        by_place = _positional(table, sensor)
+        triads = {"accelerometer": by_place.accelerometer, "gyroscope": by_place.gyroscope}
+        notes += by_place.findings
+    bare = _triads(parsed, "bare")
+    if bare and triads["accelerometer"] is None and triads["gyroscope"] is None:
+        guess: Sensor = sensor or sensor_of_file_name(table.path.name) or "accelerometer"
+        triads[guess] = bare[0]
+        units[guess] = parsed[bare[0][0]].unit_for(guess)
+        if sensor is None and sensor_of_file_name(table.path.name) is None:
+            notes.append(_assumed("Columns x y z do not say which sensor they are and were taken as an accelerometer."))
+    times = [i for i, p in enumerate(parsed) if p.role == "time"]
+    time = max(times, key=lambda i: (parsed[i].rank, -i)) if times else None
+    first = {role: next((i for i, p in enumerate(parsed) if p.role == role), None) for role in _SINGLE}
+    return Columns(
+        time=time,
+        accelerometer=triads["accelerometer"],
+        gyroscope=triads["gyroscope"],
+        temperature=first["temperature"],
+        supply=first["supply"],
+        counter=first["counter"],
+        accelerometer_unit=units["accelerometer"],
+        gyroscope_unit=units["gyroscope"],
+        time_unit=parsed[time].time_unit if time is not None else "",
+        positional=unnamed == 6 and not any(p.role in _SENSORS for p in parsed),
+        findings=tuple(notes),
+    )
+
+
+_SENSORS = ("accelerometer", "gyroscope")
+_SINGLE = ("temperature", "supply", "counter")
+
+
+def sensor_of_file_name(name: str) -> Sensor | None:
+    """The sensor a file's name speaks of, where it speaks of one only."""
+    lower = name.lower()
+    says_acc = bool(re.search(r"acc", lower))
+    says_gyro = bool(re.search(r"gyr|angular|omega|rotationrate", lower))
+    if says_acc == says_gyro:
+        return None
+    return "accelerometer" if says_acc else "gyroscope"
+
+
+def _triads(parsed: list[ColumnName], role: str) -> list[Triad]:
+    """Complete x, y, z groups of one role in file order."""
+    groups: dict[str, dict[str, int]] = {}
+    for i, name in enumerate(parsed):
+        if name.role == role and name.axis:
+            groups.setdefault(name.group, {}).setdefault(name.axis, i)
+    triads: list[Triad] = []
+    for axes in groups.values():
+        for labels in ("xyz", "012", "123"):
+            if all(label in axes for label in labels):
+                triads.append((axes[labels[0]], axes[labels[1]], axes[labels[2]]))
+                break
+    return triads
+
+
+def _choose(
+    table: Table, parsed: list[ColumnName], groups: list[Triad], role: str, notes: list[Finding]
+) -> tuple[Triad | None, str]:
+    if not groups:
+        return None, ""
+    best = max(groups, key=lambda triad: (parsed[triad[0]].rank, -groups.index(triad)))
+    others = [triad for triad in groups if triad != best]
+    if others:
+        taken = " ".join(table.label(c) for c in best)
+        listed = "; ".join(" ".join(table.label(c) for c in triad) for triad in others[:4])
+        notes.append(
+            Finding(
+                FindingCode.COLUMNS_ASSUMED,
+                Severity.WARNING,
+                f"More than one triad could be the {role}: {taken} was taken, {listed} kept aside.",
+                "The log holds raw and corrected readings, or several devices.",
+                "A calibration wants the uncorrected ones; choose with --columns if this is wrong.",
+            )
+        )
+    return best, parsed[best[0]].unit

@@ -1,0 +1,48 @@
+"""What a reader says when a file cannot be read: one sentence, never a traceback."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+class ReadError(ValueError):
+    """A file that cannot become a recording. The text is one sentence: which file, which line, what to do."""
+
+
+def from_os_error(path: Path, error: OSError) -> ReadError:
+    """The operating system's refusal in the words of the person who asked."""
+    if isinstance(error, FileNotFoundError):
+        return ReadError(f"{path}: there is no such file; check the name and the folder.")
+    if isinstance(error, IsADirectoryError):
+        return ReadError(f"{path}: this is a directory; name the log file inside it.")
+    if isinstance(error, PermissionError):
+        return ReadError(f"{path}: no permission to read this file; change its permissions or copy it.")
+    return ReadError(f"{path}: the system cannot read this file ({error.strerror or error}); copy it to a local disk.")
+
+
+def check_readable(path: Path) -> int:
+    """Size of a plain readable file in bytes.
+
+    Raises
+    ------
+    ReadError
+        When it is missing, a directory, not a plain file, empty, or may not be read.
+    """
+    try:
+        status = path.stat()
+        if path.is_dir():
+            raise IsADirectoryError
+        if not path.is_file():
+            raise ReadError(f"{path}: this is not a plain file; save the stream to a file first.")
+        if not os.access(path, os.R_OK):
+            raise PermissionError
+    except ValueError as error:
+        if isinstance(error, ReadError):
+            raise
+        raise ReadError(f"{str(path)!r}: this is not a possible file name; check it for stray characters.") from None
+    except OSError as error:
+        raise from_os_error(path, error) from None
+    if status.st_size == 0:
+        raise ReadError(f"{path}: the file is empty; record again or copy it again.")
+    return status.st_size

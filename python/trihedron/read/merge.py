@@ -1,0 +1,156 @@
+"""Two clocks, one time base: which sensor keeps its samples, and what interpolation does to the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from trihedron.read.clock import mean_rate_hz
+from trihedron.read.errors import ReadError
+from trihedron.read.table import FloatArray
+from trihedron.records import Finding, FindingCode, Severity
+
+SAME_TICK = 0.02
+"""Stamps closer than this part of a step are the same tick: the reading is taken as it is."""
+NEIGHBOUR_STEPS = 1.5
+"""Two readings further apart than this have a gap between them, and nothing is made up inside a gap."""
+FASTER = 1.2
+
+
+@dataclass(frozen=True, eq=False)
+class Merged:
+    """Common time (n,) and both sensors (n, 3), NaN where one has no near neighbours; ``start_s`` of the base."""
+
+    time_s: FloatArray
+    start_s: float
+    accelerometer: FloatArray
+    gyroscope: FloatArray
+    base: str
+    first: int
+    stop: int
+    findings: tuple[Finding, ...]
+
+
+def resample(
+    time_s: FloatArray, base_s: FloatArray, values: FloatArray, step_s: float
+) -> tuple[FloatArray, FloatArray]:
+    """Readings (m, 3) at times ``time_s`` brought to ``base_s`` (n,), and the white-noise variance factor (n,).
+
+    Linear interpolation with fraction α turns white variance σ² into ``(α² + (1 - α)²) σ²``; the same tick keeps it.
+    Rows without two neighbours within 1.5 steps become NaN.
+    """
+    right = np.clip(np.searchsorted(time_s, base_s), 1, len(time_s) - 1)
+    left = right - 1
+    width = time_s[right] - time_s[left]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        alpha = np.where(width > 0, (base_s - time_s[left]) / width, 0.0)
+    same_left = np.abs(base_s - time_s[left]) <= SAME_TICK * step_s
+    same_right = np.abs(base_s - time_s[right]) <= SAME_TICK * step_s
+    alpha = np.where(same_left, 0.0, np.where(same_right, 1.0, alpha))
+    usable = (alpha >= 0) & (alpha <= 1) & (same_left | same_right | (width <= NEIGHBOUR_STEPS * step_s))
+    weight = alpha[:, None]
+    # Written as a selection at the ends, so that a NaN in the unused neighbour does not spread.
+    out = np.where(weight == 0, values[left], np.where(weight == 1, values[right], 0.0))
+    between = (alpha > 0) & (alpha < 1)
+    out[between] = (1 - weight[between]) * values[left[between]] + weight[between] * values[right[between]]
+    out[~usable] = np.nan
+    factor = alpha**2 + (1 - alpha) ** 2
+    return out, factor
+
+
+def merge(
+    accelerometer: FloatArray,
+    accelerometer_s: FloatArray,
+    accelerometer_start_s: float,
+    gyroscope: FloatArray,
+    gyroscope_s: FloatArray,
+    gyroscope_start_s: float,
+    where: str,
+) -> Merged:
+    """Both sensors on the clock of one of them, over the time both run.
+
+    The accelerometer's clock is the base and its samples stay untouched, unless the gyro is more than 1.2 times faster:
+    then throwing gyro samples away would hurt the integration of turns, and the accelerometer is interpolated.
+
+    Raises
+    ------
+    ReadError
+        When the two clocks do not overlap.
+    """
+    acc_t = accelerometer_s + accelerometer_start_s
+    gyr_t = gyroscope_s + gyroscope_start_s
+    if len(acc_t) < 2 or len(gyr_t) < 2 or acc_t[0] > gyr_t[-1] or gyr_t[0] > acc_t[-1]:
+        raise ReadError(
+            f"{where}: the two clocks do not overlap (accelerometer {acc_t[0]:.3f} to {acc_t[-1]:.3f} s, gyro "
+            f"{gyr_t[0]:.3f} to {gyr_t[-1]:.3f} s); log both sensors by one clock."
+        )
+    if len(acc_t) == len(gyr_t) and np.array_equal(acc_t, gyr_t):
+        note = Finding(FindingCode.CLOCKS_MERGED, Severity.NOTE, "Both sensors carry the same time stamps.")
+        return Merged(
+            accelerometer_s, accelerometer_start_s, accelerometer, gyroscope, "accelerometer", 0, len(acc_t), (note,)
+        )
+    acc_rate, gyr_rate = mean_rate_hz(acc_t), mean_rate_hz(gyr_t)
+    base = "gyroscope" if gyr_rate > FASTER * acc_rate else "accelerometer"
+    base_t, other_t = (acc_t, gyr_t) if base == "accelerometer" else (gyr_t, acc_t)
+    base_v, other_v = (accelerometer, gyroscope) if base == "accelerometer" else (gyroscope, accelerometer)
+    other_rate = gyr_rate if base == "accelerometer" else acc_rate
+    tolerance = SAME_TICK / other_rate
+    first = int(np.searchsorted(base_t, other_t[0] - tolerance))
+    stop = int(np.searchsorted(base_t, other_t[-1] + tolerance, side="right"))
+    if stop - first < 2:
+        raise ReadError(
+            f"{where}: the two clocks overlap in fewer than two samples; log both sensors at the same time."
+        )
+    kept_t, kept_v = base_t[first:stop], base_v[first:stop]
+    brought, factor = resample(other_t, kept_t, other_v, 1.0 / other_rate)
+    lost = ~np.isfinite(brought).all(axis=1) & np.isfinite(kept_v).all(axis=1)
+    finding = _statement(base, acc_t, gyr_t, acc_rate, gyr_rate, factor, len(base_t) - len(kept_t), int(lost.sum()))
+    acc, gyr = (kept_v, brought) if base == "accelerometer" else (brought, kept_v)
+    return Merged(kept_t - kept_t[0], float(kept_t[0]), acc, gyr, base, first, stop, (finding,))
+
+
+def _statement(
+    base: str,
+    acc_t: FloatArray,
+    gyr_t: FloatArray,
+    acc_rate: float,
+    gyr_rate: float,
+    factor: FloatArray,
+    n_cut: int,
+    n_lost: int,
+) -> Finding:
+    other = "gyro" if base == "accelerometer" else "accelerometer"
+    same = float(np.mean(factor == 1.0))
+    variance = float(np.nanmean(factor))
+    own, brought_rate = (acc_rate, gyr_rate) if base == "accelerometer" else (gyr_rate, acc_rate)
+    coloured = variance < 0.99 or brought_rate < own / FASTER
+    seen = (
+        f"Two clocks merged: accelerometer {acc_rate:.5g} Hz, gyro {gyr_rate:.5g} Hz, gyro starts "
+        f"{1e3 * (gyr_t[0] - acc_t[0]):+.3g} ms after; the {base.replace('gyroscope', 'gyro')} keeps its samples, the "
+        f"{other} was taken at the same tick in {100 * same:.3g} % of rows and interpolated between neighbours in the "
+        f"rest, which leaves {100 * variance:.3g} % of its white-noise variance; {n_cut} rows outside the overlap were "
+        f"cut, {n_lost} rows in gaps of the {other} hold no reading."
+    )
+    return Finding(
+        FindingCode.CLOCKS_MERGED,
+        Severity.WARNING if base == "gyroscope" else Severity.NOTE,
+        seen,
+        "Each sensor was logged with its own time stamps.",
+        f"For the {other}'s noise (Allan variance) read its file alone, where nothing is interpolated."
+        if coloured
+        else "",
+        MappingProxyType(
+            {
+                "accelerometer_rate_hz": acc_rate,
+                "gyroscope_rate_hz": gyr_rate,
+                "offset_s": float(gyr_t[0] - acc_t[0]),
+                "rate_ratio": gyr_rate / acc_rate,
+                "variance_factor": variance,
+                "same_tick_fraction": same,
+                "cut_rows": float(n_cut),
+                "lost_rows": float(n_lost),
+            }
+        ),
+    )

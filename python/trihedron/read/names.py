@@ -1,0 +1,201 @@
+"""The meaning of one column name, over the habits of all common loggers."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+
+_NOT_A_SENSOR = frozenset(
+    {"cov", "covariance", "std", "stddev", "sigma", "var", "bias", "offset", "integral", "dt", "euler", "orientation"}
+    | {"quaternion", "quat", "mag", "magnetometer", "magnetic", "gravity", "clipping", "clip", "samples", "sat", "flag"}
+    | {"status", "heading", "delta", "id", "count", "error"}
+)
+_SENSOR_WORDS = {
+    "accelerometer": re.compile(r"acc|accel\w*|acceler\w*|specific|specificforce|sf"),
+    "gyroscope": re.compile(
+        r"gyr|gyro\w*|angular|omega|rotation|rotationrate|angvel|angrate|rotrate|av|angularvelocity|rate"
+    ),
+}
+_LETTER = {"a": "accelerometer", "f": "accelerometer", "g": "gyroscope", "w": "gyroscope", "t": "translation"}
+_GLUED = re.compile(
+    r"^(acc|accel|accelero?|accelerometer|acceleration|gyr|gyro|gyroscope|omega|linacc|[agwft])_?([xyz])(raw|adc)?$"
+)
+_TIME_WORDS = {"t", "time", "timestamp", "timestamps", "ts", "stamp", "elapsed", "epoch", "clock", "datetime"}
+_TIME_WORDS |= {"millis", "micros", "seconds", "secs", "ticks", "unix"}
+_COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
+_TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
+_SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
+
+_TIME_UNITS = {
+    "s": ["s", "sec", "secs", "second", "seconds"],
+    "ms": ["ms", "msec", "millis", "milliseconds", "millisecond"],
+    "us": ["us", "µs", "usec", "micros", "microseconds", "microsecond"],
+    "ns": ["ns", "nsec", "nanos", "nanoseconds", "nanosecond", "nanosec"],
+}
+_TIME_UNIT_OF = {word: unit for unit, words in _TIME_UNITS.items() for word in words}
+_UNITS = {
+    "accelerometer": {
+        "m/s^2": "ms2 mss mps2 msec2 ms-2 m/s2 m/s/s mpss",
+        "g": "g gee gees",
+        "mg": "mg millig",
+        "counts": "adc counts count lsb ticks digits int16",
+        "raw": "raw",
+    },
+    "gyroscope": {
+        "rad/s": "rads radsec rad rads-1 radps",
+        "mrad/s": "mrads mrad mradps",
+        "deg/s": "dps degs deg degsec degps °s ° degs-1 °s-1",
+        "counts": "adc counts count lsb ticks digits int16",
+        "raw": "raw",
+    },
+}
+_UNIT_OF = {
+    sensor: {word: unit for unit, words in table.items() for word in words.split()} for sensor, table in _UNITS.items()
+}
+
+
+@dataclass(frozen=True)
+class ColumnName:
+    """``role`` is accelerometer, gyroscope, translation, bare, time, temperature, supply, counter, or empty."""
+
+    role: str = ""
+    axis: str = ""
+    group: str = ""
+    unit: str = ""
+    time_unit: str = ""
+    rank: int = 0
+    words: tuple[str, ...] = ()
+
+    def unit_for(self, sensor: str) -> str:
+        """Unit stated by the name, read as that sensor's."""
+        return _unit(sensor, list(self.words))
+
+
+def _unit(sensor: str, words: list[str]) -> str:
+    """A unit spelled by the words that are left of a name: joined, or word by word."""
+    table = _UNIT_OF[sensor]
+    for length in (4, 3, 2, 1):
+        for start in range(len(words) - length + 1):
+            joined = "".join(words[start : start + length])
+            if joined in table:
+                return table[joined]
+    return ""
+
+
+@lru_cache(maxsize=4096)
+def parse_name(name: str) -> ColumnName:
+    """What a column called ``name`` holds."""
+    text = name.strip().strip('"').strip()
+    bracket = ""
+    index = ""
+    found = re.search(r"[\[({]\s*([^\])}]*?)\s*[\])}]\s*$", text)
+    if found:
+        inside = found.group(1)
+        text_before = text[: found.start()]
+        if re.fullmatch(r"[012]", inside):
+            index = inside
+        elif re.fullmatch(r"[xyzXYZ]", inside):
+            index = inside.lower()
+        else:
+            bracket = inside.lower()
+        text = text_before
+    # Another index before a unit in brackets, as in "gyro[0] [rad/s]".
+    inner = re.search(r"\[([012])\]\s*$", text)
+    if inner:
+        index, text = inner.group(1), text[: inner.start()]
+    text = text.replace("m/s^2", "m_s2").replace("m/s²", "m_s2")
+    words = [w for w in re.split(r"[^a-z0-9µ°]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", text).lower()) if w]
+    unit_words = [
+        w for w in re.split(r"[^a-z0-9µ°]+", bracket.replace("²", "2").replace("-1", "").replace("-2", "2")) if w
+    ]
+    return _classify(words, unit_words, index)
+
+
+def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName:
+    if not words:
+        return ColumnName()
+    glued_axis = ""
+    expanded: list[str] = []
+    for word in words:
+        match = _GLUED.match(word)
+        if match and not glued_axis and not (len(match.group(1)) == 1 and len(words) > 1 and words[0] != word):
+            glued_axis = match.group(2)
+            expanded.append(match.group(1))
+            if match.group(3):
+                expanded.append("adc" if match.group(3) == "adc" else "raw")
+        else:
+            expanded.append(word)
+    single = _single_role(words, unit_words)
+    if single is not None:
+        return single
+    axis = index or glued_axis
+    rest = list(expanded)
+    if not axis:
+        for label in ("x", "y", "z", "0", "1", "2", "3"):
+            if label in rest:
+                at = len(rest) - 1 - rest[::-1].index(label)
+                axis = rest.pop(at)
+                break
+    if not axis or any(word in _NOT_A_SENSOR for word in rest):
+        return ColumnName(words=tuple(words))
+    sensor = _sensor(rest)
+    left = [w for w in rest if not any(p.fullmatch(w) for p in _SENSOR_WORDS.values())]
+    if sensor and left and left[0] in _LETTER:
+        left = left[1:] if _LETTER[left[0]] == sensor and len(rest) == len(left) else left
+    key = " ".join(rest) + "|" + " ".join(unit_words)
+    if not sensor:
+        if not rest or (len(rest) <= 2 and not _unit_words_only(rest)):
+            return ColumnName("bare" if not rest else "", axis, key, words=tuple(unit_words))
+        return ColumnName("bare", axis, key, words=tuple(rest + unit_words)) if _unit_words_only(rest) else ColumnName()
+    unit = _unit(sensor, unit_words) or _unit(sensor, left) if sensor in _UNIT_OF else ""
+    rank = 0
+    if any(w in {"measured", "raw", "uncalibrated", "uncal", "unbiased"} for w in rest):
+        rank += 2
+    if any(w in {"user", "linacc", "filtered", "lp", "smooth", "output"} for w in rest):
+        rank -= 2
+    return ColumnName(sensor, axis, key, unit, rank=rank, words=tuple(left + unit_words))
+
+
+def _unit_words_only(words: list[str]) -> bool:
+    return bool(words) and any("".join(words) in table for table in _UNIT_OF.values())
+
+
+def _sensor(words: list[str]) -> str:
+    hits = {s for s, pattern in _SENSOR_WORDS.items() if any(pattern.fullmatch(w) for w in words)}
+    if {"angular", "acceleration"} <= set(words):
+        return ""
+    if len(hits) == 1:
+        return hits.pop()
+    if len(hits) == 2:
+        # "accelerometer rate x": the first word names the sensor.
+        for word in words:
+            for sensor, pattern in _SENSOR_WORDS.items():
+                if pattern.fullmatch(word) and word != "rate":
+                    return sensor
+    if words and words[0] in _LETTER:
+        return _LETTER[words[0]]
+    return ""
+
+
+def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
+    joined = "".join(words)
+    if words[0] in {"temp", "temperature", "tempc"} or any(_TEMPERATURE.fullmatch(w) for w in words):
+        return ColumnName("temperature", words=tuple(words))
+    if any(w in _SUPPLY for w in words):
+        return ColumnName("supply", words=tuple(words))
+    if joined == "sampletimefine":
+        return ColumnName("time", time_unit="100us", rank=3)
+    if words[0] == "utc" or "relative" in words:
+        return ColumnName()
+    if joined in {"nsamples", "sample", "samples", "samplecounter", "packetcounter", "n", "i"} or (
+        words[-1] in _COUNTER_WORDS and len(words) <= 2
+    ):
+        return ColumnName("counter")
+    is_time = words[0] in _TIME_WORDS or (len(words) == 1 and words[0] in _TIME_UNIT_OF)
+    is_time = is_time or any(w in {"time", "timestamp", "timestamps", "stamp", "datetime"} for w in words)
+    if is_time and not any(w in {"x", "y", "z", "zone", "offset", "valid"} for w in words):
+        units = [_TIME_UNIT_OF[w] for w in [*words, *unit_words] if w in _TIME_UNIT_OF]
+        rank = 2 if words[0] in {"t", "time", "timestamp"} else 1
+        return ColumnName("time", time_unit=units[-1] if units else "", rank=rank + bool(units))
+    return None

@@ -1,0 +1,50 @@
+"""Parquet tables, read by polars."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.table import FloatArray, Table, check_memory, file_sha256
+from trihedron.records import Finding, FindingCode, Severity
+
+
+def read_parquet(path: Path) -> Table:
+    """Numeric and time columns of a Parquet file; anything else is left out and said so."""
+    try:
+        n_rows = pl.scan_parquet(path).select(pl.len()).collect().item()
+        schema = pl.read_parquet_schema(path)
+        check_memory(path, n_rows, len(schema))
+        frame = pl.read_parquet(path)
+    except OSError as error:
+        raise from_os_error(path, error) from None
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, ValueError) as error:
+        if isinstance(error, ReadError):
+            raise
+        first = str(error).strip().split("\n")[0][:160]
+        raise ReadError(f"{path}: this Parquet file is damaged or cut off ({first}); write it again.") from None
+    names: list[str] = []
+    columns: list[FloatArray] = []
+    findings: list[Finding] = []
+    for name, series in zip(frame.columns, frame.get_columns(), strict=True):
+        if series.dtype.is_temporal():
+            scale = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}.get(getattr(series.dtype, "time_unit", ""), 1e-9)
+            columns.append(np.asarray(series.to_physical().cast(pl.Float64).to_numpy(), dtype=np.float64) * scale)
+            names.append(f"{name} [s]")
+        elif series.dtype.is_numeric() or series.dtype == pl.Boolean:
+            columns.append(np.asarray(series.cast(pl.Float64).to_numpy(), dtype=np.float64))
+            names.append(name)
+        else:
+            findings.append(
+                Finding(
+                    FindingCode.COLUMN_LEFT_OUT,
+                    Severity.NOTE,
+                    f"Column '{name}' holds {series.dtype}, not numbers, and was left out.",
+                )
+            )
+    if not columns or n_rows == 0:
+        raise ReadError(f"{path}: the table has no rows of numbers; write it again.")
+    return Table(path, tuple(names), tuple(columns), file_sha256(path), findings=tuple(findings))

@@ -1,0 +1,84 @@
+"""Short windows of a log and which of them are quiet: what units and column order are judged by.
+
+This is a first look for recognising units, not the segmentation: no pose is accepted or refused here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.table import FloatArray
+
+WINDOW_S = 0.5
+MAX_WINDOWS = 4000
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Windows of about half a second, evenly spread over the log where there are too many.
+
+    ``mean`` and ``noise`` map a sensor's name to (m, 3): mean reading and white noise of one sample (standard deviation
+    of the first difference over √2) of each window; ``start`` (m,) is its first sample, ``length`` its samples;
+    ``quiet`` (m,) says which are near the log's own noise floor in every sensor.
+    """
+
+    start: npt.NDArray[np.int64]
+    length: int
+    mean: dict[str, FloatArray]
+    noise: dict[str, FloatArray]
+    quiet: npt.NDArray[np.bool_]
+
+    def quiet_mean(self, sensor: str) -> FloatArray:
+        """(k, 3) mean readings of the quiet windows."""
+        out: FloatArray = self.mean[sensor][self.quiet]
+        return out
+
+    def quiet_noise(self, sensor: str) -> FloatArray:
+        """(3,) median noise of one sample over the quiet windows."""
+        out: FloatArray = np.median(self.noise[sensor][self.quiet], axis=0)
+        return out
+
+
+def look(sensors: dict[str, FloatArray], rate_hz: float) -> Windows | None:
+    """Windows of a log; None where no window without missing values exists."""
+    n = min(len(a) for a in sensors.values())
+    length = int(min(max(round(WINDOW_S * rate_hz), 8), max(n, 1)))
+    n_windows = n // length
+    if n_windows == 0 or n < 2:
+        return None
+    picked = np.unique(np.linspace(0, n_windows - 1, min(n_windows, MAX_WINDOWS)).astype(np.int64))
+    start = picked * length
+    index = start[:, None] + np.arange(length)
+    mean: dict[str, FloatArray] = {}
+    noise: dict[str, FloatArray] = {}
+    spread: dict[str, FloatArray] = {}
+    for name, array in sensors.items():
+        block = array[index]
+        mean[name] = block.mean(axis=1)
+        noise[name] = np.diff(block, axis=1).std(axis=1) / np.sqrt(2.0)
+        spread[name] = np.linalg.norm(block.std(axis=1), axis=1)
+    complete = np.logical_and.reduce([np.isfinite(m).all(axis=1) for m in mean.values()])
+    if not complete.any():
+        return None
+    start = start[complete]
+    mean = {k: v[complete] for k, v in mean.items()}
+    noise = {k: v[complete] for k, v in noise.items()}
+    quiet = np.ones(len(start), dtype=bool)
+    for value in spread.values():
+        kept = value[complete]
+        # The quietest tenth shows the sensor's own noise; three times that still is no hand motion.
+        quiet &= kept <= 3.0 * np.percentile(kept, 10.0)
+    if not quiet.any():
+        total = sum(v[complete] / max(float(np.median(v[complete])), 1e-300) for v in spread.values())
+        quiet = np.asarray(total <= np.percentile(total, 10.0))
+    return Windows(start, length, mean, noise, quiet)
+
+
+def is_integer(array: FloatArray) -> bool:
+    """All readings (of a sample of up to about 20000 rows) are whole numbers."""
+    probe = array[:: max(1, len(array) // 20000)]
+    probe = probe[np.isfinite(probe)]
+    return bool(len(probe)) and bool(np.all(probe == np.rint(probe)))

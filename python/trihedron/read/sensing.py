@@ -1,0 +1,284 @@
+"""Which unit, which triad: decided by names, by what the user says, and by what the readings can only be.
+
+The gyro's unit is decided by physics where the log allows it: between two rests gravity cannot turn further than the
+angle the gyro travels, so ``angle / ∫|ω - bias| dt`` comes near 1 for rad/s, near π/180 for deg/s.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from trihedron.read.errors import ReadError
+from trihedron.read.rest import Windows, is_integer, look
+from trihedron.read.table import FloatArray
+from trihedron.records import Finding, FindingCode, Severity
+from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
+
+NEAR_GRAVITY = 0.2
+"""An uncalibrated accelerometer at rest may be this far off: scale a few per cent, zero offset a tenth of g."""
+MIN_TURN_RAD = 0.5
+MAX_MOVES = 400
+_RATIO_LOW, _RATIO_HIGH = 0.25, 1.2
+_ADVICE = {
+    "accelerometer": "Say it with --accelerometer-unit m/s^2, g, mg or counts if this is wrong.",
+    "gyroscope": "Say it with --gyroscope-unit rad/s, mrad/s, deg/s or counts if this is wrong.",
+}
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A unit and what to say about it."""
+
+    unit: AccelerationUnit | RateUnit
+    findings: tuple[Finding, ...]
+
+
+def parse_acceleration_unit(text: str | AccelerationUnit) -> AccelerationUnit:
+    """A user's unit word."""
+    words = {"m/s2": "m/s^2", "m/s²": "m/s^2", "mps2": "m/s^2", "si": "m/s^2", "raw": "counts", "lsb": "counts"}
+    key = text.value if isinstance(text, AccelerationUnit) else str(text).strip().lower()
+    try:
+        return AccelerationUnit(words.get(key, key))
+    except ValueError:
+        raise ReadError(f"'{text}' is not an acceleration unit; use m/s^2, g, mg or counts.") from None
+
+
+def parse_rate_unit(text: str | RateUnit) -> RateUnit:
+    """A user's unit word."""
+    words = {"dps": "deg/s", "°/s": "deg/s", "si": "rad/s", "raw": "counts", "lsb": "counts"}
+    key = text.value if isinstance(text, RateUnit) else str(text).strip().lower()
+    try:
+        return RateUnit(words.get(key, key))
+    except ValueError:
+        raise ReadError(f"'{text}' is not an angular rate unit; use rad/s, mrad/s, deg/s or counts.") from None
+
+
+def _finding(code: FindingCode, severity: Severity, seen: str, cause: str, action: str, **numbers: float) -> Finding:
+    return Finding(code, severity, seen, cause, action, MappingProxyType(numbers))
+
+
+def rest_norm(windows: Windows | None) -> float:
+    """Median length of the accelerometer's reading in quiet windows, raw unit."""
+    if windows is None:
+        return math.nan
+    return float(np.median(np.linalg.norm(windows.quiet_mean("accelerometer"), axis=1)))
+
+
+def judge_accelerometer(
+    readings: FloatArray, windows: Windows | None, named: str, given: str | AccelerationUnit | None
+) -> Judged:
+    """Unit of the accelerometer: as given, else as named, else from |a| at rest."""
+    norm = rest_norm(windows)
+    whole = is_integer(readings)
+    if given is not None or named not in {"", "raw"}:
+        unit = parse_acceleration_unit(given if given is not None else named)
+        source = "as you said" if given is not None else "by its column names"
+        return Judged(unit, _stated("accelerometer", unit, source, _contradiction_accelerometer(unit, norm, source)))
+    if whole and not _is_near(norm, 1.0):
+        found = AccelerationUnit.COUNTS
+        seen = "The accelerometer's readings are whole numbers and were taken as counts."
+        if _is_near(norm, 1000.0):
+            return Judged(
+                found,
+                (
+                    _finding(
+                        FindingCode.UNIT_ASSUMED,
+                        Severity.WARNING,
+                        f"The accelerometer reads whole numbers of length {norm:.4g} at rest: counts of about "
+                        "1/1000 g, or mg; taken as counts.",
+                        "Both look alike. The calibration differs only in its name of the raw unit.",
+                        _ADVICE["accelerometer"],
+                        rest_norm=norm,
+                    ),
+                ),
+            )
+        return Judged(found, (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, seen, "", "", rest_norm=norm),))
+    for unit, length in (
+        (AccelerationUnit.M_S2, STANDARD_GRAVITY_M_S2),
+        (AccelerationUnit.G, 1.0),
+        (AccelerationUnit.MG, 1000.0),
+    ):
+        if _is_near(norm, length):
+            seen = f"The accelerometer reads {norm:.4g} at rest, so its unit is {unit.value}."
+            return Judged(unit, (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, seen, "", "", rest_norm=norm),))
+    if norm < 1.0 and not whole:
+        return Judged(AccelerationUnit.M_S2, (_gravity_missing(norm),))
+    seen = (
+        f"The accelerometer reads {norm:.4g} in its quietest stretches, which is gravity in no known unit; "
+        "taken as raw counts."
+    )
+    cause = "A raw reading of unknown scale, a log that never rests, or wrong columns."
+    return Judged(
+        AccelerationUnit.COUNTS,
+        (_finding(FindingCode.UNIT_ASSUMED, Severity.WARNING, seen, cause, _ADVICE["accelerometer"], rest_norm=norm),),
+    )
+
+
+def _is_near(value: float, target: float) -> bool:
+    return abs(value - target) <= NEAR_GRAVITY * target
+
+
+def _gravity_missing(norm: float) -> Finding:
+    return _finding(
+        FindingCode.GRAVITY_MISSING,
+        Severity.SERIOUS,
+        f"The accelerometer reads only {norm:.3g} at rest: gravity is missing from it.",
+        "'Linear' or 'user' acceleration of a phone, from which gravity was taken out, or wrong columns.",
+        "Log the accelerometer itself; nothing here can be calibrated without gravity.",
+        rest_norm=norm,
+    )
+
+
+def _contradiction_accelerometer(unit: AccelerationUnit, norm: float, source: str) -> Finding | None:
+    scale = acceleration_to_si(unit)
+    if scale is None or not math.isfinite(norm):
+        return None
+    si = norm * scale
+    if 0.6 * STANDARD_GRAVITY_M_S2 <= si <= 1.5 * STANDARD_GRAVITY_M_S2:
+        return None
+    return _finding(
+        FindingCode.UNIT_CONTRADICTED,
+        Severity.SERIOUS,
+        f"The accelerometer is in {unit.value} {source}, but at rest it reads {norm:.4g} {unit.value}, "
+        f"{si / STANDARD_GRAVITY_M_S2:.3g} times gravity.",
+        "A wrong unit, wrong columns, or a log that never rests.",
+        _ADVICE["accelerometer"],
+        rest_norm=norm,
+    )
+
+
+def _stated(
+    sensor: str, unit: AccelerationUnit | RateUnit, source: str, against: Finding | None
+) -> tuple[Finding, ...]:
+    if against is not None:
+        return (against,)
+    return (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, f"The {sensor} is in {unit.value} {source}.", "", ""),)
+
+
+def turn_ratio(gyroscope: FloatArray, time_s: FloatArray, windows: Windows) -> tuple[float, int]:
+    """(largest usual ratio of gravity's turn [rad] to the gyro's path [raw unit * s], number of turns behind it)."""
+    index = np.flatnonzero(windows.quiet)
+    directions = windows.mean["accelerometer"][index]
+    norms = np.linalg.norm(directions, axis=1)
+    if not len(index) or not np.all(norms > 0):
+        return math.nan, 0
+    directions = directions / norms[:, None]
+    cosine = np.clip(np.einsum("ij,ij->i", directions[:-1], directions[1:]), -1.0, 1.0)
+    angle = np.arccos(cosine)
+    ratios = []
+    for k in np.flatnonzero(angle > MIN_TURN_RAD)[:MAX_MOVES]:
+        first, last = int(windows.start[index[k]]), int(windows.start[index[k + 1]]) + windows.length
+        bias = 0.5 * (windows.mean["gyroscope"][index[k]] + windows.mean["gyroscope"][index[k + 1]])
+        speed = np.linalg.norm(gyroscope[first:last] - bias, axis=1)
+        step = np.diff(time_s[first:last])
+        path = float(np.nansum(0.5 * (speed[1:] + speed[:-1]) * step))
+        if path > 0.0 and np.isfinite(path):
+            ratios.append(float(angle[k]) / path)
+    return (float(np.percentile(ratios, 80.0)), len(ratios)) if ratios else (math.nan, 0)
+
+
+def _unit_by_turn(ratio: float, n_turns: int) -> RateUnit | None:
+    if n_turns < 2 or not math.isfinite(ratio):
+        return None
+    for unit in (RateUnit.RAD_S, RateUnit.DEG_S, RateUnit.MRAD_S):
+        scale = rate_to_si(unit)
+        if scale is not None and _RATIO_LOW * scale <= ratio <= _RATIO_HIGH * scale:
+            return unit
+    return None
+
+
+def judge_gyroscope(
+    readings: FloatArray,
+    has_accelerometer: bool,
+    time_s: FloatArray,
+    windows: Windows | None,
+    named: str,
+    given: str | RateUnit | None,
+) -> Judged:
+    """Unit of the gyro: as given, else as named, else by turning gravity, else by magnitude (a warning)."""
+    ratio, n_turns = math.nan, 0
+    if has_accelerometer and windows is not None:
+        ratio, n_turns = turn_ratio(readings, time_s, windows)
+    by_turn = _unit_by_turn(ratio, n_turns)
+    if given is not None or named not in {"", "raw"}:
+        unit = parse_rate_unit(given if given is not None else named)
+        source = "as you said" if given is not None else "by its column names"
+        against = None
+        if unit is not RateUnit.COUNTS and by_turn not in {None, unit}:
+            against = _finding(
+                FindingCode.UNIT_CONTRADICTED,
+                Severity.SERIOUS,
+                f"The gyro is in {unit.value} {source}, but in {n_turns} turns gravity moved as if it were in "
+                f"{by_turn.value if by_turn else ''}.",
+                "A wrong unit or a wrong sampling rate.",
+                _ADVICE["gyroscope"],
+                ratio=ratio,
+            )
+        return Judged(unit, _stated("gyro", unit, source, against))
+    if is_integer(readings):
+        seen = "The gyro's readings are whole numbers and were taken as counts."
+        return Judged(RateUnit.COUNTS, (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, seen, "", ""),))
+    if by_turn is not None:
+        seen = f"In {n_turns} turns of the log gravity moved as a gyro in {by_turn.value} says, so that is its unit."
+        return Judged(by_turn, (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, seen, "", "", ratio=ratio),))
+    return _gyroscope_by_magnitude(readings, windows)
+
+
+def _gyroscope_by_magnitude(readings: FloatArray, windows: Windows | None) -> Judged:
+    finite = np.abs(readings[np.isfinite(readings)])
+    largest = float(finite.max()) if len(finite) else math.nan
+    rest = largest
+    if windows is not None:
+        rest = float(np.median(np.abs(windows.quiet_mean("gyroscope")).max(axis=1)))
+    # A gyro at rest reads its bias: MEMS stay below about 10 deg/s (0.2 rad/s, 200 mrad/s); none measures 40 rad/s.
+    if largest > 40.0:
+        unit = RateUnit.MRAD_S if rest > 20.0 else RateUnit.DEG_S
+    else:
+        unit = RateUnit.RAD_S if rest < 0.1 else RateUnit.DEG_S
+    return Judged(
+        unit,
+        (
+            _finding(
+                FindingCode.UNIT_ASSUMED,
+                Severity.WARNING,
+                f"Nothing states the gyro's unit; it reads {rest:.3g} at rest and {largest:.4g} at most, "
+                f"so it was taken as {unit.value}.",
+                "No unit in the header, and no turns between rests to settle it.",
+                _ADVICE["gyroscope"],
+                rest=rest,
+                largest=largest,
+            ),
+        ),
+    )
+
+
+def order_of_triads(first: FloatArray, second: FloatArray, rate_hz: float) -> tuple[bool | None, str]:
+    """Whether the first of two unnamed triads is the accelerometer (None: cannot tell), and why.
+
+    At rest in different poses a gyro repeats its bias while an accelerometer points elsewhere; in one pose gravity
+    still stands far higher above the accelerometer's noise than a bias does above the gyro's.
+    """
+    windows = look_at_pair(first, second, rate_hz)
+    if windows is None:
+        return None, "the log is too short to tell"
+    change, level = [], []
+    for name in ("first", "second"):
+        noise = float(np.linalg.norm(windows.quiet_noise(name)))
+        means = windows.quiet_mean(name)
+        scale = max(noise, 1e-12 * float(np.abs(means).max(initial=0.0)), 1e-300)
+        change.append(float(np.linalg.norm(means.std(axis=0))) / scale)
+        level.append(float(np.median(np.linalg.norm(means, axis=1))) / scale)
+    if max(change) > 5.0 and max(change) > 5.0 * min(change):
+        return change[0] > change[1], "its quiet readings differ from pose to pose"
+    if max(level) > 5.0 * min(level):
+        return level[0] > level[1], "its steady reading stands far above its noise, as gravity does"
+    return None, "both triads look alike"
+
+
+def look_at_pair(first: FloatArray, second: FloatArray, rate_hz: float) -> Windows | None:
+    """Windows of two triads not yet named."""
+    return look({"first": first, "second": second}, rate_hz)
