@@ -5,6 +5,7 @@
 
 pub mod error;
 pub mod gauss_newton;
+pub mod kalman;
 pub mod poisson;
 pub mod rotation;
 pub mod simulate;

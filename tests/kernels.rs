@@ -6,3 +6,6 @@ mod gauss_newton;
 mod poisson;
 #[path = "kernels/rotation.rs"]
 mod rotation;
+
+#[path = "kernels/kalman.rs"]
+mod kalman;

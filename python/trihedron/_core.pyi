@@ -1,5 +1,8 @@
 """Signatures of the compiled core. A test compares this stub with the runtime."""
 
+from collections.abc import Sequence
+from typing import final
+
 import numpy as np
 import numpy.typing as npt
 
@@ -29,6 +32,7 @@ def integrate_raw_rate(
     moves: npt.NDArray[np.int64],
     rate_degree: int,
 ) -> tuple[FloatArray, list[float]]: ...
+
 # simulate
 def simulate_motion(
     segments: FloatArray,
@@ -38,3 +42,96 @@ def simulate_motion(
     gravity_m_s2: float,
     earth_rate_rad_s: tuple[float, float, float],
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]: ...
+
+# kalman
+@final
+class AxisKalmanModel:
+    def __new__(
+        cls,
+        *,
+        quantisation: float,
+        white: float,
+        flicker: float,
+        walk: float,
+        ramp: float,
+        resolution: float,
+        dither: float,
+        flicker_rates: Sequence[float],
+        ramp_frequency: float,
+        ramp_damping: float,
+        averages: bool,
+    ) -> AxisKalmanModel: ...
+    def white_variance(self, hold_s: float) -> float: ...
+
+@final
+class AxisKalman:
+    def __new__(
+        cls, model: AxisKalmanModel, prior_mean: FloatArray, prior_sigma: FloatArray, walk: FloatArray
+    ) -> AxisKalman: ...
+    def add(
+        self,
+        reading: float,
+        reference: Sequence[float],
+        start_s: float,
+        hold_s: float,
+        extra_variance: float = 0.0,
+    ) -> tuple[float, float]: ...
+    def imagine(self, reference: Sequence[float], start_s: float, hold_s: float) -> None: ...
+    def copy(self) -> AxisKalman: ...
+    @property
+    def constants(self) -> FloatArray: ...
+    @property
+    def sigma(self) -> FloatArray: ...
+    @property
+    def covariance(self) -> FloatArray: ...
+    @property
+    def drift(self) -> tuple[float, float]: ...
+    @property
+    def n_poses(self) -> int: ...
+    @property
+    def n_states(self) -> int: ...
+    @property
+    def end_s(self) -> float | None: ...
+
+def kalman_track(
+    model: AxisKalmanModel,
+    prior_mean: FloatArray,
+    prior_sigma: FloatArray,
+    walk: FloatArray,
+    readings: FloatArray,
+    references: FloatArray,
+    start_s: FloatArray,
+    hold_s: FloatArray,
+    extra_variance: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
+def kalman_smooth(
+    model: AxisKalmanModel,
+    prior_mean: FloatArray,
+    prior_sigma: FloatArray,
+    walk: FloatArray,
+    readings: FloatArray,
+    references: FloatArray,
+    start_s: FloatArray,
+    hold_s: FloatArray,
+    extra_variance: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]: ...
+def kalman_noise_covariance(
+    model: AxisKalmanModel, start_s: FloatArray, hold_s: FloatArray, extra_variance: FloatArray
+) -> FloatArray: ...
+def kalman_least_squares(
+    readings: FloatArray,
+    references: FloatArray,
+    variance: float,
+    prior_mean: FloatArray,
+    prior_sigma: FloatArray,
+) -> tuple[FloatArray, FloatArray]: ...
+def kalman_generalised_least_squares(
+    model: AxisKalmanModel,
+    prior_mean: FloatArray,
+    prior_sigma: FloatArray,
+    readings: FloatArray,
+    references: FloatArray,
+    start_s: FloatArray,
+    hold_s: FloatArray,
+    extra_variance: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...

@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 
 use crate::error::Result as KernelResult;
 
+mod kalman;
 mod poisson;
 mod rotation;
 mod simulate;
@@ -27,6 +28,7 @@ pub(crate) fn run<T: Send>(
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     poisson::register(module)?;
+    kalman::register(module)?;
     rotation::register(module)?;
     simulate::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.

@@ -11,19 +11,37 @@ from trihedron.records.calibration import (
     SensorCalibration,
 )
 from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.kalman import (
+    CONSTANT_NAMES,
+    AxisKalmanResult,
+    AxisNoise,
+    Consistency,
+    ConstantsTrack,
+    KalmanCalibration,
+    LiveEstimate,
+    PoseTable,
+)
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Hold, Move, Segments
 from trihedron.records.truth import TrueSegment, Truth
 
 __all__ = [
+    "CONSTANT_NAMES",
     "PARAMETER_NAMES",
+    "AxisKalmanResult",
+    "AxisNoise",
     "Calibration",
+    "Consistency",
+    "ConstantsTrack",
     "Finding",
     "FindingCode",
     "FitQuality",
     "Hold",
+    "KalmanCalibration",
+    "LiveEstimate",
     "Move",
     "Observability",
+    "PoseTable",
     "Recording",
     "Segments",
     "SensorCalibration",

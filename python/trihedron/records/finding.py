@@ -66,6 +66,11 @@ class FindingCode(str, Enum):
     TURN_NOT_A_MULTIPLE = "turn-not-a-multiple"
     GYRO_BIAS_DRIFT = "gyro-bias-drift"
     NOT_CONVERGED = "not-converged"
+    # kalman
+    INNOVATIONS_TOO_LARGE = "innovations-too-large"
+    INNOVATIONS_TOO_SMALL = "innovations-too-small"
+    INNOVATIONS_COLOURED = "innovations-coloured"
+    NOISE_ASSUMED = "noise-assumed"
 
 
 @dataclass(frozen=True)

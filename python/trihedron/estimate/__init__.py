@@ -1,0 +1,1 @@
+"""Estimation: one file or folder per procedure, records in and records out."""

@@ -1,0 +1,19 @@
+"""Calibration by Kalman filter with the identified noise in its state (docs/kalman.md)."""
+
+from trihedron.estimate.kalman.consistency import check_innovations, normalised_error_squared
+from trihedron.estimate.kalman.live import Goal, LiveCalibration
+from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
+from trihedron.estimate.kalman.reference import DIVIDING_HEAD_POSES, pose_table_from_angles
+from trihedron.estimate.kalman.shaping import ShapingOptions
+
+__all__ = [
+    "DIVIDING_HEAD_POSES",
+    "Goal",
+    "LiveCalibration",
+    "Prior",
+    "ShapingOptions",
+    "calibrate_with_references",
+    "check_innovations",
+    "normalised_error_squared",
+    "pose_table_from_angles",
+]

@@ -1,0 +1,100 @@
+"""Does the filter believe the right amount? Tests of innovations, and of errors where the truth is known."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.kalman import Consistency
+
+FloatArray = npt.NDArray[np.float64]
+
+CONFIDENCE = 0.99
+DIFFUSE_RATIO = 30.0
+"""An innovation predicted this many times wider than the later ones tells of the diffuse start, not of noise."""
+
+
+def is_settled(innovation_sigma: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which innovations (n,) were predicted by the data; the others only by the diffuse start."""
+    typical = float(np.median(innovation_sigma[len(innovation_sigma) // 2 :]))
+    settled: npt.NDArray[np.bool_] = innovation_sigma <= DIFFUSE_RATIO * typical
+    return settled
+
+
+def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> Consistency:
+    """Mean of the normalised innovation squared, and Ljung-Box test of whiteness (docs/kalman.md, eq. 12-13).
+
+    Parameters
+    ----------
+    innovation, innovation_sigma : (n,)
+        One-step prediction errors and their predicted standard deviations, any unit.
+    """
+    z = (innovation / innovation_sigma)[is_settled(innovation_sigma)]
+    n = len(z)
+    if n == 0:
+        return Consistency(float("nan"), 0.0, float("inf"), 0, 1.0, 0)
+    tail = (1.0 - CONFIDENCE) / 2.0
+    low, high = float(stats.chi2.ppf(tail, n)) / n, float(stats.chi2.ppf(1.0 - tail, n)) / n
+    n_lags = min(20, n // 5)
+    power = float(z @ z)
+    r = np.array([float(z[lag:] @ z[: n - lag]) / power for lag in range(1, n_lags + 1)]) if power > 0 else np.zeros(0)
+    p = 1.0
+    if len(r):
+        q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, n_lags + 1))))
+        p = float(stats.chi2.sf(q, n_lags))
+    return Consistency(power / n, low, high, n, p, n_lags, tuple(float(v) for v in r))
+
+
+def consistency_findings(axis: int, seen: Consistency) -> list[Finding]:
+    """What an inconsistent filter tells about the noise it was given."""
+    out: list[Finding] = []
+    name = "xyz"[axis]
+    numbers = MappingProxyType({"nis_mean": seen.nis_mean, "nis_low": seen.nis_low, "nis_high": seen.nis_high})
+    if seen.n and seen.nis_mean > seen.nis_high:
+        out.append(
+            Finding(
+                FindingCode.INNOVATIONS_TOO_LARGE,
+                Severity.WARNING,
+                f"Axis {name}: squared innovations are {seen.nis_mean:.2f} times what the noise model predicts "
+                f"(99 % limit {seen.nis_high:.2f}).",
+                "The noise is larger than the model says, or a reference attitude is wrong.",
+                f"Multiply the error bars of this axis by {np.sqrt(seen.nis_mean):.2f}, or identify the noise anew.",
+                numbers,
+            )
+        )
+    elif seen.n and seen.nis_mean < seen.nis_low:
+        out.append(
+            Finding(
+                FindingCode.INNOVATIONS_TOO_SMALL,
+                Severity.NOTE,
+                f"Axis {name}: squared innovations are only {seen.nis_mean:.2f} times what the noise model predicts "
+                f"(99 % limit {seen.nis_low:.2f}).",
+                "The noise is smaller than the model says.",
+                "The error bars are too wide; identify the noise anew if that matters.",
+                numbers,
+            )
+        )
+    if seen.n_lags and seen.whiteness_p < 1.0 - CONFIDENCE:
+        out.append(
+            Finding(
+                FindingCode.INNOVATIONS_COLOURED,
+                Severity.WARNING,
+                f"Axis {name}: innovations are correlated from pose to pose (Ljung-Box p = {seen.whiteness_p:.1e} over "
+                f"{seen.n_lags} lags, first autocorrelation {seen.autocorrelation[0]:+.2f}).",
+                "Slow noise, temperature or a systematic reference error that the noise model lacks.",
+                "Look at the innovations against time and attitude; add the missing noise term.",
+                MappingProxyType({"whiteness_p": seen.whiteness_p, "autocorrelation_1": seen.autocorrelation[0]}),
+            )
+        )
+    return out
+
+
+def normalised_error_squared(error: FloatArray, covariance: FloatArray) -> float:
+    """NEES ``eᵀ P⁻¹ e`` of an estimate whose truth is known: chi-square with ``len(e)`` degrees of freedom."""
+    scale = np.sqrt(np.diag(covariance))
+    whitened = np.linalg.solve(covariance / np.outer(scale, scale), error / scale)
+    return float((error / scale) @ whitened)

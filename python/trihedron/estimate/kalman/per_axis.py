@@ -1,0 +1,262 @@
+"""Calibration in known attitudes, axis by axis: the filter, and in the same run the least squares to compare with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
+from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
+from trihedron.records.calibration import Observability, SensorCalibration
+from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack, KalmanCalibration, PoseTable
+
+FloatArray = npt.NDArray[np.float64]
+
+DIFFUSE = 1e8
+"""Width of a diffuse start in standard deviations of one reading: its information is 1e-16 of one pose's."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What is believed before the first pose: ``mean``, ``sigma`` (3, 4) of ``(kx, ky, kz, U0)`` per axis.
+
+    ``walk`` (3, 4) is the intensity of a slow walk of each constant, per √s; zero keeps the constants constant.
+    """
+
+    mean: FloatArray
+    sigma: FloatArray
+    walk: FloatArray
+
+    @classmethod
+    def diffuse(cls, reading_sigma: npt.ArrayLike) -> Prior:
+        """No belief at all: ``1e8`` standard deviations ``reading_sigma`` (3,) of one reading around zero."""
+        sigma = np.broadcast_to(np.asarray(reading_sigma, dtype=np.float64), (3,))
+        return cls(np.zeros((3, 4)), DIFFUSE * np.repeat(sigma[:, None], 4, axis=1), np.zeros((3, 4)))
+
+    def __post_init__(self) -> None:
+        for name in ("mean", "sigma", "walk"):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            if array.shape != (3, 4) or not np.all(np.isfinite(array)):
+                raise ValueError(f"prior {name} must be finite with shape (3, 4), got {array.shape}")
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+
+def noise_per_axis(noise: AxisNoise | Sequence[AxisNoise]) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
+    """One description for all axes, or one per axis."""
+    if isinstance(noise, AxisNoise):
+        return noise, noise, noise
+    if len(noise) != 3:
+        raise ValueError(f"noise must describe one axis or three, got {len(noise)}")
+    return noise[0], noise[1], noise[2]
+
+
+def calibrate_with_references(
+    readings: npt.ArrayLike,
+    references: PoseTable | npt.ArrayLike,
+    noise: AxisNoise | Sequence[AxisNoise],
+    *,
+    start_s: npt.ArrayLike,
+    hold_s: npt.ArrayLike,
+    extra_variance: npt.ArrayLike = 0.0,
+    prior: Prior | None = None,
+    options: ShapingOptions | None = None,
+    raw_unit: str = "counts",
+    with_baselines: bool = True,
+) -> KalmanCalibration:
+    """Calibrate a triad from mean readings in known attitudes, with every method's track (docs/kalman.md, eq. 2).
+
+    Parameters
+    ----------
+    readings : (n, 3)
+        Mean raw reading of each hold.
+    references : PoseTable or (n, 3)
+        Specific force in the body, m/s².
+    noise : AxisNoise or three of them
+        Noise of the raw readings.
+    start_s, hold_s : (n,)
+        When each hold starts and how long it lasts, s; scalars are not enough for ``start_s``.
+    extra_variance : (n,), (n, 3) or scalar
+        Variance of a reading on top of the noise model, raw².
+    prior : Prior, optional
+        Default: none at all (diffuse).
+    with_baselines : bool
+        Also run recursive and batch least squares, ordinary and generalised. The latter cost O(n³).
+
+    Raises
+    ------
+    ValueError
+        When shapes disagree, values are not finite, poses are out of order or do not determine the constants.
+    """
+    table = references if isinstance(references, PoseTable) else PoseTable(np.asarray(references, dtype=np.float64))
+    f = table.specific_force
+    z = np.array(readings, dtype=np.float64)
+    if z.shape != f.shape:
+        raise ValueError(f"there are {len(f)} reference poses, but the readings have shape {z.shape}: one row per pose")
+    start = np.array(start_s, dtype=np.float64)
+    hold = np.array(np.broadcast_to(np.asarray(hold_s, dtype=np.float64), (len(f),)))
+    if start.shape != (len(f),):
+        raise ValueError(f"start_s must have one entry per pose ({len(f)}), got shape {start.shape}")
+    extra = np.asarray(extra_variance, dtype=np.float64)
+    extra = np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (len(f), 3)))
+    if not (np.all(np.isfinite(hold)) and np.all(hold > 0)):
+        raise ValueError("hold_s must be finite and positive: every pose needs a positive length")
+    noises = noise_per_axis(noise)
+    options = options or ShapingOptions()
+    session = float(start[-1] + hold[-1] - start[0])
+    models = [shaping_model(n, options, session_s=session, hold_s=float(np.median(hold))) for n in noises]
+    if table.sigma_m_s2 > 0:
+        # An angle error moves the reference sideways by σ; the axis' own sensitivity turns it into raw units.
+        extra = extra + (table.sigma_m_s2 * _sensitivity(z, f)) ** 2
+    if prior is None:
+        prior = Prior.diffuse([max(model.white_variance(float(np.min(hold))), 1e-300) ** 0.5 for model in models])
+
+    axes: list[AxisKalmanResult] = []
+    findings: list[Finding] = []
+    for axis in range(3):
+        result = _one_axis(
+            axis, noises[axis], models[axis], prior, z[:, axis].copy(), f, start, hold, extra[:, axis].copy(),
+            with_baselines=with_baselines,
+        )  # fmt: skip
+        axes.append(result)
+        findings += consistency_findings(axis, result.consistency)
+    inverse_S = np.array([a.constants[:3] for a in axes])
+    inverse_b = np.array([a.constants[3] for a in axes])
+    observability, seen = _observability(f)
+    findings += seen
+    accelerometer = direct_form(axes, raw_unit, observability)
+    residual = (z @ accelerometer.S.T + accelerometer.b) - f
+    return KalmanCalibration(
+        tuple(axes), accelerometer, inverse_S, inverse_b, f, z, start, hold, residual, tuple(findings)
+    )
+
+
+def _sensitivity(z: FloatArray, f: FloatArray) -> FloatArray:
+    """(3,) rough size of each axis' sensitivity row [raw/(m/s²)], good enough to scale an angle error."""
+    rows = np.linalg.lstsq(np.column_stack([f, np.ones(len(f))]), z, rcond=None)[0][:3]
+    sensitivity: FloatArray = np.linalg.norm(rows, axis=0)
+    return sensitivity
+
+
+def _one_axis(
+    axis: int,
+    noise: AxisNoise,
+    model: _core.AxisKalmanModel,
+    prior: Prior,
+    z: FloatArray,
+    f: FloatArray,
+    start: FloatArray,
+    hold: FloatArray,
+    extra: FloatArray,
+    *,
+    with_baselines: bool,
+) -> AxisKalmanResult:
+    mean, sigma, walk = prior.mean[axis].copy(), prior.sigma[axis].copy(), prior.walk[axis].copy()
+    constants, stated, covariance, innovation, variance, drift, drift_sigma = _core.kalman_track(
+        model, mean, sigma, walk, z, f, start, hold, extra
+    )
+    _, _, smoothed, smoothed_sigma = _core.kalman_smooth(model, mean, sigma, walk, z, f, start, hold, extra)
+    tracks = [ConstantsTrack("kalman", constants, stated)]
+    batch: dict[str, tuple[FloatArray, FloatArray]] = {}
+    if with_baselines:
+        # Ordinary least squares is told the white noise only, which is all it can use.
+        white = model.white_variance(float(np.median(hold))) + float(np.median(extra))
+        recursive = _core.kalman_least_squares(z, f, white, mean, sigma)
+        ols, ols_cov, gls, gls_cov, track, track_sigma = _core.kalman_generalised_least_squares(
+            model, mean, sigma, z, f, start, hold, extra
+        )
+        tracks += [
+            ConstantsTrack("recursive least squares", *recursive),
+            ConstantsTrack("recursive generalised least squares", track, track_sigma),
+        ]
+        batch = {
+            "least squares": (ols, np.sqrt(np.diag(ols_cov))),
+            "generalised least squares": (gls, np.sqrt(np.diag(gls_cov))),
+        }
+    innovation_sigma = np.sqrt(variance)
+    return AxisKalmanResult(
+        axis=axis,
+        noise=noise,
+        constants=constants[-1].copy(),
+        covariance=covariance,
+        tracks=tuple(tracks),
+        batch=batch,
+        innovation=innovation,
+        innovation_sigma=innovation_sigma,
+        is_settled=is_settled(innovation_sigma),
+        drift=drift,
+        drift_sigma=drift_sigma,
+        smoothed_drift=smoothed,
+        smoothed_drift_sigma=smoothed_sigma,
+        consistency=check_innovations(innovation, innovation_sigma),
+    )
+
+
+def direct_form(
+    axes: Sequence[AxisKalmanResult], raw_unit: str, observability: Observability | None = None
+) -> SensorCalibration:
+    """``raw = S_a f + b_a`` per axis → ``f = S raw + b`` with its covariance, to first order (docs/kalman.md, eq. 11).
+
+    Raises
+    ------
+    ValueError
+        When the three axes are not independent: no direct form exists.
+    """
+    inverse_S = np.array([a.constants[:3] for a in axes])
+    inverse_b = np.array([a.constants[3] for a in axes])
+    scale = np.linalg.norm(inverse_S, axis=1)
+    if np.any(scale == 0) or np.linalg.cond(inverse_S / scale[:, None]) > 1e6:
+        raise ValueError("the three axes read the same component of gravity: the triad cannot be inverted")
+    S = np.linalg.inv(inverse_S)
+    b = -S @ inverse_b
+    # dS = −S dS_a S and db = −S (dS_a b + db_a): row i of S_a and b_a[i] move together, other rows independently.
+    covariance = np.zeros((12, 12))
+    for i, axis in enumerate(axes):
+        jacobian = np.zeros((12, 4))
+        for j in range(3):
+            jacobian[:9, j] = -np.outer(S[:, i], S[j, :]).ravel()
+            jacobian[9:, j] = -S[:, i] * b[j]
+        jacobian[9:, 3] = -S[:, i]
+        covariance += jacobian @ axis.covariance @ jacobian.T
+    return SensorCalibration(
+        S=S,
+        b=b,
+        covariance=covariance,
+        raw_unit=raw_unit,
+        si_unit="m/s^2",
+        method="kalman, known attitudes",
+        observability=observability,
+    )
+
+
+def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
+    """How well the reference attitudes determine the four constants of any axis."""
+    design = np.column_stack([f, np.full(len(f), np.sqrt(np.mean(f**2) * 3.0))])
+    design = design / np.sqrt(np.mean(np.sum(f**2, axis=1)))
+    singular = np.linalg.svd(design / np.sqrt(len(f)), compute_uv=True)
+    values, directions = singular[1], singular[2]
+    condition = float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
+    weakest = int(np.argmax(np.abs(directions[-1])))
+    name = ("sensitivity to x", "sensitivity to y", "sensitivity to z", "zero reading")[weakest]
+    advice = (
+        "turn the zero reading's axis both ways up" if weakest == 3 else f"tilt {'xyz'[weakest]} towards the vertical"
+    )
+    rank = int(np.sum(values > 1e-9 * values[0]))
+    observability = Observability(rank, 4, condition, values, weakest=name, advice=(advice,))
+    findings: list[Finding] = []
+    if condition > 30.0:
+        findings.append(
+            Finding(
+                FindingCode.WEAKLY_OBSERVABLE,
+                Severity.WARNING,
+                f"The attitudes determine the {name} {condition:.0f} times worse than the best-seen constant.",
+                "The poses do not turn every axis towards the vertical, both ways up.",
+                f"Add poses that {advice}.",
+            )
+        )
+    return observability, findings

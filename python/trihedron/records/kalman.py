@@ -1,0 +1,193 @@
+"""Nouns of calibration by Kalman filter: noise of an axis, reference attitudes, what the filter said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records.calibration import FloatArray, SensorCalibration
+from trihedron.records.finding import Finding, Severity
+
+CONSTANT_NAMES: tuple[str, ...] = ("kx", "ky", "kz", "U0")
+"""Order of an axis' constants: sensitivity to the three reference components [raw/(m/s²)], zero reading [raw]."""
+
+
+@dataclass(frozen=True)
+class AxisNoise:
+    """Noise of one axis by its Allan coefficients, in the raw unit ``u`` of the axis (docs/kalman.md, eq. 3).
+
+    ``quantisation`` Q [u·s] of the integrated output, ``white`` N [u/√Hz], ``flicker`` B [u], ``walk`` K [u/√s],
+    ``ramp`` R [u/s]; ``resolution`` is one step of the converter [u] and ``sample_sigma`` the noise of one sample
+    before it [u], which decides how much of the rounding error averages out (0: none of it).
+    """
+
+    quantisation: float = 0.0
+    white: float = 0.0
+    flicker: float = 0.0
+    walk: float = 0.0
+    ramp: float = 0.0
+    resolution: float = 0.0
+    sample_sigma: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value >= 0):
+                raise ValueError(f"noise coefficient {name} must be zero or positive, got {value}")
+
+    def scaled(self, factor: float) -> AxisNoise:
+        """The same noise in another unit, or with every amplitude multiplied."""
+        return AxisNoise(**{name: factor * value for name, value in vars(self).items()})
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTable:
+    """Known attitudes: specific force (n, 3) [m/s²] along the reference axes while the sensor stands still.
+
+    ``sigma_m_s2`` is the uncertainty of each component (angle errors of the head times g). ``source`` says where the
+    table came from, ``has_two_axes`` whether both angles vary.
+    """
+
+    specific_force: FloatArray
+    sigma_m_s2: float = 0.0
+    source: str = "memory"
+
+    def __post_init__(self) -> None:
+        f = np.array(self.specific_force, dtype=np.float64)
+        if f.ndim != 2 or f.shape[1] != 3 or len(f) == 0:
+            raise ValueError(f"specific_force must have shape (n, 3) with n ≥ 1, got {f.shape}")
+        if not np.all(np.isfinite(f)):
+            row = int(np.flatnonzero(~np.isfinite(f).all(axis=1))[0])
+            raise ValueError(f"pose {row + 1} of the reference table is not finite")
+        if not (np.isfinite(self.sigma_m_s2) and self.sigma_m_s2 >= 0):
+            raise ValueError(f"sigma_m_s2 must be zero or positive, got {self.sigma_m_s2}")
+        f.setflags(write=False)
+        object.__setattr__(self, "specific_force", f)
+
+    def __len__(self) -> int:
+        return len(self.specific_force)
+
+
+@dataclass(frozen=True, eq=False)
+class ConstantsTrack:
+    """Constants of one axis after every pose by one method: ``constants`` and stated ``sigma`` (n, 4)."""
+
+    method: str
+    constants: FloatArray
+    sigma: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class AxisKalmanResult:
+    """One axis: final constants (4,) with covariance (4, 4), the tracks of all methods, and what was left over.
+
+    ``innovation``, ``innovation_sigma`` (n,) [raw] are one-step predictions; ``nis`` their squared ratio, which is
+    chi-square with one degree of freedom when the noise model is right, where ``is_settled`` (n,) (elsewhere the
+    diffuse start predicted nothing). ``drift``, ``drift_sigma`` (n,) is the slow noise at the end of each hold given
+    the readings so far, ``smoothed_drift`` given all of them. ``batch`` holds the one-shot solutions as ``(constants,
+    sigma)``.
+    """
+
+    axis: int
+    noise: AxisNoise
+    constants: FloatArray
+    covariance: FloatArray
+    tracks: tuple[ConstantsTrack, ...]
+    batch: Mapping[str, tuple[FloatArray, FloatArray]]
+    innovation: FloatArray
+    innovation_sigma: FloatArray
+    is_settled: npt.NDArray[np.bool_]
+    drift: FloatArray
+    drift_sigma: FloatArray
+    smoothed_drift: FloatArray
+    smoothed_drift_sigma: FloatArray
+    consistency: Consistency
+
+    @property
+    def sigma(self) -> FloatArray:
+        """(4,) standard errors of the constants."""
+        out: FloatArray = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return out
+
+    @property
+    def nis(self) -> FloatArray:
+        """(n,) normalised innovation squared."""
+        out: FloatArray = (self.innovation / self.innovation_sigma) ** 2
+        return out
+
+    def track(self, method: str) -> ConstantsTrack:
+        """The track of one method."""
+        for track in self.tracks:
+            if track.method == method:
+                return track
+        raise KeyError(f"no track of method {method!r}; there are {[t.method for t in self.tracks]}")
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """Whether innovations behave as the filter said: mean of NIS with its 99 % limits, and a whiteness test.
+
+    ``whiteness_p`` is the Ljung-Box probability that white innovations look as correlated as these in ``n_lags`` lags.
+    """
+
+    nis_mean: float
+    nis_low: float
+    nis_high: float
+    n: int
+    whiteness_p: float
+    n_lags: int
+    autocorrelation: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class KalmanCalibration:
+    """Calibration of a triad by Kalman filter.
+
+    ``inverse_S`` (3, 3), ``inverse_b`` (3,): ``raw = inverse_S f + inverse_b``; ``accelerometer`` the direct form
+    ``f = S raw + b`` with its covariance, in the frame of the references. ``residual_m_s2`` (n, 3) is corrected minus
+    reference specific force.
+    """
+
+    axes: tuple[AxisKalmanResult, ...]
+    accelerometer: SensorCalibration
+    inverse_S: FloatArray
+    inverse_b: FloatArray
+    references: FloatArray
+    readings: FloatArray
+    start_s: FloatArray
+    hold_s: FloatArray
+    residual_m_s2: FloatArray
+    findings: tuple[Finding, ...] = ()
+    extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def n_poses(self) -> int:
+        """Number of poses used."""
+        return len(self.references)
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No finding says that the answer is not to be trusted."""
+        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
+
+
+@dataclass(frozen=True, eq=False)
+class LiveEstimate:
+    """What is known after a pose: constants (3, 4) with standard errors, and how far the goal is.
+
+    ``relative_sigma`` (3, 4) are the standard errors divided by the axis' own sensitivity: dimensionless for the three
+    sensitivities, m/s² for the zero reading. ``poses_needed`` counts further poses predicted to reach the goal (0 when
+    reached, None when the predicted poses do not reach it); ``next_reference`` (3,) [m/s²] is the most useful next one.
+    """
+
+    n_poses: int
+    constants: FloatArray
+    sigma: FloatArray
+    relative_sigma: FloatArray
+    good_enough: bool
+    poses_needed: int | None
+    next_reference: FloatArray | None
+    nis: FloatArray

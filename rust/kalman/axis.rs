@@ -1,0 +1,335 @@
+//! The filter of one axis: reference accelerations known, constants and noise estimated together.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::shaping::{Layout, Shaping, ShapingModel};
+use super::ud::{Factors, Transition, UdFilter};
+use crate::error::{Error, Result};
+
+/// Constants of one axis: sensitivity to each of the three reference components, and zero reading.
+pub const N_CONSTANTS: usize = 4;
+
+/// Steps remembered: regular logs need one, and a forgotten one costs microseconds.
+const REMEMBERED_STEPS: usize = 64;
+
+/// One reading of the axis in a known attitude.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Mean raw reading over the hold.
+    pub reading: f64,
+    /// Specific force [m/s²] along the three reference axes.
+    pub reference: [f64; 3],
+    /// Start of the hold, s.
+    pub start: f64,
+    /// Length of the hold, s.
+    pub hold: f64,
+    /// Variance on top of the noise model (a disturbed pose, an uncertain reference), raw².
+    pub extra_variance: f64,
+}
+
+/// What is believed of the constants before the first pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prior {
+    /// Mean of `(kx, ky, kz, U0)`.
+    pub mean: [f64; N_CONSTANTS],
+    /// Standard deviations.
+    pub sigma: [f64; N_CONSTANTS],
+    /// Intensity of a slow walk of each constant, per √s; zero keeps it constant.
+    pub walk: [f64; N_CONSTANTS],
+}
+
+/// One step of the filter, as the caller may want to plot it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisStep {
+    /// Measured minus predicted reading.
+    pub innovation: f64,
+    /// Variance that the filter predicted for it.
+    pub innovation_variance: f64,
+}
+
+/// Recursive estimate of one axis, a pose at a time.
+#[derive(Debug, Clone)]
+pub struct AxisFilter {
+    model: ShapingModel,
+    shaping: Shaping,
+    layout: Layout,
+    /// Intensities of the constants' walks; when any is positive the constants are moving states as well.
+    walk: [f64; N_CONSTANTS],
+    moving: usize,
+    pub(crate) filter: UdFilter,
+    pub(crate) row: Vec<f64>,
+    end: Option<f64>,
+    steps: Vec<([f64; 2], Transition)>,
+    latest_step: usize,
+    n_poses: usize,
+}
+
+impl AxisFilter {
+    /// A filter that has seen nothing yet.
+    ///
+    /// # Errors
+    /// When the noise or the prior is malformed.
+    pub fn new(model: ShapingModel, prior: &Prior) -> Result<Self> {
+        let shaping = model.system()?;
+        let layout = shaping.layout();
+        let n_noise = layout.n();
+        let n = n_noise + N_CONSTANTS;
+        for (name, values, least) in [
+            ("standard deviations", &prior.sigma, f64::MIN_POSITIVE),
+            ("walks", &prior.walk, 0.0),
+        ] {
+            if values.iter().any(|v| !(v.is_finite() && *v >= least)) {
+                return Err(Error::bad_input(format!(
+                    "the {name} of the constants must be finite and positive, got {values:?}"
+                )));
+            }
+        }
+        if prior.mean.iter().any(|v| !v.is_finite()) {
+            return Err(Error::bad_input(
+                "the prior mean of the constants must be finite",
+            ));
+        }
+        let mut covariance = DMatrix::zeros(n, n);
+        covariance
+            .view_mut((0, 0), (n_noise, n_noise))
+            .copy_from(&shaping.start());
+        let mut x = vec![0.0; n];
+        for i in 0..N_CONSTANTS {
+            covariance[(n_noise + i, n_noise + i)] = prior.sigma[i].powi(2);
+            x[n_noise + i] = prior.mean[i];
+        }
+        let moving = if prior.walk.iter().any(|w| *w > 0.0) {
+            n
+        } else {
+            n_noise
+        };
+        Ok(Self {
+            filter: UdFilter::new(x, Factors::of(&covariance)),
+            row: vec![0.0; n],
+            model,
+            shaping,
+            layout,
+            walk: prior.walk,
+            moving,
+            end: None,
+            steps: Vec::new(),
+            latest_step: 0,
+            n_poses: 0,
+        })
+    }
+
+    /// Number of noise states in front of the four constants.
+    #[must_use]
+    pub fn n_noise(&self) -> usize {
+        self.layout.n()
+    }
+
+    /// Which noise state is what.
+    #[must_use]
+    pub fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    /// Poses seen.
+    #[must_use]
+    pub fn n_poses(&self) -> usize {
+        self.n_poses
+    }
+
+    /// End of the last hold, s.
+    #[must_use]
+    pub fn end(&self) -> Option<f64> {
+        self.end
+    }
+
+    /// Row of the slow noise over all states.
+    #[must_use]
+    pub fn slow_row(&self) -> DVector<f64> {
+        let mut row = DVector::zeros(self.filter.n());
+        row.rows_mut(0, self.n_noise())
+            .copy_from(&self.shaping.slow_row());
+        row
+    }
+
+    fn transition(&mut self, gap: f64, hold: f64) -> usize {
+        let key = [gap, hold];
+        let same =
+            |k: &[f64; 2]| k[0].to_bits() == key[0].to_bits() && k[1].to_bits() == key[1].to_bits();
+        if let Some((k, _)) = self.steps.get(self.latest_step)
+            && same(k)
+        {
+            return self.latest_step;
+        }
+        if let Some(found) = self.steps.iter().position(|(k, _)| same(k)) {
+            self.latest_step = found;
+            return found;
+        }
+        let (phi_noise, q_noise) = self.shaping.step(gap, hold);
+        let (m, k) = (self.moving, self.n_noise());
+        let mut phi = DMatrix::identity(m, m);
+        let mut q = DMatrix::zeros(m, m);
+        phi.view_mut((0, 0), (k, k)).copy_from(&phi_noise);
+        q.view_mut((0, 0), (k, k)).copy_from(&q_noise);
+        for i in k..m {
+            q[(i, i)] = self.walk[i - k].powi(2) * (gap + hold);
+        }
+        if self.steps.len() == REMEMBERED_STEPS {
+            self.steps.clear();
+        }
+        self.steps.push((key, Transition::new(&phi, &q)));
+        self.latest_step = self.steps.len() - 1;
+        self.latest_step
+    }
+
+    /// The transition that the last pose used.
+    #[must_use]
+    pub fn last_transition(&self) -> &Transition {
+        &self.steps[self.latest_step].1
+    }
+
+    /// States that move.
+    #[must_use]
+    pub fn n_moving(&self) -> usize {
+        self.moving
+    }
+
+    fn advance(&mut self, reference: [f64; 3], start: f64, hold: f64) -> Result<()> {
+        if !(hold.is_finite() && hold > 0.0 && start.is_finite()) {
+            return Err(Error::bad_input(format!(
+                "pose {}: a hold needs a finite start and a positive length, got {start} s and {hold} s",
+                self.n_poses + 1
+            )));
+        }
+        if reference.iter().any(|f| !f.is_finite()) {
+            return Err(Error::bad_input(format!(
+                "pose {}: the reference is not finite",
+                self.n_poses + 1
+            )));
+        }
+        // The clock's rounding must not look like travel back in time.
+        let gap = match self.end {
+            None => 0.0,
+            Some(end) if start >= end => start - end,
+            Some(end) if end - start <= 1e-6 * hold => 0.0,
+            Some(end) => {
+                return Err(Error::bad_input(format!(
+                    "pose {} starts at {start} s, before the last hold ended at {end} s: give the poses in order of time",
+                    self.n_poses + 1
+                )));
+            }
+        };
+        let step = self.transition(gap, hold);
+        self.filter.predict(&self.steps[step].1);
+        let k = self.n_noise();
+        self.shaping.measurement_row(hold, &mut self.row[..k]);
+        self.row[k..k + 3].copy_from_slice(&reference);
+        self.row[k + 3] = 1.0;
+        self.end = Some(start + hold);
+        self.n_poses += 1;
+        Ok(())
+    }
+
+    /// Take one more pose.
+    ///
+    /// # Errors
+    /// When the pose is not finite, or earlier than the last one.
+    pub fn add(&mut self, pose: &Pose) -> Result<AxisStep> {
+        if !(pose.reading.is_finite()
+            && pose.extra_variance.is_finite()
+            && pose.extra_variance >= 0.0)
+        {
+            return Err(Error::bad_input(format!(
+                "pose {}: the reading must be finite and its extra variance not negative",
+                self.n_poses + 1
+            )));
+        }
+        self.advance(pose.reference, pose.start, pose.hold)?;
+        let r = self.model.white_variance(pose.hold) + pose.extra_variance;
+        let seen = self.filter.update(&self.row, pose.reading, r);
+        Ok(AxisStep {
+            innovation: seen.value,
+            innovation_variance: seen.variance,
+        })
+    }
+
+    /// What a future pose would do to the covariance, whatever it will read.
+    ///
+    /// # Errors
+    /// As [`Self::add`].
+    pub fn imagine(&mut self, reference: [f64; 3], start: f64, hold: f64) -> Result<()> {
+        self.advance(reference, start, hold)?;
+        let r = self.model.white_variance(hold);
+        self.filter.update_with_innovation(&self.row, 0.0, r);
+        Ok(())
+    }
+
+    /// `(kx, ky, kz, U0)`.
+    #[must_use]
+    pub fn constants(&self) -> [f64; N_CONSTANTS] {
+        let k = self.n_noise();
+        std::array::from_fn(|i| self.filter.x[k + i])
+    }
+
+    /// Covariance of the constants.
+    #[must_use]
+    pub fn covariance(&self) -> DMatrix<f64> {
+        self.filter.factors.covariance_from(self.n_noise())
+    }
+
+    /// Standard errors of the constants.
+    #[must_use]
+    pub fn sigma(&self) -> [f64; N_CONSTANTS] {
+        let k = self.n_noise();
+        std::array::from_fn(|i| self.filter.factors.variance(k + i).sqrt())
+    }
+
+    /// Slow noise at the end of the last hold, and its standard error.
+    #[must_use]
+    pub fn drift(&self) -> (f64, f64) {
+        let row = self.slow_row();
+        let value = row.iter().zip(&self.filter.x).map(|(h, x)| h * x).sum();
+        (
+            value,
+            self.filter.factors.variance_along(row.as_slice()).sqrt(),
+        )
+    }
+}
+
+/// Everything one axis' filter said, pose by pose.
+#[derive(Debug, Clone)]
+pub struct AxisTrack {
+    /// Constants after each pose.
+    pub constants: Vec<[f64; N_CONSTANTS]>,
+    /// Their standard errors.
+    pub sigma: Vec<[f64; N_CONSTANTS]>,
+    /// Covariance of the constants after the last pose.
+    pub covariance: DMatrix<f64>,
+    /// Innovations and their variances.
+    pub steps: Vec<AxisStep>,
+    /// Filtered slow noise at the end of each hold, and its standard error.
+    pub drift: Vec<(f64, f64)>,
+}
+
+/// Run the filter over all poses.
+///
+/// # Errors
+/// As [`AxisFilter::new`] and [`AxisFilter::add`].
+pub fn track(model: &ShapingModel, prior: &Prior, poses: &[Pose]) -> Result<AxisTrack> {
+    let mut filter = AxisFilter::new(model.clone(), prior)?;
+    let n = poses.len();
+    let mut out = AxisTrack {
+        constants: Vec::with_capacity(n),
+        sigma: Vec::with_capacity(n),
+        covariance: DMatrix::zeros(0, 0),
+        steps: Vec::with_capacity(n),
+        drift: Vec::with_capacity(n),
+    };
+    for pose in poses {
+        out.steps.push(filter.add(pose)?);
+        out.constants.push(filter.constants());
+        out.sigma.push(filter.sigma());
+        out.drift.push(filter.drift());
+    }
+    out.covariance = filter.covariance();
+    Ok(out)
+}

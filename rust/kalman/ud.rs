@@ -1,0 +1,280 @@
+//! Square-root-free factors `P = U D Uᵀ` of a covariance: Bierman's measurement update, Thornton's time update.
+//!
+//! Only the first `m` states move; the constants behind them do not. With `U` upper triangular this order leaves the
+//! constants' factor untouched by the time update, which therefore costs `O(m³ + m n)` instead of `O(n³)`.
+//! Source: Bierman, Factorization Methods for Discrete Sequential Estimation (1977), chapters V and VI.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Unit upper triangular `U` (by columns) and diagonal `D` of a covariance.
+#[derive(Debug, Clone)]
+pub struct Factors {
+    n: usize,
+    /// Column `j` starts at `j n`; the diagonal is one and everything below it zero.
+    u: Vec<f64>,
+    d: Vec<f64>,
+}
+
+impl Factors {
+    /// Factors of a positive semidefinite matrix; pivots that rounding made negative count as zero.
+    #[must_use]
+    pub fn of(covariance: &DMatrix<f64>) -> Self {
+        let n = covariance.nrows();
+        let mut u = vec![0.0; n * n];
+        let mut d = vec![0.0; n];
+        for j in (0..n).rev() {
+            for i in (0..=j).rev() {
+                let mut rest = covariance[(i, j)];
+                for k in j + 1..n {
+                    rest -= u[k * n + i] * d[k] * u[k * n + j];
+                }
+                if i == j {
+                    // A pivot below the rounding of its own diagonal is zero: nothing is left of that variance.
+                    let floor = 4.0 * f64::EPSILON * covariance[(j, j)].abs();
+                    d[j] = if rest > floor { rest } else { 0.0 };
+                    u[j * n + j] = 1.0;
+                } else {
+                    u[j * n + i] = if d[j] > 0.0 { rest / d[j] } else { 0.0 };
+                }
+            }
+        }
+        Self { n, u, d }
+    }
+
+    /// Factors of a diagonal covariance.
+    #[must_use]
+    pub fn diagonal(variances: &[f64]) -> Self {
+        let n = variances.len();
+        let mut u = vec![0.0; n * n];
+        for j in 0..n {
+            u[j * n + j] = 1.0;
+        }
+        Self {
+            n,
+            u,
+            d: variances.to_vec(),
+        }
+    }
+
+    /// `U D Uᵀ` of the states from `first` on.
+    #[must_use]
+    pub fn covariance_from(&self, first: usize) -> DMatrix<f64> {
+        let n = self.n;
+        DMatrix::from_fn(n - first, n - first, |r, c| {
+            let (i, j) = (r + first, c + first);
+            (i.max(j)..n)
+                .map(|k| self.u[k * n + i] * self.d[k] * self.u[k * n + j])
+                .sum()
+        })
+    }
+
+    /// Variance of one state.
+    #[must_use]
+    pub fn variance(&self, i: usize) -> f64 {
+        let n = self.n;
+        (i..n)
+            .map(|k| self.u[k * n + i].powi(2) * self.d[k])
+            .sum::<f64>()
+    }
+
+    /// `hᵀ P h`.
+    #[must_use]
+    pub fn variance_along(&self, h: &[f64]) -> f64 {
+        let n = self.n;
+        (0..n)
+            .map(|j| {
+                let f: f64 = (0..=j).map(|i| self.u[j * n + i] * h[i]).sum();
+                f * f * self.d[j]
+            })
+            .sum()
+    }
+}
+
+/// Transition of the moving states over one step: `x ← Φ x + w`, `cov w = G diag(q) Gᵀ`.
+#[derive(Debug, Clone)]
+pub struct Transition {
+    m: usize,
+    /// `Φ` by rows.
+    phi: Vec<f64>,
+    noise: Factors,
+}
+
+impl Transition {
+    /// From the transition matrix and the covariance of the driving noise.
+    #[must_use]
+    pub fn new(phi: &DMatrix<f64>, noise: &DMatrix<f64>) -> Self {
+        let m = phi.nrows();
+        Self {
+            m,
+            phi: phi.transpose().as_slice().to_vec(),
+            noise: Factors::of(noise),
+        }
+    }
+
+    /// `Φ`.
+    #[must_use]
+    pub fn phi(&self) -> DMatrix<f64> {
+        DMatrix::from_row_slice(self.m, self.m, &self.phi)
+    }
+}
+
+/// What one scalar measurement said that the filter did not know.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Innovation {
+    /// Measured minus predicted.
+    pub value: f64,
+    /// Its predicted variance `hᵀ P h + r`.
+    pub variance: f64,
+}
+
+/// Estimate and factored covariance of a linear system with scalar measurements.
+#[derive(Debug, Clone)]
+pub struct UdFilter {
+    /// Current estimate.
+    pub x: Vec<f64>,
+    /// Factored covariance of its error.
+    pub factors: Factors,
+    work: Vec<f64>,
+}
+
+impl UdFilter {
+    /// Start from an estimate and the factors of its covariance.
+    #[must_use]
+    pub fn new(x: Vec<f64>, factors: Factors) -> Self {
+        let n = x.len();
+        Self {
+            x,
+            factors,
+            work: vec![0.0; 2 * n + 2 * n * n + 2 * n],
+        }
+    }
+
+    /// Number of states.
+    #[must_use]
+    pub fn n(&self) -> usize {
+        self.x.len()
+    }
+
+    /// Measure `z = h·x + v`, `var v = r`: Bierman's update. The gain is left in [`Self::gain`].
+    ///
+    /// Every diagonal element is multiplied by a ratio in `[0, 1]`: the covariance stays positive semidefinite in
+    /// finite arithmetic, whatever the ratio of prior to measurement variance.
+    pub fn update(&mut self, h: &[f64], z: f64, r: f64) -> Innovation {
+        let predicted: f64 = h.iter().zip(&self.x).map(|(h, x)| h * x).sum();
+        self.update_with_innovation(h, z - predicted, r)
+    }
+
+    /// The same with the innovation given, as an extended filter computes it from its non-linear prediction.
+    pub fn update_with_innovation(&mut self, h: &[f64], innovation: f64, r: f64) -> Innovation {
+        let n = self.x.len();
+        let Factors { u, d, .. } = &mut self.factors;
+        let gain = &mut self.work[..n];
+        let mut alpha = r;
+        for j in 0..n {
+            let column = &mut u[j * n..j * n + n];
+            let f: f64 = column[..j].iter().zip(h).map(|(u, h)| u * h).sum::<f64>() + h[j];
+            let v = d[j] * f;
+            let before = alpha;
+            alpha += f * v;
+            gain[j] = v;
+            if v == 0.0 {
+                // Nothing known about this direction can change: it is exact already, or not seen by `h`.
+                continue;
+            }
+            // Without noise so far (`before == 0`) the gain's earlier entries are all zero and λ multiplies nothing.
+            let lambda = if before > 0.0 { -f / before } else { 0.0 };
+            if alpha > 0.0 {
+                d[j] *= before / alpha;
+            }
+            for i in 0..j {
+                let old = column[i];
+                column[i] = old + lambda * gain[i];
+                gain[i] += v * old;
+            }
+        }
+        if alpha > 0.0 {
+            for (g, x) in gain.iter_mut().zip(&mut self.x) {
+                *g /= alpha;
+                *x += *g * innovation;
+            }
+        } else {
+            gain.fill(0.0);
+        }
+        Innovation {
+            value: innovation,
+            variance: alpha,
+        }
+    }
+
+    /// Gain of the last measurement.
+    #[must_use]
+    pub fn gain(&self) -> &[f64] {
+        &self.work[..self.x.len()]
+    }
+
+    /// Move the first `m` states: Thornton's update by modified weighted Gram-Schmidt.
+    pub fn predict(&mut self, step: &Transition) {
+        let (n, m) = (self.x.len(), step.m);
+        let Factors { u, d, .. } = &mut self.factors;
+        let (rows, rest) = self.work.split_at_mut(2 * m * m);
+        let (weights, moved) = rest.split_at_mut(2 * m);
+        let width = 2 * m;
+        // rows = [Φ U11 | G], weights = [D1 | q]
+        for i in 0..m {
+            let phi = &step.phi[i * m..(i + 1) * m];
+            for j in 0..m {
+                rows[i * width + j] = (0..=j).map(|k| phi[k] * u[j * n + k]).sum();
+                rows[i * width + m + j] = step.noise.u[j * m + i];
+            }
+            weights[i] = d[i];
+            weights[m + i] = step.noise.d[i];
+        }
+        // U12 ← Φ U12 and x ← Φ x
+        for j in m..n {
+            for i in 0..m {
+                let phi = &step.phi[i * m..(i + 1) * m];
+                moved[i] = phi
+                    .iter()
+                    .zip(&u[j * n..j * n + m])
+                    .map(|(p, u)| p * u)
+                    .sum();
+            }
+            u[j * n..j * n + m].copy_from_slice(&moved[..m]);
+        }
+        for i in 0..m {
+            let phi = &step.phi[i * m..(i + 1) * m];
+            moved[i] = phi.iter().zip(&self.x).map(|(p, x)| p * x).sum();
+        }
+        self.x[..m].copy_from_slice(&moved[..m]);
+        for j in (0..m).rev() {
+            let (above, row) = rows.split_at_mut(j * width);
+            let row = &mut row[..width];
+            let length: f64 = row.iter().zip(&*weights).map(|(r, w)| w * r * r).sum();
+            d[j] = length;
+            for i in 0..j {
+                let other = &mut above[i * width..(i + 1) * width];
+                let share = if length > 0.0 {
+                    other
+                        .iter()
+                        .zip(&*row)
+                        .zip(&*weights)
+                        .map(|((o, r), w)| o * r * w)
+                        .sum::<f64>()
+                        / length
+                } else {
+                    0.0
+                };
+                for (o, r) in other.iter_mut().zip(&*row) {
+                    *o -= share * r;
+                }
+                u[j * n + i] = share;
+            }
+        }
+    }
+
+    /// Current estimate as a vector.
+    #[must_use]
+    pub fn estimate(&self) -> DVector<f64> {
+        DVector::from_column_slice(&self.x)
+    }
+}

@@ -1,0 +1,453 @@
+//! The Kalman filter across the seam.
+
+use nalgebra::DMatrix;
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+    ToPyArray,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::rotation::rows3;
+use crate::kalman::axis::{self, AxisFilter, N_CONSTANTS, Pose, Prior};
+use crate::kalman::least_squares;
+use crate::kalman::shaping::{NoiseTerms, ShapingModel};
+use crate::kalman::smoother;
+
+type Array1<'py> = Bound<'py, PyArray1<f64>>;
+type Array2<'py> = Bound<'py, PyArray2<f64>>;
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<AxisKalmanModel>()?;
+    module.add_class::<AxisKalman>()?;
+    module.add_function(wrap_pyfunction!(kalman_track, module)?)?;
+    module.add_function(wrap_pyfunction!(kalman_smooth, module)?)?;
+    module.add_function(wrap_pyfunction!(kalman_noise_covariance, module)?)?;
+    module.add_function(wrap_pyfunction!(kalman_least_squares, module)?)?;
+    module.add_function(wrap_pyfunction!(kalman_generalised_least_squares, module)?)?;
+    Ok(())
+}
+
+fn four(name: &str, array: &PyReadonlyArray1<'_, f64>) -> PyResult<[f64; N_CONSTANTS]> {
+    let values: Vec<f64> = array.as_array().iter().copied().collect();
+    values.try_into().map_err(|values: Vec<f64>| {
+        PyValueError::new_err(format!(
+            "{name} must have shape (4,), got ({},)",
+            values.len()
+        ))
+    })
+}
+
+fn rows4(py: Python<'_>, rows: &[[f64; N_CONSTANTS]]) -> PyResult<Py<PyArray2<f64>>> {
+    let flat: Vec<f64> = rows.iter().flatten().copied().collect();
+    Ok(flat
+        .to_pyarray(py)
+        .reshape([rows.len(), N_CONSTANTS])?
+        .unbind())
+}
+
+fn matrix<'py>(py: Python<'py>, m: &DMatrix<f64>) -> PyResult<Array2<'py>> {
+    m.transpose()
+        .as_slice()
+        .to_pyarray(py)
+        .reshape([m.nrows(), m.ncols()])
+}
+
+fn poses(
+    readings: &PyReadonlyArray1<'_, f64>,
+    references: &PyReadonlyArray2<'_, f64>,
+    start_s: &PyReadonlyArray1<'_, f64>,
+    hold_s: &PyReadonlyArray1<'_, f64>,
+    extra_variance: &PyReadonlyArray1<'_, f64>,
+) -> PyResult<Vec<Pose>> {
+    let rows = rows3("references", references)?;
+    let n = rows.len();
+    for (name, array) in [
+        ("readings", readings),
+        ("start_s", start_s),
+        ("hold_s", hold_s),
+        ("extra_variance", extra_variance),
+    ] {
+        if array.len() != n {
+            return Err(PyValueError::new_err(format!(
+                "{name} must have shape ({n},) like the references, got ({},)",
+                array.len()
+            )));
+        }
+    }
+    let (z, t, hold, extra) = (
+        readings.as_array(),
+        start_s.as_array(),
+        hold_s.as_array(),
+        extra_variance.as_array(),
+    );
+    Ok((0..n)
+        .map(|i| Pose {
+            reading: z[i],
+            reference: rows[i].into(),
+            start: t[i],
+            hold: hold[i],
+            extra_variance: extra[i],
+        })
+        .collect())
+}
+
+/// Noise of one axis and how it is shaped.
+#[pyclass(module = "trihedron._core", frozen)]
+struct AxisKalmanModel {
+    inner: ShapingModel,
+}
+
+#[pymethods]
+impl AxisKalmanModel {
+    #[new]
+    #[pyo3(signature = (*, quantisation, white, flicker, walk, ramp, resolution, dither, flicker_rates, ramp_frequency, ramp_damping, averages))]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        quantisation: f64,
+        white: f64,
+        flicker: f64,
+        walk: f64,
+        ramp: f64,
+        resolution: f64,
+        dither: f64,
+        flicker_rates: Vec<f64>,
+        ramp_frequency: f64,
+        ramp_damping: f64,
+        averages: bool,
+    ) -> PyResult<Self> {
+        let inner = ShapingModel {
+            terms: NoiseTerms {
+                quantisation,
+                white,
+                flicker,
+                walk,
+                ramp,
+                resolution,
+            },
+            flicker_rates,
+            ramp_frequency,
+            ramp_damping,
+            dither,
+            averages,
+        };
+        inner
+            .system()
+            .map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(Self { inner })
+    }
+
+    /// Variance of a reading over a hold that is white from pose to pose.
+    fn white_variance(&self, hold_s: f64) -> f64 {
+        self.inner.white_variance(hold_s)
+    }
+}
+
+fn prior(
+    mean: &PyReadonlyArray1<'_, f64>,
+    sigma: &PyReadonlyArray1<'_, f64>,
+    walk: &PyReadonlyArray1<'_, f64>,
+) -> PyResult<Prior> {
+    Ok(Prior {
+        mean: four("prior_mean", mean)?,
+        sigma: four("prior_sigma", sigma)?,
+        walk: four("walk", walk)?,
+    })
+}
+
+/// The filter of one axis, fed a pose at a time.
+#[pyclass(module = "trihedron._core")]
+struct AxisKalman {
+    inner: AxisFilter,
+}
+
+#[pymethods]
+impl AxisKalman {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        model: &AxisKalmanModel,
+        prior_mean: PyReadonlyArray1<'_, f64>,
+        prior_sigma: PyReadonlyArray1<'_, f64>,
+        walk: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Self> {
+        let prior = prior(&prior_mean, &prior_sigma, &walk)?;
+        let model = model.inner.clone();
+        Ok(Self {
+            inner: super::run(py, || AxisFilter::new(model, &prior))?,
+        })
+    }
+
+    /// Take one pose; innovation and its predicted variance.
+    #[pyo3(signature = (reading, reference, start_s, hold_s, extra_variance=0.0))]
+    fn add(
+        &mut self,
+        py: Python<'_>,
+        reading: f64,
+        reference: [f64; 3],
+        start_s: f64,
+        hold_s: f64,
+        extra_variance: f64,
+    ) -> PyResult<(f64, f64)> {
+        let pose = Pose {
+            reading,
+            reference,
+            start: start_s,
+            hold: hold_s,
+            extra_variance,
+        };
+        let filter = &mut self.inner;
+        let seen = super::run(py, || filter.add(&pose))?;
+        Ok((seen.innovation, seen.innovation_variance))
+    }
+
+    /// Pass a pose that has not been measured: the covariance changes, the estimate does not.
+    fn imagine(
+        &mut self,
+        py: Python<'_>,
+        reference: [f64; 3],
+        start_s: f64,
+        hold_s: f64,
+    ) -> PyResult<()> {
+        let filter = &mut self.inner;
+        super::run(py, || filter.imagine(reference, start_s, hold_s))
+    }
+
+    /// An independent filter in the same state.
+    fn copy(&self) -> Self {
+        Self {
+            inner: self.inner.clone(),
+        }
+    }
+
+    #[getter]
+    fn constants<'py>(&self, py: Python<'py>) -> Array1<'py> {
+        self.inner.constants().to_pyarray(py)
+    }
+
+    #[getter]
+    fn sigma<'py>(&self, py: Python<'py>) -> Array1<'py> {
+        self.inner.sigma().to_pyarray(py)
+    }
+
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
+        matrix(py, &self.inner.covariance())
+    }
+
+    /// Slow noise at the end of the last hold, and its standard error.
+    #[getter]
+    fn drift(&self) -> (f64, f64) {
+        self.inner.drift()
+    }
+
+    #[getter]
+    fn n_poses(&self) -> usize {
+        self.inner.n_poses()
+    }
+
+    #[getter]
+    fn n_states(&self) -> usize {
+        self.inner.n_noise() + N_CONSTANTS
+    }
+
+    #[getter]
+    fn end_s(&self) -> Option<f64> {
+        self.inner.end()
+    }
+}
+
+type Track = (
+    Py<PyArray2<f64>>,
+    Py<PyArray2<f64>>,
+    Py<PyArray2<f64>>,
+    Py<PyArray1<f64>>,
+    Py<PyArray1<f64>>,
+    Py<PyArray1<f64>>,
+    Py<PyArray1<f64>>,
+);
+
+/// Constants, sigma, final covariance, innovations, their variances, drift, its sigma.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn kalman_track(
+    py: Python<'_>,
+    model: &AxisKalmanModel,
+    prior_mean: PyReadonlyArray1<'_, f64>,
+    prior_sigma: PyReadonlyArray1<'_, f64>,
+    walk: PyReadonlyArray1<'_, f64>,
+    readings: PyReadonlyArray1<'_, f64>,
+    references: PyReadonlyArray2<'_, f64>,
+    start_s: PyReadonlyArray1<'_, f64>,
+    hold_s: PyReadonlyArray1<'_, f64>,
+    extra_variance: PyReadonlyArray1<'_, f64>,
+) -> PyResult<Track> {
+    let poses = poses(&readings, &references, &start_s, &hold_s, &extra_variance)?;
+    let prior = prior(&prior_mean, &prior_sigma, &walk)?;
+    let model = &model.inner;
+    let out = super::run(py, || axis::track(model, &prior, &poses))?;
+    let column = |values: Vec<f64>| values.to_pyarray(py).unbind();
+    Ok((
+        rows4(py, &out.constants)?,
+        rows4(py, &out.sigma)?,
+        matrix(py, &out.covariance)?.unbind(),
+        column(out.steps.iter().map(|s| s.innovation).collect()),
+        column(out.steps.iter().map(|s| s.innovation_variance).collect()),
+        column(out.drift.iter().map(|d| d.0).collect()),
+        column(out.drift.iter().map(|d| d.1).collect()),
+    ))
+}
+
+type SmoothedArrays = (
+    Py<PyArray2<f64>>,
+    Py<PyArray2<f64>>,
+    Py<PyArray1<f64>>,
+    Py<PyArray1<f64>>,
+);
+
+/// Smoothed constants, sigma, drift, its sigma.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn kalman_smooth(
+    py: Python<'_>,
+    model: &AxisKalmanModel,
+    prior_mean: PyReadonlyArray1<'_, f64>,
+    prior_sigma: PyReadonlyArray1<'_, f64>,
+    walk: PyReadonlyArray1<'_, f64>,
+    readings: PyReadonlyArray1<'_, f64>,
+    references: PyReadonlyArray2<'_, f64>,
+    start_s: PyReadonlyArray1<'_, f64>,
+    hold_s: PyReadonlyArray1<'_, f64>,
+    extra_variance: PyReadonlyArray1<'_, f64>,
+) -> PyResult<SmoothedArrays> {
+    let poses = poses(&readings, &references, &start_s, &hold_s, &extra_variance)?;
+    let prior = prior(&prior_mean, &prior_sigma, &walk)?;
+    let model = &model.inner;
+    let out = super::run(py, || smoother::smooth(model, &prior, &poses))?;
+    let column = |values: Vec<f64>| values.to_pyarray(py).unbind();
+    Ok((
+        rows4(py, &out.constants)?,
+        rows4(py, &out.sigma)?,
+        column(out.drift.iter().map(|d| d.0).collect()),
+        column(out.drift.iter().map(|d| d.1).collect()),
+    ))
+}
+
+/// Covariance of the readings under the noise model.
+#[pyfunction]
+fn kalman_noise_covariance<'py>(
+    py: Python<'py>,
+    model: &AxisKalmanModel,
+    start_s: PyReadonlyArray1<'py, f64>,
+    hold_s: PyReadonlyArray1<'py, f64>,
+    extra_variance: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Array2<'py>> {
+    if hold_s.len() != start_s.len() || extra_variance.len() != start_s.len() {
+        return Err(PyValueError::new_err(
+            "start_s, hold_s and extra_variance must have the same length",
+        ));
+    }
+    let (t, hold, extra) = (
+        start_s.as_array(),
+        hold_s.as_array(),
+        extra_variance.as_array(),
+    );
+    let poses: Vec<Pose> = (0..t.len())
+        .map(|i| Pose {
+            reading: 0.0,
+            reference: [0.0; 3],
+            start: t[i],
+            hold: hold[i],
+            extra_variance: extra[i],
+        })
+        .collect();
+    let model = &model.inner;
+    let c = super::run(py, || least_squares::noise_covariance(model, &poses))?;
+    matrix(py, &c)
+}
+
+type Recursion = (Py<PyArray2<f64>>, Py<PyArray2<f64>>);
+
+/// Recursive ordinary least squares: constants, stated sigma.
+#[pyfunction]
+fn kalman_least_squares(
+    py: Python<'_>,
+    readings: PyReadonlyArray1<'_, f64>,
+    references: PyReadonlyArray2<'_, f64>,
+    variance: f64,
+    prior_mean: PyReadonlyArray1<'_, f64>,
+    prior_sigma: PyReadonlyArray1<'_, f64>,
+) -> PyResult<Recursion> {
+    let rows = rows3("references", &references)?;
+    if rows.len() != readings.len() {
+        return Err(PyValueError::new_err(format!(
+            "readings must have shape ({},) like the references, got ({},)",
+            rows.len(),
+            readings.len()
+        )));
+    }
+    let poses: Vec<Pose> = rows
+        .iter()
+        .zip(readings.as_array())
+        .map(|(f, z)| Pose {
+            reading: *z,
+            reference: (*f).into(),
+            start: 0.0,
+            hold: 1.0,
+            extra_variance: 0.0,
+        })
+        .collect();
+    let (mean, sigma) = (
+        four("prior_mean", &prior_mean)?,
+        four("prior_sigma", &prior_sigma)?,
+    );
+    let out = super::run(py, || {
+        Ok(least_squares::recursive(&poses, variance, &mean, &sigma))
+    })?;
+    Ok((rows4(py, &out.constants)?, rows4(py, &out.sigma)?))
+}
+
+type Generalised = (
+    Py<PyArray1<f64>>,
+    Py<PyArray2<f64>>,
+    Py<PyArray1<f64>>,
+    Py<PyArray2<f64>>,
+    Py<PyArray2<f64>>,
+    Py<PyArray2<f64>>,
+);
+
+/// Batch ordinary (constants, covariance), batch generalised (constants, covariance), recursive generalised.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn kalman_generalised_least_squares(
+    py: Python<'_>,
+    model: &AxisKalmanModel,
+    prior_mean: PyReadonlyArray1<'_, f64>,
+    prior_sigma: PyReadonlyArray1<'_, f64>,
+    readings: PyReadonlyArray1<'_, f64>,
+    references: PyReadonlyArray2<'_, f64>,
+    start_s: PyReadonlyArray1<'_, f64>,
+    hold_s: PyReadonlyArray1<'_, f64>,
+    extra_variance: PyReadonlyArray1<'_, f64>,
+) -> PyResult<Generalised> {
+    let poses = poses(&readings, &references, &start_s, &hold_s, &extra_variance)?;
+    let (mean, sigma) = (
+        four("prior_mean", &prior_mean)?,
+        four("prior_sigma", &prior_sigma)?,
+    );
+    let model = &model.inner;
+    let (ordinary, generalised, recursion) = super::run(py, || {
+        let noise = least_squares::noise_covariance(model, &poses)?;
+        let ordinary = least_squares::ordinary(&poses, &noise)?;
+        let (batch, recursion) = least_squares::generalised(&poses, noise, &mean, &sigma)?;
+        Ok((ordinary, batch, recursion))
+    })?;
+    Ok((
+        ordinary.constants.to_pyarray(py).unbind(),
+        matrix(py, &ordinary.covariance)?.unbind(),
+        generalised.constants.to_pyarray(py).unbind(),
+        matrix(py, &generalised.covariance)?.unbind(),
+        rows4(py, &recursion.constants)?,
+        rows4(py, &recursion.sigma)?,
+    ))
+}

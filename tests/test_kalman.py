@@ -1,0 +1,358 @@
+"""Calibration by Kalman filter in known attitudes: against closed forms, exact arithmetic and simulated truth."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from trihedron import _core
+from trihedron.estimate.kalman import (
+    DIVIDING_HEAD_POSES,
+    Goal,
+    LiveCalibration,
+    Prior,
+    ShapingOptions,
+    calibrate_with_references,
+    normalised_error_squared,
+    pose_table_from_angles,
+)
+from trihedron.estimate.kalman.shaping import shaping_model
+from trihedron.records import AxisNoise, FindingCode, PoseTable
+from twins_kalman import (
+    ARTICLE_CONSTANTS,
+    GRAVITY,
+    covariance_of_hold_means,
+    generalised_least_squares,
+    naive_covariance_form,
+    recursive_least_squares_in_fractions,
+)
+
+SIGMA = 0.11 * 0.032002 / GRAVITY
+"""The article's converter noise of 0.11 m/s² in volts."""
+
+
+def compiled(*, rates=(0.01,), averages=True, ramp_frequency=1e-4, **terms):
+    named = {
+        "quantisation": 0.0,
+        "white": 0.0,
+        "flicker": 0.0,
+        "walk": 0.0,
+        "ramp": 0.0,
+        "resolution": 0.0,
+        "dither": 0.0,
+    }
+    return _core.AxisKalmanModel(
+        **(named | terms),
+        flicker_rates=list(rates),
+        ramp_frequency=ramp_frequency,
+        ramp_damping=0.7,
+        averages=averages,
+    )
+
+
+def session(seed, n):
+    rng = np.random.default_rng(seed)
+    hold = rng.uniform(1.0, 8.0, n)
+    pause = np.where(rng.random(n) < 0.3, 0.0, rng.uniform(0.5, 40.0, n))
+    start = 100.0 + np.cumsum(np.concatenate([[0.0], (hold + pause)[:-1]]))
+    f = rng.standard_normal((n, 3))
+    return start, hold, GRAVITY * f / np.linalg.norm(f, axis=1)[:, None], rng
+
+
+MIXES = {
+    "white": {"white": 0.02},
+    "quantisation": {"quantisation": 0.05, "white": 0.001},
+    "walk": {"white": 0.02, "walk": 0.004},
+    "ramp": {"white": 0.02, "ramp": 0.001, "ramp_frequency": 1e-11},
+    "flicker": {"white": 0.02, "flicker": 0.02, "rates": (0.003, 0.03, 0.3)},
+    "everything": {
+        "white": 0.02,
+        "quantisation": 0.03,
+        "walk": 0.004,
+        "ramp": 0.001,
+        "ramp_frequency": 1e-11,
+        "flicker": 0.02,
+        "rates": (0.003, 0.03, 0.3),
+    },
+}
+
+
+def covariance_by_hand(mix, start, hold):
+    terms = dict(mix)
+    terms.pop("ramp_frequency", None)
+    terms["slope"] = terms.pop("ramp", 0.0)
+    flicker, rates = terms.pop("flicker", 0.0), terms.pop("rates", ())
+    sigma = flicker * np.sqrt(np.log(10.0) / np.pi)
+    return covariance_of_hold_means(start, hold, gauss_markov=[(beta, sigma) for beta in rates], **terms)
+
+
+@pytest.mark.parametrize("mix", MIXES.values(), ids=MIXES)
+def test_the_noise_covariance_of_hold_means_is_the_integral_done_by_hand(mix):
+    start, hold, _, _ = session(3, 25)
+    got = _core.kalman_noise_covariance(compiled(**mix), start, hold, np.zeros(25))
+    # The second-order ramp with ω₀ = 1e-11 rad/s departs from a straight line by ω₀ t ~ 1e-8 over 600 s.
+    np.testing.assert_allclose(got, covariance_by_hand(mix, start, hold), rtol=1e-7, atol=1e-14)
+
+
+@pytest.mark.parametrize("mix", MIXES.values(), ids=MIXES)
+def test_the_filter_is_generalised_least_squares_on_every_prefix(mix):
+    start, hold, f, rng = session(4, 30)
+    readings = f @ [0.1, -0.02, 0.01] + 2.0 + 0.05 * rng.standard_normal(30)
+    model, diffuse = compiled(**mix), np.full(4, 1e7)
+    constants, sigma, *_ = _core.kalman_track(
+        model, np.zeros(4), diffuse, np.zeros(4), readings, f, start, hold, np.zeros(30)
+    )
+    covariance = covariance_by_hand(mix, start, hold)
+    for n in (5, 12, 30):
+        expected, cov = generalised_least_squares(f[:n], readings[:n], covariance[:n, :n])
+        stated = np.sqrt(np.diag(cov))
+        # 1e-5 σ: rounding of the dense inverse, and the ramp's ω₀ where few poses separate it from U0.
+        np.testing.assert_allclose((constants[n - 1] - expected) / stated, 0.0, atol=1e-5)
+        np.testing.assert_allclose(sigma[n - 1], stated, rtol=1e-5)
+
+
+def test_the_smoother_is_the_conditional_expectation_given_all_readings():
+    start, hold, f, rng = session(5, 40)
+    readings = f @ [0.1, -0.02, 0.01] + 2.0 + 0.05 * rng.standard_normal(40)
+    model = compiled(white=0.02, walk=0.004, flicker=0.02, rates=(0.003, 0.03), averages=False)
+    start_of = (np.zeros(4), np.full(4, 1e7), np.zeros(4))
+    _, _, drift, drift_sigma = _core.kalman_smooth(model, *start_of, readings, f, start, hold, np.zeros(40))
+    total = _core.kalman_noise_covariance(model, start, hold, np.zeros(40))
+    slow = total - np.diag([model.white_variance(h) for h in hold])
+    constants, cov = generalised_least_squares(f, readings, total)
+    h = np.column_stack([f, np.ones(40)])
+    gain = slow @ np.linalg.inv(total)
+    expected = gain @ (readings - h @ constants)
+    spread = slow - gain @ slow + gain @ h @ cov @ h.T @ gain.T
+    np.testing.assert_allclose(drift, expected, atol=1e-9)
+    # The start is 1e4 final standard errors wide: 1e-8 of the information.
+    np.testing.assert_allclose(drift_sigma, np.sqrt(np.diag(spread)), rtol=1e-6)
+
+
+def test_factors_keep_their_digits_where_the_printed_covariance_form_loses_them_all():
+    rng = np.random.default_rng(6)
+    rows = np.column_stack([1.0 + 1e-4 * rng.standard_normal((12, 3)), np.ones(12)])
+    readings = rows @ [1.0, 2.0, 3.0, 4.0]
+    variance, prior = 2.0**-40, 2.0**40
+    exact, exact_variance = recursive_least_squares_in_fractions(rows, readings, variance, prior)
+    constants, sigma = _core.kalman_least_squares(
+        readings, np.ascontiguousarray(rows[:, :3]), variance, np.zeros(4), np.full(4, np.sqrt(prior))
+    )
+    # Prior to measurement variance 1e24, columns equal to 1e-4: the factors still hold five digits of σ.
+    np.testing.assert_allclose(sigma[-1], np.sqrt([float(v) for v in exact_variance]), rtol=1e-5)
+    np.testing.assert_allclose((constants[-1] - [float(v) for v in exact]) / sigma[-1], 0.0, atol=0.1)
+    naive = naive_covariance_form(rows, variance, prior)
+    assert np.max(np.abs(naive / [float(v) for v in exact_variance] - 1.0)) > 0.5
+
+
+def article_readings(seed, noise):
+    """One axis' noise drawn from the model of hold means; 324 poses of 5 s with 5 s between."""
+    n = len(DIVIDING_HEAD_POSES)
+    start, hold = 10.0 * np.arange(n), np.full(n, 5.0)
+    options = ShapingOptions()
+    model = shaping_model(noise, options, session_s=float(start[-1] + 5.0), hold_s=5.0)
+    c = _core.kalman_noise_covariance(model, start, hold, np.zeros(n))
+    draws = np.linalg.cholesky(c) @ np.random.default_rng(seed).standard_normal((n, 3))
+    table = pose_table_from_angles(*DIVIDING_HEAD_POSES.T, gravity_m_s2=GRAVITY)
+    return table, table.specific_force @ ARTICLE_CONSTANTS[:, :3].T + ARTICLE_CONSTANTS[:, 3] + draws, start, hold
+
+
+ARTICLE_MIX = AxisNoise(white=0.9 * SIGMA * 5**0.5, flicker=0.3 * SIGMA, walk=SIGMA / 60.0, ramp=SIGMA / 3000.0)
+
+
+def test_the_articles_experiment_gives_its_constants_back_with_honest_error_bars():
+    nees, z = [], []
+    for seed in range(40):
+        table, readings, start, hold = article_readings(seed, ARTICLE_MIX)
+        result = calibrate_with_references(
+            readings, table, ARTICLE_MIX, start_s=start, hold_s=hold, with_baselines=False, raw_unit="V"
+        )
+        for axis in result.axes:
+            error = axis.constants - ARTICLE_CONSTANTS[axis.axis]
+            nees.append(normalised_error_squared(error, axis.covariance))
+            z.append(error / axis.sigma)
+    # 120 independent draws of chi-square with 4 degrees of freedom; two-sided 99.9 % limits of their sum.
+    low, high = stats.chi2.ppf([0.0005, 0.9995], 4 * len(nees))
+    assert low < np.sum(nees) < high
+    # Largest of 480 standard normals: beyond 4.8 once in 1300 such tests.
+    assert np.max(np.abs(z)) < 4.8
+
+
+def test_the_articles_experiment_has_its_absolute_error():
+    """12 bits over 5 V are 0.11 m/s² rms and ±0.19 m/s² at most: the article's two figures are one converter's step."""
+    step = 5.0 / 4096
+    n = len(DIVIDING_HEAD_POSES)
+    table = pose_table_from_angles(*DIVIDING_HEAD_POSES.T, gravity_m_s2=GRAVITY)
+    clean = table.specific_force @ ARTICLE_CONSTANTS[:, :3].T + ARTICLE_CONSTANTS[:, 3]
+    readings = np.round(clean / step) * step
+    result = calibrate_with_references(
+        readings, table, AxisNoise(resolution=step), start_s=10.0 * np.arange(n), hold_s=5.0, raw_unit="V"
+    )
+    sensitivity = 0.032002 / GRAVITY
+    assert step / np.sqrt(12.0) / sensitivity == pytest.approx(0.108, abs=0.001)
+    worst = np.max(np.abs(result.residual_m_s2[:, 0]))
+    # Half a step is 0.187 m/s²; the calibration's own error at a pose is 0.108 √(4/324) = 0.012, three of them.
+    assert 0.17 < worst < 0.187 + 3 * 0.012
+
+
+def test_white_noise_alone_leaves_nothing_to_gain_over_least_squares():
+    noise = AxisNoise(white=SIGMA * 5**0.5)
+    table, readings, start, hold = article_readings(1, noise)
+    result = calibrate_with_references(readings, table, noise, start_s=start, hold_s=hold, raw_unit="V")
+    for axis in result.axes:
+        recursive = axis.track("recursive least squares")
+        settled = axis.track("kalman").sigma < 1.0
+        # Rounding of the first, nearly undetermined poses is below a millionth of their own error bar.
+        difference = (axis.track("kalman").constants - recursive.constants) / recursive.sigma
+        np.testing.assert_allclose(difference[settled], 0.0, atol=1e-6)
+        for constants, _ in axis.batch.values():
+            np.testing.assert_allclose((axis.constants - constants) / axis.sigma, 0.0, atol=1e-6)
+
+
+def test_recursive_least_squares_states_too_small_errors_under_slow_noise():
+    table, readings, start, hold = article_readings(2, ARTICLE_MIX)
+    axis = calibrate_with_references(readings, table, ARTICLE_MIX, start_s=start, hold_s=hold).axes[0]
+    stated = axis.track("recursive least squares").sigma[-1]
+    honest = axis.batch["least squares"][1]
+    assert honest[3] > 3.0 * stated[3]
+    assert np.all(axis.sigma <= honest * (1 + 1e-9))
+
+
+@pytest.mark.parametrize(
+    ("believed", "code"),
+    [
+        (ARTICLE_MIX, None),
+        (ARTICLE_MIX.scaled(0.5), FindingCode.INNOVATIONS_TOO_LARGE),
+        (ARTICLE_MIX.scaled(2.0), FindingCode.INNOVATIONS_TOO_SMALL),
+        (AxisNoise(white=1.5 * SIGMA * 5**0.5), FindingCode.INNOVATIONS_COLOURED),
+    ],
+    ids=["right", "half", "double", "white only"],
+)
+def test_wrong_noise_shows_in_the_innovations_and_right_noise_does_not(believed, code):
+    reported = {}
+    true = (
+        ARTICLE_MIX
+        if code is not FindingCode.INNOVATIONS_COLOURED
+        else AxisNoise(white=SIGMA * 5**0.5, walk=SIGMA / 4.0)
+    )
+    for seed in range(10):
+        table, readings, start, hold = article_readings(50 + seed, true)
+        result = calibrate_with_references(
+            readings, table, believed, start_s=start, hold_s=hold, with_baselines=False, raw_unit="V"
+        )
+        for finding in result.findings:
+            reported[finding.code] = reported.get(finding.code, 0) + 1
+    if code is None:
+        # 30 axes × 3 one-per-cent tests: more than 5 alarms has probability 0.001.
+        assert sum(reported.values()) <= 5
+    else:
+        assert reported[code] >= 27
+
+
+def test_the_direct_form_carries_the_covariance_of_the_inverse_form():
+    table, readings, start, hold = article_readings(9, ARTICLE_MIX)
+    run = {"start_s": start, "hold_s": hold, "with_baselines": False, "raw_unit": "V"}
+    base = calibrate_with_references(readings, table, ARTICLE_MIX, **run)
+    rng = np.random.default_rng(10)
+    draws = []
+    for _ in range(4000):
+        inverse = np.array([rng.multivariate_normal(a.constants, a.covariance) for a in base.axes])
+        S = np.linalg.inv(inverse[:, :3])
+        draws.append(np.concatenate([S.ravel(), -S @ inverse[:, 3]]))
+    got = np.sqrt(np.diag(base.accelerometer.covariance))
+    # Standard deviations of 4000 draws scatter by 1.1 %; 12 of them within 4 of that; second order is negligible.
+    np.testing.assert_allclose(np.std(draws, axis=0) / got, 1.0, atol=0.045)
+    np.testing.assert_allclose(base.accelerometer.S @ base.inverse_S, np.eye(3), atol=1e-12)
+
+
+def test_live_calibration_says_what_the_whole_run_says():
+    table, readings, start, hold = article_readings(11, ARTICLE_MIX)
+    result = calibrate_with_references(
+        readings, table, ARTICLE_MIX, start_s=start, hold_s=hold, with_baselines=False, raw_unit="V"
+    )
+    session_s = float(start[-1] + hold[-1] - start[0])
+    live = LiveCalibration(ARTICLE_MIX, gravity_m_s2=GRAVITY, session_s=session_s, hold_s=5.0)
+    for i in range(324):
+        last = live.add(readings[i], table.specific_force[i], start_s=start[i], hold_s=hold[i], look_ahead=0)
+    np.testing.assert_allclose(last.constants, [a.constants for a in result.axes], rtol=1e-9)
+    np.testing.assert_allclose(last.sigma, [a.sigma for a in result.axes], rtol=1e-9)
+
+
+def test_predicted_poses_are_the_poses_it_takes():
+    noise = AxisNoise(white=0.02, walk=0.0005)
+    live = LiveCalibration(
+        noise, gravity_m_s2=GRAVITY, goal=Goal(sensitivity=5e-4, zero_m_s2=0.02), hold_s=2.0, pause_s=2.0
+    )
+    rng = np.random.default_rng(12)
+    reference, clock, promised = np.array([0.0, 0.0, GRAVITY]), 0.0, []
+    for _ in range(60):
+        reading = reference * [1.01, 0.99, 1.02] + [0.1, -0.2, 0.3] + 0.014 * rng.standard_normal(3)
+        said = live.add(reading, reference, start_s=clock, hold_s=2.0)
+        clock += 4.0
+        if said.good_enough:
+            break
+        reference = said.next_reference
+        if said.poses_needed is not None:
+            promised.append(said.n_poses + said.poses_needed)
+    assert said.good_enough
+    assert said.poses_needed == 0
+    # The promise depends on the sensitivities only through their size, known to a few per cent after four poses.
+    assert all(abs(p - said.n_poses) <= 1 for p in promised)
+    assert np.all(np.abs(said.constants - [[1.01, 0, 0, 0.1], [0, 0.99, 0, -0.2], [0, 0, 1.02, 0.3]]) < 5 * said.sigma)
+
+
+def test_a_plan_that_cannot_reach_the_goal_is_said_so():
+    live = LiveCalibration(AxisNoise(white=0.02), gravity_m_s2=GRAVITY)
+    flat = [[0.0, 0.0, GRAVITY]] * 5
+    for i, reference in enumerate(np.vstack([np.eye(3), -np.eye(3)]) * GRAVITY):
+        said = live.add(reference, reference, start_s=4.0 * i, hold_s=1.0, plan=flat)
+    assert said.poses_needed is None
+
+
+def test_angles_become_the_specific_force_of_the_dividing_head():
+    assert DIVIDING_HEAD_POSES.shape == (324, 2)
+    table = pose_table_from_angles([0.0, 90.0, 0.0], [0.0, 0.0, 90.0], gravity_m_s2=GRAVITY, sigma_angle_deg=0.1)
+    np.testing.assert_allclose(table.specific_force / GRAVITY, [[0, 0, 1], [-1, 0, 0], [0, 1, 0]], atol=1e-15)
+    assert table.sigma_m_s2 == pytest.approx(GRAVITY * np.radians(0.1))
+
+
+def test_one_angle_alone_does_not_determine_an_axis():
+    table = pose_table_from_angles(np.arange(0.0, 360.0, 10.0), gravity_m_s2=GRAVITY)
+    with pytest.raises(ValueError, match="do not determine the four constants"):
+        calibrate_with_references(
+            table.specific_force, table, AxisNoise(white=0.01), start_s=10.0 * np.arange(36), hold_s=5.0
+        )
+
+
+def test_an_uncertain_head_widens_the_error_bars_by_its_angle():
+    table, readings, start, hold = article_readings(13, ARTICLE_MIX)
+    rough = PoseTable(table.specific_force, sigma_m_s2=0.11)
+    run = {"start_s": start, "hold_s": hold, "with_baselines": False}
+    sharp = calibrate_with_references(readings, table, AxisNoise(white=SIGMA * 5**0.5), **run)
+    wide = calibrate_with_references(readings, rough, AxisNoise(white=SIGMA * 5**0.5), **run)
+    # Reading noise and reference error are equal here (0.11 m/s² each): √2, to the misalignment's 0.3 %.
+    np.testing.assert_allclose(wide.axes[0].sigma / sharp.axes[0].sigma, np.sqrt(2.0), rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"start_s": np.zeros(324)}, "in order of time"),
+        ({"start_s": np.zeros(3)}, "one entry per pose"),
+        ({"hold_s": 0.0}, "positive length"),
+        ({"noise": AxisNoise()}, "believed exactly"),
+        ({"noise": [AxisNoise(white=1.0)] * 2}, "one axis or three"),
+        ({"readings": np.full((324, 3), np.nan)}, "must be finite"),
+        ({"readings": np.zeros((10, 3))}, "one row per pose"),
+        ({"prior": Prior(np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((3, 4)))}, "must be finite and positive"),
+    ],
+)
+def test_malformed_questions_are_refused_in_plain_words(change, message):
+    table, readings, start, hold = article_readings(14, ARTICLE_MIX)
+    asked = {"readings": readings, "references": table, "noise": ARTICLE_MIX, "start_s": start, "hold_s": hold} | change
+    with pytest.raises(ValueError, match=message):
+        calibrate_with_references(**asked)
+
+
+def test_a_negative_noise_coefficient_is_refused():
+    with pytest.raises(ValueError, match="flicker must be zero or positive"):
+        AxisNoise(white=1.0, flicker=-1.0)

@@ -1,0 +1,73 @@
+"""Slow, obvious versions of what the Kalman room computes."""
+
+from fractions import Fraction
+
+import numpy as np
+
+GRAVITY = 9.80665
+ARTICLE_CONSTANTS = np.array(
+    [
+        [0.032002, -0.0017435, 7.4811e-5, -2.5865],
+        [0.0022174, 0.031399, 0.00016485, -2.4363],
+        [-0.00033471, -0.0017407, -0.032812, -2.3423],
+    ]
+) / [GRAVITY, GRAVITY, GRAVITY, 1.0]
+"""Published constants of the article, V/(m/s²) and V, rows x, y, z."""
+
+
+def covariance_of_hold_means(start, hold, *, white=0.0, quantisation=0.0, walk=0.0, slope=0.0, gauss_markov=()):
+    """Covariance of means over holds, from the integrals by hand: noise starts at ``start[0]``, ``slope`` is constant.
+
+    ``gauss_markov`` lists pairs (inverse correlation time, standard deviation).
+    """
+    n = len(start)
+    mid = start - start[0] + hold / 2
+    c = slope**2 * np.outer(mid, mid)
+    for i in range(n):
+        c[i, i] += white**2 / hold[i] + 2 * (quantisation / hold[i]) ** 2 + walk**2 * (mid[i] - hold[i] / 6)
+        for beta, sigma in gauss_markov:
+            x = beta * hold[i]
+            c[i, i] += sigma**2 * 2 * (x - 1 + np.exp(-x)) / x**2
+        for j in range(i):
+            both = walk**2 * mid[j]
+            gap = start[i] - start[j] - hold[j]
+            if gap < 1e-9:
+                both -= quantisation**2 / hold[i] / hold[j]
+            for beta, sigma in gauss_markov:
+                x, y = beta * hold[i], beta * hold[j]
+                both += sigma**2 * np.exp(-beta * gap) * (1 - np.exp(-x)) / x * (1 - np.exp(-y)) / y
+            c[i, j] += both
+            c[j, i] += both
+    return c
+
+
+def generalised_least_squares(references, readings, covariance):
+    """Estimate and covariance of the four constants from readings with a full noise covariance."""
+    h = np.column_stack([references, np.ones(len(references))])
+    inverse = np.linalg.inv(covariance)
+    cov = np.linalg.inv(h.T @ inverse @ h)
+    return cov @ h.T @ inverse @ readings, cov
+
+
+def recursive_least_squares_in_fractions(rows, readings, variance, prior_variance):
+    """Textbook recursion in exact arithmetic; returns the estimate and the variances as fractions."""
+    n = len(rows[0])
+    p = [[Fraction(prior_variance) if i == j else Fraction(0) for j in range(n)] for i in range(n)]
+    x = [Fraction(0)] * n
+    for row, reading in zip(rows, readings, strict=True):
+        h = [Fraction(v) for v in row]
+        ph = [sum(p[i][j] * h[j] for j in range(n)) for i in range(n)]
+        s = sum(h[i] * ph[i] for i in range(n)) + Fraction(variance)
+        innovation = Fraction(reading) - sum(h[i] * x[i] for i in range(n))
+        x = [x[i] + ph[i] * innovation / s for i in range(n)]
+        p = [[p[i][j] - ph[i] * ph[j] / s for j in range(n)] for i in range(n)]
+    return x, [p[i][i] for i in range(n)]
+
+
+def naive_covariance_form(rows, variance, prior_variance):
+    """Variances by ``P − K H P`` in double precision: the form the article prints."""
+    p = np.eye(len(rows[0])) * prior_variance
+    for h in rows:
+        ph = p @ h
+        p = p - np.outer(ph, ph) / (h @ ph + variance)
+    return np.diag(p)
