@@ -102,6 +102,18 @@ impl Loss {
         if self == Self::Linear {
             return 1.0;
         }
+        let (weight, psi2, slope) = self.expectations(block);
+        weight * psi2 / slope.powi(2)
+    }
+
+    /// `E[ψ²]` per residual for Gaussian noise: Σψ² divided by it estimates χ² without the weight of outliers.
+    #[must_use]
+    pub fn expected_influence(self, block: usize) -> f64 {
+        self.expectations(block).1
+    }
+
+    /// `(E[w], E[ψ²], E[ψ'])` over blocks of unit Gaussian residuals.
+    fn expectations(self, block: usize) -> (f64, f64, f64) {
         let k = block as f64;
         let (mut mass, mut weight, mut psi2, mut slope) = (0.0, 0.0, 0.0, 0.0);
         // Simpson's rule over the radius: the integrands are smooth but for one kink, 4000 panels leave 1e-7.
@@ -114,14 +126,15 @@ impl Loss {
                 i if i % 2 == 1 => 4.0,
                 _ => 2.0,
             };
-            let density = if block == 1 { 1.0 } else { r.powf(k - 1.0) } * (-0.5 * r * r).exp();
+            let density =
+                simpson * if block == 1 { 1.0 } else { r.powf(k - 1.0) } * (-0.5 * r * r).exp();
             let (_, first, second) = self.rho(r * r);
-            mass += simpson * density;
-            weight += simpson * density * first;
-            psi2 += simpson * density * first * first * r * r / k;
-            slope += simpson * density * (first + 2.0 * second * r * r / k);
+            mass += density;
+            weight += density * first;
+            psi2 += density * first * first * r * r / k;
+            slope += density * (first + 2.0 * second * r * r / k);
         }
-        (weight / mass) * (psi2 / mass) / (slope / mass).powi(2)
+        (weight / mass, psi2 / mass, slope / mass)
     }
 }
 

@@ -8,6 +8,45 @@ import numpy.typing as npt
 
 from trihedron.records.calibration import FloatArray
 
+# accelerometer
+@final
+class NormSettings:
+    def __new__(
+        cls,
+        gravity_m_s2: float,
+        *,
+        symmetric: bool = False,
+        squared: bool = False,
+        loss: int = 0,
+        loss_scale: float = 1.0,
+    ) -> NormSettings: ...
+
+@final
+class NormFit:
+    S: FloatArray
+    b: FloatArray
+    covariance: FloatArray
+    residuals: FloatArray
+    sigmas: FloatArray
+    weights: FloatArray
+    chi2: float
+    robust_chi2: float
+    rank: int
+    is_converged: bool
+    stopped_because: str
+    n_iterations: int
+
+def fit_norm(
+    readings: FloatArray,
+    noise: FloatArray,
+    settings: NormSettings,
+    start: tuple[FloatArray, FloatArray] | None = None,
+) -> NormFit: ...
+def fit_norm_held_out(
+    readings: FloatArray, noise: FloatArray, settings: NormSettings, fit: NormFit, folds: Sequence[int]
+) -> FloatArray: ...
+def fit_ellipsoid(readings: FloatArray, gravity_m_s2: float, symmetric: bool) -> tuple[FloatArray, FloatArray]: ...
+
 # rotation
 def rotation_from_vector(vectors: FloatArray) -> FloatArray: ...
 def vector_from_rotation(rotations: FloatArray) -> FloatArray: ...

@@ -13,6 +13,7 @@ use crate::error::Result as KernelResult;
 
 mod kalman;
 mod poisson;
+mod accelerometer;
 mod rotation;
 mod simulate;
 
@@ -29,6 +30,7 @@ pub(crate) fn run<T: Send>(
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     poisson::register(module)?;
     kalman::register(module)?;
+    accelerometer::register(module)?;
     rotation::register(module)?;
     simulate::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.

@@ -47,7 +47,8 @@ class FitQuality:
     ``held_out`` has the shape of ``residual``: the same quantity predicted by a fit that did not see that pose or move
     (k-fold), ``held_out_sigma`` its prediction error. ``rms_dof`` is the rms per degree of freedom, ``floor`` the rms
     that noise alone would give. ``angle_deg`` (m,), gyro only: angle between predicted and measured gravity after each
-    move, in sample; ``held_out_angle_deg`` (m,) the same held out.
+    move, in sample; ``held_out_angle_deg`` (m,) the same held out. ``covariance_scale`` is the factor by which the
+    covariance of the stated noise was multiplied because the residuals exceed that noise; 1 when they do not.
     """
 
     unit: str
@@ -66,6 +67,7 @@ class FitQuality:
     weights: FloatArray | None = None
     n_iterations: int = 0
     stopped_because: str = ""
+    covariance_scale: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

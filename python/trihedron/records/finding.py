@@ -71,6 +71,8 @@ class FindingCode(str, Enum):
     INNOVATIONS_TOO_SMALL = "innovations-too-small"
     INNOVATIONS_COLOURED = "innovations-coloured"
     NOISE_ASSUMED = "noise-assumed"
+    SCALE_NOT_NOMINAL = "scale-not-nominal"
+    POSE_NOT_A_FACE = "pose-not-a-face"
 
 
 @dataclass(frozen=True)

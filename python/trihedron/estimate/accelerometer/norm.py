@@ -1,0 +1,300 @@
+"""Method 2: ``|S a' + b| = |g|`` in every still pose, free of case and table (docs/model.md, section 3)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.estimate.accelerometer import inputs, verdict
+from trihedron.estimate.accelerometer.poses import ENTRIES, PoseDesign
+from trihedron.records.calibration import FitQuality, FloatArray, Frame, SensorCalibration
+from trihedron.records.finding import Finding
+from trihedron.sensor_model import reframing
+from trihedron.units import AccelerationUnit
+
+Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
+
+# Number across the seam, and the scale (in standard errors) that keeps 95 % efficiency on Gaussian noise.
+_LOSSES: dict[str, tuple[int, float]] = {
+    "linear": (0, 1.0),
+    "huber": (1, 1.345),
+    "soft_l1": (2, 1.0),
+    "cauchy": (3, 2.385),
+}
+
+METHOD = "method 2: norm of gravity in still poses"
+
+LEAVE_ONE_OUT_LIMIT = 200
+"""Up to this many poses each is held out alone; beyond, poses are held out in this many folds of neighbours in time."""
+
+
+def calibrate_norm(
+    means: npt.ArrayLike,
+    sigma_means: npt.ArrayLike,
+    gravity_m_s2: float,
+    *,
+    raw_unit: AccelerationUnit | str = AccelerationUnit.COUNTS,
+    frame: Frame = "lower",
+    loss: Loss = "linear",
+    loss_scale: float | None = None,
+    objective: Literal["norm", "squared"] = "norm",
+    axis_signs: npt.ArrayLike | None = None,
+    start: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+) -> tuple[SensorCalibration, tuple[Finding, ...]]:
+    """Accelerometer triad from the mean readings of still poses, whatever their orientation.
+
+    Minimises ``Σ ρ(((|S a' + b| - |g|)/σ)²)`` with ``σ² = uᵀ S Σ Sᵀ u``, the noise of the mean along gravity (eq. 12).
+
+    Parameters
+    ----------
+    means : (n, 3)
+        Mean raw reading of each pose.
+    sigma_means : (3,), (n, 3) or (n, 3, 3)
+        Standard errors of the means in raw units, or their covariances. They decide weights and error bars.
+    gravity_m_s2 : float
+        |g| where the recording was made. A relative error of |g| is the same relative error of every scale.
+    raw_unit : AccelerationUnit
+        Unit of ``means``; only kept in the result and used to question implausible scales.
+    frame : "lower" or "symmetric"
+        Instrument trihedron. (``case`` needs method 1: still poses do not know the case.)
+    loss, loss_scale
+        Robust loss and its scale in standard errors; the default scales keep 95 % efficiency on Gaussian noise.
+    objective : "norm" or "squared"
+        ``squared`` is the manual's ``(|S a'+b|² - |g|²)²``; the norm is better conditioned.
+    axis_signs : (3,) of ±1, optional
+        Sign with which each raw axis follows its axis of Mz, from the board's documentation or method 1: the signs of
+        the diagonal of S. Gravity's magnitude cannot tell them; +1 without a statement. An odd number of minus signs
+        is reported as a left-handed triad.
+    start : (S, b), optional
+        Starting model; an ellipsoid fit otherwise.
+
+    Returns
+    -------
+    (SensorCalibration, findings)
+        When the poses do not determine nine parameters, the unseen ones stay at the ellipsoid or sphere start, their
+        variance is that of complete ignorance (100 % of scale, |g| of zero), and a SERIOUS finding names poses to add.
+
+    Raises
+    ------
+    ValueError
+        When arrays do not fit, hold NaN, there are fewer than three poses, or all poses read the same.
+    """
+    values, noise = inputs.pose_means(means, sigma_means)
+    g = inputs.gravity(gravity_m_s2)
+    signs = inputs.axis_signs(axis_signs)
+    unit = AccelerationUnit(raw_unit)
+    settings = _settings(g, frame, loss, loss_scale, objective)
+    _enough(values)
+    # The core works on axes with positive signs; flipping a raw axis flips a column of S and nothing else.
+    flip = np.outer(signs, signs)
+    positive, turned = values * signs, noise * flip
+    fit = _core.fit_norm(positive, turned, settings, _positive_start(start, signs))
+    folds = _folds(len(values))
+    apart = _core.fit_norm_held_out(positive, turned, settings, fit, folds)
+    return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
+
+
+def calibrate_norm_samples(
+    samples: npt.ArrayLike,
+    pose_of_sample: npt.ArrayLike,
+    sigma_means: npt.ArrayLike,
+    gravity_m_s2: float,
+    *,
+    raw_unit: AccelerationUnit | str = AccelerationUnit.COUNTS,
+    frame: Frame = "lower",
+    loss: Loss = "linear",
+    loss_scale: float | None = None,
+    axis_signs: npt.ArrayLike | None = None,
+) -> tuple[SensorCalibration, tuple[Finding, ...]]:
+    """The same from every raw sample of every still pose, in one parallel pass (10⁶ samples in a fraction of a second).
+
+    Each sample is charged with ``n_pose`` times the variance of its pose's mean, so that slow noise inside a hold,
+    which averaging does not remove, is not mistaken for information. A robust loss rejects single samples, not poses.
+
+    Parameters
+    ----------
+    samples : (n, 3)
+        Raw readings of the still poses.
+    pose_of_sample : (n,) of int
+        Index of the pose of each sample, 0 … n_poses - 1.
+    sigma_means : (3,), (n_poses, 3) or (n_poses, 3, 3)
+        Noise of the mean reading of each pose.
+
+    Other parameters, results and errors are those of :func:`calibrate_norm`.
+    """
+    raw = np.ascontiguousarray(samples, dtype=np.float64)
+    pose = np.asarray(pose_of_sample)
+    if raw.ndim != 2 or raw.shape[1] != 3 or pose.shape != (len(raw),) or len(raw) == 0:
+        raise ValueError(f"samples must have shape (n, 3) with one pose index each, got {raw.shape} and {pose.shape}")
+    if not np.issubdtype(pose.dtype, np.integer) or pose.min() < 0:
+        raise ValueError("pose indices must be non-negative integers")
+    count = np.bincount(pose)
+    if np.any(count == 0):
+        raise ValueError(f"pose {int(np.flatnonzero(count == 0)[0])} has no samples")
+    sums = np.column_stack([np.bincount(pose, weights=raw[:, j]) for j in range(3)])
+    values, noise = inputs.pose_means(sums / count[:, None], sigma_means)
+    g = inputs.gravity(gravity_m_s2)
+    signs = inputs.axis_signs(axis_signs)
+    unit = AccelerationUnit(raw_unit)
+    settings = _settings(g, frame, loss, loss_scale, "norm")
+    _enough(values)
+    flip = np.outer(signs, signs)
+    per_pose = noise * flip * count[:, None, None]
+    start = _core.fit_norm(values * signs, noise * flip, settings)
+    fit = _core.fit_norm(raw * signs, per_pose[pose], settings, (start.S, start.b))
+    apart = _core.fit_norm_held_out(values * signs, noise * flip, settings, start, _folds(len(values)))
+    return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
+
+
+def _settings(g: float, frame: str, loss: str, loss_scale: float | None, objective: str) -> _core.NormSettings:
+    if frame not in ("lower", "symmetric"):
+        raise ValueError(
+            f"still poses of any orientation give the frame 'lower' or 'symmetric', not {frame!r}: "
+            "they do not know the case"
+        )
+    if loss not in _LOSSES:
+        raise ValueError(f"loss must be one of {', '.join(_LOSSES)}, got {loss!r}")
+    if objective not in ("norm", "squared"):
+        raise ValueError(f"objective must be 'norm' or 'squared', got {objective!r}")
+    number, default = _LOSSES[loss]
+    return _core.NormSettings(
+        g,
+        symmetric=frame == "symmetric",
+        squared=objective == "squared",
+        loss=number,
+        loss_scale=default if loss_scale is None else float(loss_scale),
+    )
+
+
+def _enough(values: FloatArray) -> None:
+    if len(values) < 3:
+        raise ValueError(
+            f"{len(values)} still poses are too few for an accelerometer: record at least nine different orientations, "
+            "better eighteen (six faces and twelve edges of a cube)"
+        )
+
+
+def _positive_start(
+    start: tuple[npt.ArrayLike, npt.ArrayLike] | None, signs: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    if start is None:
+        return None
+    S, b = (np.ascontiguousarray(part, dtype=np.float64) for part in start)
+    if S.shape != (3, 3) or b.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(b))):
+        raise ValueError("a start is S of shape (3, 3) and b of shape (3,), finite")
+    return np.ascontiguousarray(S * signs), b
+
+
+def _folds(n: int) -> list[int]:
+    if n <= LEAVE_ONE_OUT_LIMIT:
+        return list(range(n))
+    return [i * LEAVE_ONE_OUT_LIMIT // n for i in range(n)]
+
+
+def _assemble(
+    fit: _core.NormFit,
+    apart: FloatArray,
+    values: FloatArray,
+    noise: FloatArray,
+    g: float,
+    unit: AccelerationUnit,
+    signs: FloatArray,
+    frame: Frame,
+    *,
+    signs_are_known: bool,
+) -> tuple[SensorCalibration, tuple[Finding, ...]]:
+    """Residuals, certainty and findings of a fitted triad, back in the raw axes as they are."""
+    # f = S₊ (D a') + b: flipping a raw axis flips a column of S.
+    S = fit.S * signs
+    f = values @ S.T + fit.b
+    up = f / np.linalg.norm(f, axis=1)[:, None]
+    residual, sigma = norm_residual(f, S, noise, g)
+    dof = len(values) - 9
+    z2 = (residual / sigma) ** 2
+    # A robust loss also judges the noise without the poses it rejected; of single samples it says nothing about poses.
+    chi2 = fit.robust_chi2 if len(fit.weights) == len(values) else float(z2.sum())
+    scale = verdict.covariance_scale(chi2, dof)
+    design = PoseDesign.of(up, sigma / g)
+    relative_sigma = float(np.median(sigma)) / g
+    if design.rank < 9:
+        covariance = _covariance_of_ignorance(design, S, fit.b, g, frame)
+    else:
+        turn = np.concatenate([np.tile(signs, 3), np.ones(3)])
+        covariance = fit.covariance * np.outer(turn, turn) * scale
+    rms = float(np.sqrt(np.mean(residual**2)))
+    rms_dof = float(np.sqrt(np.sum(residual**2) / dof)) if dof > 0 else float("nan")
+    floor = float(np.sqrt(np.mean(sigma**2)))
+    unseen = apart[:, 0]
+    predicted = np.isfinite(unseen)
+    observability = design.observability(relative_sigma)
+    quality = FitQuality(
+        unit="m/s^2",
+        residual=residual,
+        sigma=sigma,
+        chi2=float(z2.sum()),
+        dof=max(dof, 0),
+        rms=rms,
+        rms_dof=rms_dof,
+        floor=floor,
+        held_out=unseen,
+        held_out_sigma=apart[:, 1],
+        held_out_rms=float(np.sqrt(np.mean(unseen[predicted] ** 2))) if predicted.any() else None,
+        weights=fit.weights if len(fit.weights) == len(values) else None,
+        n_iterations=fit.n_iterations,
+        stopped_because=fit.stopped_because,
+        covariance_scale=scale,
+    )
+    findings = [
+        *verdict.convergence_findings(fit.is_converged, fit.stopped_because),
+        *verdict.observability_findings(design, relative_sigma, observability.advice),
+        *verdict.model_findings(S, unit, signs_are_known=signs_are_known),
+        *verdict.residual_findings(chi2, dof, rms_dof, floor),
+        *verdict.held_out_findings(unseen, apart[:, 1], apart[:, 2], dof),
+    ]
+    sensor = SensorCalibration(
+        S=S,
+        b=fit.b,
+        covariance=covariance,
+        raw_unit=unit.value,
+        si_unit="m/s^2",
+        method=METHOD,
+        quality=quality,
+        observability=observability,
+    )
+    return sensor, tuple(findings)
+
+
+def norm_residual(f: FloatArray, S: FloatArray, noise: FloatArray, g: float) -> tuple[FloatArray, FloatArray]:
+    """``|f| - |g|`` (n,) less the inflation by noise across gravity, and its standard error (n,), in m/s² (eq. 12).
+
+    ``f`` (n, 3) corrected means in m/s², ``noise`` (n, 3, 3) covariances of the raw means.
+    """
+    norm = np.linalg.norm(f, axis=1)
+    up = f / norm[:, None]
+    spread = np.einsum("ij,njk,lk->nil", S, noise, S)
+    total = np.trace(spread, axis1=1, axis2=2)
+    along = np.einsum("ni,nij,nj->n", up, spread, up)
+    sigma = np.sqrt(np.maximum(along, 1e-6 * total))
+    return norm - g - (total - along) / (2.0 * g), sigma
+
+
+def _covariance_of_ignorance(design: PoseDesign, S: FloatArray, b: FloatArray, g: float, frame: Frame) -> FloatArray:
+    """(12, 12) with the unseen directions as wide as a prior of 100 % in scale and |g| in zero (eq. 17)."""
+    physical = np.linalg.inv(design.information + np.eye(9))
+    to_lower = reframing(S, b, "lower")
+    L, low = to_lower.rotation @ S, to_lower.rotation @ b
+    # δf = M f + z with f = L a' + b: δL = M L, δb = M b + z.
+    jacobian = np.zeros((12, 9))
+    for column, (j, k) in enumerate(ENTRIES):
+        M = np.zeros((3, 3))
+        M[j, k] = 1.0
+        jacobian[:9, column] = (M @ L).ravel()
+        jacobian[9:, column] = M @ low
+    jacobian[9:, 6:] = g * np.eye(3)
+    back = reframing(L, low, frame)
+    jacobian = back.jacobian @ jacobian
+    covariance: FloatArray = jacobian @ physical @ jacobian.T
+    return covariance

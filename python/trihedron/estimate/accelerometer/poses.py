@@ -1,0 +1,157 @@
+"""What still poses in given directions determine, in words, and which pose to add next.
+
+In the truth's own coordinates a small error of the model is ``δf = M f + z`` with M lower triangular; a pose with
+gravity reaction along the unit vector u sees ``uᵀδf = g Σ_{j≥k} M_jk u_j u_k + zᵀu``. These nine functions of direction
+depend on nothing but u, so that the sufficiency of a set of poses can be told before the first sample is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from trihedron.records.calibration import FloatArray, Observability
+
+ENTRIES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
+"""Rows and columns of M's six entries."""
+
+NAMES: tuple[str, ...] = tuple(
+    f"scale of axis {j + 1}" if j == k else f"angle between axes {k + 1} and {j + 1}" for j, k in ENTRIES
+) + tuple(f"zero of axis {j + 1}" for j in range(3))
+"""The nine parameters as a user would name them."""
+
+RANK_TOLERANCE = 1e-6
+"""Singular value, relative to the largest, below which a direction counts as unseen: only the same pose repeats to a
+part in a million."""
+
+
+def _unit(directions: FloatArray) -> FloatArray:
+    unit: FloatArray = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return unit
+
+
+CANDIDATES: FloatArray = _unit(np.array([c for c in product((-1.0, 0.0, 1.0), repeat=3) if any(c)]))
+"""(26, 3) faces, edges and corners of a cube: the poses that a hand can find on a table."""
+
+
+def design_rows(directions: FloatArray) -> FloatArray:
+    """(n, 9) sensitivity of the norm, in units of |g|, of poses with unit upward vectors (n, 3)."""
+    u = np.asarray(directions, dtype=np.float64)
+    return np.column_stack([u[:, j] * u[:, k] for j, k in ENTRIES] + [u[:, j] for j in range(3)])
+
+
+def pose_in_words(direction: FloatArray) -> str:
+    """How to hold the sensor so that a unit vector (3,) of it points up.
+
+    Examples
+    --------
+    >>> pose_in_words(np.array([0.7071, 0.0, -0.7071]))
+    'axis 1 up, then tilted 45° so that axis 3 points half down'
+    """
+    u = np.asarray(direction, dtype=np.float64)
+    order = np.argsort(-np.abs(u), kind="stable")
+    first = order[0]
+    text = f"axis {first + 1} {'up' if u[first] > 0 else 'down'}"
+    others = [j for j in order[1:] if abs(u[j]) > 0.2]
+    if not others:
+        return text
+    tilt = np.degrees(np.arccos(min(abs(u[first]) / np.linalg.norm(u), 1.0)))
+    toward = " and ".join(f"axis {j + 1} points half {'up' if u[j] > 0 else 'down'}" for j in others)
+    return f"{text}, then tilted {tilt:.0f}° so that {toward}"
+
+
+@dataclass(frozen=True, eq=False)
+class PoseDesign:
+    """The information of a set of poses.
+
+    ``information`` (9, 9) in units of (|g|/σ)²; ``covariance`` its inverse over the ``rank`` determined directions;
+    ``singular_values`` (9,) of the column-scaled design.
+    """
+
+    rows: FloatArray
+    information: FloatArray
+    covariance: FloatArray
+    rank: int
+    singular_values: FloatArray
+    scale: FloatArray
+    directions: FloatArray
+
+    @classmethod
+    def of(cls, up: FloatArray, relative_sigma: FloatArray) -> PoseDesign:
+        """Of poses with unit upward vectors (n, 3) and standard errors σ/|g| (n,)."""
+        rows = design_rows(up) / np.asarray(relative_sigma)[:, None]
+        scale = np.linalg.norm(rows, axis=0)
+        scale = np.where(scale > 0, scale, 1.0)
+        padded = np.zeros((max(len(rows), 9), 9))
+        padded[: len(rows)] = rows / scale
+        _, s, vt = np.linalg.svd(padded, full_matrices=False)
+        rank = int(np.sum(s > RANK_TOLERANCE * s[0]))
+        half = (vt[:rank].T / s[:rank]) / scale[:, None]
+        return cls(rows, rows.T @ rows, half @ half.T, rank, s, scale, vt)
+
+    def weakest(self) -> str:
+        """The worst determined combination, in words."""
+        direction = self.directions[-1] / self.scale
+        share = np.abs(direction) / np.abs(direction).max()
+        # Zero and scale are compared in the effect each has on a reading near |g|, which both rows already are in.
+        names = [NAMES[k] for k in np.argsort(-share, kind="stable") if share[k] > 0.5]
+        joined = names[0] if len(names) == 1 else " together with ".join([", ".join(names[:-1]), names[-1]])
+        if self.rank < 9:
+            return f"{joined}: not seen at all ({self.rank} of 9 parameters are determined)"
+        return f"{joined}: seen {self.singular_values[0] / self.singular_values[-1]:.3g} times worse than the best"
+
+    def worst_prediction(self) -> float:
+        """Largest standard error, over the candidate directions, of the norm that the model predicts, in |g|."""
+        if self.rank < 9:
+            return float("inf")
+        rows = design_rows(CANDIDATES)
+        return float(np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows).max()))
+
+    def advice(self, relative_sigma: float, n_poses: int) -> tuple[str, ...]:
+        """The poses that most reduce the largest variance among the nine parameters, one after another (greedy)."""
+        information = self.information.copy()
+        # A prior of one (100 % of scale, |g| of zero) makes the unseen comparable with the badly seen.
+        information += np.eye(9)
+        rows = design_rows(CANDIDATES) / relative_sigma
+        words = []
+        for _ in range(n_poses):
+            covariance = np.linalg.inv(information)
+            seen = rows @ covariance
+            gain = seen**2 / (1.0 + np.einsum("ij,ij->i", seen, rows))[:, None]
+            left = np.diag(covariance) - gain
+            # The worst first; among equals the smaller sum, so that a pose also helps the second worst.
+            score = left.max(axis=1) + 1e-3 * left.sum(axis=1)
+            best = int(np.argmin(score))
+            words.append(pose_in_words(CANDIDATES[best]))
+            information += np.outer(rows[best], rows[best])
+        return tuple(words)
+
+    def correlated(self) -> tuple[tuple[str, str, float], ...]:
+        """Pairs of parameters with |correlation| > 0.9, strongest first."""
+        if self.rank < 9:
+            return ()
+        sigma = np.sqrt(np.diag(self.covariance))
+        correlation = self.covariance / np.outer(sigma, sigma)
+        pairs = [
+            (NAMES[j], NAMES[k], float(correlation[j, k]))
+            for j in range(9)
+            for k in range(j + 1, 9)
+            if abs(correlation[j, k]) > 0.9
+        ]
+        return tuple(sorted(pairs, key=lambda pair: -abs(pair[2])))
+
+    def observability(self, relative_sigma: float, n_advised: int = 3) -> Observability:
+        """As a record, with advice where something is weak."""
+        missing = max(9 - self.rank, 0)
+        n_advised = max(missing, n_advised)
+        return Observability(
+            rank=self.rank,
+            n_parameters=9,
+            condition=float(self.singular_values[0] / self.singular_values[-1]) if self.rank == 9 else float("inf"),
+            singular_values=self.singular_values,
+            weakest=self.weakest(),
+            advice=self.advice(relative_sigma, n_advised),
+            correlated=self.correlated(),
+        )

@@ -1,0 +1,50 @@
+"""Gravity and rotation of the Earth where the sensor stands."""
+
+from __future__ import annotations
+
+import math
+
+EARTH_RATE_RAD_S = 7.292115e-5
+"""Rotation of the Earth against inertial space (WGS 84)."""
+
+_EQUATORIAL_RADIUS_M = 6378137.0
+_FLATTENING = 1.0 / 298.257223563
+_GM_M3_S2 = 3.986004418e14
+_GRAVITY_EQUATOR_M_S2 = 9.7803253359
+_GRAVITY_POLE_M_S2 = 9.8321849378
+_POLAR_RADIUS_M = _EQUATORIAL_RADIUS_M * (1.0 - _FLATTENING)
+_ECCENTRICITY2 = _FLATTENING * (2.0 - _FLATTENING)
+
+
+def normal_gravity(latitude_deg: float, height_m: float = 0.0) -> float:
+    """Magnitude of normal gravity [m/s²] at a geodetic latitude [deg] and height above the ellipsoid [m].
+
+    Somigliana's closed formula on the WGS 84 ellipsoid and the second-order height correction (NIMA TR8350.2, eq. 4-1
+    and 4-3). What it leaves out, the local anomaly, is typically 3e-4 m/s² and seldom above 2e-3 m/s²: 0.02 % of scale.
+
+    Raises
+    ------
+    ValueError
+        When the latitude is not within ±90° or the height not within -1 to 20 km.
+
+    Examples
+    --------
+    >>> round(normal_gravity(45.0), 6)
+    9.806198
+    """
+    if not -90.0 <= latitude_deg <= 90.0:
+        raise ValueError(f"latitude must be between -90 and 90 degrees, got {latitude_deg}")
+    if not -1000.0 <= height_m <= 20000.0:
+        raise ValueError(f"height must be between -1000 and 20000 m, got {height_m}")
+    sin2 = math.sin(math.radians(latitude_deg)) ** 2
+    k = _POLAR_RADIUS_M * _GRAVITY_POLE_M_S2 / (_EQUATORIAL_RADIUS_M * _GRAVITY_EQUATOR_M_S2) - 1.0
+    at_surface = _GRAVITY_EQUATOR_M_S2 * (1.0 + k * sin2) / math.sqrt(1.0 - _ECCENTRICITY2 * sin2)
+    m = EARTH_RATE_RAD_S**2 * _EQUATORIAL_RADIUS_M**2 * _POLAR_RADIUS_M / _GM_M3_S2
+    relative = height_m / _EQUATORIAL_RADIUS_M
+    return at_surface * (1.0 - 2.0 * (1.0 + _FLATTENING + m - 2.0 * _FLATTENING * sin2) * relative + 3.0 * relative**2)
+
+
+def earth_rate_north_up(latitude_deg: float) -> tuple[float, float]:
+    """Northward and upward components [rad/s] of the Earth's rotation at a latitude [deg]."""
+    latitude = math.radians(latitude_deg)
+    return EARTH_RATE_RAD_S * math.cos(latitude), EARTH_RATE_RAD_S * math.sin(latitude)

@@ -1,0 +1,212 @@
+r"""The linear sensor model in both directions, and the frames in which it may be expressed (docs/model.md, section 1).
+
+Direct form, raw → truth (*correct*):  ``f = S a' + b``.
+Inverse form, truth → raw (*distort*):  ``a' = S_a f + b_a`` with ``S_a = S⁻¹``, ``b_a = -S⁻¹ b``.
+
+Signs and handedness
+--------------------
+``|f| = |g|`` is unchanged when Mz is reflected, so nothing in still poses decides the sign of a row of ``S``. A frame
+is therefore reached from another by a *proper rotation* only: a triad whose documented axes are left-handed
+(``det S < 0``) stays left-handed in every frame, with the signs on the diagonal of ``S``, and is reported, not mended.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from trihedron.records.calibration import Calibration, FloatArray, Frame, SensorCalibration
+
+
+def correct(readings: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:
+    """Raw readings (n, 3) → truth (n, 3) in SI, ``S a' + b`` (eq. 1)."""
+    return np.asarray(np.asarray(readings, dtype=np.float64) @ S.T + b, dtype=np.float64)
+
+
+def distort(truth: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:
+    """Truth (n, 3) in SI → raw readings (n, 3), ``S⁻¹ (f - b)`` (eq. 2)."""
+    return np.asarray(np.linalg.solve(S, (np.asarray(truth, dtype=np.float64) - b).T).T, dtype=np.float64)
+
+
+def other_form(S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Direct form → inverse form, or back: ``(S⁻¹, -S⁻¹ b)`` (eq. 3).
+
+    Raises
+    ------
+    ValueError
+        When S is singular.
+    """
+    S = np.asarray(S, dtype=np.float64)
+    if np.linalg.cond(S) > 1e12:
+        raise ValueError("S is singular: two sensor axes are parallel, or one has no scale")
+    inverse = np.asarray(np.linalg.inv(S), dtype=np.float64)
+    return inverse, -inverse @ b
+
+
+def other_form_jacobian(S: FloatArray, b: FloatArray) -> FloatArray:
+    """(12, 12) derivative of :func:`other_form`: rows and columns are S row by row, then b.
+
+    ``δS_a = -S_a δS S_a``,  ``δb_a = -S_a δb + S_a δS S_a b``.
+    """
+    inverse, offset = other_form(S, b)
+    jacobian = np.zeros((12, 12))
+    jacobian[:9, :9] = -np.kron(inverse, inverse.T)
+    jacobian[9:, :9] = -np.kron(inverse, offset[None, :])
+    jacobian[9:, 9:] = -inverse
+    return jacobian
+
+
+@dataclass(frozen=True, eq=False)
+class Reframing:
+    """How one triad gets into a frame: ``S → R S``, ``b → R b`` with a proper rotation that depends on S itself.
+
+    ``rotation`` R (3, 3); ``tilt`` (3, 12) the small rotation vector of R per change of the 12 parameters (so that
+    ``δR = [tilt δp]× R``); ``jacobian`` (12, 12) of the new parameters with respect to the old ones.
+    """
+
+    rotation: FloatArray
+    tilt: FloatArray
+    jacobian: FloatArray
+
+    def follow(self, S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of another sensor's ``R S``, ``R b``: (12, 12) per its own and (12, 12) per this triad's."""
+        order = _columns_first()
+        own = np.asarray(np.kron(np.eye(4), self.rotation)[np.ix_(order, order)], dtype=np.float64)
+        moved = np.column_stack([self.rotation @ S, self.rotation @ b])
+        through = np.zeros((12, 12))
+        for k in range(12):
+            through[:, k] = _flatten(_skew(self.tilt[:, k]) @ moved)
+        return own, through
+
+
+def reframing(S: FloatArray, b: FloatArray, frame: Frame) -> Reframing:
+    """The rotation that expresses an accelerometer triad in a frame, with its derivatives (eq. 4 and 5).
+
+    ``lower``: ``S = Q L`` with L lower triangular, ``R = Qᵀ``. ``symmetric``: ``S = U P`` (polar), ``R = Uᵀ``.
+    ``case``: the identity. Where ``det S < 0`` the sign stays on the diagonal: R is the proper rotation nearest to the
+    identity.
+
+    Raises
+    ------
+    ValueError
+        When S is singular.
+    """
+    S = np.asarray(S, dtype=np.float64)
+    b = np.asarray(b, dtype=np.float64)
+    other_form(S, b)
+    if frame == "case":
+        return Reframing(np.eye(3), np.zeros((3, 12)), np.eye(12))
+    if frame == "lower":
+        # QL is QR with rows and columns reversed.
+        q, _ = np.linalg.qr(S[::-1, ::-1])
+        q = q[::-1, ::-1]
+        q = q * np.sign(np.diag(q.T @ S))
+    elif frame == "symmetric":
+        u, _, vt = np.linalg.svd(S)
+        q = u @ vt
+    else:
+        raise ValueError(f"frame must be 'lower', 'symmetric' or 'case', got {frame!r}")
+    signs = _nearest_proper(q)
+    rotation: FloatArray = (q * signs).T
+    new = rotation @ S
+    tilt = np.zeros((3, 12))
+    for k in range(9):
+        change = np.zeros((3, 3))
+        change[k // 3, k % 3] = 1.0
+        turned = rotation @ change
+        tilt[:, k] = _lower_tilt(turned, new) if frame == "lower" else _symmetric_tilt(turned * signs, new * signs)
+    own, through = Reframing(rotation, tilt, np.eye(12)).follow(S, b)
+    return Reframing(rotation, tilt, own + through)
+
+
+def _lower_tilt(turned: FloatArray, new: FloatArray) -> FloatArray:
+    """ω with ``turned + [ω]× new`` lower triangular."""
+    x = turned @ np.linalg.inv(new)
+    return np.array([x[1, 2], -x[0, 2], x[0, 1]])
+
+
+def _symmetric_tilt(turned: FloatArray, new: FloatArray) -> FloatArray:
+    """ω with ``turned + [ω]× new`` symmetric, new being symmetric: ``(tr(P) I - P) ω = -vee(turned - turnedᵀ)``."""
+    skewness = np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
+    tilt: FloatArray = -np.linalg.solve(np.trace(new) * np.eye(3) - new, skewness)
+    return tilt
+
+
+def _nearest_proper(q: FloatArray) -> FloatArray:
+    """Signs (3,) of q's columns that make it a proper rotation with the largest trace."""
+    wanted = np.sign(np.linalg.det(q))
+    choices = [np.array(signs) for signs in product((1.0, -1.0), repeat=3) if np.prod(signs) == wanted]
+    best: FloatArray = max(choices, key=lambda signs: float(np.sum(np.diag(q) * signs)))
+    return best
+
+
+def rotated(sensor: SensorCalibration, rotation: FloatArray) -> SensorCalibration:
+    """The same sensor in a frame turned by a known rotation R: ``S → R S``, ``b → R b``, covariance along."""
+    rotation = np.asarray(rotation, dtype=np.float64)
+    order = _columns_first()
+    jacobian = np.kron(np.eye(4), rotation)[np.ix_(order, order)]
+    covariance = jacobian @ sensor.covariance @ jacobian.T
+    return replace(sensor, S=rotation @ sensor.S, b=rotation @ sensor.b, covariance=covariance)
+
+
+def in_frame(calibration: Calibration, frame: Frame) -> Calibration:
+    """Both sensors in another frame; the uncertainty of the accelerometer's axes turns the gyro's axes with it (eq. 6).
+
+    Raises
+    ------
+    ValueError
+        When the accelerometer's S is singular, or ``case`` is asked for: no still pose knows the case.
+    """
+    if frame == calibration.frame:
+        return calibration
+    if frame == "case":
+        raise ValueError("the case frame is only known from method 1 (six faces of the case)")
+    accelerometer = calibration.accelerometer
+    change = reframing(accelerometer.S, accelerometer.b, frame)
+    n = len(calibration.covariance)
+    jacobian = np.zeros((n, n))
+    jacobian[:12, :12] = change.jacobian
+    gyroscope = calibration.gyroscope
+    if gyroscope is not None:
+        jacobian[12:, 12:], jacobian[12:, :12] = change.follow(gyroscope.S, gyroscope.b)
+    covariance = jacobian @ calibration.covariance @ jacobian.T
+    R = change.rotation
+    return replace(
+        calibration,
+        accelerometer=replace(
+            accelerometer,
+            S=_exactly_in_frame(R @ accelerometer.S, frame),
+            b=R @ accelerometer.b,
+            covariance=covariance[:12, :12],
+        ),
+        gyroscope=None
+        if gyroscope is None
+        else replace(gyroscope, S=R @ gyroscope.S, b=R @ gyroscope.b, covariance=covariance[12:, 12:]),
+        covariance=covariance,
+        frame=frame,
+    )
+
+
+def _exactly_in_frame(S: FloatArray, frame: Frame) -> FloatArray:
+    """Rounding removed from the entries that the frame makes zero or equal."""
+    if frame == "lower":
+        return np.tril(S)
+    signs = np.sign(np.diag(S))
+    symmetric: FloatArray = 0.5 * (S * signs + (S * signs).T) * signs
+    return symmetric
+
+
+def _skew(v: FloatArray) -> FloatArray:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def _flatten(S_and_b: FloatArray) -> FloatArray:
+    """(3, 4) of S beside b → the 12 parameters."""
+    return np.concatenate([S_and_b[:, :3].ravel(), S_and_b[:, 3]])
+
+
+def _columns_first() -> list[int]:
+    """Where each of the 12 parameters lies in the columns of S, then b, stacked."""
+    return [3 * j + i for i in range(3) for j in range(3)] + [9, 10, 11]

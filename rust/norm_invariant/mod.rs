@@ -1,0 +1,359 @@
+//! Accelerometer triad from still poses alone: `|S a' + b| = |g|` in every orientation (model.md, section 3).
+//!
+//! Nine parameters, `S` lower triangular or symmetric. The residual `|S a' + b| - |g|` of a pose is divided by the noise
+//! of its mean *projected on gravity*, `σ² = uᵀ S Σ Sᵀ u` with `u = f/|f|`. σ is frozen while the solver runs and renewed
+//! between runs: left free it would reward a large `S`.
+
+mod held_out;
+mod problem;
+
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
+
+pub use held_out::{HeldOut, held_out};
+use problem::{Frozen, PoseProblem, SampleProblem};
+
+use crate::ellipsoid::{self, Standardisation};
+use crate::error::{Error, Result};
+use crate::gauss_newton::{self, Certainty, Loss, Options, Stop};
+
+/// Free parameters: six of `S`, three of `b`.
+pub const N_PARAMETERS: usize = 9;
+
+/// The instrument trihedron in which `S` is expressed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frame {
+    /// z1 along accelerometer axis 1, z2 in the plane of axes 1 and 2: `S` lower triangular.
+    Lower,
+    /// `S` symmetric.
+    Symmetric,
+}
+
+impl Frame {
+    /// `(row, column)` of the six free entries of `S`; a symmetric `S` has the mirrored one as well.
+    const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+}
+
+/// What is squared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Objective {
+    /// `|S a' + b| - |g|`.
+    Norm,
+    /// `(|S a' + b|² - |g|²) / 2|g|`, the manual's objective in m/s².
+    SquaredNorm,
+}
+
+/// Direct model `f = S a' + b`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Model {
+    /// m/s² per raw unit.
+    pub s: Matrix3<f64>,
+    /// m/s².
+    pub b: Vector3<f64>,
+}
+
+impl Model {
+    /// Raw reading → specific force.
+    #[must_use]
+    pub fn correct(&self, reading: &Vector3<f64>) -> Vector3<f64> {
+        self.s * reading + self.b
+    }
+}
+
+/// How to fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// |g| in m/s².
+    pub gravity: f64,
+    /// Of the answer.
+    pub frame: Frame,
+    /// What is squared.
+    pub objective: Objective,
+    /// How large residuals are charged.
+    pub loss: Loss,
+}
+
+/// A fitted triad.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The answer.
+    pub model: Model,
+    /// Of `S` row by row, then `b`; entries fixed by the frame have none. For the stated noise, not rescaled.
+    pub covariance: SMatrix<f64, 12, 12>,
+    /// `|S a' + b| - |g|` in m/s² (less the mean inflation that noise across gravity gives a norm).
+    pub residuals: Vec<f64>,
+    /// Predicted standard error of each residual, m/s².
+    pub sigmas: Vec<f64>,
+    /// Weight that the loss gave each residual, 1 for least squares.
+    pub weights: Vec<f64>,
+    /// Σ (residual/sigma)².
+    pub chi2: f64,
+    /// The same estimated without the weight of outliers, Σψ²/E[ψ²]; `chi2` for least squares.
+    pub robust_chi2: f64,
+    /// Rank, singular values of the Jacobian in the solver's parameters.
+    pub certainty: Certainty,
+    /// Why the solver stopped.
+    pub stop: Stop,
+    /// Linearisations over all renewals of σ.
+    pub iterations: usize,
+}
+
+/// Readings with the noise covariance of each (`noise` has one entry for all, or one per reading).
+#[derive(Debug, Clone, Copy)]
+pub struct Readings<'a> {
+    /// Raw.
+    pub values: &'a [Vector3<f64>],
+    /// Raw unit squared.
+    pub noise: &'a [Matrix3<f64>],
+}
+
+impl Readings<'_> {
+    fn noise_of(&self, i: usize) -> &Matrix3<f64> {
+        &self.noise[if self.noise.len() == 1 { 0 } else { i }]
+    }
+
+    fn check(&self) -> Result<()> {
+        if self.values.is_empty() {
+            return Err(Error::bad_input("there are no still poses to fit"));
+        }
+        if self.noise.len() != 1 && self.noise.len() != self.values.len() {
+            return Err(Error::bad_input(format!(
+                "{} noise covariances do not belong to {} readings",
+                self.noise.len(),
+                self.values.len()
+            )));
+        }
+        if let Some(i) = self
+            .values
+            .iter()
+            .position(|a| a.iter().any(|value| !value.is_finite()))
+        {
+            return Err(Error::bad_input(format!("reading {i} is not finite")));
+        }
+        for (i, noise) in self.noise.iter().enumerate() {
+            // An axis without noise is legal (a stuck channel is the audit's business), a pose without any is not.
+            if noise.iter().any(|value| !value.is_finite()) || noise.trace() <= 0.0 {
+                return Err(Error::bad_input(format!(
+                    "the standard error of reading {i} must be finite and positive"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Above this many readings rows are not kept: the normal equations are summed in one parallel pass.
+const ROWS_KEPT: usize = 20_000;
+
+/// Times that σ is renewed at most; it depends on the answer only through directions and settles in two.
+const RENEWALS: usize = 8;
+
+/// Fits from an ellipsoid start, or from `start`.
+///
+/// With fewer than nine independent poses the undetermined directions stay at the start and `certainty.rank` tells.
+///
+/// # Errors
+/// When readings are malformed or all the same, or the fit collapses to `S = 0`.
+pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -> Result<Fit> {
+    readings.check()?;
+    if !settings.gravity.is_finite() || settings.gravity <= 0.0 {
+        return Err(Error::bad_input(format!(
+            "gravity must be a positive number in m/s², got {}",
+            settings.gravity
+        )));
+    }
+    let standard = Standardisation::of(readings.values)?;
+    let begin = match start {
+        Some(model) => in_frame(&model, settings.frame)?,
+        None => starting_model(readings.values, settings)?,
+    };
+    let options = Options {
+        loss: settings.loss,
+        ..Options::default()
+    };
+    let mut theta = pack(&begin, &standard);
+    let volume = (begin.s * standard.size).determinant().abs();
+    let mut iterations = 0;
+    for renewal in 0.. {
+        let frozen = Frozen::at(
+            readings,
+            settings,
+            &unpack(&theta, settings.frame, &standard),
+        );
+        let problem = PoseProblem {
+            readings,
+            settings,
+            standard,
+            frozen: &frozen,
+            volume,
+        };
+        let solution = if readings.values.len() > ROWS_KEPT {
+            gauss_newton::minimise_problem(&SampleProblem(&problem), theta.clone(), &options)?
+        } else {
+            gauss_newton::minimise(
+                |x| Ok(problem.linearise(x)),
+                |x| Ok(problem.residuals(x)),
+                theta.clone(),
+                &options,
+            )?
+        };
+        iterations += solution.iterations;
+        let change = (&solution.parameters - &theta).norm() / theta.norm();
+        theta = solution.parameters.clone();
+        // σ moves with the parameters at first order only through S: 1e-7 in S is 1e-7 in σ, far below its own error.
+        if change < 1e-7 || renewal + 1 == RENEWALS {
+            return finish(&problem, &solution, iterations);
+        }
+    }
+    unreachable!("the loop returns at its last renewal")
+}
+
+fn finish(
+    problem: &PoseProblem<'_>,
+    solution: &gauss_newton::Solution,
+    iterations: usize,
+) -> Result<Fit> {
+    let settings = problem.settings;
+    // Noise in a reading enters residual and derivative alike and draws S towards zero, by (σ/g)² of itself.
+    let theta = &solution.parameters
+        + &solution.certainty.covariance * problem.noise_in_gradient(&solution.parameters);
+    let model = unpack(&theta, settings.frame, &problem.standard);
+    let shrink = (model.s * problem.standard.size).determinant().abs() / problem.volume;
+    if shrink < 2.0 * problem::SMALLEST_VOLUME {
+        return Err(Error::not_determined(
+            "the fit runs into the worthless minimum S = 0, |b| = |g|: the poses do not differ enough, or are not still",
+        ));
+    }
+    let map = map_to_entries(settings.frame, &problem.standard);
+    let covariance = &map * &solution.certainty.covariance * map.transpose();
+    let residuals = problem.in_m_s2(&model);
+    let squared: Vec<f64> = residuals
+        .iter()
+        .zip(&problem.frozen.sigma)
+        .map(|(r, s)| (r / s).powi(2))
+        .collect();
+    let weights: Vec<f64> = squared.iter().map(|z2| settings.loss.weight(*z2)).collect();
+    let influence: f64 = squared.iter().zip(&weights).map(|(z2, w)| w * w * z2).sum();
+    Ok(Fit {
+        model,
+        covariance: SMatrix::from_column_slice(covariance.as_slice()),
+        chi2: squared.iter().sum(),
+        robust_chi2: influence / settings.loss.expected_influence(1),
+        residuals,
+        sigmas: problem.frozen.sigma.clone(),
+        weights,
+        certainty: solution.certainty.clone(),
+        stop: solution.stop,
+        iterations,
+    })
+}
+
+/// The ellipsoid, or the sphere where the poses do not determine one; whichever explains the readings better.
+fn starting_model(values: &[Vector3<f64>], settings: &Settings) -> Result<Model> {
+    let standard = Standardisation::of(values)?;
+    let u: Vec<_> = values.iter().map(|a| standard.apply(a)).collect();
+    let g = settings.gravity;
+    let mut candidates = Vec::new();
+    if let Ok(quadric) = ellipsoid::fit_quadric(&u) {
+        candidates.extend(quadric.model(g, settings.frame));
+    }
+    if candidates.is_empty()
+        && u.len() >= N_PARAMETERS
+        && let Ok(quadric) = ellipsoid::fit_ellipsoid(&u)
+    {
+        candidates.extend(quadric.model(g, settings.frame));
+    }
+    if let Some((centre, radius)) = ellipsoid::fit_sphere(&u) {
+        let s = Matrix3::identity() * (g / radius);
+        candidates.push(Model { s, b: -s * centre });
+    }
+    candidates
+        .into_iter()
+        .map(|model| {
+            let misfit: f64 = u
+                .iter()
+                .map(|a| (model.correct(a).norm() - g).powi(2))
+                .sum();
+            (misfit, model)
+        })
+        // Readings all on one tiny cap give spheres far too large or small; a triad's axes differ by less than that.
+        .filter(|(misfit, model)| misfit.is_finite() && model.s.determinant().abs() > 0.0)
+        .min_by(|(a, _), (b, _)| a.total_cmp(b))
+        .map(|(_, model)| standard.undo(&model))
+        .ok_or_else(|| {
+            Error::not_determined(format!(
+                "the still poses give no starting point: {}",
+                ellipsoid::missing_directions(&u)
+            ))
+        })
+}
+
+/// The same norms in the frame asked for.
+///
+/// # Errors
+/// When `S` is singular.
+pub fn in_frame(model: &Model, frame: Frame) -> Result<Model> {
+    let m = model.s.transpose() * model.s;
+    let s = match frame {
+        Frame::Lower => ellipsoid::reversed_cholesky(&m),
+        Frame::Symmetric => ellipsoid::symmetric_root(&m),
+    }
+    .ok_or_else(|| Error::bad_input("the starting S is singular"))?;
+    let inverse = model
+        .s
+        .try_inverse()
+        .ok_or_else(|| Error::bad_input("the starting S is singular"))?;
+    Ok(Model {
+        s,
+        b: s * inverse * model.b,
+    })
+}
+
+/// Solver's parameters: six entries of `S · size`, then `d = b + S centre`, so that columns are of one size.
+fn pack(model: &Model, standard: &Standardisation) -> DVector<f64> {
+    let s = model.s * standard.size;
+    let d = model.b + model.s * standard.centre;
+    let mut theta = DVector::zeros(N_PARAMETERS);
+    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
+        theta[k] = s[(i, j)];
+    }
+    theta.rows_mut(6, 3).copy_from(&d);
+    theta
+}
+
+/// `S` and `d` in standardised readings.
+fn unpack_standardised(theta: &DVector<f64>, frame: Frame) -> Model {
+    let mut s = Matrix3::zeros();
+    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
+        s[(i, j)] = theta[k];
+        if frame == Frame::Symmetric {
+            s[(j, i)] = theta[k];
+        }
+    }
+    Model {
+        s,
+        b: Vector3::new(theta[6], theta[7], theta[8]),
+    }
+}
+
+fn unpack(theta: &DVector<f64>, frame: Frame, standard: &Standardisation) -> Model {
+    standard.undo(&unpack_standardised(theta, frame))
+}
+
+/// `∂(S row by row, b)/∂θ`: linear, because `b = d - S centre`.
+fn map_to_entries(frame: Frame, standard: &Standardisation) -> DMatrix<f64> {
+    let mut map = DMatrix::zeros(12, N_PARAMETERS);
+    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
+        let mut places = vec![(i, j)];
+        if frame == Frame::Symmetric && i != j {
+            places.push((j, i));
+        }
+        for (row, column) in places {
+            map[(3 * row + column, k)] = 1.0 / standard.size;
+            map[(9 + row, k)] -= standard.centre[column] / standard.size;
+        }
+    }
+    for i in 0..3 {
+        map[(9 + i, 6 + i)] = 1.0;
+    }
+    map
+}

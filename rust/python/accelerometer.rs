@@ -1,0 +1,259 @@
+//! Accelerometer fits across the seam.
+
+use nalgebra::{Matrix3, Vector3};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods, ToPyArray,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::rotation::rows3;
+use crate::ellipsoid;
+use crate::gauss_newton::Loss;
+use crate::norm_invariant::{self, Fit, Frame, Model, Objective, Readings, Settings};
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<NormSettings>()?;
+    module.add_class::<NormFit>()?;
+    module.add_function(wrap_pyfunction!(fit_norm, module)?)?;
+    module.add_function(wrap_pyfunction!(fit_norm_held_out, module)?)?;
+    module.add_function(wrap_pyfunction!(fit_ellipsoid, module)?)?;
+    Ok(())
+}
+
+/// How the norm is fitted. Losses: 0 linear, 1 Huber, 2 soft-L1, 3 Cauchy.
+#[pyclass(frozen)]
+struct NormSettings(Settings);
+
+#[pymethods]
+impl NormSettings {
+    #[new]
+    #[pyo3(signature = (gravity_m_s2, *, symmetric=false, squared=false, loss=0, loss_scale=1.0))]
+    fn new(
+        gravity_m_s2: f64,
+        symmetric: bool,
+        squared: bool,
+        loss: u8,
+        loss_scale: f64,
+    ) -> PyResult<Self> {
+        if !(loss_scale.is_finite() && loss_scale > 0.0) {
+            return Err(PyValueError::new_err(format!(
+                "the scale of a robust loss must be a positive number of standard errors, got {loss_scale}"
+            )));
+        }
+        let loss = match loss {
+            0 => Loss::Linear,
+            1 => Loss::Huber { scale: loss_scale },
+            2 => Loss::SoftL1 { scale: loss_scale },
+            3 => Loss::Cauchy { scale: loss_scale },
+            _ => {
+                return Err(PyValueError::new_err(format!(
+                    "there is no loss number {loss}"
+                )));
+            }
+        };
+        Ok(Self(Settings {
+            gravity: gravity_m_s2,
+            frame: frame(symmetric),
+            objective: if squared {
+                Objective::SquaredNorm
+            } else {
+                Objective::Norm
+            },
+            loss,
+        }))
+    }
+}
+
+fn frame(symmetric: bool) -> Frame {
+    if symmetric {
+        Frame::Symmetric
+    } else {
+        Frame::Lower
+    }
+}
+
+/// A fitted triad; arrays are copies.
+#[pyclass(frozen)]
+struct NormFit(Fit);
+
+#[pymethods]
+impl NormFit {
+    /// (3, 3) m/s² per raw unit.
+    #[getter]
+    #[pyo3(name = "S")]
+    fn s<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        rows(py, self.0.model.s.transpose().as_slice(), 3)
+    }
+
+    /// (3,) m/s².
+    #[getter]
+    fn b<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.model.b.as_slice().to_pyarray(py)
+    }
+
+    /// (12, 12) of S row by row, then b.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        rows(py, self.0.covariance.as_slice(), 12)
+    }
+
+    /// (n,) m/s².
+    #[getter]
+    fn residuals<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.residuals.to_pyarray(py)
+    }
+
+    /// (n,) m/s².
+    #[getter]
+    fn sigmas<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.sigmas.to_pyarray(py)
+    }
+
+    /// (n,) weight that the loss gave each residual.
+    #[getter]
+    fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0.weights.to_pyarray(py)
+    }
+
+    #[getter]
+    fn chi2(&self) -> f64 {
+        self.0.chi2
+    }
+
+    #[getter]
+    fn robust_chi2(&self) -> f64 {
+        self.0.robust_chi2
+    }
+
+    #[getter]
+    fn rank(&self) -> usize {
+        self.0.certainty.rank
+    }
+
+    #[getter]
+    fn is_converged(&self) -> bool {
+        self.0.stop.is_converged()
+    }
+
+    #[getter]
+    fn stopped_because(&self) -> &'static str {
+        self.0.stop.in_words()
+    }
+
+    #[getter]
+    fn n_iterations(&self) -> usize {
+        self.0.iterations
+    }
+}
+
+fn rows<'py>(py: Python<'py>, flat: &[f64], n: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    flat.to_pyarray(py).reshape([flat.len() / n, n])
+}
+
+/// Owned `(3, 3)` matrices of an `(n, 3, 3)` array of any strides.
+fn matrices3(name: &str, array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Matrix3<f64>>> {
+    let shape = array.shape();
+    if shape[1] != 3 || shape[2] != 3 {
+        return Err(PyValueError::new_err(format!(
+            "{name} must have shape (n, 3, 3), got {shape:?}"
+        )));
+    }
+    let flat: Vec<f64> = array.as_array().iter().copied().collect();
+    Ok(flat.chunks_exact(9).map(Matrix3::from_row_slice).collect())
+}
+
+/// `S` and `b` to start from.
+type Start<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, f64>);
+
+#[pyfunction]
+#[pyo3(signature = (readings, noise, settings, start=None))]
+fn fit_norm(
+    py: Python<'_>,
+    readings: PyReadonlyArray2<'_, f64>,
+    noise: PyReadonlyArray3<'_, f64>,
+    settings: &Bound<'_, NormSettings>,
+    start: Option<Start<'_>>,
+) -> PyResult<NormFit> {
+    let readings = rows3("readings", &readings)?;
+    let noise = matrices3("noise", &noise)?;
+    let start = start
+        .map(|(s, b)| {
+            let s = rows3("start S", &s)?;
+            let b: Vec<f64> = b.as_array().iter().copied().collect();
+            if s.len() != 3 || b.len() != 3 {
+                return Err(PyValueError::new_err(
+                    "a start is S of shape (3, 3) and b of shape (3,)",
+                ));
+            }
+            Ok(Model {
+                s: Matrix3::from_rows(&[s[0].transpose(), s[1].transpose(), s[2].transpose()]),
+                b: Vector3::from_column_slice(&b),
+            })
+        })
+        .transpose()?;
+    let settings = settings.get().0;
+    super::run(py, || {
+        norm_invariant::fit(
+            Readings {
+                values: &readings,
+                noise: &noise,
+            },
+            &settings,
+            start,
+        )
+    })
+    .map(NormFit)
+}
+
+#[pyfunction]
+fn fit_norm_held_out<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    noise: PyReadonlyArray3<'py, f64>,
+    settings: &Bound<'py, NormSettings>,
+    fit: &Bound<'py, NormFit>,
+    folds: Vec<usize>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let readings = rows3("readings", &readings)?;
+    let noise = matrices3("noise", &noise)?;
+    let settings = settings.get().0;
+    let full = fit.get().0.clone();
+    let flat = super::run(py, || {
+        let poses = norm_invariant::held_out(
+            Readings {
+                values: &readings,
+                noise: &noise,
+            },
+            &settings,
+            &full,
+            &folds,
+        )?;
+        Ok(poses
+            .iter()
+            .flat_map(|pose| [pose.residual, pose.sigma, pose.chi2_per_dof])
+            .collect::<Vec<f64>>())
+    })?;
+    rows(py, &flat, 3)
+}
+
+/// `S` and `b` of a model.
+type SAndB<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+
+#[pyfunction]
+fn fit_ellipsoid<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    gravity_m_s2: f64,
+    symmetric: bool,
+) -> PyResult<SAndB<'py>> {
+    let readings = rows3("readings", &readings)?;
+    let model = super::run(py, || {
+        ellipsoid::calibrate(&readings, gravity_m_s2, frame(symmetric))
+    })?;
+    Ok((
+        rows(py, model.s.transpose().as_slice(), 3)?,
+        model.b.as_slice().to_pyarray(py),
+    ))
+}
