@@ -4,9 +4,11 @@
 //! Vocabulary: `S`, `b` are the direct form `f = S a' + b` (raw to SI), `Mz` is the instrument trihedron.
 
 pub mod ellipsoid;
+pub mod banded;
 pub mod error;
 pub mod gauss_newton;
 pub mod kalman;
+pub mod gyro_alignment;
 pub mod poisson;
 pub mod norm_invariant;
 pub mod rotation;

@@ -235,6 +235,12 @@ impl PreparedMove {
         self.steps.len()
     }
 
+    /// Time between the anchors, s.
+    #[must_use]
+    pub fn span_s(&self) -> f64 {
+        self.span_s
+    }
+
     /// `∫ w' dt` over the move, raw unit · s: the turn as the gyro saw it when its axis stays fixed.
     #[must_use]
     pub fn raw_angle(&self) -> Vector3<f64> {

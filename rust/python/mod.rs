@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use crate::error::Result as KernelResult;
 
 mod kalman;
+mod gyro_alignment;
 mod poisson;
 mod accelerometer;
 mod rotation;
@@ -28,6 +29,7 @@ pub(crate) fn run<T: Send>(
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    gyro_alignment::register(module)?;
     poisson::register(module)?;
     kalman::register(module)?;
     accelerometer::register(module)?;

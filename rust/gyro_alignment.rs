@@ -1,0 +1,284 @@
+//! Method 2 for gyros: the rotation between still poses must carry one measured specific force into the other.
+//!
+//! For the move from hold `i` to hold `j`
+//!
+//! ```text
+//! r = Tⱼᵀ (B(S_ω, z) f_i − f_j),      f = S_f a' + b_f                                      (5.7)
+//! ```
+//!
+//! `Tⱼ` spans the plane across `f_j`: the length of `f` belongs to the accelerometer, so a move carries rank-two
+//! information. `z` is the zero reading of the gyro, interpolated between the means of the two holds. The residuals are
+//! weighed by their full covariance (5.8), in which neighbouring moves are correlated through the hold they share. With
+//! free accelerometer parameters the rows `|f_h| − |g|` of every hold join in, and the fit is the joint one.
+
+mod covariance;
+mod stages;
+
+use crate::error::{Error, Result};
+use crate::poisson::{PreparedMove, RateNoise, Turn, integrate_all};
+use crate::rotation::skew;
+use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Matrix3x2, SMatrix, Vector3};
+
+pub use stages::{Fit, Settings, fit};
+
+/// Means of one still pose.
+#[derive(Debug, Clone, Copy)]
+pub struct StillPose {
+    /// Raw accelerometer mean.
+    pub reading: Vector3<f64>,
+    /// Variance of each component of that mean.
+    pub var_reading: Vector3<f64>,
+    /// Raw gyro mean: the zero reading here.
+    pub zero: Vector3<f64>,
+    /// Variance of each component of that mean.
+    pub var_zero: Vector3<f64>,
+}
+
+/// A move joins two holds.
+#[derive(Debug, Clone, Copy)]
+pub struct Link {
+    /// Hold before.
+    pub before: usize,
+    /// Hold after.
+    pub after: usize,
+}
+
+/// Both sensors' direct models.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// `S_f`.
+    pub accelerometer_scale: Matrix3<f64>,
+    /// `b_f`.
+    pub accelerometer_bias: Vector3<f64>,
+    /// `S_ω`.
+    pub gyroscope_scale: Matrix3<f64>,
+    /// A rate in the moves that the holds do not show, rad/s (zero unless asked for).
+    pub rate_offset: Vector3<f64>,
+}
+
+/// Everything measured.
+#[derive(Debug, Clone)]
+pub struct Alignment {
+    /// Still poses.
+    pub holds: Vec<StillPose>,
+    /// Which holds each move joins.
+    pub links: Vec<Link>,
+    /// The moves.
+    pub moves: Vec<PreparedMove>,
+    /// Moves that take part in the fit; the others are only predicted.
+    pub used: Vec<bool>,
+    /// Known magnitude of gravity, m/s².
+    pub gravity: f64,
+    /// Noise of the integrated rate.
+    pub noise: RateNoise,
+    /// Variance of the true change of the zero reading from hold to hold, raw unit².
+    pub var_zero_walk: Vector3<f64>,
+    /// Directions in `(S_f row by row, b_f)` that are free: `(12, k)`; no columns when the accelerometer is given.
+    pub accelerometer_basis: DMatrix<f64>,
+    /// Whether the rate offset is free.
+    pub is_offset_free: bool,
+}
+
+/// 3 × 12 derivative of `f` with respect to `(S_f row by row, b_f)`.
+type WrtAccelerometer = SMatrix<f64, 3, 12>;
+
+fn force_wrt_accelerometer(reading: &Vector3<f64>) -> WrtAccelerometer {
+    let mut out = WrtAccelerometer::zeros();
+    for i in 0..3 {
+        for j in 0..3 {
+            out[(i, 3 * i + j)] = reading[j];
+        }
+        out[(i, 9 + i)] = 1.0;
+    }
+    out
+}
+
+/// Two unit vectors across `direction`.
+#[must_use]
+pub fn tangent_plane(direction: &Vector3<f64>) -> Matrix3x2<f64> {
+    let smallest = direction.iamin();
+    let mut helper = Vector3::zeros();
+    helper[smallest] = 1.0;
+    let first = direction.cross(&helper).normalize();
+    let second = direction.cross(&first).normalize();
+    Matrix3x2::from_columns(&[first, second])
+}
+
+/// The model evaluated: forces of the holds and rotations of the moves.
+struct Evaluated {
+    model: Model,
+    forces: Vec<Vector3<f64>>,
+    turns: Vec<Turn>,
+}
+
+/// Residual of one move and everything it answers to, in three components.
+struct MoveRow {
+    residual: Vector3<f64>,
+    /// Derivative with respect to the rotation vector at the start of the move: `B [f_i]×`.
+    wrt_angle: Matrix3<f64>,
+    jacobian: DMatrix<f64>,
+}
+
+impl Alignment {
+    /// Checks that sizes agree.
+    ///
+    /// # Errors
+    /// When they do not, or a link names a hold that does not exist.
+    pub fn check(&self) -> Result<()> {
+        let m = self.moves.len();
+        if self.links.len() != m || self.used.len() != m {
+            return Err(Error::bad_input(format!(
+                "{m} moves came with {} links and {} flags",
+                self.links.len(),
+                self.used.len()
+            )));
+        }
+        let n = self.holds.len();
+        if let Some(link) = self
+            .links
+            .iter()
+            .find(|link| link.before >= n || link.after >= n)
+        {
+            return Err(Error::bad_input(format!(
+                "a move joins holds {} and {}, but there are {n} holds",
+                link.before, link.after
+            )));
+        }
+        if !self.used.iter().any(|&used| used) {
+            return Err(Error::not_determined(
+                "no move between two still poses is left: record turns with a still pose before and after each",
+            ));
+        }
+        if self.accelerometer_basis.nrows() != 12 {
+            return Err(Error::bad_input(
+                "the accelerometer basis must have 12 rows",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Number of free accelerometer parameters.
+    #[must_use]
+    pub fn n_accelerometer(&self) -> usize {
+        self.accelerometer_basis.ncols()
+    }
+
+    /// Number of free parameters: accelerometer, `S_ω`, offset.
+    #[must_use]
+    pub fn n_parameters(&self) -> usize {
+        self.n_accelerometer() + 9 + if self.is_offset_free { 3 } else { 0 }
+    }
+
+    /// Parameters at the start: accelerometer increments are counted from `base`.
+    fn pack(&self, base: &Model) -> DVector<f64> {
+        let k = self.n_accelerometer();
+        let mut x = DVector::zeros(self.n_parameters());
+        for i in 0..3 {
+            for j in 0..3 {
+                x[k + 3 * i + j] = base.gyroscope_scale[(i, j)];
+            }
+            if self.is_offset_free {
+                x[k + 9 + i] = base.rate_offset[i];
+            }
+        }
+        x
+    }
+
+    fn unpack(&self, base: &Model, x: &DVector<f64>) -> Model {
+        let k = self.n_accelerometer();
+        let mut model = base.clone();
+        if k > 0 {
+            let change = &self.accelerometer_basis * x.rows(0, k);
+            for i in 0..3 {
+                for j in 0..3 {
+                    model.accelerometer_scale[(i, j)] += change[3 * i + j];
+                }
+                model.accelerometer_bias[i] += change[9 + i];
+            }
+        }
+        for i in 0..3 {
+            for j in 0..3 {
+                model.gyroscope_scale[(i, j)] = x[k + 3 * i + j];
+            }
+            if self.is_offset_free {
+                model.rate_offset[i] = x[k + 9 + i];
+            }
+        }
+        model
+    }
+
+    fn evaluate(&self, model: Model) -> Evaluated {
+        let forces = self
+            .holds
+            .iter()
+            .map(|hold| model.accelerometer_scale * hold.reading + model.accelerometer_bias)
+            .collect();
+        let bias = |hold: usize| model.rate_offset - model.gyroscope_scale * self.holds[hold].zero;
+        let before: Vec<_> = self.links.iter().map(|link| bias(link.before)).collect();
+        let after: Vec<_> = self.links.iter().map(|link| bias(link.after)).collect();
+        let turns = integrate_all(
+            &self.moves,
+            &model.gyroscope_scale,
+            &before,
+            &after,
+            &self.noise,
+        );
+        Evaluated {
+            model,
+            forces,
+            turns,
+        }
+    }
+
+    fn move_row(&self, at: &Evaluated, index: usize) -> MoveRow {
+        let link = self.links[index];
+        let turn = &at.turns[index];
+        let (from, to) = (at.forces[link.before], at.forces[link.after]);
+        let wrt_angle = turn.rotation * skew(&from);
+        let k = self.n_accelerometer();
+        let mut jacobian = DMatrix::zeros(3, self.n_parameters());
+        if k > 0 {
+            let wrt = turn.rotation * force_wrt_accelerometer(&self.holds[link.before].reading)
+                - force_wrt_accelerometer(&self.holds[link.after].reading);
+            jacobian
+                .columns_mut(0, k)
+                .copy_from(&(wrt * &self.accelerometer_basis));
+        }
+        let (z0, z1) = (self.holds[link.before].zero, self.holds[link.after].zero);
+        for i in 0..3 {
+            for j in 0..3 {
+                let theta = turn.wrt_scale.column(3 * i + j)
+                    - turn.wrt_bias_before.column(i) * z0[j]
+                    - turn.wrt_bias_after.column(i) * z1[j];
+                jacobian.set_column(k + 3 * i + j, &(wrt_angle * theta));
+            }
+            if self.is_offset_free {
+                let theta = turn.wrt_bias_before.column(i) + turn.wrt_bias_after.column(i);
+                jacobian.set_column(k + 9 + i, &(wrt_angle * theta));
+            }
+        }
+        MoveRow {
+            residual: turn.rotation * from - to,
+            wrt_angle,
+            jacobian,
+        }
+    }
+}
+
+/// Rows of the stacked residual: which hold or move they belong to.
+#[derive(Debug, Clone, Copy)]
+enum Rows {
+    /// `|f| − |g|` of a hold: one row.
+    Norm(usize),
+    /// A move, with the plane it is seen in: two rows.
+    Move(usize, Matrix2x3<f64>),
+}
+
+impl Rows {
+    fn len(&self) -> usize {
+        match self {
+            Self::Norm(_) => 1,
+            Self::Move(..) => 2,
+        }
+    }
+}

@@ -1,0 +1,273 @@
+//! The fit: a robust approach from several starts, then generalised least squares with the covariance (5.8).
+
+use super::covariance::{Layout, whole_covariance};
+use super::{Alignment, Evaluated, Model};
+use crate::banded::BandedCholesky;
+use crate::error::{Error, Result};
+use crate::gauss_newton::{self, Certainty, Loss, Options, Solution};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+/// How to fit.
+#[derive(Debug, Clone, Copy)]
+pub struct Settings {
+    /// What a move costs whose residual is far beyond its noise; scales in standard errors.
+    pub loss: Loss,
+    /// Times the covariance is computed anew.
+    pub max_rounds: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            loss: Loss::Linear,
+            max_rounds: 12,
+        }
+    }
+}
+
+/// The answer and its certainty.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Both sensors at the solution.
+    pub model: Model,
+    /// `(p, p)` of the free parameters (accelerometer, `S_ω`, offset): noise of everything measured; no doubt about fixed
+    /// accelerometer parameters.
+    pub covariance: DMatrix<f64>,
+    /// `(p, 12)`: what an error of the accelerometer parameters does to the solution when they are fixed.
+    pub wrt_accelerometer: DMatrix<f64>,
+    /// `(p, 3)`: covariance of the solution with the weighted mean of the zero readings.
+    pub cov_with_zero: DMatrix<f64>,
+    /// Weighted sum of squares, robust weights included, and its degrees of freedom.
+    pub chi2: f64,
+    /// Rows minus determined parameters.
+    pub dof: usize,
+    /// SVD of the whitened Jacobian with unit columns.
+    pub certainty: Certainty,
+    /// Robust weight of every move; one when it is in full force.
+    pub weights: Vec<f64>,
+    /// Squared Mahalanobis distance (two degrees of freedom) of every used move.
+    pub mahalanobis: Vec<f64>,
+    /// `B f_i − f_j` of every move, used or not, m/s².
+    pub residuals: Vec<Vector3<f64>>,
+    /// Covariance of each from its own measurements.
+    pub cov_residuals: Vec<Matrix3<f64>>,
+    /// Derivative of each with respect to the free parameters, `(3, p)`.
+    pub jacobians: Vec<DMatrix<f64>>,
+    /// Predicted force after each move, m/s².
+    pub predicted: Vec<Vector3<f64>>,
+    /// Linearisations made.
+    pub iterations: usize,
+    /// Whether the solver and the covariance both settled, and why it stopped.
+    pub is_converged: bool,
+    /// In words.
+    pub stopped_because: &'static str,
+}
+
+/// Angle, rad, beyond which the robust approach stops believing a move.
+const DOUBTFUL_ANGLE: f64 = 0.05;
+
+/// Fits from each start and keeps the best; then weighs by the full covariance.
+///
+/// `zero_weights` `(n_holds)` are the weights of each hold's zero reading in the mean that the caller forms.
+///
+/// # Errors
+/// When the pieces do not fit together, no start is given, or no start gives finite residuals.
+pub fn fit(
+    problem: &Alignment,
+    starts: &[Model],
+    zero_weights: &[Vector3<f64>],
+    settings: &Settings,
+) -> Result<Fit> {
+    problem.check()?;
+    let mut base = approach(problem, starts)?;
+    let mut weights = vec![1.0; problem.links.len()];
+    let mut iterations = 0;
+    let mut settled = false;
+    let mut last: Option<Solution> = None;
+    for _ in 0..settings.max_rounds.max(1) {
+        let at = problem.evaluate(base.clone());
+        let layout = Layout::new(problem, &at);
+        let (factor, mahalanobis) = layout.covariance(problem, &at, &weights)?;
+        let mut next_weights: Vec<f64> = mahalanobis
+            .iter()
+            .map(|&squared| settings.loss.weight(squared).max(1e-6))
+            .collect();
+        if last.is_none() {
+            // The approach was not weighed: its residuals say nothing about outliers yet.
+            next_weights.fill(1.0);
+        }
+        let change_of_weights = next_weights
+            .iter()
+            .zip(&weights)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        let factor = if change_of_weights > 0.0 {
+            layout.covariance(problem, &at, &next_weights)?.0
+        } else {
+            factor
+        };
+        weights = next_weights;
+        let solution = weigh(problem, &base, &layout, &factor)?;
+        iterations += solution.iterations;
+        let start = problem.pack(&base);
+        let moved = &solution.parameters - start;
+        // In standard errors: the covariance of the residuals follows the parameters far more slowly than this.
+        let distance = (&solution.r_factor * &moved).norm();
+        base = problem.unpack(&base, &solution.parameters);
+        last = Some(solution);
+        if distance < 1e-3 && change_of_weights < 1e-3 {
+            settled = true;
+            break;
+        }
+    }
+    let solution = last.ok_or_else(|| Error::bad_input("a fit needs at least one round"))?;
+    finish(
+        problem,
+        base,
+        &weights,
+        zero_weights,
+        &solution,
+        iterations,
+        settled,
+    )
+}
+
+/// Least squares on directions with a robust loss, accelerometer fixed, from every start; the cheapest wins.
+fn approach(problem: &Alignment, starts: &[Model]) -> Result<Model> {
+    let mut fixed = problem.clone();
+    fixed.accelerometer_basis = DMatrix::zeros(12, 0);
+    fixed.is_offset_free = false;
+    let n_used = fixed.used.iter().filter(|&&used| used).count();
+    let options = Options {
+        loss: Loss::SoftL1 { scale: 1.0 },
+        block: 3,
+        step_tolerance: 1e-6,
+        max_iterations: 60,
+        ..Options::default()
+    };
+    let unit = 1.0 / (DOUBTFUL_ANGLE * problem.gravity);
+    let mut best: Option<(f64, Model)> = None;
+    for start in starts {
+        let rows = |x: &DVector<f64>| {
+            let at = fixed.evaluate(fixed.unpack(start, x));
+            let mut residual = DVector::zeros(3 * n_used);
+            let mut jacobian = DMatrix::zeros(3 * n_used, 9);
+            let mut row = 0;
+            for index in (0..fixed.links.len()).filter(|&index| fixed.used[index]) {
+                let one = fixed.move_row(&at, index);
+                residual.rows_mut(row, 3).copy_from(&(one.residual * unit));
+                jacobian.rows_mut(row, 3).copy_from(&(one.jacobian * unit));
+                row += 3;
+            }
+            (residual, jacobian)
+        };
+        let Ok(solution) = gauss_newton::minimise(
+            |x| Ok(rows(x)),
+            |x| Ok(rows(x).0),
+            fixed.pack(start),
+            &options,
+        ) else {
+            continue;
+        };
+        if best.as_ref().is_none_or(|(cost, _)| solution.cost < *cost) {
+            best = Some((solution.cost, fixed.unpack(start, &solution.parameters)));
+        }
+    }
+    best.map(|(_, model)| model).ok_or_else(|| {
+        Error::bad_input(
+            "the gyro fit has no usable start: give the nominal scale of the gyro (rad/s per raw unit)",
+        )
+    })
+}
+
+/// One generalised least-squares fit with the covariance fixed.
+fn weigh(
+    problem: &Alignment,
+    base: &Model,
+    layout: &Layout,
+    factor: &BandedCholesky,
+) -> Result<Solution> {
+    let whitened = |x: &DVector<f64>| {
+        let at = problem.evaluate(problem.unpack(base, x));
+        let (residual, jacobian) = layout.linearise(problem, &at);
+        let mut columns = jacobian.insert_column(0, 0.0);
+        columns.set_column(0, &residual);
+        factor.whiten(&mut columns);
+        columns
+    };
+    gauss_newton::minimise(
+        |x| {
+            let columns = whitened(x);
+            Ok((columns.column(0).into_owned(), columns.remove_column(0)))
+        },
+        |x| Ok(whitened(x).column(0).into_owned()),
+        problem.pack(base),
+        &Options::default(),
+    )
+}
+
+#[allow(clippy::too_many_arguments)]
+fn finish(
+    problem: &Alignment,
+    model: Model,
+    weights: &[f64],
+    zero_weights: &[Vector3<f64>],
+    solution: &Solution,
+    iterations: usize,
+    settled: bool,
+) -> Result<Fit> {
+    let at: Evaluated = problem.evaluate(model);
+    let layout = Layout::new(problem, &at);
+    let (factor, mahalanobis) = layout.covariance(problem, &at, weights)?;
+    let (residual, jacobian) = layout.linearise(problem, &at);
+    let mut columns = jacobian.insert_column(0, 0.0);
+    columns.set_column(0, &residual);
+    factor.whiten(&mut columns);
+    let chi2 = columns.column(0).norm_squared();
+    let jacobian = columns.remove_column(0);
+    let certainty = gauss_newton::certainty(&jacobian, 1.0, Options::default().rank_tolerance);
+    let covariance = certainty.covariance.clone();
+    // x̂ = x − K ε with K = P Jᵀ in whitened rows: how anything that entered the rows reaches the solution.
+    let gain = &covariance * jacobian.transpose();
+    let mut by_accelerometer = layout.wrt_accelerometer(problem, &at);
+    factor.whiten(&mut by_accelerometer);
+    let wrt_accelerometer = -&gain * by_accelerometer;
+    let mut cov_with_zero = DMatrix::zeros(problem.n_parameters(), 3);
+    for (hold, mut wrt) in layout.wrt_zero(problem, &at).into_iter().enumerate() {
+        factor.whiten(&mut wrt);
+        let var = problem.holds[hold]
+            .var_zero
+            .component_mul(&zero_weights.get(hold).copied().unwrap_or_default());
+        cov_with_zero -=
+            &gain * wrt * DMatrix::from_diagonal(&DVector::from_column_slice(var.as_slice()));
+    }
+    let rows: Vec<_> = (0..problem.links.len())
+        .map(|index| problem.move_row(&at, index))
+        .collect();
+    let dof = layout.n.saturating_sub(certainty.rank);
+    Ok(Fit {
+        covariance,
+        wrt_accelerometer,
+        cov_with_zero,
+        chi2,
+        dof,
+        certainty,
+        weights: weights.to_vec(),
+        mahalanobis,
+        residuals: rows.iter().map(|row| row.residual).collect(),
+        cov_residuals: (0..rows.len())
+            .map(|index| whole_covariance(problem, &at, index))
+            .collect(),
+        jacobians: rows.into_iter().map(|row| row.jacobian).collect(),
+        predicted: problem
+            .links
+            .iter()
+            .zip(&at.turns)
+            .map(|(link, turn)| turn.rotation * at.forces[link.before])
+            .collect(),
+        model: at.model,
+        iterations,
+        is_converged: settled && solution.stop.is_converged(),
+        stopped_because: solution.stop.in_words(),
+    })
+}

@@ -1,0 +1,293 @@
+//! Gyro alignment across the seam.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::poisson::{matrix3, ranges, samples, vector3};
+use super::rotation::rows3;
+use crate::gauss_newton::Loss;
+use crate::gyro_alignment::{Alignment, Fit, Link, Model, Settings, StillPose, fit};
+use crate::poisson::{PreparedMove, RateModel, RateNoise, prepare_all};
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Moves>()?;
+    module.add_class::<AlignmentFit>()?;
+    Ok(())
+}
+
+/// The moves of a recording, prepared once for many fits.
+#[pyclass(frozen, module = "trihedron._core")]
+struct Moves {
+    links: Vec<Link>,
+    moves: Vec<PreparedMove>,
+}
+
+/// Where the alignment ended.
+#[pyclass(frozen, get_all, module = "trihedron._core")]
+struct AlignmentFit {
+    accelerometer_scale: Py<PyArray2<f64>>,
+    accelerometer_bias: Py<PyArray1<f64>>,
+    gyroscope_scale: Py<PyArray2<f64>>,
+    rate_offset: Py<PyArray1<f64>>,
+    covariance: Py<PyArray2<f64>>,
+    wrt_accelerometer: Py<PyArray2<f64>>,
+    cov_with_zero: Py<PyArray2<f64>>,
+    chi2: f64,
+    dof: usize,
+    rank: usize,
+    singular_values: Py<PyArray1<f64>>,
+    directions: Py<PyArray2<f64>>,
+    weights: Py<PyArray1<f64>>,
+    mahalanobis: Py<PyArray1<f64>>,
+    residuals: Py<PyArray2<f64>>,
+    cov_residuals: Py<PyArray3<f64>>,
+    jacobians: Py<PyArray3<f64>>,
+    predicted: Py<PyArray2<f64>>,
+    iterations: usize,
+    is_converged: bool,
+    stopped_because: &'static str,
+}
+
+fn links(array: &PyReadonlyArray2<'_, i64>) -> PyResult<Vec<Link>> {
+    if array.shape()[1] != 2 {
+        return Err(PyValueError::new_err(format!(
+            "links must have shape (m, 2), got ({}, {})",
+            array.shape()[0],
+            array.shape()[1]
+        )));
+    }
+    let index = |value: i64| {
+        usize::try_from(value)
+            .map_err(|_| PyValueError::new_err(format!("hold {value} does not exist")))
+    };
+    array
+        .as_array()
+        .rows()
+        .into_iter()
+        .map(|row| {
+            Ok(Link {
+                before: index(row[0])?,
+                after: index(row[1])?,
+            })
+        })
+        .collect()
+}
+
+fn same_length(n: usize, pieces: &[(&str, usize)]) -> PyResult<()> {
+    for (name, length) in pieces {
+        if *length != n {
+            return Err(PyValueError::new_err(format!(
+                "{name} has {length} rows where {n} are needed"
+            )));
+        }
+    }
+    Ok(())
+}
+
+#[pymethods]
+impl Moves {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        time_s: PyReadonlyArray1<'_, f64>,
+        gyroscope: PyReadonlyArray2<'_, f64>,
+        edges: PyReadonlyArray2<'_, i64>,
+        anchors_s: PyReadonlyArray2<'_, f64>,
+        holds: PyReadonlyArray2<'_, i64>,
+        rate_degree: u8,
+    ) -> PyResult<Self> {
+        let time_s = samples(&time_s);
+        let raw = rows3("gyroscope", &gyroscope)?;
+        let ranges = ranges(&edges, &anchors_s)?;
+        let links = links(&holds)?;
+        same_length(ranges.len(), &[("holds", links.len())])?;
+        let moves = super::run(py, || {
+            prepare_all(&time_s, &raw, &ranges, RateModel::of_degree(rate_degree)?)
+        })?;
+        Ok(Self { links, moves })
+    }
+
+    /// `∫ w' dt` of every move, (m, 3), raw unit · s.
+    fn raw_angles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let flat: Vec<f64> = self
+            .moves
+            .iter()
+            .flat_map(|one| one.raw_angle().as_slice().to_vec())
+            .collect();
+        flat.to_pyarray(py).reshape([self.moves.len(), 3])
+    }
+
+    /// Integrated time of every move, (m,), s.
+    fn durations_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let durations: Vec<f64> = self.moves.iter().map(PreparedMove::duration_s).collect();
+        durations.to_pyarray(py)
+    }
+
+    #[pyo3(signature = (*, reading, var_reading, zero, var_zero, zero_weights, used, starts, accelerometer_scale,
+        accelerometer_bias, accelerometer_basis, gravity_m_s2, noise_density, sigma_time_s, nominal_step_s,
+        var_zero_walk, is_offset_free, loss_scale))]
+    #[allow(clippy::too_many_arguments)]
+    fn align(
+        &self,
+        py: Python<'_>,
+        reading: PyReadonlyArray2<'_, f64>,
+        var_reading: PyReadonlyArray2<'_, f64>,
+        zero: PyReadonlyArray2<'_, f64>,
+        var_zero: PyReadonlyArray2<'_, f64>,
+        zero_weights: PyReadonlyArray2<'_, f64>,
+        used: PyReadonlyArray1<'_, bool>,
+        starts: PyReadonlyArray3<'_, f64>,
+        accelerometer_scale: PyReadonlyArray2<'_, f64>,
+        accelerometer_bias: PyReadonlyArray1<'_, f64>,
+        accelerometer_basis: PyReadonlyArray2<'_, f64>,
+        gravity_m_s2: f64,
+        noise_density: PyReadonlyArray1<'_, f64>,
+        sigma_time_s: f64,
+        nominal_step_s: f64,
+        var_zero_walk: PyReadonlyArray1<'_, f64>,
+        is_offset_free: bool,
+        loss_scale: Option<f64>,
+    ) -> PyResult<AlignmentFit> {
+        let reading = rows3("reading", &reading)?;
+        let var_reading = rows3("var_reading", &var_reading)?;
+        let zero = rows3("zero", &zero)?;
+        let var_zero = rows3("var_zero", &var_zero)?;
+        let zero_weights = rows3("zero_weights", &zero_weights)?;
+        let n = reading.len();
+        same_length(
+            n,
+            &[
+                ("var_reading", var_reading.len()),
+                ("zero", zero.len()),
+                ("var_zero", var_zero.len()),
+                ("zero_weights", zero_weights.len()),
+            ],
+        )?;
+        if starts.shape()[1..] != [3, 3] {
+            return Err(PyValueError::new_err(format!(
+                "starts must have shape (k, 3, 3), got {:?}",
+                starts.shape()
+            )));
+        }
+        let basis = accelerometer_basis.as_array();
+        let problem = Alignment {
+            holds: (0..n)
+                .map(|h| StillPose {
+                    reading: reading[h],
+                    var_reading: var_reading[h],
+                    zero: zero[h],
+                    var_zero: var_zero[h],
+                })
+                .collect(),
+            links: self.links.clone(),
+            moves: self.moves.clone(),
+            used: samples(&used),
+            gravity: gravity_m_s2,
+            noise: RateNoise {
+                density: vector3("noise_density", &noise_density)?,
+                sigma_time_s,
+                nominal_step_s,
+            },
+            var_zero_walk: vector3("var_zero_walk", &var_zero_walk)?,
+            accelerometer_basis: DMatrix::from_fn(basis.nrows(), basis.ncols(), |i, j| {
+                basis[[i, j]]
+            }),
+            is_offset_free,
+        };
+        let base = Model {
+            accelerometer_scale: matrix3("accelerometer_scale", &accelerometer_scale)?,
+            accelerometer_bias: vector3("accelerometer_bias", &accelerometer_bias)?,
+            gyroscope_scale: Matrix3::identity(),
+            rate_offset: Vector3::zeros(),
+        };
+        let starts: Vec<Model> = starts
+            .as_array()
+            .outer_iter()
+            .map(|start| Model {
+                gyroscope_scale: Matrix3::from_fn(|i, j| start[[i, j]]),
+                ..base.clone()
+            })
+            .collect();
+        let settings = Settings {
+            loss: loss_scale.map_or(Loss::Linear, |scale| Loss::Cauchy { scale }),
+            ..Settings::default()
+        };
+        let found = super::run(py, || fit(&problem, &starts, &zero_weights, &settings))?;
+        export(py, &found)
+    }
+}
+
+fn matrix(py: Python<'_>, matrix: &DMatrix<f64>) -> PyResult<Py<PyArray2<f64>>> {
+    let flat: Vec<f64> = matrix.transpose().as_slice().to_vec();
+    Ok(flat
+        .to_pyarray(py)
+        .reshape([matrix.nrows(), matrix.ncols()])?
+        .unbind())
+}
+
+fn square(py: Python<'_>, matrix: &Matrix3<f64>) -> PyResult<Py<PyArray2<f64>>> {
+    Ok(matrix
+        .transpose()
+        .as_slice()
+        .to_pyarray(py)
+        .reshape([3, 3])?
+        .unbind())
+}
+
+fn vectors(py: Python<'_>, rows: &[Vector3<f64>]) -> PyResult<Py<PyArray2<f64>>> {
+    let flat: Vec<f64> = rows.iter().flat_map(|v| v.as_slice().to_vec()).collect();
+    Ok(flat.to_pyarray(py).reshape([rows.len(), 3])?.unbind())
+}
+
+fn export(py: Python<'_>, found: &Fit) -> PyResult<AlignmentFit> {
+    let m = found.residuals.len();
+    let p = found.covariance.nrows();
+    let cov: Vec<f64> = found
+        .cov_residuals
+        .iter()
+        .flat_map(|matrix| matrix.as_slice().to_vec())
+        .collect();
+    let jacobians: Vec<f64> = found
+        .jacobians
+        .iter()
+        .flat_map(|matrix| matrix.transpose().as_slice().to_vec())
+        .collect();
+    Ok(AlignmentFit {
+        accelerometer_scale: square(py, &found.model.accelerometer_scale)?,
+        accelerometer_bias: found
+            .model
+            .accelerometer_bias
+            .as_slice()
+            .to_pyarray(py)
+            .unbind(),
+        gyroscope_scale: square(py, &found.model.gyroscope_scale)?,
+        rate_offset: found.model.rate_offset.as_slice().to_pyarray(py).unbind(),
+        covariance: matrix(py, &found.covariance)?,
+        wrt_accelerometer: matrix(py, &found.wrt_accelerometer)?,
+        cov_with_zero: matrix(py, &found.cov_with_zero)?,
+        chi2: found.chi2,
+        dof: found.dof,
+        rank: found.certainty.rank,
+        singular_values: found
+            .certainty
+            .singular_values
+            .as_slice()
+            .to_pyarray(py)
+            .unbind(),
+        directions: matrix(py, &found.certainty.directions)?,
+        weights: found.weights.to_pyarray(py).unbind(),
+        mahalanobis: found.mahalanobis.to_pyarray(py).unbind(),
+        residuals: vectors(py, &found.residuals)?,
+        cov_residuals: cov.to_pyarray(py).reshape([m, 3, 3])?.unbind(),
+        jacobians: jacobians.to_pyarray(py).reshape([m, 3, p])?.unbind(),
+        predicted: vectors(py, &found.predicted)?,
+        iterations: found.iterations,
+        is_converged: found.is_converged,
+        stopped_because: found.stopped_because,
+    })
+}
