@@ -174,6 +174,7 @@ def kalman_generalised_least_squares(
     hold_s: FloatArray,
     extra_variance: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
+
 # gyro alignment
 @final
 class Moves:

@@ -11,8 +11,8 @@ use pyo3::prelude::*;
 
 use crate::error::Result as KernelResult;
 
-mod kalman;
 mod gyro_alignment;
+mod kalman;
 mod poisson;
 mod accelerometer;
 mod rotation;

@@ -1,0 +1,347 @@
+"""The alignment run on measured moves: screening of outliers, covariance of both sensors' parameters, held-out moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import chi2 as chi2_distribution
+
+from trihedron._core import AlignmentFit
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.records.calibration import FitQuality, SensorCalibration
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+RateDegree = Literal[0, 1, 3]
+"""Degree of the rate polynomial over a sample: 0 constant, 1 linear, 3 coning-corrected."""
+
+CAUCHY_SCALE = 3.0
+"""Of a move's Mahalanobis distance (two degrees of freedom) in the screening fit: at three the weight is one half."""
+
+FALSE_ALARM = 1e-3
+"""Chance that a sound recording raises a statistical finding of one kind."""
+
+
+@dataclass(frozen=True)
+class MoveOptions:
+    """How moves are fitted.
+
+    ``rate_degree`` of the rate polynomial over a sample (0 constant, 1 linear, 3 coning-corrected); ``is_robust``
+    screens moves whose residual is far beyond the others'; ``is_offset_free`` adds a constant rate inside the moves that
+    the holds do not show (3 parameters); ``n_folds`` for held-out prediction, 0 for none; ``nominal_scale`` (3, 3) or a
+    number, rad/s per raw unit, where the moves cannot tell it.
+    """
+
+    rate_degree: RateDegree = 3
+    is_robust: bool = True
+    is_offset_free: bool = False
+    n_folds: int = 5
+    nominal_scale: FloatArray | float | None = None
+
+    def nominal(self) -> FloatArray | None:
+        """Nominal scale as a matrix (3, 3)."""
+        if self.nominal_scale is None:
+            return None
+        value = np.asarray(self.nominal_scale, dtype=np.float64)
+        if value.ndim == 0:
+            return float(value) * np.eye(3)
+        if value.shape != (3, 3):
+            raise ValueError(f"nominal_scale must be a number or (3, 3), got shape {value.shape}")
+        return value
+
+
+@dataclass(frozen=True, eq=False)
+class Aligned:
+    """A finished alignment.
+
+    ``parameters_covariance`` (p, p) of (free accelerometer, ``S_ω``, offset) with everything in it; ``covariance``
+    (24, 24) of (``S_f``, ``b_f``, ``S_ω``, ``b_ω``); ``used`` (m,) the moves behind it, ``outliers`` those screened out;
+    ``inflation`` the factor χ²/dof by which the covariance was widened, one when the residual is within the noise.
+    """
+
+    fit: AlignmentFit
+    gyroscope_bias: FloatArray
+    covariance: FloatArray
+    parameters_covariance: FloatArray
+    used: BoolArray
+    outliers: tuple[int, ...]
+    inflation: float
+
+
+def align(
+    measured: MoveMeasurements,
+    accelerometer: SensorCalibration,
+    basis: FloatArray,
+    gravity_m_s2: float,
+    starts: FloatArray,
+    options: MoveOptions,
+    used: BoolArray | None = None,
+) -> AlignmentFit:
+    """One alignment in the core, robust or not at all."""
+    return _core_align(
+        measured,
+        accelerometer,
+        basis,
+        gravity_m_s2,
+        starts,
+        options,
+        ~measured.is_clipped if used is None else used,
+        None,
+    )
+
+
+def align_screened(
+    measured: MoveMeasurements,
+    accelerometer: SensorCalibration,
+    basis: FloatArray,
+    gravity_m_s2: float,
+    starts: FloatArray,
+    options: MoveOptions,
+) -> Aligned:
+    """Robust fit, outliers out, least squares on the rest, covariance of all 24 parameters.
+
+    A move is an outlier when its squared Mahalanobis distance, in units of the typical one when that is above the
+    noise, has a chance below ``FALSE_ALARM`` among all moves.
+    """
+    used = ~measured.is_clipped
+    if not np.any(used):
+        raise ValueError("the gyro met its limit in every move: turn more slowly or set a wider range")
+    outliers: tuple[int, ...] = ()
+    n_parameters = 9 + (3 if options.is_offset_free else 0)
+    if options.is_robust and 2 * int(np.count_nonzero(used)) > n_parameters + 2:
+        screen = _core_align(measured, accelerometer, basis, gravity_m_s2, starts, options, used, CAUCHY_SCALE)
+        distance = np.asarray(screen.mahalanobis)
+        # The median of χ²(2) is 1.386; residuals of p fitted parameters are smaller by 1 − p/n.
+        shrink = max(1.0 - screen.rank / (2.0 * np.count_nonzero(used)), 0.1)
+        typical = max(1.0, float(np.median(distance[used])) / (1.386 * shrink))
+        limit = float(chi2_distribution.isf(FALSE_ALARM / np.count_nonzero(used), 2)) * typical
+        far = used & (distance > limit)
+        # Screening may not decide the fit: enough moves must remain.
+        if np.any(far) and 2 * np.count_nonzero(used & ~far) > n_parameters + 2:
+            outliers = tuple(int(i) for i in np.flatnonzero(far))
+            used = used & ~far
+        starts = np.concatenate([np.asarray(screen.gyroscope_scale)[None], starts])
+    fit = _core_align(measured, accelerometer, basis, gravity_m_s2, starts, options, used, None)
+    inflation = 1.0
+    if fit.dof > 0 and chi2_distribution.sf(fit.chi2, fit.dof) < FALSE_ALARM:
+        inflation = fit.chi2 / fit.dof
+    return _assemble(fit, measured, accelerometer, basis, used, outliers, inflation)
+
+
+def _core_align(
+    measured: MoveMeasurements,
+    accelerometer: SensorCalibration,
+    basis: FloatArray,
+    gravity_m_s2: float,
+    starts: FloatArray,
+    options: MoveOptions,
+    used: BoolArray,
+    loss_scale: float | None,
+) -> AlignmentFit:
+    return measured.moves.align(
+        reading=measured.reading,
+        var_reading=measured.var_reading,
+        zero=measured.zero,
+        var_zero=measured.var_zero,
+        zero_weights=measured.zero_weights,
+        used=used,
+        starts=starts,
+        accelerometer_scale=accelerometer.S,
+        accelerometer_bias=accelerometer.b,
+        accelerometer_basis=basis,
+        gravity_m_s2=gravity_m_s2,
+        noise_density=measured.noise_density,
+        sigma_time_s=measured.sigma_time_s,
+        nominal_step_s=measured.nominal_step_s,
+        var_zero_walk=measured.var_zero_walk,
+        is_offset_free=options.is_offset_free,
+        loss_scale=loss_scale,
+    )
+
+
+def _assemble(
+    fit: AlignmentFit,
+    measured: MoveMeasurements,
+    accelerometer: SensorCalibration,
+    basis: FloatArray,
+    used: BoolArray,
+    outliers: tuple[int, ...],
+    inflation: float,
+) -> Aligned:
+    """Covariance of (S_f, b_f, S_ω, b_ω) from that of the fit, of the zero readings and of a fixed accelerometer.
+
+    ``b_ω = −S_ω z̄ + offset``, so ``δb = −δS_ω z̄ − S_ω δz̄ + δoffset``.
+    """
+    S = np.asarray(fit.gyroscope_scale)
+    k = basis.shape[1]
+    p = fit.covariance.shape[0]
+    inner = inflation * (np.asarray(fit.covariance) + _unseen(fit, S, k))
+    cov_accelerometer = accelerometer.covariance if k == 0 else np.zeros((12, 12))
+    response = np.asarray(fit.wrt_accelerometer)
+    # y = (fit parameters, z̄, given accelerometer).
+    n = p + 3 + 12
+    joint = np.zeros((n, n))
+    joint[:p, :p] = inner + response @ cov_accelerometer @ response.T
+    joint[:p, p : p + 3] = fit.cov_with_zero
+    joint[p : p + 3, :p] = np.asarray(fit.cov_with_zero).T
+    joint[p : p + 3, p : p + 3] = np.diag(measured.var_zero_mean)
+    joint[:p, p + 3 :] = response @ cov_accelerometer
+    joint[p + 3 :, :p] = joint[:p, p + 3 :].T
+    joint[p + 3 :, p + 3 :] = cov_accelerometer
+    to_all = np.zeros((24, n))
+    if k == 0:
+        to_all[:12, p + 3 :] = np.eye(12)
+    else:
+        to_all[:12, :k] = basis
+    to_all[12:21, k : k + 9] = np.eye(9)
+    for i in range(3):
+        to_all[21 + i, k + 3 * i : k + 3 * i + 3] = -measured.zero_mean
+    to_all[21:, p : p + 3] = -S
+    if p > k + 9:
+        to_all[21:, k + 9 : k + 12] = np.eye(3)
+    covariance = to_all @ joint @ to_all.T
+    return Aligned(
+        fit=fit,
+        gyroscope_bias=np.asarray(fit.rate_offset) - S @ measured.zero_mean,
+        covariance=0.5 * (covariance + covariance.T),
+        parameters_covariance=joint[:p, :p],
+        used=used,
+        outliers=outliers,
+        inflation=inflation,
+    )
+
+
+def _unseen(fit: AlignmentFit, S: FloatArray, k: int) -> FloatArray:
+    """Variance of directions that the moves do not see, (p, p): as uncertain as the scale itself is large."""
+    p = len(fit.singular_values)
+    extra = np.zeros((p, p))
+    if fit.rank == p:
+        return extra
+    size = float(np.linalg.norm(S, 2))
+    for direction in np.asarray(fit.directions).T[fit.rank :]:
+        scaled = np.zeros(p)
+        scaled[k : k + 9] = direction[k : k + 9]
+        length = float(np.linalg.norm(scaled))
+        if length > 0.0:
+            extra += np.outer(scaled, scaled) * (size / length) ** 2
+    return extra
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Predicted minus measured gravity of some moves: ``residual`` and ``sigma`` (m, 3) in m/s², ``angle_deg`` (m,),
+    ``z2`` (m,) the squared residual in standard errors (two degrees of freedom)."""
+
+    residual: FloatArray
+    sigma: FloatArray
+    angle_deg: FloatArray
+    z2: FloatArray
+    floor2: FloatArray
+
+
+def predict(aligned: Aligned, measured: MoveMeasurements, gravity_m_s2: float, is_held_out: bool) -> Prediction:
+    """Compare predicted and measured directions of gravity after every move.
+
+    ``residual = |g| (B f_i/|f_i| − f_j/|f_j|)``; its variance adds, for held-out moves, that of the calibration.
+    """
+    fit = aligned.fit
+    forces = measured.reading @ np.asarray(fit.accelerometer_scale).T + np.asarray(fit.accelerometer_bias)
+    after = forces[measured.links[:, 1]]
+    norm_after = np.linalg.norm(after, axis=1, keepdims=True)
+    to = after / norm_after
+    predicted = np.asarray(fit.predicted)
+    predicted = predicted / np.linalg.norm(predicted, axis=1, keepdims=True)
+    residual = gravity_m_s2 * (predicted - to)
+    angle = np.degrees(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(predicted - to, axis=1), 1.0)))
+    across = np.eye(3)[None] - to[:, :, None] * to[:, None, :]
+    covariance = np.asarray(fit.cov_residuals).copy()
+    noise = across @ covariance @ across
+    if is_held_out:
+        jacobian = np.asarray(fit.jacobians)
+        covariance += jacobian @ aligned.parameters_covariance @ np.swapaxes(jacobian, 1, 2)
+    covariance = across @ covariance @ across
+    z2 = np.array(
+        [
+            float(r @ np.linalg.pinv(c, rcond=1e-9, hermitian=True) @ r)
+            for r, c in zip(residual, covariance, strict=True)
+        ]
+    )
+    return Prediction(
+        residual=residual,
+        sigma=np.sqrt(np.maximum(np.einsum("mii->mi", covariance), 0.0)),
+        angle_deg=angle,
+        z2=z2,
+        floor2=np.einsum("mii->m", noise),
+    )
+
+
+def held_out(
+    aligned: Aligned,
+    measured: MoveMeasurements,
+    accelerometer: SensorCalibration,
+    basis: FloatArray,
+    gravity_m_s2: float,
+    options: MoveOptions,
+) -> Prediction | None:
+    """Every used move predicted by a fit that did not see it (k-fold, every k-th move), or ``None`` with too few moves."""
+    indices = np.flatnonzero(aligned.used)
+    n_folds = min(options.n_folds, len(indices))
+    n_parameters = 9 + (3 if options.is_offset_free else 0)
+    if n_folds < 2 or 2 * (len(indices) - -(-len(indices) // n_folds)) < n_parameters:
+        return None
+    parts: list[tuple[npt.NDArray[np.intp], Prediction]] = []
+    start = np.asarray(aligned.fit.gyroscope_scale)[None]
+    for fold in range(n_folds):
+        out = indices[fold::n_folds]
+        used = aligned.used.copy()
+        used[out] = False
+        fit = align(measured, accelerometer, basis, gravity_m_s2, start, options, used)
+        if fit.rank < aligned.fit.rank:
+            return None
+        without = _assemble(fit, measured, accelerometer, basis, used, (), aligned.inflation)
+        parts.append((out, predict(without, measured, gravity_m_s2, is_held_out=True)))
+    m = measured.n_moves
+    merged = {name: np.full((m, 3), np.nan) for name in ("residual", "sigma")}
+    merged |= {name: np.full(m, np.nan) for name in ("angle_deg", "z2", "floor2")}
+    for out, part in parts:
+        for name, values in merged.items():
+            values[out] = getattr(part, name)[out]
+    return Prediction(**merged)
+
+
+def quality_of(
+    aligned: Aligned, measured: MoveMeasurements, gravity_m_s2: float, held: Prediction | None
+) -> FitQuality:
+    """The gyro's residuals in sample and held out; a move is two numbers, so rms is per tangent component."""
+    seen = predict(aligned, measured, gravity_m_s2, is_held_out=False)
+    used = aligned.used
+    fit = aligned.fit
+    total = float(np.sum(seen.residual[used] ** 2))
+    n = 2 * int(np.count_nonzero(used))
+    dof = max(n - min(9, fit.rank), 0)
+    weights = np.where(used, 1.0, 0.0)
+    held_rms = None
+    if held is not None:
+        held_rms = float(np.sqrt(np.nansum(held.residual**2) / n))
+    return FitQuality(
+        unit="m/s^2",
+        residual=seen.residual,
+        sigma=seen.sigma,
+        chi2=fit.chi2,
+        dof=fit.dof,
+        rms=float(np.sqrt(total / n)),
+        rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
+        floor=float(np.sqrt(np.sum(seen.floor2[used]) / n)),
+        held_out=None if held is None else held.residual,
+        held_out_sigma=None if held is None else held.sigma,
+        held_out_rms=held_rms,
+        angle_deg=seen.angle_deg,
+        held_out_angle_deg=None if held is None else held.angle_deg,
+        weights=weights,
+        n_iterations=fit.iterations,
+        stopped_because=fit.stopped_because,
+    )

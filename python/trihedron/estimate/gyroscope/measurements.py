@@ -1,0 +1,270 @@
+"""What a recording says about its moves: arrays for the alignment, and the noise behind each of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron._core import Moves
+from trihedron.records.calibration import SensorCalibration
+from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.recording import Recording
+from trihedron.records.segments import Segments
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+BLOCK_S = 0.5
+"""Length of the blocks whose scatter gives the angle random walk: moves last of this order, and it is long against
+the correlation that an anti-alias filter leaves between samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class MoveMeasurements:
+    """Everything the alignment needs, in raw units of each sensor.
+
+    ``reading``, ``zero`` (n, 3) are the hold means of accelerometer and gyro, ``var_reading``, ``var_zero`` (n, 3) the
+    variances of these means; ``links`` (m, 2) the holds each move joins, ``edges`` (m, 2) its samples;
+    ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_zero_walk`` (3,) the variance by which the
+    true zero reading changes from hold to hold; ``is_clipped`` (m,) marks moves in which the gyro met its limit.
+    ``zero_weights`` (n, 3) make the session's zero reading ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,).
+    """
+
+    moves: Moves
+    links: IntArray
+    edges: IntArray
+    durations_s: FloatArray
+    reading: FloatArray
+    var_reading: FloatArray
+    zero: FloatArray
+    var_zero: FloatArray
+    zero_weights: FloatArray
+    zero_mean: FloatArray
+    var_zero_mean: FloatArray
+    var_zero_walk: FloatArray
+    noise_density: FloatArray
+    sigma_time_s: float
+    nominal_step_s: float
+    is_clipped: BoolArray
+    is_gapped: BoolArray
+    zero_excess: FloatArray
+
+    @property
+    def n_moves(self) -> int:
+        """Number of moves."""
+        return len(self.links)
+
+
+def resolution_of(readings: FloatArray) -> FloatArray:
+    """Smallest step between different values of each column, (3,); zero for a column that is not quantised."""
+    steps = np.zeros(readings.shape[1])
+    for axis, column in enumerate(readings.T):
+        finite = column[np.isfinite(column)]
+        values = np.unique(finite)
+        if len(values) < 2:
+            continue
+        gaps = np.diff(values)
+        # A grid shows when values repeat: far fewer distinct ones than samples.
+        if len(values) < 0.5 * len(finite):
+            steps[axis] = float(np.median(gaps[gaps < 1.5 * np.quantile(gaps, 0.25)]))
+    return steps
+
+
+def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
+    """Angle random walk ``N`` of each raw axis in raw unit · √s, (3,), from block means inside the holds.
+
+    ``N² = τ σ²(τ)`` with the Allan variance of blocks of τ = 0.5 s, pooled over the holds: unlike the scatter of single
+    samples it is right for filtered gyros, whose neighbouring samples are correlated. Never below the converter's own
+    noise, ``LSB²/12`` per sample.
+    """
+    gyroscope = _required(recording.gyroscope, "gyroscope")
+    step_s = 1.0 / recording.rate_hz
+    sums = np.zeros(3)
+    count = 0
+    for hold in segments.holds:
+        block = gyroscope[hold.samples()]
+        block = block[np.all(np.isfinite(block), axis=1)]
+        length = min(max(1, round(BLOCK_S / step_s)), len(block) // 4)
+        if length < 1:
+            continue
+        n = len(block) // length
+        means = block[: n * length].reshape(n, length, 3).mean(axis=1)
+        difference = np.diff(means, axis=0)
+        sums += 0.5 * np.sum(difference**2, axis=0) * length * step_s
+        count += n - 1
+    if count < 8 and segments.gyroscope_sigma is not None:
+        variance = np.asarray(segments.gyroscope_sigma) ** 2 * step_s
+    elif count:
+        variance = sums / count
+    else:
+        raise ValueError("the holds are too short to tell the gyro's noise: hold each pose for at least a second")
+    converter = resolution_of(gyroscope) ** 2 / 12.0 * step_s
+    density: FloatArray = np.sqrt(np.maximum(variance, converter))
+    return density
+
+
+def measure_moves(
+    recording: Recording, segments: Segments, accelerometer: SensorCalibration, rate_degree: int
+) -> MoveMeasurements:
+    """Collect hold means, moves and noise.
+
+    Raises
+    ------
+    ValueError
+        When a sensor is missing or there is no move between two holds.
+    """
+    gyroscope = _required(recording.gyroscope, "gyroscope")
+    _required(recording.accelerometer, "accelerometer")
+    if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
+        raise ValueError("method 2 needs the hold means of both sensors: segment a recording that has both")
+    moves = [move for move in segments.moves if move.stop - move.start >= 2]
+    if not moves:
+        raise ValueError(
+            "no move between two still poses was found: turn the sensor by hand between poses and hold each for some "
+            "seconds"
+        )
+    if moves[-1].stop > recording.n_samples or segments.holds[-1].stop > recording.n_samples:
+        raise ValueError("the segments reach beyond the recording: they belong to another log")
+    edges = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
+    links = np.array([[move.hold_before, move.hold_after] for move in moves], dtype=np.int64)
+    anchors = segments.time_mid_s[links]
+    prepared = Moves(recording.time_s, gyroscope, edges, np.ascontiguousarray(anchors), links, rate_degree)
+
+    zero = np.ascontiguousarray(segments.gyroscope_mean, dtype=np.float64)
+    var_zero = _mean_variance(segments.gyroscope_sigma_mean, segments.gyroscope_sigma, gyroscope)
+    reading = np.ascontiguousarray(segments.accelerometer_mean, dtype=np.float64)
+    var_reading = _mean_variance(
+        segments.accelerometer_sigma_mean,
+        segments.accelerometer_sigma,
+        _required(recording.accelerometer, "accelerometer"),
+    )
+    var_reading = var_reading + _unexplained_reading_variance(accelerometer)
+    change = zero[links[:, 1]] - zero[links[:, 0]]
+    expected = var_zero[links[:, 1]] + var_zero[links[:, 0]]
+    walk = np.maximum(np.mean(change**2 - expected, axis=0), 0.0)
+    weights, mean, var_mean, excess = _pool(zero, var_zero)
+    steps = np.diff(recording.time_s)
+    nominal = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 1.0 / recording.rate_hz
+    jitter = float(np.median(np.abs(steps - nominal))) * 1.4826 / np.sqrt(2.0)
+    return MoveMeasurements(
+        moves=prepared,
+        links=links,
+        edges=edges,
+        durations_s=prepared.durations_s(),
+        reading=reading,
+        var_reading=var_reading,
+        zero=zero,
+        var_zero=var_zero,
+        zero_weights=weights,
+        zero_mean=mean,
+        var_zero_mean=var_mean,
+        var_zero_walk=walk,
+        noise_density=rate_noise_density(recording, segments),
+        sigma_time_s=jitter,
+        nominal_step_s=nominal,
+        is_clipped=clipped_moves(gyroscope, edges),
+        is_gapped=np.array([np.max(steps[a : b - 1], initial=0.0) > 5.0 * nominal for a, b in edges]),
+        zero_excess=excess,
+    )
+
+
+def clipped_moves(gyroscope: FloatArray, edges: IntArray) -> BoolArray:
+    """Moves in which a raw axis stays at the extreme value of the whole record for two samples or more, (m,).
+
+    A gyro that is not clipped reaches its extreme once, not repeatedly.
+    """
+    finite = np.where(np.isfinite(gyroscope), gyroscope, 0.0)
+    at_limit = np.zeros(len(gyroscope), dtype=bool)
+    for axis in range(3):
+        column = finite[:, axis]
+        for limit in (column.max(), column.min()):
+            at = column == limit
+            repeated = at[1:] & at[:-1]
+            # At rest a coarse converter repeats its extreme too: a limit is far from where the gyro rests.
+            if np.any(repeated) and abs(limit - np.median(column)) > 0.3 * np.ptp(column):
+                at_limit |= at
+    return np.array([int(np.count_nonzero(at_limit[a:b])) >= 2 for a, b in edges], dtype=bool)
+
+
+def audit_moves(measured: MoveMeasurements) -> list[Finding]:
+    """Findings on clipped moves, gaps inside moves, and a zero reading that changes from hold to hold."""
+    findings = []
+    if np.any(measured.is_clipped):
+        which = [int(i) for i in np.flatnonzero(measured.is_clipped)]
+        findings.append(
+            Finding(
+                FindingCode.CLIPPING,
+                Severity.WARNING,
+                f"the gyro met its limit in {len(which)} of {measured.n_moves} moves ({_list(which)}); "
+                "they are left out of the fit.",
+                "the sensor was turned faster than its range",
+                "Turn more slowly, or set a wider range.",
+            )
+        )
+    if np.any(measured.is_gapped):
+        which = [int(i) for i in np.flatnonzero(measured.is_gapped)]
+        findings.append(
+            Finding(
+                FindingCode.TIME_GAP,
+                Severity.WARNING,
+                f"samples are missing inside {len(which)} of {measured.n_moves} moves ({_list(which)}); "
+                "their rotation is uncertain and they weigh less.",
+                "the logger lost samples while the sensor moved",
+                "Record again, or log at a rate that the link sustains.",
+            )
+        )
+    return findings
+
+
+def _list(indices: list[int]) -> str:
+    shown = ", ".join(str(i) for i in indices[:8])
+    return f"move {shown}" + (" ..." if len(indices) > 8 else "")
+
+
+def _required(readings: FloatArray | None, name: str) -> FloatArray:
+    if readings is None:
+        raise ValueError(f"the recording has no {name}: method 2 needs both sensors")
+    return readings
+
+
+def _mean_variance(sigma_mean: FloatArray | None, sigma: FloatArray | None, readings: FloatArray) -> FloatArray:
+    """Variance of the hold means, (n, 3), with the converter's share where its noise cannot be averaged away."""
+    if sigma_mean is None:
+        raise ValueError("the segments do not say how certain their hold means are")
+    variance = np.asarray(sigma_mean, dtype=np.float64) ** 2
+    if sigma is not None:
+        lsb = resolution_of(readings)
+        # Below half a step of noise the converter's error no longer averages out: it stays uniform within one step.
+        variance = variance + np.where(np.asarray(sigma) < 0.5 * lsb, lsb**2 / 12.0, 0.0)
+    return np.ascontiguousarray(variance)
+
+
+def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArray:
+    """What the accelerometer's own residual says beyond noise, per raw axis, (3,): directions suffer as norms do."""
+    quality = accelerometer.quality
+    if quality is None or not np.isfinite(quality.rms_dof) or not np.isfinite(quality.floor):
+        return np.zeros(3)
+    excess = max(quality.rms_dof**2 - quality.floor**2, 0.0)
+    gains: FloatArray = np.sum(accelerometer.S**2, axis=0)
+    return excess / gains
+
+
+def _pool(zero: FloatArray, var_zero: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Random-effects mean of the hold zeros (DerSimonian & Laird 1986): weights, mean, variance, χ² against constancy."""
+    floor = np.maximum(var_zero, 1e-30 + 1e-24 * zero**2)
+    weight = 1.0 / floor
+    total = weight.sum(axis=0)
+    mean = (weight * zero).sum(axis=0) / total
+    chi2 = (weight * (zero - mean) ** 2).sum(axis=0)
+    dof = len(zero) - 1
+    spread = np.maximum(chi2 - dof, 0.0) / np.maximum(total - (weight**2).sum(axis=0) / total, 1e-300)
+    # Only a change beyond chance counts: a spread fitted to pure noise would spoil the weights of long holds.
+    spread = np.where(chi2 > dof + 4.0 * np.sqrt(2.0 * max(dof, 1)), spread, 0.0)
+    weight = 1.0 / (floor + spread)
+    weight /= weight.sum(axis=0)
+    mean = (weight * zero).sum(axis=0)
+    variance = (weight**2 * (floor + spread)).sum(axis=0)
+    return np.ascontiguousarray(weight), mean, variance, chi2

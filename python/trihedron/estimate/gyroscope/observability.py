@@ -1,0 +1,106 @@
+"""What the moves determine and what they leave open, in words, with the moves to add."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron._core import AlignmentFit
+from trihedron.records.calibration import PARAMETER_NAMES, Observability
+from trihedron.records.finding import Finding, FindingCode, Severity
+
+FloatArray = npt.NDArray[np.float64]
+
+WEAK = 0.03
+"""Relative standard error of a direction in ``S_ω`` above which it is called weak: data sheets promise this much."""
+
+
+def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_accelerometer: int) -> Observability:
+    """Turn the SVD of the whitened Jacobian and the covariance (9, 9) of ``S_ω`` into words.
+
+    A move shows ``δS_ω ∫w' dt`` across the vertical only, so the element ``S_ij`` needs a turn about body axis ``j`` during
+    which axis ``i`` is not vertical, and, for ``i ≠ j``, by an angle that is not a whole turn.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    worst = vectors[:, -1].reshape(3, 3)
+    size = float(np.linalg.norm(S, 2))
+    relative = float(np.sqrt(max(values[-1], 0.0))) / size if size > 0 else float("inf")
+    rate, axis = (int(k) for k in np.unravel_index(np.argmax(np.abs(worst)), (3, 3)))
+    if rate == axis:
+        weakest = f"scale of gyro axis {axis + 1} (S{axis + 1}{axis + 1})"
+    else:
+        weakest = f"how gyro axis {axis + 1} answers to rate about axis {rate + 1} (S{rate + 1}{axis + 1})"
+    weakest += f", known to {100.0 * relative:.2g} % of the scale"
+    advice: tuple[str, ...] = ()
+    if fit.rank < len(fit.singular_values) or relative > WEAK:
+        advice = tuple(_advice(fit, covariance, size, n_accelerometer))
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    correlation = covariance / np.outer(sigma, sigma)
+    pairs = tuple(
+        (PARAMETER_NAMES[i], PARAMETER_NAMES[j], float(correlation[i, j]))
+        for i in range(9)
+        for j in range(i + 1, 9)
+        if abs(correlation[i, j]) > 0.9
+    )
+    singular = np.asarray(fit.singular_values)
+    n = len(singular)
+    condition = float(singular[0] / singular[-1]) if fit.rank == n and singular[-1] > 0 else float("inf")
+    return Observability(fit.rank, n, condition, singular, weakest, advice, pairs)
+
+
+def _advice(fit: AlignmentFit, covariance: FloatArray, size: float, n_accelerometer: int) -> list[str]:
+    del n_accelerometer
+    lines = []
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / size
+    for axis in range(3):
+        weak = [rate for rate in range(3) if sigma[rate, axis] > WEAK]
+        if not weak:
+            continue
+        if len(weak) == 3:
+            starts = "twice, starting with each of the two other axes upright once"
+        elif weak == [axis]:
+            starts = "and back"
+        else:
+            across = next(rate for rate in weak if rate != axis)
+            # The element S_ij is seen while axis i is level: start with the third axis upright.
+            third = 3 - axis - across
+            starts = f"starting with body axis {third + 1} upright"
+        lines.append(
+            f"lay body axis {axis + 1} level and turn the sensor about it by 90 to 120 degrees, {starts}, with a still "
+            "pose before and after"
+        )
+    if not lines and fit.rank < len(fit.singular_values):
+        lines.append("add moves about all three body axes held level, each with a still pose before and after")
+    return lines
+
+
+def observability_findings(observability: Observability, covariance: FloatArray, S: FloatArray) -> list[Finding]:
+    """NOT_OBSERVABLE or WEAKLY_OBSERVABLE with the moves to add, or nothing."""
+    action = " ".join(f"{line[0].upper()}{line[1:]}." for line in observability.advice)
+    cause = "turns about the vertical leave gravity where it was, and a whole turn brings it back"
+    missing = observability.n_parameters - observability.rank
+    if missing > 0:
+        return [
+            Finding(
+                FindingCode.NOT_OBSERVABLE,
+                Severity.SERIOUS,
+                f"the moves determine {observability.rank} of {observability.n_parameters} gyro parameters; "
+                f"least known: {observability.weakest}.",
+                cause,
+                action,
+            )
+        ]
+    size = float(np.linalg.norm(S, 2))
+    relative = float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0))) / size if size > 0 else float("inf")
+    if relative > WEAK:
+        serious = relative > 10.0 * WEAK
+        return [
+            Finding(
+                FindingCode.NOT_OBSERVABLE if serious else FindingCode.WEAKLY_OBSERVABLE,
+                Severity.SERIOUS if serious else Severity.WARNING,
+                f"the moves hardly show {observability.weakest}.",
+                cause,
+                action,
+            )
+        ]
+    return []

@@ -1,0 +1,95 @@
+"""Where the alignment starts: scale, sign and axes of an unknown gyro from one linear least-squares problem."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.records.calibration import SensorCalibration
+from trihedron.records.recording import Recording
+from trihedron.units import rate_to_si
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def integral_start(
+    recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration
+) -> FloatArray | None:
+    """``S_ω`` (3, 3) from Poisson's equation in integral form, or ``None`` when the moves do not determine it.
+
+    ``f_j − f_i = ∫ [f]× S_ω (w' − z) dt`` is linear in ``S_ω`` once ``f(t)`` inside the move is taken from the
+    accelerometer. Accelerations of the hand disturb it, but they average out over a move; scale, sign, axis order and
+    handedness come out right without any nominal figure.
+    """
+    if recording.gyroscope is None or recording.accelerometer is None:
+        return None
+    rows, sides = [], []
+    force = accelerometer.S @ measured.reading.T + accelerometer.b[:, None]
+    for (start, stop), (before, after), clipped in zip(
+        measured.edges, measured.links, measured.is_clipped, strict=True
+    ):
+        time = recording.time_s[start:stop]
+        rate = recording.gyroscope[start:stop] - 0.5 * (measured.zero[before] + measured.zero[after])
+        inside = recording.accelerometer[start:stop] @ accelerometer.S.T + accelerometer.b
+        keep = np.all(np.isfinite(rate) & np.isfinite(inside), axis=1)
+        if clipped or np.count_nonzero(keep) < 2:
+            continue
+        # ∂([f]× S w)/∂S_ij = f × e_i w_j, integrated by trapezoids.
+        product = inside[keep][:, :, None] * rate[keep][:, None, :]
+        moment = _trapezoid(product, time[keep])
+        row = np.zeros((3, 3, 3))
+        for i in range(3):
+            unit = np.zeros(3)
+            unit[i] = 1.0
+            row[:, i, :] = -_cross_matrix(unit) @ moment
+        rows.append(row.reshape(3, 9))
+        sides.append(force[:, after] - force[:, before])
+    if len(rows) < 3:
+        return None
+    matrix, side = np.concatenate(rows), np.concatenate(sides)
+    size = np.linalg.norm(matrix, axis=0)
+    if np.any(size == 0.0):
+        return None
+    solution, _, rank, singular = np.linalg.lstsq(matrix / size, side, rcond=1e-3)
+    if rank < 9 or singular[-1] < 1e-3 * singular[0]:
+        return None
+    S: FloatArray = (solution / size).reshape(3, 3)
+    return S
+
+
+def starts(
+    recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration, nominal: FloatArray | None
+) -> FloatArray:
+    """Starts (k, 3, 3) for the alignment: the linear one, the nominal one, and the nominal one of the unit.
+
+    Raises
+    ------
+    ValueError
+        When readings are counts, no nominal scale is given and the moves do not determine a start.
+    """
+    found = []
+    if nominal is not None:
+        found.append(np.asarray(nominal, dtype=np.float64))
+    linear = integral_start(recording, measured, accelerometer)
+    if linear is not None:
+        found.append(linear)
+    unit = rate_to_si(recording.gyroscope_unit)
+    if unit is not None and nominal is None:
+        found.append(unit * np.eye(3))
+    if not found:
+        raise ValueError(
+            "the moves do not determine a first guess of the gyro scale and its readings are counts: "
+            "give nominal_scale (3, 3) in rad/s per count, or add moves about all three axes"
+        )
+    return np.ascontiguousarray(np.stack(found))
+
+
+def _trapezoid(values: FloatArray, time: FloatArray) -> FloatArray:
+    widths = np.diff(time)[:, None, None]
+    total: FloatArray = np.sum(0.5 * (values[1:] + values[:-1]) * widths, axis=0)
+    return total
+
+
+def _cross_matrix(v: FloatArray) -> FloatArray:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
