@@ -1,4 +1,4 @@
-"""The alignment run on measured moves: screening of outliers, covariance of both sensors' parameters, held-out moves."""
+"""The alignment run on measured moves: screening of outliers, covariance of both sensors' parameters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.stats import chi2 as chi2_distribution
 
 from trihedron._core import AlignmentFit
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.records.calibration import FitQuality, SensorCalibration
+from trihedron.records.calibration import SensorCalibration
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -31,9 +31,9 @@ class MoveOptions:
     """How moves are fitted.
 
     ``rate_degree`` of the rate polynomial over a sample (0 constant, 1 linear, 3 coning-corrected); ``is_robust``
-    screens moves whose residual is far beyond the others'; ``is_offset_free`` adds a constant rate inside the moves that
-    the holds do not show (3 parameters); ``n_folds`` for held-out prediction, 0 for none; ``nominal_scale`` (3, 3) or a
-    number, rad/s per raw unit, where the moves cannot tell it.
+    screens moves whose residual is far beyond the others'; ``is_offset_free`` adds a constant rate inside the moves
+    that the holds do not show (3 parameters); ``n_folds`` for held-out prediction, 0 for none; ``nominal_scale`` (3, 3)
+    or a number, rad/s per raw unit, where the moves cannot tell it.
     """
 
     rate_degree: RateDegree = 3
@@ -59,8 +59,8 @@ class Aligned:
     """A finished alignment.
 
     ``parameters_covariance`` (p, p) of (free accelerometer, ``S_ω``, offset) with everything in it; ``covariance``
-    (24, 24) of (``S_f``, ``b_f``, ``S_ω``, ``b_ω``); ``used`` (m,) the moves behind it, ``outliers`` those screened out;
-    ``inflation`` the factor χ²/dof by which the covariance was widened, one when the residual is within the noise.
+    (24, 24) of (``S_f``, ``b_f``, ``S_ω``, ``b_ω``); ``used`` (m,) the moves behind it, ``outliers`` those screened
+    out; ``inflation`` the factor χ²/dof by which the covariance was widened, one when the residual is within the noise.
     """
 
     fit: AlignmentFit
@@ -129,7 +129,7 @@ def align_screened(
     inflation = 1.0
     if fit.dof > 0 and chi2_distribution.sf(fit.chi2, fit.dof) < FALSE_ALARM:
         inflation = fit.chi2 / fit.dof
-    return _assemble(fit, measured, accelerometer, basis, used, outliers, inflation)
+    return assemble(fit, measured, accelerometer, basis, used, outliers, inflation)
 
 
 def _core_align(
@@ -163,7 +163,7 @@ def _core_align(
     )
 
 
-def _assemble(
+def assemble(
     fit: AlignmentFit,
     measured: MoveMeasurements,
     accelerometer: SensorCalibration,
@@ -229,119 +229,3 @@ def _unseen(fit: AlignmentFit, S: FloatArray, k: int) -> FloatArray:
         if length > 0.0:
             extra += np.outer(scaled, scaled) * (size / length) ** 2
     return extra
-
-
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """Predicted minus measured gravity of some moves: ``residual`` and ``sigma`` (m, 3) in m/s², ``angle_deg`` (m,),
-    ``z2`` (m,) the squared residual in standard errors (two degrees of freedom)."""
-
-    residual: FloatArray
-    sigma: FloatArray
-    angle_deg: FloatArray
-    z2: FloatArray
-    floor2: FloatArray
-
-
-def predict(aligned: Aligned, measured: MoveMeasurements, gravity_m_s2: float, is_held_out: bool) -> Prediction:
-    """Compare predicted and measured directions of gravity after every move.
-
-    ``residual = |g| (B f_i/|f_i| − f_j/|f_j|)``; its variance adds, for held-out moves, that of the calibration.
-    """
-    fit = aligned.fit
-    forces = measured.reading @ np.asarray(fit.accelerometer_scale).T + np.asarray(fit.accelerometer_bias)
-    after = forces[measured.links[:, 1]]
-    norm_after = np.linalg.norm(after, axis=1, keepdims=True)
-    to = after / norm_after
-    predicted = np.asarray(fit.predicted)
-    predicted = predicted / np.linalg.norm(predicted, axis=1, keepdims=True)
-    residual = gravity_m_s2 * (predicted - to)
-    angle = np.degrees(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(predicted - to, axis=1), 1.0)))
-    across = np.eye(3)[None] - to[:, :, None] * to[:, None, :]
-    covariance = np.asarray(fit.cov_residuals).copy()
-    noise = across @ covariance @ across
-    if is_held_out:
-        jacobian = np.asarray(fit.jacobians)
-        covariance += jacobian @ aligned.parameters_covariance @ np.swapaxes(jacobian, 1, 2)
-    covariance = across @ covariance @ across
-    z2 = np.array(
-        [
-            float(r @ np.linalg.pinv(c, rcond=1e-9, hermitian=True) @ r)
-            for r, c in zip(residual, covariance, strict=True)
-        ]
-    )
-    return Prediction(
-        residual=residual,
-        sigma=np.sqrt(np.maximum(np.einsum("mii->mi", covariance), 0.0)),
-        angle_deg=angle,
-        z2=z2,
-        floor2=np.einsum("mii->m", noise),
-    )
-
-
-def held_out(
-    aligned: Aligned,
-    measured: MoveMeasurements,
-    accelerometer: SensorCalibration,
-    basis: FloatArray,
-    gravity_m_s2: float,
-    options: MoveOptions,
-) -> Prediction | None:
-    """Every used move predicted by a fit that did not see it (k-fold, every k-th move), or ``None`` with too few moves."""
-    indices = np.flatnonzero(aligned.used)
-    n_folds = min(options.n_folds, len(indices))
-    n_parameters = 9 + (3 if options.is_offset_free else 0)
-    if n_folds < 2 or 2 * (len(indices) - -(-len(indices) // n_folds)) < n_parameters:
-        return None
-    parts: list[tuple[npt.NDArray[np.intp], Prediction]] = []
-    start = np.asarray(aligned.fit.gyroscope_scale)[None]
-    for fold in range(n_folds):
-        out = indices[fold::n_folds]
-        used = aligned.used.copy()
-        used[out] = False
-        fit = align(measured, accelerometer, basis, gravity_m_s2, start, options, used)
-        if fit.rank < aligned.fit.rank:
-            return None
-        without = _assemble(fit, measured, accelerometer, basis, used, (), aligned.inflation)
-        parts.append((out, predict(without, measured, gravity_m_s2, is_held_out=True)))
-    m = measured.n_moves
-    merged = {name: np.full((m, 3), np.nan) for name in ("residual", "sigma")}
-    merged |= {name: np.full(m, np.nan) for name in ("angle_deg", "z2", "floor2")}
-    for out, part in parts:
-        for name, values in merged.items():
-            values[out] = getattr(part, name)[out]
-    return Prediction(**merged)
-
-
-def quality_of(
-    aligned: Aligned, measured: MoveMeasurements, gravity_m_s2: float, held: Prediction | None
-) -> FitQuality:
-    """The gyro's residuals in sample and held out; a move is two numbers, so rms is per tangent component."""
-    seen = predict(aligned, measured, gravity_m_s2, is_held_out=False)
-    used = aligned.used
-    fit = aligned.fit
-    total = float(np.sum(seen.residual[used] ** 2))
-    n = 2 * int(np.count_nonzero(used))
-    dof = max(n - min(9, fit.rank), 0)
-    weights = np.where(used, 1.0, 0.0)
-    held_rms = None
-    if held is not None:
-        held_rms = float(np.sqrt(np.nansum(held.residual**2) / n))
-    return FitQuality(
-        unit="m/s^2",
-        residual=seen.residual,
-        sigma=seen.sigma,
-        chi2=fit.chi2,
-        dof=fit.dof,
-        rms=float(np.sqrt(total / n)),
-        rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
-        floor=float(np.sqrt(np.sum(seen.floor2[used]) / n)),
-        held_out=None if held is None else held.residual,
-        held_out_sigma=None if held is None else held.sigma,
-        held_out_rms=held_rms,
-        angle_deg=seen.angle_deg,
-        held_out_angle_deg=None if held is None else held.angle_deg,
-        weights=weights,
-        n_iterations=fit.iterations,
-        stopped_because=fit.stopped_because,
-    )

@@ -253,7 +253,7 @@ def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArra
 
 
 def _pool(zero: FloatArray, var_zero: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Random-effects mean of the hold zeros (DerSimonian & Laird 1986): weights, mean, variance, χ² against constancy."""
+    """Random-effects mean of the zeros (DerSimonian & Laird 1986): weights, mean, variance, χ² against constancy."""
     floor = np.maximum(var_zero, 1e-30 + 1e-24 * zero**2)
     weight = 1.0 / floor
     total = weight.sum(axis=0)

@@ -15,11 +15,11 @@ WEAK = 0.03
 """Relative standard error of a direction in ``S_ω`` above which it is called weak: data sheets promise this much."""
 
 
-def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_accelerometer: int) -> Observability:
+def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray) -> Observability:
     """Turn the SVD of the whitened Jacobian and the covariance (9, 9) of ``S_ω`` into words.
 
-    A move shows ``δS_ω ∫w' dt`` across the vertical only, so the element ``S_ij`` needs a turn about body axis ``j`` during
-    which axis ``i`` is not vertical, and, for ``i ≠ j``, by an angle that is not a whole turn.
+    A move shows ``δS_ω ∫w' dt`` across the vertical only, so the element ``S_ij`` needs a turn about body axis ``j``
+    during which axis ``i`` is not vertical, and, for ``i ≠ j``, by an angle that is not a whole turn.
     """
     values, vectors = np.linalg.eigh(covariance)
     worst = vectors[:, -1].reshape(3, 3)
@@ -29,11 +29,11 @@ def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_acceler
     if rate == axis:
         weakest = f"scale of gyro axis {axis + 1} (S{axis + 1}{axis + 1})"
     else:
-        weakest = f"how gyro axis {axis + 1} answers to rate about axis {rate + 1} (S{rate + 1}{axis + 1})"
+        weakest = f"the share of gyro axis {axis + 1} in the rate about axis {rate + 1} (S{rate + 1}{axis + 1})"
     weakest += f", known to {100.0 * relative:.2g} % of the scale"
     advice: tuple[str, ...] = ()
     if fit.rank < len(fit.singular_values) or relative > WEAK:
-        advice = tuple(_advice(fit, covariance, size, n_accelerometer))
+        advice = tuple(_advice(fit, covariance, size))
     sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)
     pairs = tuple(
@@ -48,8 +48,7 @@ def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_acceler
     return Observability(fit.rank, n, condition, singular, weakest, advice, pairs)
 
 
-def _advice(fit: AlignmentFit, covariance: FloatArray, size: float, n_accelerometer: int) -> list[str]:
-    del n_accelerometer
+def _advice(fit: AlignmentFit, covariance: FloatArray, size: float) -> list[str]:
     lines = []
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / size
     for axis in range(3):
