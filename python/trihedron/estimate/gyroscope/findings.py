@@ -93,7 +93,7 @@ def handedness(S: FloatArray, S_accelerometer: FloatArray) -> list[Finding]:
                 FindingCode.LEFT_HANDED,
                 Severity.WARNING,
                 seen,
-                "the accelerometer's axes as logged form a left-handed triad, or one sensor's signs or order were changed",
+                "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed",
                 "Check the axis directions of the board against both data sheets.",
             )
         )

@@ -1,0 +1,144 @@
+"""Both sensors in one fit: the reference answer, with the covariance of all 24 parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.estimate.gyroscope.alignment import Aligned, MoveOptions, align_screened
+from trihedron.estimate.gyroscope.findings import findings_of
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
+from trihedron.estimate.gyroscope.moves import gyroscope_of
+from trihedron.estimate.gyroscope.start import starts
+from trihedron.estimate.gyroscope.verification import held_out
+from trihedron.records.calibration import Calibration, FitQuality, Frame, SensorCalibration
+from trihedron.records.recording import Recording
+from trihedron.records.segments import Segments
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def calibrate_joint(
+    recording: Recording,
+    segments: Segments,
+    accelerometer: SensorCalibration,
+    gravity_m_s2: float,
+    gravity_source: str,
+    options: MoveOptions | None = None,
+) -> Calibration:
+    """Fit ``S_f, b_f, S_ω`` to the norm of every hold and the rotation of every move at once (equations 5.7, 5.8).
+
+    The noise of a hold's mean enters its norm and both neighbouring moves, with its full covariance. The frame is that
+    of ``accelerometer``, which is also the start: nothing in the data turns the trihedron as a whole.
+
+    Parameters
+    ----------
+    recording, segments : Recording, Segments
+        Raw readings of both sensors, their still poses and moves.
+    accelerometer : SensorCalibration
+        Solution of the accelerometer alone (its quality tells how far its residual exceeds the noise).
+    gravity_m_s2, gravity_source : float, str
+        Magnitude of gravity and where it comes from.
+    options : MoveOptions
+        As for method 2.
+
+    Raises
+    ------
+    ValueError
+        As :func:`trihedron.estimate.gyroscope.calibrate_moves`.
+    """
+    options = options or MoveOptions()
+    measured = measure_moves(recording, segments, accelerometer, options.rate_degree)
+    basis, frame = free_directions(accelerometer.S)
+    first = starts(recording, measured, accelerometer, options.nominal())
+    aligned = align_screened(measured, accelerometer, basis, gravity_m_s2, first, options)
+    held = held_out(aligned, measured, accelerometer, basis, gravity_m_s2, options)
+    return Calibration(
+        accelerometer=SensorCalibration(
+            S=np.asarray(aligned.fit.accelerometer_scale),
+            b=np.asarray(aligned.fit.accelerometer_bias),
+            covariance=aligned.covariance[:12, :12],
+            raw_unit=accelerometer.raw_unit,
+            si_unit=accelerometer.si_unit,
+            method="joint",
+            quality=_norm_quality(aligned, measured, accelerometer.quality, gravity_m_s2, basis.shape[1]),
+            observability=accelerometer.observability,
+        ),
+        gyroscope=gyroscope_of(aligned, measured, recording, gravity_m_s2, held, "joint"),
+        covariance=aligned.covariance,
+        frame=frame,
+        gravity_m_s2=gravity_m_s2,
+        gravity_source=gravity_source,
+        recording_source=recording.source,
+        recording_sha256=recording.sha256,
+        findings=findings_of(aligned, measured, held),
+    )
+
+
+def free_directions(S: FloatArray) -> tuple[FloatArray, Frame]:
+    """Directions (12, 9) in ``(S row by row, b)`` that do not turn the frame of ``S``, and that frame.
+
+    Lower triangular: its six elements. Otherwise ``S = U P`` with ``P`` symmetric (polar factors) keeps ``U``, and
+    ``δS = U δP``: with ``U = 1`` that is the symmetric frame, with any other the case frame as it was given.
+    """
+    size = float(np.linalg.norm(S, 2))
+    directions = []
+    frame: Frame
+    if np.abs(np.triu(S, 1)).max() <= 1e-12 * size:
+        frame = "lower"
+        for i in range(3):
+            for j in range(i + 1):
+                direction = np.zeros((3, 3))
+                direction[i, j] = 1.0
+                directions.append(direction)
+    else:
+        left, _, right = np.linalg.svd(S)
+        U = left @ right
+        frame = "symmetric" if np.abs(S - S.T).max() <= 1e-9 * size else "case"
+        for i in range(3):
+            for j in range(i + 1):
+                direction = np.zeros((3, 3))
+                direction[i, j] = direction[j, i] = 1.0
+                directions.append(U @ direction)
+    basis = np.zeros((12, 9))
+    for column, direction in enumerate(directions):
+        basis[:9, column] = direction.ravel()
+    basis[9:, 6:] = np.eye(3)
+    return basis, frame
+
+
+def _norm_quality(
+    aligned: Aligned,
+    measured: MoveMeasurements,
+    alone: FitQuality | None,
+    gravity_m_s2: float,
+    n_parameters: int,
+) -> FitQuality:
+    """Norm residual of every hold at the joint solution; what was held out stays that of the accelerometer alone."""
+    S = np.asarray(aligned.fit.accelerometer_scale)
+    force = measured.reading @ S.T + np.asarray(aligned.fit.accelerometer_bias)
+    norm = np.linalg.norm(force, axis=1)
+    residual = norm - gravity_m_s2
+    gain = (force / norm[:, None]) @ S
+    sigma = np.sqrt(np.sum(gain**2 * measured.var_reading, axis=1))
+    dof = max(len(residual) - n_parameters, 0)
+    total = float(np.sum(residual**2))
+    quality = FitQuality(
+        unit="m/s^2",
+        residual=residual,
+        sigma=sigma,
+        chi2=float(np.sum((residual / np.maximum(sigma, 1e-300)) ** 2)),
+        dof=dof,
+        rms=float(np.sqrt(total / len(residual))),
+        rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
+        floor=float(np.sqrt(np.mean(sigma**2))),
+        n_iterations=aligned.fit.iterations,
+        stopped_because=aligned.fit.stopped_because,
+    )
+    if alone is None:
+        return quality
+    return replace(
+        quality, held_out=alone.held_out, held_out_sigma=alone.held_out_sigma, held_out_rms=alone.held_out_rms
+    )
