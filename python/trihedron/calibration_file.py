@@ -1,0 +1,318 @@
+"""The calibration file: JSON that states its own equation, direction, units and certainty (docs/calibration-file.md).
+
+Numbers are written with all their digits, so that reading a file gives back exactly what was written. A file is checked
+against the schema shipped with the package before anything is believed of it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.output_file import write_whole
+from trihedron.records import (
+    PARAMETER_NAMES,
+    Calibration,
+    Finding,
+    FindingCode,
+    FitQuality,
+    Observability,
+    SensorCalibration,
+    Severity,
+)
+
+FORMAT = "trihedron calibration"
+FORMAT_VERSION = 1
+
+EQUATION = "truth = S * raw + b"
+DIRECTION = (
+    "raw to true: multiply the raw reading (column of three, in raw_unit) by S, row by row, then add b; the result "
+    "is in si_unit, in the instrument trihedron. S is not to be inverted and b is not to be subtracted. "
+    "One trihedron is shared by both sensors."
+)
+FRAME_MEANING = {
+    "lower": "axis 1 of the trihedron lies along accelerometer axis 1, axis 2 in the plane of accelerometer axes 1 "
+    "and 2; S of the accelerometer is lower triangular",
+    "symmetric": "the trihedron nearest to the accelerometer's axes; S of the accelerometer is symmetric",
+    "case": "axes normal to three faces of the case; S is full",
+}
+
+_ARRAYS = (
+    "singular_values",
+    "residual",
+    "sigma",
+    "held_out",
+    "held_out_sigma",
+    "angle_deg",
+    "held_out_angle_deg",
+    "weights",
+)
+
+
+class CalibrationFileError(ValueError):
+    """A calibration file that cannot be read. One sentence: which file, what is wrong, what to do."""
+
+
+def write_calibration(calibration: Calibration, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a calibration file in one step, never over another file unless told to.
+
+    Raises
+    ------
+    OutputError
+        (a ``ValueError``) when the file exists or cannot be written.
+    """
+    write_whole(path, calibration_text(calibration), overwrite=overwrite)
+
+
+def read_calibration(path: str | os.PathLike[str]) -> Calibration:
+    """Read and check a calibration file.
+
+    Raises
+    ------
+    CalibrationFileError
+        When the file is missing, is not JSON, is not a calibration, or is of a format this version does not know.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise CalibrationFileError(f"{path}: this is a directory; name the calibration file inside it.")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise CalibrationFileError(f"{path}: there is no such file; check the name and the folder.") from None
+    except PermissionError:
+        raise CalibrationFileError(f"{path}: no permission to read this file; change its permissions.") from None
+    except (UnicodeDecodeError, OSError):
+        raise CalibrationFileError(f"{path}: this is not a calibration file (not text); name the .json file.") from None
+    try:
+        document = json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        line = f" (line {error.lineno})" if isinstance(error, json.JSONDecodeError) else ""
+        raise CalibrationFileError(
+            f"{path}: this is not JSON{line}; name a calibration file written by `trihedron calibrate -o`."
+        ) from None
+    return calibration_from_document(document, str(path))
+
+
+def calibration_text(calibration: Calibration) -> str:
+    """The file's content."""
+    return _folded(calibration_document(calibration)) + "\n"
+
+
+def calibration_document(calibration: Calibration) -> dict[str, Any]:
+    """A calibration as plain JSON types.
+
+    Raises
+    ------
+    ValueError
+        When a sensor's covariance disagrees with its block of the full one: the file keeps each number once.
+    """
+    sensors = {"accelerometer": calibration.accelerometer, "gyroscope": calibration.gyroscope}
+    for k, (name, sensor) in enumerate(sensors.items()):
+        if sensor is None:
+            continue
+        block = calibration.covariance[12 * k : 12 * k + 12, 12 * k : 12 * k + 12]
+        if not np.array_equal(block, sensor.covariance):
+            raise ValueError(f"the {name}'s covariance is not its block of the full covariance")
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "written_by": _written_by(),
+        "equation": EQUATION,
+        "direction": DIRECTION,
+        "frame": calibration.frame,
+        "frame_meaning": FRAME_MEANING[calibration.frame],
+        "gravity_m_s2": calibration.gravity_m_s2,
+        "gravity_source": calibration.gravity_source,
+        "is_trustworthy": calibration.is_trustworthy,
+        "accelerometer": _sensor_document(calibration.accelerometer),
+        "gyroscope": None if calibration.gyroscope is None else _sensor_document(calibration.gyroscope),
+        "parameter_order": _parameter_order(calibration.gyroscope is not None),
+        "covariance": plain(calibration.covariance),
+        "findings": [finding.to_dict() for finding in calibration.findings],
+        "recording": {"source": calibration.recording_source, "sha256": calibration.recording_sha256},
+        "extensions": plain(dict(calibration.extensions)),
+    }
+
+
+def calibration_from_document(document: object, source: str = "document") -> Calibration:
+    """The calibration that a document states; ``source`` names it in complaints.
+
+    Raises
+    ------
+    CalibrationFileError
+        When it does not follow the schema, or states what cannot be.
+    """
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise CalibrationFileError(
+            f"{source}: this JSON is not a calibration; name a file written by `trihedron calibrate -o`."
+        )
+    stated = document.get("format_version")
+    if isinstance(stated, int) and stated > FORMAT_VERSION:
+        raise CalibrationFileError(
+            f"{source}: written in format {stated}, this version reads up to {FORMAT_VERSION}; update trihedron."
+        )
+    _check_schema(document, source)
+    if document["equation"] != EQUATION:
+        raise CalibrationFileError(
+            f"{source}: states the equation {document['equation']!r}, not {EQUATION!r}; convert S and b to it first."
+        )
+    try:
+        return _from_checked(document)
+    except (ValueError, TypeError) as error:
+        raise CalibrationFileError(f"{source}: {error}; the file was changed by hand or damaged.") from None
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema (draft 2020-12) that every calibration file follows."""
+    text = files("trihedron").joinpath("schema", "calibration.schema.json").read_text(encoding="utf-8")
+    loaded: dict[str, Any] = json.loads(text)
+    return loaded
+
+
+def plain(value: Any) -> Any:
+    """Arrays, tuples and mappings as JSON types; what is not a finite number becomes ``null``."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict | MappingProxyType):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if value is None or isinstance(value, str | int | bool):
+        return value
+    raise TypeError(f"{type(value).__name__} has no place in a calibration file")
+
+
+def _check_schema(document: dict[str, Any], source: str) -> None:
+    # Imported here: it costs more than reading the file.
+    from jsonschema import Draft202012Validator
+    from jsonschema.exceptions import best_match
+
+    error = best_match(Draft202012Validator(schema()).iter_errors(document))
+    if error is not None:
+        place = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in error.absolute_path).lstrip(".")
+        what = error.message if len(error.message) < 120 else error.message[:117] + "..."
+        raise CalibrationFileError(
+            f"{source}: {place or 'the document'} does not follow the calibration schema ({what}); "
+            "the file was changed by hand or damaged."
+        )
+
+
+def _parameter_order(has_gyroscope: bool) -> list[str]:
+    sensors = ("accelerometer", "gyroscope") if has_gyroscope else ("accelerometer",)
+    return [f"{sensor}.{parameter}" for sensor in sensors for parameter in PARAMETER_NAMES]
+
+
+def _written_by() -> str:
+    try:
+        return f"trihedron {version('trihedron')}"
+    except PackageNotFoundError:
+        return "trihedron (not installed)"
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a number")
+
+
+def _sensor_document(sensor: SensorCalibration) -> dict[str, Any]:
+    return {
+        "S": plain(sensor.S),
+        "b": plain(sensor.b),
+        "sigma_S": plain(sensor.sigma_S),
+        "sigma_b": plain(sensor.sigma_b),
+        "raw_unit": sensor.raw_unit,
+        "si_unit": sensor.si_unit,
+        "method": sensor.method,
+        "residuals": None if sensor.quality is None else plain(vars(sensor.quality)),
+        "observability": None if sensor.observability is None else plain(vars(sensor.observability)),
+    }
+
+
+def _array(value: Any) -> npt.NDArray[np.float64]:
+    """Numbers back into an array; ``null`` was not a finite number."""
+    return np.array(value, dtype=np.float64)
+
+
+def _fields(document: dict[str, Any]) -> dict[str, Any]:
+    return {key: _array(value) if key in _ARRAYS and value is not None else value for key, value in document.items()}
+
+
+def _sensor(document: dict[str, Any], covariance: npt.NDArray[np.float64]) -> SensorCalibration:
+    quality, observability = document["residuals"], document["observability"]
+    if quality is not None:
+        numbers: dict[str, Any] = _fields(quality)
+        numbers |= {key: math.nan for key in _MAY_BE_NAN if numbers[key] is None}
+        quality = FitQuality(**numbers)
+    if observability is not None:
+        seen = _fields(observability)
+        seen["condition"] = math.inf if seen["condition"] is None else seen["condition"]
+        seen["advice"] = tuple(seen["advice"])
+        seen["correlated"] = tuple((a, b, float(c)) for a, b, c in seen["correlated"])
+        observability = Observability(**seen)
+    return SensorCalibration(
+        S=_array(document["S"]),
+        b=_array(document["b"]),
+        covariance=covariance,
+        raw_unit=document["raw_unit"],
+        si_unit=document["si_unit"],
+        method=document["method"],
+        quality=quality,
+        observability=observability,
+    )
+
+
+# Numbers of a fit without degrees of freedom.
+_MAY_BE_NAN = ("chi2", "rms", "rms_dof", "floor")
+
+
+def _from_checked(document: dict[str, Any]) -> Calibration:
+    covariance = _array(document["covariance"])
+    if document["parameter_order"] != _parameter_order(document["gyroscope"] is not None):
+        raise ValueError("parameter_order is not S row by row, then b, accelerometer first")
+    n = 12 if document["gyroscope"] is None else 24
+    if covariance.shape != (n, n):
+        raise ValueError(f"covariance must be {n} x {n}, got {' x '.join(map(str, covariance.shape))}")
+    return Calibration(
+        accelerometer=_sensor(document["accelerometer"], covariance[:12, :12]),
+        gyroscope=None if n == 12 else _sensor(document["gyroscope"], covariance[12:, 12:]),
+        covariance=covariance,
+        frame=document["frame"],
+        gravity_m_s2=document["gravity_m_s2"],
+        gravity_source=document["gravity_source"],
+        recording_source=document["recording"]["source"],
+        recording_sha256=document["recording"]["sha256"],
+        findings=tuple(_finding(finding) for finding in document["findings"]),
+        extensions=MappingProxyType(document["extensions"]),
+    )
+
+
+def _finding(document: dict[str, Any]) -> Finding:
+    return Finding(
+        code=FindingCode(document["code"]),
+        severity=Severity(document["severity"]),
+        seen=document["seen"],
+        cause=document["cause"],
+        action=document["action"],
+        numbers=MappingProxyType({k: math.nan if v is None else v for k, v in document["numbers"].items()}),
+    )
+
+
+def _folded(value: Any, indent: str = "") -> str:
+    """JSON with one line per row of numbers: a matrix looks like one."""
+    inner = indent + "  "
+    if isinstance(value, dict) and value:
+        items = (f"{inner}{json.dumps(key)}: {_folded(item, inner)}" for key, item in value.items())
+        return "{\n" + ",\n".join(items) + f"\n{indent}}}"
+    if isinstance(value, list) and any(isinstance(item, list | dict) for item in value):
+        return "[\n" + ",\n".join(inner + _folded(item, inner) for item in value) + f"\n{indent}]"
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)

@@ -1,0 +1,169 @@
+"""Options that several commands share, and the decorators that give them to a command."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Optional
+
+import typer
+
+if TYPE_CHECKING:
+    from trihedron.records import Recording
+
+Json = Annotated[
+    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+    typer.Option("--json", metavar="FILE", help="Write the result as JSON; '-' (or no FILE) is stdout."),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace output files that exist.")]
+Report = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--report", metavar="FILE", help="Write a report: .html with figures, .txt or .json."),
+]
+
+
+@dataclass(frozen=True)
+class LogSource:
+    """Where the readings come from, as said on the command line."""
+
+    log: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Argument(metavar="[LOG]", help="Log: CSV, TSV, text (also compressed), .npz, .npy or Parquet."),
+    ] = None
+    accel: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--accel", metavar="F", help="Log of the accelerometer, where each sensor has its own."),
+    ] = None
+    gyro: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own."),
+    ] = None
+    columns: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--columns", metavar="LIST", help="'t,ax,ay,az,-,gx,gy,gz' in file order, or 'ax=3,ay=4,az=5'."),
+    ] = None
+    rate: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--rate", metavar="HZ", help="Sampling rate of a log without a time column."),
+    ] = None
+    accel_unit: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--accel-unit", metavar="UNIT", help="m/s^2, g, mg or counts; detected otherwise."),
+    ] = None
+    gyro_unit: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--gyro-unit", metavar="UNIT", help="rad/s, mrad/s, deg/s or counts; detected otherwise."),
+    ] = None
+    time_unit: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--time-unit", metavar="UNIT", help="s, ms, us or ns; detected otherwise."),
+    ] = None
+    device: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--device", metavar="N", help="Which device (from 1) of an archive of several."),
+    ] = None
+
+    def read(self) -> Recording:
+        """The audited recording, with progress shown when it takes long."""
+        if self.log is None and self.accel is None and self.gyro is None:
+            raise typer.BadParameter("no log was named: give LOG, or --accel F and --gyro F")
+        from trihedron.pipeline import read
+
+        with progress("reading") as report:
+            return read(
+                self.log,
+                accelerometer_path=self.accel,
+                gyroscope_path=self.gyro,
+                columns=self.columns,
+                rate_hz=self.rate,
+                accelerometer_unit=self.accel_unit,
+                gyroscope_unit=self.gyro_unit,
+                time_unit=self.time_unit,
+                device=self.device,
+                progress=report,
+            )
+
+
+@dataclass(frozen=True)
+class GravitySource:
+    """|g| at the place of the recording, as said on the command line."""
+
+    gravity: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--gravity", metavar="M_S2", help="Local gravity [m/s^2]. It goes into every scale."),
+    ] = None
+    latitude: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--latitude", metavar="DEG", help="Latitude, from which gravity follows (WGS 84)."),
+    ] = None
+    height: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--height", metavar="M", help="Height above sea level, with --latitude."),
+    ] = None
+
+
+def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command the fields of option groups as its own options: ``source=LogSource`` fills argument ``source``.
+
+    One place states an option; a command names the group.
+    """
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        own = inspect.signature(command, eval_str=True)
+        parameters: list[inspect.Parameter] = []
+        for name, parameter in own.parameters.items():
+            if name in groups:
+                hints = inspect.get_annotations(groups[name], eval_str=True)
+                parameters += [
+                    inspect.Parameter(
+                        f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default, annotation=hints[f.name]
+                    )
+                    for f in fields(groups[name])
+                ]
+            else:
+                parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
+
+        @functools.wraps(command)
+        def run(**given: Any) -> None:
+            for name, group in groups.items():
+                given[name] = group(**{f.name: given.pop(f.name) for f in fields(group)})
+            command(**given)
+
+        del run.__wrapped__  # typer would read the inner signature
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        run.__annotations__ = {p.name: p.annotation for p in parameters}
+        return run
+
+    return decorate
+
+
+@contextmanager
+def progress(task: str, after_s: float = 1.0) -> Iterator[Callable[[float, str], None]]:
+    """A bar on stderr for what takes longer than ``after_s``; silent before."""
+    began = time.monotonic()
+    bar: Any = None
+    handle: Any = None
+
+    def report(done: float, text: str) -> None:
+        nonlocal bar, handle
+        if bar is None:
+            if time.monotonic() - began < after_s:
+                return
+            from rich.console import Console
+            from rich.progress import Progress
+
+            bar = Progress(console=Console(stderr=True), transient=True)
+            bar.start()
+            handle = bar.add_task(task, total=1.0)
+        bar.update(handle, completed=done, description=text or task)
+
+    try:
+        yield report
+    finally:
+        if bar is not None:
+            bar.stop()
