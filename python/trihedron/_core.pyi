@@ -132,6 +132,39 @@ class AxisKalman:
     @property
     def end_s(self) -> float | None: ...
 
+@final
+class NormKalman:
+    def __new__(
+        cls,
+        model_x: AxisKalmanModel,
+        model_y: AxisKalmanModel,
+        model_z: AxisKalmanModel,
+        symmetric: bool,
+        gravity: float,
+        prior_mean: FloatArray,
+        prior_sigma: FloatArray,
+    ) -> NormKalman: ...
+    def add(
+        self,
+        reading: Sequence[float],
+        start_s: float,
+        hold_s: float,
+        extra_variance: Sequence[float] = ...,
+    ) -> tuple[float, float]: ...
+    def relinearise(self, most: int) -> int | None: ...
+    def imagine(self, reading: Sequence[float], start_s: float, hold_s: float) -> None: ...
+    def copy(self) -> NormKalman: ...
+    @property
+    def parameters(self) -> FloatArray: ...
+    @property
+    def covariance(self) -> FloatArray: ...
+    @property
+    def innovations(self) -> FloatArray: ...
+    @property
+    def n_poses(self) -> int: ...
+    @property
+    def end_s(self) -> float | None: ...
+
 def kalman_track(
     model: AxisKalmanModel,
     prior_mean: FloatArray,

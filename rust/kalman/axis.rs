@@ -3,14 +3,12 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::shaping::{Layout, Shaping, ShapingModel};
+use super::timeline::{Steps, Timeline};
 use super::ud::{Factors, Transition, UdFilter};
 use crate::error::{Error, Result};
 
 /// Constants of one axis: sensitivity to each of the three reference components, and zero reading.
 pub const N_CONSTANTS: usize = 4;
-
-/// Steps remembered: regular logs need one, and a forgotten one costs microseconds.
-const REMEMBERED_STEPS: usize = 64;
 
 /// One reading of the axis in a known attitude.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,10 +56,8 @@ pub struct AxisFilter {
     moving: usize,
     pub(crate) filter: UdFilter,
     pub(crate) row: Vec<f64>,
-    end: Option<f64>,
-    steps: Vec<([f64; 2], Transition)>,
-    latest_step: usize,
-    n_poses: usize,
+    timeline: Timeline,
+    steps: Steps,
 }
 
 impl AxisFilter {
@@ -111,10 +107,8 @@ impl AxisFilter {
             layout,
             walk: prior.walk,
             moving,
-            end: None,
-            steps: Vec::new(),
-            latest_step: 0,
-            n_poses: 0,
+            timeline: Timeline::default(),
+            steps: Steps::default(),
         })
     }
 
@@ -133,13 +127,13 @@ impl AxisFilter {
     /// Poses seen.
     #[must_use]
     pub fn n_poses(&self) -> usize {
-        self.n_poses
+        self.timeline.n_poses()
     }
 
     /// End of the last hold, s.
     #[must_use]
     pub fn end(&self) -> Option<f64> {
-        self.end
+        self.timeline.end()
     }
 
     /// Row of the slow noise over all states.
@@ -151,81 +145,51 @@ impl AxisFilter {
         row
     }
 
-    fn transition(&mut self, gap: f64, hold: f64) -> usize {
-        let key = [gap, hold];
-        let same =
-            |k: &[f64; 2]| k[0].to_bits() == key[0].to_bits() && k[1].to_bits() == key[1].to_bits();
-        if let Some((k, _)) = self.steps.get(self.latest_step)
-            && same(k)
-        {
-            return self.latest_step;
-        }
-        if let Some(found) = self.steps.iter().position(|(k, _)| same(k)) {
-            self.latest_step = found;
-            return found;
-        }
-        let (phi_noise, q_noise) = self.shaping.step(gap, hold);
-        let (m, k) = (self.moving, self.n_noise());
-        let mut phi = DMatrix::identity(m, m);
-        let mut q = DMatrix::zeros(m, m);
-        phi.view_mut((0, 0), (k, k)).copy_from(&phi_noise);
-        q.view_mut((0, 0), (k, k)).copy_from(&q_noise);
-        for i in k..m {
-            q[(i, i)] = self.walk[i - k].powi(2) * (gap + hold);
-        }
-        if self.steps.len() == REMEMBERED_STEPS {
-            self.steps.clear();
-        }
-        self.steps.push((key, Transition::new(&phi, &q)));
-        self.latest_step = self.steps.len() - 1;
-        self.latest_step
-    }
-
-    /// The transition that the last pose used.
+    /// Transition of all states over the last step.
     #[must_use]
-    pub fn last_transition(&self) -> &Transition {
-        &self.steps[self.latest_step].1
-    }
-
-    /// States that move.
-    #[must_use]
-    pub fn n_moving(&self) -> usize {
-        self.moving
+    pub fn last_phi(&self) -> DMatrix<f64> {
+        let n = self.filter.n();
+        let mut phi = DMatrix::identity(n, n);
+        if let Some(step) = self.steps.last() {
+            phi.view_mut((0, 0), (self.moving, self.moving))
+                .copy_from(&step.phi());
+        }
+        phi
     }
 
     fn advance(&mut self, reference: [f64; 3], start: f64, hold: f64) -> Result<()> {
-        if !(hold.is_finite() && hold > 0.0 && start.is_finite()) {
-            return Err(Error::bad_input(format!(
-                "pose {}: a hold needs a finite start and a positive length, got {start} s and {hold} s",
-                self.n_poses + 1
-            )));
-        }
+        let gap = self.timeline.gap(start, hold)?;
         if reference.iter().any(|f| !f.is_finite()) {
             return Err(Error::bad_input(format!(
                 "pose {}: the reference is not finite",
-                self.n_poses + 1
+                self.n_poses() + 1
             )));
         }
-        // The clock's rounding must not look like travel back in time.
-        let gap = match self.end {
-            None => 0.0,
-            Some(end) if start >= end => start - end,
-            Some(end) if end - start <= 1e-6 * hold => 0.0,
-            Some(end) => {
-                return Err(Error::bad_input(format!(
-                    "pose {} starts at {start} s, before the last hold ended at {end} s: give the poses in order of time",
-                    self.n_poses + 1
-                )));
+        let (m, k) = (self.moving, self.n_noise());
+        let Self {
+            shaping,
+            walk,
+            steps,
+            filter,
+            row,
+            ..
+        } = self;
+        let step = steps.get(gap, hold, || {
+            let (phi_noise, q_noise) = shaping.step(gap, hold);
+            let mut phi = DMatrix::identity(m, m);
+            let mut q = DMatrix::zeros(m, m);
+            phi.view_mut((0, 0), (k, k)).copy_from(&phi_noise);
+            q.view_mut((0, 0), (k, k)).copy_from(&q_noise);
+            for i in k..m {
+                q[(i, i)] = walk[i - k].powi(2) * (gap + hold);
             }
-        };
-        let step = self.transition(gap, hold);
-        self.filter.predict(&self.steps[step].1);
-        let k = self.n_noise();
-        self.shaping.measurement_row(hold, &mut self.row[..k]);
-        self.row[k..k + 3].copy_from_slice(&reference);
-        self.row[k + 3] = 1.0;
-        self.end = Some(start + hold);
-        self.n_poses += 1;
+            Transition::new(&phi, &q)
+        });
+        filter.predict(step);
+        shaping.measurement_row(hold, &mut row[..k]);
+        row[k..k + 3].copy_from_slice(&reference);
+        row[k + 3] = 1.0;
+        self.timeline.pass(start, hold);
         Ok(())
     }
 
@@ -240,7 +204,7 @@ impl AxisFilter {
         {
             return Err(Error::bad_input(format!(
                 "pose {}: the reading must be finite and its extra variance not negative",
-                self.n_poses + 1
+                self.n_poses() + 1
             )));
         }
         self.advance(pose.reference, pose.start, pose.hold)?;

@@ -7,9 +7,12 @@
 pub mod axis;
 pub mod discretisation;
 pub mod least_squares;
+pub mod norm;
 pub mod shaping;
 pub mod smoother;
+pub mod timeline;
 pub mod ud;
 
 pub use axis::{AxisFilter, AxisTrack, Pose, Prior, track};
+pub use norm::{Frame, NormFilter, NormPose, NormPrior};
 pub use shaping::{NoiseTerms, ShapingModel};

@@ -64,14 +64,10 @@ pub fn smooth(model: &ShapingModel, prior: &Prior, poses: &[Pose]) -> Result<Smo
     let mut passed = Vec::with_capacity(poses.len());
     for pose in poses {
         let seen = filter.add(pose)?;
-        let mut phi = DMatrix::identity(n, n);
-        let m = filter.n_moving();
-        phi.view_mut((0, 0), (m, m))
-            .copy_from(&filter.last_transition().phi());
         passed.push(Passed {
             x: filter.filter.estimate(),
             p: filter.filter.factors.covariance_from(0),
-            phi,
+            phi: filter.last_phi(),
             row: DVector::from_column_slice(&filter.row),
             gain: DVector::from_column_slice(filter.filter.gain()),
             innovation: seen.innovation,

@@ -46,7 +46,7 @@ fn rows4(py: Python<'_>, rows: &[[f64; N_CONSTANTS]]) -> PyResult<Py<PyArray2<f6
         .unbind())
 }
 
-fn matrix<'py>(py: Python<'py>, m: &DMatrix<f64>) -> PyResult<Array2<'py>> {
+pub(super) fn matrix<'py>(py: Python<'py>, m: &DMatrix<f64>) -> PyResult<Array2<'py>> {
     m.transpose()
         .as_slice()
         .to_pyarray(py)
@@ -94,8 +94,8 @@ fn poses(
 
 /// Noise of one axis and how it is shaped.
 #[pyclass(module = "trihedron._core", frozen)]
-struct AxisKalmanModel {
-    inner: ShapingModel,
+pub(super) struct AxisKalmanModel {
+    pub(super) inner: ShapingModel,
 }
 
 #[pymethods]

@@ -13,6 +13,7 @@ use crate::error::Result as KernelResult;
 
 mod gyro_alignment;
 mod kalman;
+mod kalman_norm;
 mod poisson;
 mod accelerometer;
 mod rotation;
@@ -33,6 +34,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     poisson::register(module)?;
     kalman::register(module)?;
     accelerometer::register(module)?;
+    kalman_norm::register(module)?;
     rotation::register(module)?;
     simulate::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.

@@ -19,6 +19,7 @@ from trihedron.records.kalman import (
     ConstantsTrack,
     KalmanCalibration,
     LiveEstimate,
+    NormKalmanCalibration,
     PoseTable,
 )
 from trihedron.records.recording import Recording
@@ -40,6 +41,7 @@ __all__ = [
     "KalmanCalibration",
     "LiveEstimate",
     "Move",
+    "NormKalmanCalibration",
     "Observability",
     "PoseTable",
     "Recording",

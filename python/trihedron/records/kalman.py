@@ -191,3 +191,31 @@ class LiveEstimate:
     poses_needed: int | None
     next_reference: FloatArray | None
     nis: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class NormKalmanCalibration:
+    """Calibration of a triad by the filter that knows only the length of gravity.
+
+    ``parameters``, ``sigma`` (n, 12) are S row by row, then b, after every pose, as they stood then; ``accelerometer``
+    holds the final ones. ``innovation``, ``innovation_sigma`` (n,) [m/s²] belong to the last of ``n_runs`` runs over
+    all poses (0: not converged, and a finding says so). ``residual_m_s2`` (n,) is the corrected length minus |g|.
+    """
+
+    accelerometer: SensorCalibration
+    gravity_m_s2: float
+    parameters: FloatArray
+    sigma: FloatArray
+    innovation: FloatArray
+    innovation_sigma: FloatArray
+    is_settled: npt.NDArray[np.bool_]
+    n_runs: int
+    residual_m_s2: FloatArray
+    consistency: Consistency
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def nis(self) -> FloatArray:
+        """(n,) normalised innovation squared."""
+        out: FloatArray = (self.innovation / self.innovation_sigma) ** 2
+        return out

@@ -1,7 +1,9 @@
 """Calibration by Kalman filter with the identified noise in its state (docs/kalman.md)."""
 
 from trihedron.estimate.kalman.consistency import check_innovations, normalised_error_squared
-from trihedron.estimate.kalman.live import Goal, LiveCalibration
+from trihedron.estimate.kalman.guide import Goal
+from trihedron.estimate.kalman.live import LiveCalibration
+from trihedron.estimate.kalman.norm_invariant import LiveNormCalibration, NormStart, calibrate_without_references
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
 from trihedron.estimate.kalman.reference import DIVIDING_HEAD_POSES, pose_table_from_angles
 from trihedron.estimate.kalman.shaping import ShapingOptions
@@ -10,9 +12,12 @@ __all__ = [
     "DIVIDING_HEAD_POSES",
     "Goal",
     "LiveCalibration",
+    "LiveNormCalibration",
+    "NormStart",
     "Prior",
     "ShapingOptions",
     "calibrate_with_references",
+    "calibrate_without_references",
     "check_innovations",
     "normalised_error_squared",
     "pose_table_from_angles",

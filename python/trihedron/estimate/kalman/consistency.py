@@ -49,20 +49,20 @@ def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> C
     return Consistency(power / n, low, high, n, p, n_lags, tuple(float(v) for v in r))
 
 
-def consistency_findings(axis: int, seen: Consistency) -> list[Finding]:
-    """What an inconsistent filter tells about the noise it was given."""
+def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
+    """What an inconsistent filter tells about the noise it was given; ``axis`` None stands for all three."""
     out: list[Finding] = []
-    name = "xyz"[axis]
+    name = "Norm of gravity" if axis is None else f"Axis {'xyz'[axis]}"
     numbers = MappingProxyType({"nis_mean": seen.nis_mean, "nis_low": seen.nis_low, "nis_high": seen.nis_high})
     if seen.n and seen.nis_mean > seen.nis_high:
         out.append(
             Finding(
                 FindingCode.INNOVATIONS_TOO_LARGE,
                 Severity.WARNING,
-                f"Axis {name}: squared innovations are {seen.nis_mean:.2f} times what the noise model predicts "
+                f"{name}: squared innovations are {seen.nis_mean:.2f} times what the noise model predicts "
                 f"(99 % limit {seen.nis_high:.2f}).",
                 "The noise is larger than the model says, or a reference attitude is wrong.",
-                f"Multiply the error bars of this axis by {np.sqrt(seen.nis_mean):.2f}, or identify the noise anew.",
+                f"Multiply the error bars by {np.sqrt(seen.nis_mean):.2f}, or identify the noise anew.",
                 numbers,
             )
         )
@@ -71,7 +71,7 @@ def consistency_findings(axis: int, seen: Consistency) -> list[Finding]:
             Finding(
                 FindingCode.INNOVATIONS_TOO_SMALL,
                 Severity.NOTE,
-                f"Axis {name}: squared innovations are only {seen.nis_mean:.2f} times what the noise model predicts "
+                f"{name}: squared innovations are only {seen.nis_mean:.2f} times what the noise model predicts "
                 f"(99 % limit {seen.nis_low:.2f}).",
                 "The noise is smaller than the model says.",
                 "The error bars are too wide; identify the noise anew if that matters.",
@@ -83,7 +83,7 @@ def consistency_findings(axis: int, seen: Consistency) -> list[Finding]:
             Finding(
                 FindingCode.INNOVATIONS_COLOURED,
                 Severity.WARNING,
-                f"Axis {name}: innovations are correlated from pose to pose (Ljung-Box p = {seen.whiteness_p:.1e} over "
+                f"{name}: innovations are correlated from pose to pose (Ljung-Box p = {seen.whiteness_p:.1e} over "
                 f"{seen.n_lags} lags, first autocorrelation {seen.autocorrelation[0]:+.2f}).",
                 "Slow noise, temperature or a systematic reference error that the noise model lacks.",
                 "Look at the innovations against time and attitude; add the missing noise term.",

@@ -1,0 +1,375 @@
+//! The filter that needs no reference attitudes: at rest the corrected reading has the length of gravity.
+//!
+//! `z = |g| = |S (a' − n) + b| + v`: nine constants (`S` lower triangular or symmetric, `b`) and the slow noise `n` of all
+//! three axes. The measurement is not linear, so each update is iterated, and after a session the whole run is repeated
+//! with every pose linearised at the latest constants until nothing moves: that limit is the weighted batch fit.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::shaping::{Shaping, ShapingModel};
+use super::timeline::{Steps, Timeline};
+use super::ud::{Factors, Innovation, Transition, UdFilter};
+use crate::error::{Error, Result};
+
+/// Constants of the triad: six of `S`, three of `b`.
+pub const N_PARAMETERS: usize = 9;
+
+/// Which rotation of the body frame is chosen, since the length of a vector cannot tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frame {
+    /// `S` lower triangular: parameters `s11 s21 s22 s31 s32 s33`.
+    Lower,
+    /// `S` symmetric: the same entries, mirrored.
+    Symmetric,
+}
+
+/// Row and column of each of the six parameters of `S`.
+const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
+impl Frame {
+    /// `S` and `b` of nine parameters.
+    #[must_use]
+    pub fn unpack(self, theta: &[f64]) -> (Matrix3<f64>, Vector3<f64>) {
+        let mut s = Matrix3::zeros();
+        for (value, (i, j)) in theta.iter().zip(ENTRIES) {
+            s[(i, j)] = *value;
+            if self == Self::Symmetric {
+                s[(j, i)] = *value;
+            }
+        }
+        (s, Vector3::new(theta[6], theta[7], theta[8]))
+    }
+
+    /// Derivative of `u·(S a + b)` with respect to the nine parameters.
+    fn row(self, u: &Vector3<f64>, a: &Vector3<f64>, row: &mut [f64]) {
+        for (value, (i, j)) in row.iter_mut().zip(ENTRIES) {
+            *value = u[i] * a[j];
+            if self == Self::Symmetric && i != j {
+                *value += u[j] * a[i];
+            }
+        }
+        row[6..9].copy_from_slice(u.as_slice());
+    }
+}
+
+/// Mean reading of all three axes over one hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NormPose {
+    /// Mean raw readings.
+    pub reading: [f64; 3],
+    /// Start of the hold, s.
+    pub start: f64,
+    /// Length of the hold, s.
+    pub hold: f64,
+    /// Variance on top of the noise model per axis, raw².
+    pub extra_variance: [f64; 3],
+}
+
+/// What is believed of the nine parameters before the first pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NormPrior {
+    /// Mean, in the order of [`Frame::unpack`].
+    pub mean: [f64; N_PARAMETERS],
+    /// Standard deviations.
+    pub sigma: [f64; N_PARAMETERS],
+}
+
+/// Updates are repeated at most this often; four or five suffice unless the start is far off.
+const MAX_ITERATIONS: usize = 20;
+/// An iteration that moves every parameter by less than this part of its standard error is the last.
+const SETTLED: f64 = 1e-3;
+/// A run over all poses that moves every parameter by less than this part of its standard error is the last.
+const CONVERGED: f64 = 1e-6;
+
+/// Recursive estimate of a triad from the length of gravity alone.
+#[derive(Debug, Clone)]
+pub struct NormFilter {
+    models: [ShapingModel; 3],
+    shapings: [Shaping; 3],
+    frame: Frame,
+    gravity: f64,
+    prior: NormPrior,
+    n_noise: usize,
+    filter: UdFilter,
+    timeline: Timeline,
+    steps: Steps,
+    poses: Vec<NormPose>,
+    innovations: Vec<Innovation>,
+}
+
+impl NormFilter {
+    /// A filter that has seen nothing yet.
+    ///
+    /// # Errors
+    /// When the noise, the prior or gravity is malformed.
+    pub fn new(
+        models: [ShapingModel; 3],
+        frame: Frame,
+        gravity: f64,
+        prior: &NormPrior,
+    ) -> Result<Self> {
+        if !(gravity.is_finite() && gravity > 0.0) {
+            return Err(Error::bad_input(format!(
+                "gravity must be positive, got {gravity} m/s²"
+            )));
+        }
+        if prior.sigma.iter().any(|s| !(s.is_finite() && *s > 0.0))
+            || prior.mean.iter().any(|m| !m.is_finite())
+        {
+            return Err(Error::bad_input(
+                "the start of the calibration must be finite, with positive standard deviations",
+            ));
+        }
+        let (s, _) = frame.unpack(&prior.mean);
+        if s.determinant() == 0.0 {
+            return Err(Error::bad_input(
+                "the start of the calibration must have three independent axes: S = 0 is a fixed point of the norm",
+            ));
+        }
+        let shapings = [
+            models[0].system()?,
+            models[1].system()?,
+            models[2].system()?,
+        ];
+        let n_noise = shapings.iter().map(|s| s.layout().n()).sum();
+        let filter = Self::start(&shapings, n_noise, prior);
+        Ok(Self {
+            models,
+            shapings,
+            frame,
+            gravity,
+            prior: prior.clone(),
+            n_noise,
+            filter,
+            timeline: Timeline::default(),
+            steps: Steps::default(),
+            poses: Vec::new(),
+            innovations: Vec::new(),
+        })
+    }
+
+    fn start(shapings: &[Shaping; 3], n_noise: usize, prior: &NormPrior) -> UdFilter {
+        let n = n_noise + N_PARAMETERS;
+        let mut covariance = DMatrix::zeros(n, n);
+        let mut at = 0;
+        for shaping in shapings {
+            let p0 = shaping.start();
+            let k = p0.nrows();
+            covariance.view_mut((at, at), (k, k)).copy_from(&p0);
+            at += k;
+        }
+        let mut x = vec![0.0; n];
+        for i in 0..N_PARAMETERS {
+            covariance[(n_noise + i, n_noise + i)] = prior.sigma[i].powi(2);
+            x[n_noise + i] = prior.mean[i];
+        }
+        UdFilter::new(x, Factors::of(&covariance))
+    }
+
+    fn move_noise(&mut self, start: f64, hold: f64) -> Result<()> {
+        let gap = self.timeline.gap(start, hold)?;
+        let (shapings, m) = (&self.shapings, self.n_noise);
+        let step = self.steps.get(gap, hold, || {
+            let mut phi = DMatrix::zeros(m, m);
+            let mut q = DMatrix::zeros(m, m);
+            let mut at = 0;
+            for shaping in shapings {
+                let (phi_axis, q_axis) = shaping.step(gap, hold);
+                let k = phi_axis.nrows();
+                phi.view_mut((at, at), (k, k)).copy_from(&phi_axis);
+                q.view_mut((at, at), (k, k)).copy_from(&q_axis);
+                at += k;
+            }
+            Transition::new(&phi, &q)
+        });
+        self.filter.predict(step);
+        self.timeline.pass(start, hold);
+        Ok(())
+    }
+
+    /// Row, predicted length and white variance of a pose, linearised at `theta` and the given noise states.
+    fn linearise(
+        &self,
+        pose: &NormPose,
+        noise: &[f64],
+        theta: &[f64],
+        row: &mut [f64],
+    ) -> (f64, f64) {
+        let (s, b) = self.frame.unpack(theta);
+        let mut a = Vector3::from(pose.reading);
+        let mut at = 0;
+        for (axis, shaping) in self.shapings.iter().enumerate() {
+            let k = shaping.layout().n();
+            shaping.measurement_row(pose.hold, &mut row[at..at + k]);
+            a[axis] -= row[at..at + k]
+                .iter()
+                .zip(&noise[at..at + k])
+                .map(|(h, x)| h * x)
+                .sum::<f64>();
+            at += k;
+        }
+        let f = s * a + b;
+        let length = f.norm();
+        let u = if length > 0.0 {
+            f / length
+        } else {
+            Vector3::z()
+        };
+        let along = s.transpose() * u;
+        let mut at = 0;
+        for (axis, shaping) in self.shapings.iter().enumerate() {
+            let k = shaping.layout().n();
+            for value in &mut row[at..at + k] {
+                *value *= -along[axis];
+            }
+            at += k;
+        }
+        self.frame.row(&u, &a, &mut row[self.n_noise..]);
+        let white = Vector3::from_fn(|i, _| {
+            self.models[i].white_variance(pose.hold) + pose.extra_variance[i]
+        });
+        let variance = along.component_mul(&along).dot(&white);
+        // Noise across the vertical lengthens the vector on average: E|f + ε| = |f| + tr((I − u uᵀ) Σ) / 2|f|.
+        let total: f64 = (0..3).map(|i| s.column(i).norm_squared() * white[i]).sum();
+        let lengthening = (total - variance) / (2.0 * self.gravity);
+        (length - lengthening, variance)
+    }
+
+    /// One update linearised at `theta`: the measurement minus its linear prediction from the current estimate.
+    fn update_at(&self, filter: &mut UdFilter, pose: &NormPose, theta: &[f64]) -> Innovation {
+        let n = filter.n();
+        let mut row = vec![0.0; n];
+        let (predicted, variance) =
+            self.linearise(pose, &filter.x[..self.n_noise], theta, &mut row);
+        let ahead: f64 = (0..N_PARAMETERS)
+            .map(|i| row[self.n_noise + i] * (filter.x[self.n_noise + i] - theta[i]))
+            .sum();
+        filter.update_with_innovation(&row, self.gravity - predicted - ahead, variance)
+    }
+
+    fn check(&self, pose: &NormPose) -> Result<()> {
+        let number = self.poses.len() + 1;
+        if pose.reading.iter().any(|a| !a.is_finite())
+            || pose
+                .extra_variance
+                .iter()
+                .any(|v| !(v.is_finite() && *v >= 0.0))
+        {
+            return Err(Error::bad_input(format!(
+                "pose {number}: the readings must be finite and their extra variances not negative"
+            )));
+        }
+        self.timeline.gap(pose.start, pose.hold).map(|_| ())
+    }
+
+    /// Take one more pose, iterating its update until the point of linearisation is the estimate itself.
+    ///
+    /// # Errors
+    /// When the pose is not finite or out of order.
+    pub fn add(&mut self, pose: &NormPose) -> Result<Innovation> {
+        self.check(pose)?;
+        self.move_noise(pose.start, pose.hold)?;
+        let before = self.filter.clone();
+        let mut theta = before.x[self.n_noise..].to_vec();
+        let mut first = None;
+        for _ in 0..MAX_ITERATIONS {
+            let mut filter = before.clone();
+            let seen = self.update_at(&mut filter, pose, &theta);
+            first.get_or_insert(seen);
+            let moved = self.moved(&filter, &theta);
+            theta.copy_from_slice(&filter.x[self.n_noise..]);
+            self.filter = filter;
+            if moved < SETTLED {
+                break;
+            }
+        }
+        self.poses.push(*pose);
+        let seen = first.unwrap_or(Innovation {
+            value: 0.0,
+            variance: 0.0,
+        });
+        self.innovations.push(seen);
+        Ok(seen)
+    }
+
+    /// Largest move of a parameter from `theta` in its standard errors.
+    fn moved(&self, filter: &UdFilter, theta: &[f64]) -> f64 {
+        (0..N_PARAMETERS)
+            .map(|i| {
+                let at = self.n_noise + i;
+                (filter.x[at] - theta[i]).abs() / filter.factors.variance(at).sqrt()
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Run over all poses again, linearised at the latest constants, until they stay. Returns the number of runs, or
+    /// `None` when `most` were not enough.
+    ///
+    /// # Errors
+    /// Never for poses that were taken once.
+    pub fn relinearise(&mut self, most: usize) -> Result<Option<usize>> {
+        for run in 1..=most {
+            let theta = self.filter.x[self.n_noise..].to_vec();
+            self.filter = Self::start(&self.shapings, self.n_noise, &self.prior);
+            self.timeline = Timeline::default();
+            let poses = std::mem::take(&mut self.poses);
+            let mut innovations = Vec::with_capacity(poses.len());
+            for pose in &poses {
+                self.move_noise(pose.start, pose.hold)?;
+                let mut filter = self.filter.clone();
+                innovations.push(self.update_at(&mut filter, pose, &theta));
+                self.filter = filter;
+            }
+            self.poses = poses;
+            self.innovations = innovations;
+            if self.moved(&self.filter, &theta) < CONVERGED {
+                return Ok(Some(run));
+            }
+        }
+        Ok(None)
+    }
+
+    /// What a future reading would do to the covariance.
+    ///
+    /// # Errors
+    /// As [`Self::add`].
+    pub fn imagine(&mut self, pose: &NormPose) -> Result<()> {
+        self.check(pose)?;
+        self.move_noise(pose.start, pose.hold)?;
+        let theta = self.filter.x[self.n_noise..].to_vec();
+        let mut row = vec![0.0; self.filter.n()];
+        let (_, variance) = self.linearise(pose, &self.filter.x[..self.n_noise], &theta, &mut row);
+        self.filter.update_with_innovation(&row, 0.0, variance);
+        Ok(())
+    }
+
+    /// The nine parameters.
+    #[must_use]
+    pub fn parameters(&self) -> &[f64] {
+        &self.filter.x[self.n_noise..]
+    }
+
+    /// Their covariance.
+    #[must_use]
+    pub fn covariance(&self) -> DMatrix<f64> {
+        self.filter.factors.covariance_from(self.n_noise)
+    }
+
+    /// Innovations of the latest run.
+    #[must_use]
+    pub fn innovations(&self) -> &[Innovation] {
+        &self.innovations
+    }
+
+    /// Poses seen (imagined ones do not count).
+    #[must_use]
+    pub fn n_poses(&self) -> usize {
+        self.poses.len()
+    }
+
+    /// End of the last hold, s.
+    #[must_use]
+    pub fn end(&self) -> Option<f64> {
+        self.timeline.end()
+    }
+}

@@ -1,0 +1,91 @@
+//! When the poses were held, and the transitions between them, each computed once.
+
+use super::ud::Transition;
+use crate::error::{Error, Result};
+
+/// Steps remembered: regular logs need one, and a forgotten one costs microseconds.
+const REMEMBERED_STEPS: usize = 64;
+
+/// Shorter than this part of the hold is no time but the rounding of the clock.
+const CLOCK_ROUNDING: f64 = 1e-6;
+
+/// Poses in order of time.
+#[derive(Debug, Clone, Default)]
+pub struct Timeline {
+    end: Option<f64>,
+    n_poses: usize,
+}
+
+impl Timeline {
+    /// End of the last hold, s.
+    #[must_use]
+    pub fn end(&self) -> Option<f64> {
+        self.end
+    }
+
+    /// Poses seen.
+    #[must_use]
+    pub fn n_poses(&self) -> usize {
+        self.n_poses
+    }
+
+    /// Pause before a hold of `hold` seconds from `start` on.
+    ///
+    /// # Errors
+    /// When the hold is not a stretch of time, or starts before the last one ended.
+    pub fn gap(&self, start: f64, hold: f64) -> Result<f64> {
+        let pose = self.n_poses + 1;
+        if !(hold.is_finite() && hold > 0.0 && start.is_finite()) {
+            return Err(Error::bad_input(format!(
+                "pose {pose}: a hold needs a finite start and a positive length, got {start} s and {hold} s"
+            )));
+        }
+        match self.end {
+            None => Ok(0.0),
+            Some(end) if start >= end => Ok(start - end),
+            Some(end) if end - start <= CLOCK_ROUNDING * hold => Ok(0.0),
+            Some(end) => Err(Error::bad_input(format!(
+                "pose {pose} starts at {start} s, before the last hold ended at {end} s: give the poses in order of time"
+            ))),
+        }
+    }
+
+    /// Take the hold.
+    pub fn pass(&mut self, start: f64, hold: f64) {
+        self.end = Some(start + hold);
+        self.n_poses += 1;
+    }
+}
+
+/// Transitions by pause and hold.
+#[derive(Debug, Clone, Default)]
+pub struct Steps {
+    known: Vec<([u64; 2], Transition)>,
+    latest: usize,
+}
+
+impl Steps {
+    /// The transition over `gap` and `hold`, made by `make` when it is not known yet.
+    pub fn get(&mut self, gap: f64, hold: f64, make: impl FnOnce() -> Transition) -> &Transition {
+        let key = [gap.to_bits(), hold.to_bits()];
+        let is_latest = self.known.get(self.latest).is_some_and(|(k, _)| *k == key);
+        if !is_latest {
+            if let Some(found) = self.known.iter().position(|(k, _)| *k == key) {
+                self.latest = found;
+            } else {
+                if self.known.len() == REMEMBERED_STEPS {
+                    self.known.clear();
+                }
+                self.known.push((key, make()));
+                self.latest = self.known.len() - 1;
+            }
+        }
+        &self.known[self.latest].1
+    }
+
+    /// The one last asked for.
+    #[must_use]
+    pub fn last(&self) -> Option<&Transition> {
+        self.known.get(self.latest).map(|(_, step)| step)
+    }
+}

@@ -1,0 +1,162 @@
+"""Calibration by Kalman filter from the length of gravity: against the batch fit, simulated truth and recordings."""
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.optimize import least_squares
+
+from trihedron import _core
+from trihedron.estimate.kalman import (
+    Goal,
+    LiveNormCalibration,
+    NormStart,
+    ShapingOptions,
+    calibrate_without_references,
+    normalised_error_squared,
+)
+from trihedron.estimate.kalman.shaping import shaping_model
+from trihedron.records import AxisNoise, FindingCode
+
+GRAVITY = 9.80665
+S_TRUE = np.array([[0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
+B_TRUE = np.array([-19.57, -22.47, -20.3])
+LOWER = [0, 3, 4, 6, 7, 8, 9, 10, 11]
+"""Places of the nine free parameters among S row by row and b."""
+NOISE = AxisNoise(white=1.0, walk=0.01)
+
+
+def session(seed, *, n=24, S=S_TRUE, b=B_TRUE, noise=NOISE):
+    rng = np.random.default_rng(seed)
+    f = rng.standard_normal((n, 3))
+    f *= GRAVITY / np.linalg.norm(f, axis=1)[:, None]
+    start, hold = 8.0 * np.arange(n), np.full(n, 4.0)
+    model = shaping_model(noise, ShapingOptions(), session_s=float(start[-1] + 4.0), hold_s=4.0)
+    covariance = _core.kalman_noise_covariance(model, start, hold, np.zeros(n))
+    noise_now = np.linalg.cholesky(covariance) @ rng.standard_normal((n, 3))
+    return (f - b) @ np.linalg.inv(S).T + noise_now, start, hold, covariance
+
+
+def calibrate(readings, start_s, hold_s, **options):
+    return calibrate_without_references(
+        readings, NOISE, start_s=start_s, hold_s=hold_s, gravity_m_s2=GRAVITY, **options
+    )
+
+
+def test_repeated_runs_end_at_the_batch_fit_with_the_full_noise_covariance():
+    readings, start, hold, covariance = session(1)
+    result = calibrate(readings, start, hold)
+    S, b = result.accelerometer.S, result.accelerometer.b
+    f = readings @ S.T + b
+    along = (f / np.linalg.norm(f, axis=1)[:, None]) @ S
+    of_norm = sum(np.outer(along[:, i], along[:, i]) * covariance for i in range(3))
+    whitener = np.linalg.inv(np.linalg.cholesky(of_norm))
+    triangle = np.tril_indices(3)
+
+    def residual(p):
+        trial = np.zeros((3, 3))
+        trial[triangle] = p[:6]
+        return whitener @ (np.linalg.norm(readings @ trial.T + p[6:], axis=1) - GRAVITY)
+
+    at = np.concatenate([S[triangle], b])
+    fit = least_squares(residual, at, x_scale=np.array([1e-4] * 6 + [0.1] * 3), xtol=1e-14, ftol=1e-14)
+    sigma = np.sqrt(np.diag(result.accelerometer.covariance)[LOWER])
+    # 0.02 σ: the filter corrects the mean lengthening of a noisy vector, tr(Σ)/2g = 4e-5 m/s²; the batch fit does not.
+    np.testing.assert_allclose((fit.x - at) / sigma, 0.0, atol=0.02)
+    np.testing.assert_allclose(np.sqrt(np.diag(np.linalg.inv(fit.jac.T @ fit.jac))) / sigma, 1.0, rtol=1e-3)
+    assert result.n_runs >= 1
+
+
+def test_errors_are_as_large_as_stated():
+    nees = []
+    for seed in range(100, 200):
+        result = calibrate(*session(seed)[:3])
+        error = np.concatenate([(result.accelerometer.S - S_TRUE).ravel(), result.accelerometer.b - B_TRUE])[LOWER]
+        nees.append(normalised_error_squared(error, result.accelerometer.covariance[np.ix_(LOWER, LOWER)]))
+    # 100 draws of chi-square with 9 degrees of freedom, two-sided 99.9 % limits of the sum.
+    low, high = stats.chi2.ppf([0.0005, 0.9995], 9 * len(nees))
+    assert low < np.sum(nees) < high
+
+
+@pytest.mark.parametrize("frame", ["lower", "symmetric"])
+def test_both_frames_have_the_same_metric(frame):
+    readings, start, hold, _ = session(2)
+    lower = calibrate(readings, start, hold).accelerometer
+    other = calibrate(readings, start, hold, frame=frame).accelerometer
+    # SᵀS is what the length of gravity determines, whatever the frame; the runs stop at 1e-6 σ, which is 1e-9 of S.
+    np.testing.assert_allclose(other.S.T @ other.S, lower.S.T @ lower.S, rtol=0, atol=1e-9)
+    if frame == "symmetric":
+        np.testing.assert_allclose(other.S, other.S.T, atol=0)
+
+
+def test_the_signs_of_the_start_decide_the_signs_of_the_result():
+    mirrored = S_TRUE * np.array([[-1.0], [1.0], [1.0]])
+    readings, start, hold, _ = session(3, S=mirrored)
+    zero = -np.linalg.solve(mirrored, B_TRUE)
+    rough = NormStart(np.diag([-0.038, 0.038, 0.038]), zero + 20.0, sigma_relative=0.1, sigma_zero_m_s2=2.0)
+    result = calibrate(readings, start, hold, start=rough)
+    error = np.concatenate([(result.accelerometer.S - mirrored).ravel(), result.accelerometer.b - B_TRUE])[LOWER]
+    covariance = result.accelerometer.covariance[np.ix_(LOWER, LOWER)]
+    # 99.9 % limit of chi-square with nine degrees of freedom.
+    assert normalised_error_squared(error, covariance) < stats.chi2.ppf(0.999, 9)
+
+
+def test_live_use_stops_when_good_enough_and_proposes_poses_that_get_there():
+    live = LiveNormCalibration(
+        NOISE,
+        gravity_m_s2=GRAVITY,
+        start=NormStart.nominal(0.039, [500.0, 570.0, 520.0]),
+        goal=Goal(sensitivity=2e-3, zero_m_s2=0.02),
+        session_s=300.0,
+        hold_s=4.0,
+        pause_s=4.0,
+    )
+    rng = np.random.default_rng(5)
+    direction, promised = np.array([0.0, 0.0, GRAVITY]), []
+    for i in range(60):
+        reading = np.linalg.solve(S_TRUE, direction - B_TRUE) + 0.5 * rng.standard_normal(3)
+        said = live.add(reading, start_s=8.0 * i, hold_s=4.0)
+        if said.good_enough:
+            break
+        if said.poses_needed is not None and said.n_poses >= 9:
+            promised.append(said.n_poses + said.poses_needed)
+        direction = said.next_reference
+    assert said.good_enough
+    assert said.n_poses < 60
+    # From nine poses on the constants are known well enough for a promise to hold within two poses.
+    assert promised
+    assert max(abs(p - said.n_poses) for p in promised) <= 2
+    assert np.max(np.abs(said.constants[:, :3] - S_TRUE) / said.sigma[:, :3].clip(1e-9)) < 5
+
+
+def test_a_single_plane_of_poses_is_reported_as_badly_observed():
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    f = GRAVITY * np.column_stack([np.cos(angle), np.sin(angle), 0.02 * np.sin(3 * angle)])
+    readings = (f - B_TRUE) @ np.linalg.inv(S_TRUE).T
+    start = NormStart(np.diag([0.039] * 3), -np.linalg.solve(S_TRUE, B_TRUE))
+    result = calibrate(readings, 8.0 * np.arange(24), np.full(24, 4.0), start=start)
+    assert FindingCode.WEAKLY_OBSERVABLE in {finding.code for finding in result.findings}
+    assert "3" in result.accelerometer.observability.weakest
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"readings": np.zeros((8, 3))}, "nine unknowns"),
+        ({"readings": np.ones((24, 3))}, "never changed"),
+        ({"readings": np.full((24, 3), np.inf)}, "not finite"),
+        ({"readings": np.zeros(24)}, r"shape \(n, 3\)"),
+        ({"gravity_m_s2": -1.0}, "gravity must be positive"),
+        ({"hold_s": -1.0}, "positive length"),
+        ({"start_s": np.arange(24.0)}, "in order of time"),
+    ],
+)
+def test_malformed_questions_are_refused_in_plain_words(change, message):
+    readings, start, hold, _ = session(6)
+    asked = {"readings": readings, "noise": NOISE, "start_s": start, "hold_s": hold, "gravity_m_s2": GRAVITY} | change
+    with pytest.raises(ValueError, match=message):
+        calibrate_without_references(**asked)
+
+
+def test_a_start_without_three_axes_is_refused():
+    with pytest.raises(ValueError, match="three independent axes"):
+        NormStart(np.zeros((3, 3)), np.zeros(3))
