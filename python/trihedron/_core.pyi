@@ -77,9 +77,10 @@ def simulate_motion(
     segments: FloatArray,
     wobble: FloatArray,
     shake: FloatArray,
+    replay: FloatArray,
     time_s: FloatArray,
     gravity_m_s2: float,
-    earth_rate_rad_s: tuple[float, float, float],
+    earth_rate_rad_s: Sequence[float],
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]: ...
 
 # kalman
@@ -288,3 +289,39 @@ class AlignmentFit:
     def is_converged(self) -> bool: ...
     @property
     def stopped_because(self) -> str: ...
+def simulate_noise(
+    n: int, dt_s: float, terms: Sequence[Sequence[float]], keys: Sequence[Sequence[int]]
+) -> FloatArray: ...
+def simulate_project(signal: FloatArray, directions: Sequence[Sequence[float]]) -> FloatArray: ...
+def simulate_force_at_places(
+    force: FloatArray,
+    rate: FloatArray,
+    rate_change: FloatArray,
+    places: Sequence[Sequence[float]],
+    directions: Sequence[Sequence[float]],
+) -> FloatArray: ...
+def simulate_second_order(
+    signal: FloatArray, dt_s: float, frequency_hz: Sequence[float], quality: Sequence[float]
+) -> FloatArray: ...
+def simulate_first_order(signal: FloatArray, dt_s: float, tau_s: Sequence[float]) -> FloatArray: ...
+def simulate_bridge(
+    signal: FloatArray,
+    deflection: Sequence[float],
+    second: Sequence[float],
+    third: Sequence[float],
+    mismatch: Sequence[float],
+) -> FloatArray: ...
+def simulate_play(signal: FloatArray, width: Sequence[float], offset: Sequence[float]) -> FloatArray: ...
+def simulate_creep(
+    signal: FloatArray, dt_s: float, fraction: Sequence[float], tau_s: Sequence[float]
+) -> FloatArray: ...
+def simulate_resample(signal: FloatArray, start_s: float, dt_s: float, time_s: FloatArray) -> FloatArray: ...
+def simulate_convert(
+    signal: FloatArray,
+    lsb: float,
+    low: float,
+    high: float,
+    dead_band: float,
+    zero: Sequence[float],
+    missing_every: int,
+) -> FloatArray: ...

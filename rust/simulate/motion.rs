@@ -35,6 +35,93 @@ pub struct Segment {
     pub wobble: Vec<Harmonic>,
     /// Harmonics of the pivot's displacement \[m\], level frame.
     pub shake: Vec<Harmonic>,
+    /// A rate given by samples takes the place of turn and wobble.
+    pub replay: Option<Replay>,
+}
+
+/// Rate and acceleration given at evenly spaced knots, straight lines between them.
+#[derive(Debug, Clone)]
+pub struct Replay {
+    /// Rate relative to the level frame, body frame \[rad/s\], at least two knots over the segment's duration.
+    rate: Vec<Vector3<f64>>,
+    /// Acceleration of the reference point, level frame \[m/s²\].
+    acceleration: Vec<Vector3<f64>>,
+    /// Attitude at every knot.
+    attitude: Vec<[f64; 4]>,
+    step: f64,
+}
+
+/// Rotation over time `t` by the rate `w + s t`: fourth-order Magnus, `∫ω + t³/12 w×s`.
+fn swept(w: &Vector3<f64>, s: &Vector3<f64>, t: f64) -> [f64; 4] {
+    let v = w * t + s * (0.5 * t * t) + w.cross(s) * (t * t * t / 12.0);
+    let angle = v.norm();
+    let k = if angle < 1e-6 {
+        0.5 - angle * angle / 48.0
+    } else {
+        (0.5 * angle).sin() / angle
+    };
+    [(0.5 * angle).cos(), k * v.x, k * v.y, k * v.z]
+}
+
+fn product(p: &[f64; 4], q: &[f64; 4]) -> [f64; 4] {
+    let out = [
+        p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+        p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+        p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
+        p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
+    ];
+    let norm = out.iter().map(|c| c * c).sum::<f64>().sqrt();
+    out.map(|c| c / norm)
+}
+
+impl Replay {
+    /// Lay the knots over a duration from a start attitude.
+    ///
+    /// # Errors
+    /// Fewer than two knots or lists of different length.
+    pub fn new(
+        attitude: [f64; 4],
+        duration: f64,
+        rate: Vec<Vector3<f64>>,
+        acceleration: Vec<Vector3<f64>>,
+    ) -> Result<Self> {
+        if rate.len() < 2 || rate.len() != acceleration.len() {
+            return Err(Error::bad_input(format!(
+                "a replay needs at least two knots of rate and as many of acceleration, got {} and {}",
+                rate.len(),
+                acceleration.len()
+            )));
+        }
+        let step = duration / (rate.len() - 1) as f64;
+        let mut attitudes = vec![attitude];
+        let mut q = attitude;
+        for pair in rate.windows(2) {
+            q = product(&q, &swept(&pair[0], &((pair[1] - pair[0]) / step), step));
+            attitudes.push(q);
+        }
+        Ok(Self {
+            rate,
+            acceleration,
+            attitude: attitudes,
+            step,
+        })
+    }
+
+    /// Attitude, rate, rate change, and acceleration after `local` seconds.
+    fn at(&self, local: f64) -> ([f64; 4], Vector3<f64>, Vector3<f64>, Vector3<f64>) {
+        // Truncation is the floor: local is not negative.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let i = ((local / self.step) as usize).min(self.rate.len() - 2);
+        let t = local - i as f64 * self.step;
+        let slope = (self.rate[i + 1] - self.rate[i]) / self.step;
+        let change = (self.acceleration[i + 1] - self.acceleration[i]) / self.step;
+        (
+            product(&self.attitude[i], &swept(&self.rate[i], &slope, t)),
+            self.rate[i] + slope * t,
+            slope,
+            self.acceleration[i] + change * t,
+        )
+    }
 }
 
 /// `amplitude · sin(2π frequency (t - start) + phase)`.
@@ -70,6 +157,19 @@ pub struct State {
     pub specific_force: Vector3<f64>,
 }
 
+/// Motion at many instants, row by row.
+#[derive(Debug, Clone, Default)]
+pub struct Track {
+    /// (w, x, y, z) per instant.
+    pub attitude: Vec<f64>,
+    /// \[rad/s\] per instant.
+    pub rate: Vec<f64>,
+    /// \[rad/s²\] per instant.
+    pub rate_change: Vec<f64>,
+    /// \[m/s²\] per instant.
+    pub specific_force: Vec<f64>,
+}
+
 /// Rotate by the inverse of a unit quaternion: level to body.
 #[must_use]
 pub fn level_to_body(q: &[f64; 4], x: &Vector3<f64>) -> Vector3<f64> {
@@ -102,6 +202,7 @@ impl Segment {
             && self.travel == Vector3::zeros()
             && self.wobble.is_empty()
             && self.shake.is_empty()
+            && self.replay.is_none()
     }
 
     /// Motion at `time`, which is clamped to the segment.
@@ -116,6 +217,18 @@ impl Segment {
                 rate: earth,
                 rate_change: Vector3::zeros(),
                 specific_force: level_to_body(&self.attitude, &up),
+            };
+        }
+        if let Some(replay) = &self.replay {
+            let (attitude, rate, rate_change, acceleration) = replay.at(local);
+            let earth = level_to_body(&attitude, &place.earth_rate);
+            return State {
+                attitude,
+                rate: rate + earth,
+                rate_change: rate_change - rate.cross(&earth),
+                specific_force: level_to_body(&attitude, &(acceleration + up))
+                    + rate_change.cross(&self.arm)
+                    + rate.cross(&rate.cross(&self.arm)),
             };
         }
         let tau = Jet {
@@ -157,11 +270,14 @@ impl Segment {
     }
 }
 
+/// Instants that one worker evaluates in a row.
+const CHUNK: usize = 1 << 14;
+
 /// Motion at every instant of `times` (non-decreasing; before the start and after the end the body rests).
 ///
 /// # Errors
 /// Segments that are absent, out of order, or malformed; times that run backward.
-pub fn evaluate(segments: &[Segment], place: &Place, times: &[f64]) -> Result<Vec<State>> {
+pub fn evaluate(segments: &[Segment], place: &Place, times: &[f64]) -> Result<Track> {
     if segments.is_empty() {
         return Err(Error::bad_input("a motion needs at least one segment"));
     }
@@ -186,23 +302,33 @@ pub fn evaluate(segments: &[Segment], place: &Place, times: &[f64]) -> Result<Ve
             )));
         }
     }
-    let per_chunk = 1 << 14;
-    let chunks: Vec<Vec<State>> = times
-        .par_chunks(per_chunk)
-        .map(|chunk| {
+    let n = times.len();
+    let mut track = Track {
+        attitude: vec![0.0; 4 * n],
+        rate: vec![0.0; 3 * n],
+        rate_change: vec![0.0; 3 * n],
+        specific_force: vec![0.0; 3 * n],
+    };
+    times
+        .par_chunks(CHUNK)
+        .zip(track.attitude.par_chunks_mut(4 * CHUNK))
+        .zip(track.rate.par_chunks_mut(3 * CHUNK))
+        .zip(track.rate_change.par_chunks_mut(3 * CHUNK))
+        .zip(track.specific_force.par_chunks_mut(3 * CHUNK))
+        .for_each(|((((times, q), w), a), f)| {
             let mut k = segments
-                .partition_point(|s| s.start <= chunk[0])
+                .partition_point(|s| s.start <= times[0])
                 .saturating_sub(1);
-            chunk
-                .iter()
-                .map(|&t| {
-                    while k + 1 < segments.len() && segments[k + 1].start <= t {
-                        k += 1;
-                    }
-                    segments[k].state(t, place)
-                })
-                .collect()
-        })
-        .collect();
-    Ok(chunks.into_iter().flatten().collect())
+            for (i, &t) in times.iter().enumerate() {
+                while k + 1 < segments.len() && segments[k + 1].start <= t {
+                    k += 1;
+                }
+                let state = segments[k].state(t, place);
+                q[4 * i..4 * i + 4].copy_from_slice(&state.attitude);
+                w[3 * i..3 * i + 3].copy_from_slice(state.rate.as_slice());
+                a[3 * i..3 * i + 3].copy_from_slice(state.rate_change.as_slice());
+                f[3 * i..3 * i + 3].copy_from_slice(state.specific_force.as_slice());
+            }
+        });
+    Ok(track)
 }

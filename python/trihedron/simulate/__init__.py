@@ -1,35 +1,69 @@
 """Simulation of the instrument: motion, mechanism, noise, converter. Produces the same records as reading a file."""
 
+from trihedron.simulate.accelerometer import Accelerometer, Hysteresis, ProofMass
+from trihedron.simulate.effects import EFFECT_IDS, effects_of, with_effect
+from trihedron.simulate.gyroscope import Gyroscope, SenseMode
 from trihedron.simulate.library import list_scenarios, scenario_by_name
-from trihedron.simulate.motion import Disturb, Hold, Motion, MoveTo, Oscillate, Turn, Vibrate
+from trihedron.simulate.motion import Disturb, Hold, Motion, MoveTo, Oscillate, Replay, Turn, Vibrate
 from trihedron.simulate.noise import NoiseTerms, make_noise
+from trihedron.simulate.profiles import PROFILES, Profile, profile_by_name
+from trihedron.simulate.readout import Adc, Drift, Electronics, Filter, Interference, Thermal
 from trihedron.simulate.run import simulate
-from trihedron.simulate.scenario import Clock, Environment, Scenario
-from trihedron.simulate.sensors import Accelerometer, Adc, Gyroscope
-from trihedron.simulate.sessions import dividing_head, hand_session, long_rest, six_faces, table_turns
+from trihedron.simulate.scenario import Clock, Environment, Loss, Scenario, Supply, Temperature
+from trihedron.simulate.scenario_file import read_scenario
+from trihedron.simulate.sessions import (
+    dividing_head,
+    hand_session,
+    long_rest,
+    poses_in_order,
+    rate_table,
+    six_faces,
+    table_turns,
+)
 
 __all__ = [
+    "EFFECT_IDS",
+    "PROFILES",
     "Accelerometer",
     "Adc",
     "Clock",
     "Disturb",
+    "Drift",
+    "Electronics",
     "Environment",
+    "Filter",
     "Gyroscope",
     "Hold",
+    "Hysteresis",
+    "Interference",
+    "Loss",
     "Motion",
     "MoveTo",
     "NoiseTerms",
     "Oscillate",
+    "Profile",
+    "ProofMass",
+    "Replay",
     "Scenario",
+    "SenseMode",
+    "Supply",
+    "Temperature",
+    "Thermal",
     "Turn",
     "Vibrate",
     "dividing_head",
+    "effects_of",
     "hand_session",
     "list_scenarios",
     "long_rest",
     "make_noise",
+    "poses_in_order",
+    "profile_by_name",
+    "rate_table",
+    "read_scenario",
     "scenario_by_name",
     "simulate",
     "six_faces",
     "table_turns",
+    "with_effect",
 ]

@@ -1,82 +1,150 @@
-"""Ready-made scenarios by name."""
+"""Ready-made scenarios and sessions by name."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 
-from trihedron.simulate.noise import NoiseTerms
-from trihedron.simulate.scenario import Clock, Environment, Scenario
-from trihedron.simulate.sensors import Accelerometer, Adc, Gyroscope
-from trihedron.simulate.sessions import dividing_head, hand_session, long_rest, six_faces, table_turns
-from trihedron.units import AccelerationUnit, RateUnit
+import numpy as np
 
-# Consumer 16-bit part: ±2 g at 16384 LSB/g, ±250 deg/s at 131 LSB/(deg/s), densities 400 µg/√Hz and 0.005 deg/s/√Hz.
-_LSB_M_S2 = 9.80665 / 16384.0
-_LSB_RAD_S = 1.3323e-4
-
-_MPU_ACCELEROMETER = Accelerometer(
-    S=(
-        (_LSB_M_S2 * 1.004, 0.0, 0.0),
-        (_LSB_M_S2 * 0.003, _LSB_M_S2 * 0.996, 0.0),
-        (-_LSB_M_S2 * 0.005, _LSB_M_S2 * 0.004, _LSB_M_S2 * 1.012),
-    ),
-    b=(0.35, -0.21, 0.62),
-    unit=AccelerationUnit.COUNTS,
-    noise=NoiseTerms(N=(3.9e-3, 3.9e-3, 3.9e-3), K=(2e-5, 2e-5, 2e-5)),
-    adc=Adc(1.0, -32768.0, 32767.0),
+from trihedron.simulate.accelerometer import Accelerometer
+from trihedron.simulate.effects import with_effect
+from trihedron.simulate.gyroscope import Gyroscope
+from trihedron.simulate.motion import Hold, Motion, Turn
+from trihedron.simulate.profiles import ADIS, ANALOG_6DOF, MPU, TACTICAL, Profile
+from trihedron.simulate.scenario import Environment, Scenario
+from trihedron.simulate.sessions import (
+    EDGES,
+    FACES,
+    dividing_head,
+    hand_session,
+    long_rest,
+    poses_in_order,
+    rate_table,
+    six_faces,
+    table_turns,
 )
-_MPU_GYROSCOPE = Gyroscope(
-    S=(
-        (_LSB_RAD_S * 1.011, _LSB_RAD_S * 0.006, -_LSB_RAD_S * 0.004),
-        (_LSB_RAD_S * 0.008, _LSB_RAD_S * 0.992, _LSB_RAD_S * 0.003),
-        (-_LSB_RAD_S * 0.005, _LSB_RAD_S * 0.007, _LSB_RAD_S * 1.006),
-    ),
-    b=(0.021, -0.034, 0.012),
-    unit=RateUnit.COUNTS,
-    noise=NoiseTerms(N=(8.7e-5, 8.7e-5, 8.7e-5), K=(2e-6, 2e-6, 2e-6)),
-    adc=Adc(1.0, -32768.0, 32767.0),
-)
+
+SESSIONS: dict[str, Callable[..., Motion]] = {
+    "hand": hand_session,
+    "six-faces": six_faces,
+    "table-turns": table_turns,
+    "dividing-head": dividing_head,
+    "rate-table": rate_table,
+    "rest": long_rest,
+}
+"""What a scenario file may call a session."""
+
+
+def _of(profile: Profile, motion: Motion, name: str, unit: int = 1) -> Scenario:
+    accelerometer, gyroscope = profile.unit(unit)
+    return Scenario(motion, name, accelerometer, gyroscope, profile.clock)
 
 
 def _hand_session() -> Scenario:
-    """24 poses by hand, MPU-class."""
-    return Scenario(hand_session(), "hand-session", _MPU_ACCELEROMETER, _MPU_GYROSCOPE, Clock(100.0))
+    """24 poses by hand, consumer 16-bit part."""
+    return _of(MPU, hand_session(), "hand-session")
 
 
 def _linear() -> Scenario:
-    """The same without noise and without a converter: what a perfect estimator inverts exactly."""
-    accel = Accelerometer(_MPU_ACCELEROMETER.S, _MPU_ACCELEROMETER.b, AccelerationUnit.COUNTS)
-    gyro = Gyroscope(_MPU_GYROSCOPE.S, _MPU_GYROSCOPE.b, RateUnit.COUNTS)
-    return Scenario(hand_session(), "linear-noiseless", accel, gyro, Clock(100.0), Environment())
+    """The hand session without noise and converter: what a perfect estimator inverts exactly."""
+    accelerometer, gyroscope = MPU.unit(1)
+    accel = Accelerometer(accelerometer.S, accelerometer.b, accelerometer.unit)
+    gyro = Gyroscope(gyroscope.S, gyroscope.b, gyroscope.unit)
+    return Scenario(hand_session(), "linear-noiseless", accel, gyro, MPU.clock)
+
+
+def _tactical() -> Scenario:
+    """36 poses by hand with a lever arm to the wrist, tactical unit, Earth turning."""
+    scenario = _of(TACTICAL, hand_session(36, hold_s=10.0, first_hold_s=60.0, arm_m=0.15), "hand-session-tactical")
+    return replace(scenario, environment=Environment(gravity_m_s2=0.0, latitude_deg=55.7, earth_rate=True))
 
 
 def _six_faces() -> Scenario:
-    """Six faces, twice round, MPU-class."""
-    return Scenario(six_faces(2), "six-faces", _MPU_ACCELEROMETER, _MPU_GYROSCOPE)
+    """Six faces, twice round, consumer 16-bit part."""
+    return _of(MPU, six_faces(2), "six-faces")
 
 
 def _table_turns() -> Scenario:
-    """Turns of multiples of 90 deg on three faces, MPU-class."""
-    return Scenario(table_turns(), "table-turns", _MPU_ACCELEROMETER, _MPU_GYROSCOPE)
+    """Turns of 90, 180 and 360 deg against a wall on three faces, consumer 16-bit part."""
+    return _of(MPU, table_turns(), "table-turns")
+
+
+def _manual() -> Scenario:
+    """The laboratory manual's example: 18 poses, then turns by ±8π on three faces, 10-bit converter, 50 Hz."""
+    poses = poses_in_order([*FACES, *EDGES], hold_s=6.0, move_s=3.0, wobble_deg=4.0)
+    steps = list(poses.steps)
+    for face in FACES[::2]:
+        steps += poses_in_order([face], hold_s=4.0, move_s=3.0, arrive=True).steps
+        for angle in (1440.0, -1440.0):
+            steps += [Turn(face, angle, 16.0, ramp=0.25, wobble_deg=1.5), Hold(4.0, "rest")]
+    profile = ANALOG_6DOF
+    motion = Motion(tuple(steps), start=poses.start)
+    return Scenario(motion, "manual-example", profile.accelerometer, profile.gyroscope, profile.clock)
 
 
 def _rest() -> Scenario:
-    """One hour at rest, MPU-class."""
-    return Scenario(long_rest(3600.0), "rest-hour", _MPU_ACCELEROMETER, _MPU_GYROSCOPE)
+    """One hour at rest, consumer 16-bit part."""
+    return _of(MPU, long_rest(3600.0), "rest-hour")
+
+
+def _rest_manual() -> Scenario:
+    """Two hours at rest, the manual's unit with a finer converter, for Allan curves."""
+    accel, gyro = ANALOG_6DOF.accelerometer, ANALOG_6DOF.gyroscope
+    accel = replace(accel, adc=replace(accel.adc, lsb=0.0))
+    gyro = replace(gyro, adc=replace(gyro.adc, lsb=0.0))
+    return Scenario(long_rest(7200.0), "rest-manual", accel, gyro, ANALOG_6DOF.clock)
+
+
+def _rest_industrial() -> Scenario:
+    """Three hours at rest, industrial 14-bit part."""
+    return _of(ADIS, long_rest(10000.0), "rest-industrial")
 
 
 def _dividing_head() -> Scenario:
-    """324 poses of an optical dividing head, MPU-class."""
-    return Scenario(dividing_head(), "dividing-head", _MPU_ACCELEROMETER, _MPU_GYROSCOPE)
+    """324 poses of an optical dividing head, industrial part on a 12-bit converter."""
+    scenario = _of(ADIS, dividing_head(), "dividing-head")
+    step = 0.11 * math.sqrt(12.0)  # the published converter's own noise of 0.11 m/s² as the rms of its rounding
+    accel = scenario.accelerometer
+    lsb = step / float(np.abs(np.diag(np.asarray(accel.S))).mean())
+    return replace(scenario, accelerometer=replace(accel, adc=replace(accel.adc, lsb=lsb)))
+
+
+def _rate_table() -> Scenario:
+    """Rate-table profile, ±30 to ±240 deg/s about each axis, industrial part."""
+    return _of(ADIS, rate_table(), "rate-table")
+
+
+def _imperfect() -> Scenario:
+    """24 poses by hand with several effects at once: what a linear model cannot reproduce."""
+    scenario = _of(MPU, hand_session(arm_m=0.1), "imperfect")
+    scenario = with_effect(scenario, "accel-quadratic", k2=(2e-4, -3e-4, 1e-4))
+    scenario = with_effect(scenario, "gyro-g-sensitivity", matrix=((2e-4, 0, 0), (0, -3e-4, 1e-4), (0, 0, 2e-4)))
+    scenario = with_effect(scenario, "accel-size-effect", places_m=((0.004, 0, 0), (0, 0.004, 0), (0, 0, 0)))
+    return with_effect(scenario, "accel-thermal-bias", per_k=(0.004, -0.006, 0.01), logged=False)
+
+
+def _lossy() -> Scenario:
+    """The hand session with lost samples whose stamps were made anew, and jitter."""
+    scenario = with_effect(_of(MPU, hand_session(), "lossy-log"), "dropped-samples", losses=[(30.0, 7), (60.0, 25)])
+    return with_effect(scenario, "timing-jitter", jitter_s=3e-4)
 
 
 _SCENARIOS: dict[str, Callable[[], Scenario]] = {
     "hand-session": _hand_session,
+    "hand-session-tactical": _tactical,
     "linear-noiseless": _linear,
     "six-faces": _six_faces,
     "table-turns": _table_turns,
-    "rest-hour": _rest,
+    "manual-example": _manual,
     "dividing-head": _dividing_head,
+    "rate-table": _rate_table,
+    "imperfect": _imperfect,
+    "lossy-log": _lossy,
+    "rest-hour": _rest,
+    "rest-manual": _rest_manual,
+    "rest-industrial": _rest_industrial,
 }
 
 

@@ -117,7 +117,32 @@ class Disturb:
     name: str = ""
 
 
-Step: TypeAlias = Hold | MoveTo | Turn | Oscillate | Vibrate | Disturb
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """A rate given at evenly spaced knots over the duration, straight lines between them: a rate table's profile, or
+    the moves of a real recording.
+
+    ``rate_rad_s`` (m, 3) body frame, ``acceleration_m_s2`` (m, 3) of the reference point, level frame.
+    """
+
+    rate_rad_s: FloatArray
+    acceleration_m_s2: FloatArray
+    duration_s: float
+    arm_m: Vector = _NOWHERE
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        rate, acceleration = np.asarray(self.rate_rad_s, dtype=float), np.asarray(self.acceleration_m_s2, dtype=float)
+        if rate.ndim != 2 or rate.shape[1:] != (3,) or len(rate) < 2 or rate.shape != acceleration.shape:
+            shapes = f"{rate.shape} and {acceleration.shape}"
+            raise ValueError(f"a replay needs rate and acceleration of one shape (m, 3), m >= 2, got {shapes}")
+        if not (np.isfinite(rate).all() and np.isfinite(acceleration).all()):
+            raise ValueError("a replay must not hold values that are not finite")
+        object.__setattr__(self, "rate_rad_s", rate)
+        object.__setattr__(self, "acceleration_m_s2", acceleration)
+
+
+Step: TypeAlias = Hold | MoveTo | Turn | Oscillate | Vibrate | Disturb | Replay
 
 
 @dataclass(frozen=True)
@@ -156,6 +181,7 @@ class Plan:
     segments: FloatArray
     wobble: FloatArray
     shake: FloatArray
+    replay: FloatArray
     labels: tuple[Label, ...] = field(default=())
 
     @property
@@ -171,7 +197,13 @@ class Plan:
         All in the body frame at its reference point, SI. Exact: closed forms with their derivatives.
         """
         return _core.simulate_motion(
-            self.segments, self.wobble, self.shake, np.ascontiguousarray(time_s), gravity_m_s2, earth_rate_rad_s
+            self.segments,
+            self.wobble,
+            self.shake,
+            self.replay,
+            np.ascontiguousarray(time_s, dtype=np.float64),
+            gravity_m_s2,
+            earth_rate_rad_s,
         )
 
 
@@ -256,6 +288,7 @@ class _Planner:
         self.rows: list[list[float]] = []
         self.wobble: list[list[float]] = []
         self.shake: list[list[float]] = []
+        self.replay: list[FloatArray] = []
         self.labels: list[Label] = []
 
     def add(
@@ -332,12 +365,27 @@ class _Planner:
             for line in lines:
                 amplitude = peak / (2.0 * math.pi * float(line)) ** 2 * _unit(step.direction)
                 self.shake.append([k, *amplitude, float(line), self.rng.uniform(0.0, 2.0 * math.pi)])
+        elif isinstance(step, Replay):
+            k = self.add("move", step.name, step.duration_s, arm=step.arm_m)
+            knots = np.column_stack([np.full(len(step.rate_rad_s), float(k)), step.rate_rad_s, step.acceleration_m_s2])
+            self.replay.append(knots)
+            self.attitude = self.end_of_replay(knots)
         else:
             k = self.add("disturbance", step.name, step.duration_s)
             self.add_wobble(k, step.tilt_deg, step.frequency_hz)
             if step.shift_m:
                 shift = step.shift_m * self.rng.normal(size=3)
                 self.shake.append([k, *shift, step.frequency_hz, self.rng.uniform(0.0, 2.0 * math.pi)])
+
+    def end_of_replay(self, knots: FloatArray) -> Quaternion:
+        """Attitude after the last row, which is a replay."""
+        alone = knots.copy()
+        alone[:, 0] = 0.0
+        empty = np.zeros((0, 6))
+        end = np.array([self.time])
+        q, *_ = _core.simulate_motion(np.array([self.rows[-1]]), empty, empty, alone, end, 0.0, _NOWHERE)
+        w, x, y, z = (float(c) for c in q[0])
+        return (w, x, y, z)
 
     def attitude_above_table(self) -> Quaternion:
         """Attitude relative to the table, which is what a person aims at."""
@@ -362,5 +410,6 @@ def plan_motion(motion: Motion, rng: np.random.Generator) -> Plan:
         np.array(planner.rows),
         np.array(planner.wobble).reshape(-1, 6),
         np.array(planner.shake).reshape(-1, 6),
+        np.concatenate(planner.replay) if planner.replay else np.zeros((0, 7)),
         tuple(planner.labels),
     )

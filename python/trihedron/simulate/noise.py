@@ -9,6 +9,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from trihedron import _core
+
 FloatArray = npt.NDArray[np.float64]
 Triple: TypeAlias = tuple[float, float, float]
 
@@ -17,10 +19,10 @@ _NONE: Triple = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class NoiseTerms:
-    """Coefficients of the five terms per axis, SI, as METHODS of Allan variance define them.
+    """Coefficients of the five terms per axis, SI, by their Allan variance.
 
-    With u the unit of the signal (rad/s or m/s²): ``Q`` quantisation [u·s], ``N`` white [u·√s = u/√Hz], ``B`` bias
-    instability [u] (1/f: σ² = (2 ln 2/π) B²), ``K`` rate random walk [u/√s], ``R`` ramp [u/s].
+    With u the unit of the signal (rad/s or m/s²): ``Q`` quantisation [u·s], 3Q²/τ²; ``N`` white [u·√s = u/√Hz], N²/τ;
+    ``B`` bias instability [u], (2 ln 2/π) B²; ``K`` rate random walk [u/√s], K²τ/3; ``R`` ramp [u/s], R²τ²/2.
     """
 
     Q: Triple = _NONE
@@ -30,30 +32,34 @@ class NoiseTerms:
     R: Triple = _NONE
 
     def __post_init__(self) -> None:
-        for name in "QNBK":
-            if any(not np.isfinite(v) or v < 0.0 for v in getattr(self, name)):
-                raise ValueError(f"noise term {name} must hold three numbers that are not negative")
+        for name in "QNBKR":
+            values = getattr(self, name)
+            if any(not np.isfinite(v) or (v < 0.0 and name != "R") for v in values):
+                raise ValueError(f"noise term {name} must hold three numbers that are not negative, got {values}")
+
+
+def _sequence(seed: int, stage: str) -> np.random.SeedSequence:
+    if seed < 0:
+        raise ValueError(f"the seed must not be negative, got {seed}")
+    return np.random.SeedSequence([seed, zlib.crc32(stage.encode())])
 
 
 def stream(seed: int, stage: str) -> np.random.Generator:
     """Random numbers of one stage: they depend on the seed and the stage's name only."""
-    return np.random.default_rng(np.random.SeedSequence([seed, zlib.crc32(stage.encode())]))
+    return np.random.default_rng(_sequence(seed, stage))
+
+
+def key(seed: int, stage: str) -> int:
+    """Key of one stage's stream in the kernel."""
+    return int(_sequence(seed, stage).generate_state(1, np.uint64)[0])
 
 
 def make_noise(terms: NoiseTerms, n: int, dt: float, seed: int, sensor: str) -> FloatArray:
     """(n, 3) noise at step ``dt`` [s], unit of the signal.
 
-    Per step: N/√dt white; K√dt the increments of a walk that starts at zero; Q/dt the first difference of white.
+    Per step: Q/dt the first difference of white; N/√dt white; B a sum of Gauss-Markov processes of spectrum 1/f; K√dt
+    the increments of a walk that starts at zero; R a ramp.
     """
-    out = np.zeros((n, 3))
-    for axis in range(3):
-        if terms.N[axis]:
-            out[:, axis] += terms.N[axis] / np.sqrt(dt) * stream(seed, f"{sensor}/N/{axis}").standard_normal(n)
-        if terms.K[axis]:
-            steps = stream(seed, f"{sensor}/K/{axis}").standard_normal(n)
-            out[:, axis] += terms.K[axis] * np.sqrt(dt) * (np.cumsum(steps) - steps[0])
-        if terms.Q[axis]:
-            out[:, axis] += terms.Q[axis] / dt * np.diff(stream(seed, f"{sensor}/Q/{axis}").standard_normal(n + 1))
-        if terms.R[axis]:
-            out[:, axis] += terms.R[axis] * dt * np.arange(n)
-    return out
+    table = [[terms.Q[k], terms.N[k], terms.B[k], terms.K[k], terms.R[k]] for k in range(3)]
+    keys = [[key(seed, f"{sensor}/{name}/{k}") for name in "QNBK"] for k in range(3)]
+    return _core.simulate_noise(n, dt, table, keys)

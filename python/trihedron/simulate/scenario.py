@@ -2,29 +2,168 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.simulate.accelerometer import Accelerometer
+from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion import Motion
-from trihedron.simulate.sensors import Accelerometer, Gyroscope
-from trihedron.units import STANDARD_GRAVITY_M_S2
+from trihedron.units import STANDARD_GRAVITY_M_S2, radians_from_degrees
+
+FloatArray = npt.NDArray[np.float64]
+
+EARTH_RATE_RAD_S = 7.292115e-5
+"""WGS84 angular velocity of the Earth."""
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """Temperature around the instrument: a start, a warm-up that saturates, a ramp, a swing.
+
+    ``start_degc + warm_up_k (1 - exp(-t/warm_up_tau_s)) + ramp_k_s t + swing_k sin(2π t/swing_period_s)``.
+    ``logged``: the recording has the channel, in steps of ``step_k``. Sensors refer to ``reference_degc``.
+    """
+
+    start_degc: float = 25.0
+    warm_up_k: float = 0.0
+    warm_up_tau_s: float = 300.0
+    ramp_k_s: float = 0.0
+    swing_k: float = 0.0
+    swing_period_s: float = 3600.0
+    reference_degc: float = 25.0
+    logged: bool = False
+    step_k: float = 0.01
+
+    def at(self, time_s: FloatArray) -> FloatArray:
+        """(n,) °C."""
+        if self.warm_up_k == self.ramp_k_s == self.swing_k == 0.0:
+            return np.full(len(time_s), self.start_degc)
+        t = np.maximum(time_s, 0.0)
+        out: FloatArray = (
+            self.start_degc
+            + self.warm_up_k * -np.expm1(-t / self.warm_up_tau_s)
+            + self.ramp_k_s * t
+            + self.swing_k * np.sin(2.0 * np.pi * t / self.swing_period_s)
+        )
+        return out
+
+    @property
+    def is_constant_reference(self) -> bool:
+        """Whether the die stays at its reference."""
+        still = self.warm_up_k == self.ramp_k_s == self.swing_k == 0.0
+        return still and self.start_degc == self.reference_degc
+
+
+@dataclass(frozen=True)
+class Supply:
+    """Supply voltage: nominal, a slow sag ``sag_v (1 - exp(-t/sag_tau_s))``, a ripple."""
+
+    nominal_v: float = 3.3
+    sag_v: float = 0.0
+    sag_tau_s: float = 300.0
+    ripple_v: float = 0.0
+    ripple_hz: float = 0.05
+    logged: bool = False
+    step_v: float = 0.001
+
+    def at(self, time_s: FloatArray) -> FloatArray:
+        """(n,) volts."""
+        if self.sag_v == self.ripple_v == 0.0:
+            return np.full(len(time_s), self.nominal_v)
+        t = np.maximum(time_s, 0.0)
+        ripple = self.ripple_v * np.sin(2.0 * np.pi * self.ripple_hz * t)
+        out: FloatArray = self.nominal_v + self.sag_v * np.expm1(-t / self.sag_tau_s) + ripple
+        return out
 
 
 @dataclass(frozen=True)
 class Environment:
-    """Where it happens."""
+    """Where it happens.
+
+    Gravity is ``gravity_m_s2``, or WGS84's at ``latitude_deg`` and ``height_m`` when that is 0. ``earth_rate`` lets
+    the Earth turn; the level frame's x axis points ``heading_deg`` from north, clockwise seen from above.
+    """
 
     gravity_m_s2: float = STANDARD_GRAVITY_M_S2
+    latitude_deg: float = 55.7
+    height_m: float = 0.0
+    earth_rate: bool = False
+    heading_deg: float = 0.0
+    temperature: Temperature = field(default_factory=Temperature)
+    supply: Supply = field(default_factory=Supply)
+
+    @property
+    def gravity(self) -> float:
+        """Magnitude [m/s²]."""
+        if self.gravity_m_s2 > 0.0:
+            return self.gravity_m_s2
+        return normal_gravity(self.latitude_deg, self.height_m)
+
+    @property
+    def earth_rate_level(self) -> tuple[float, float, float]:
+        """Angular velocity of the Earth in the level frame [rad/s]."""
+        if not self.earth_rate:
+            return (0.0, 0.0, 0.0)
+        latitude, heading = radians_from_degrees(self.latitude_deg), radians_from_degrees(self.heading_deg)
+        north = EARTH_RATE_RAD_S * math.cos(latitude)
+        return (north * math.cos(heading), north * math.sin(heading), EARTH_RATE_RAD_S * math.sin(latitude))
+
+
+def normal_gravity(latitude_deg: float, height_m: float) -> float:
+    """WGS84 normal gravity (Somigliana) continued upward to second order in height [m/s²]."""
+    s2 = math.sin(radians_from_degrees(latitude_deg)) ** 2
+    surface = 9.7803253359 * (1.0 + 0.001931852652458 * s2) / math.sqrt(1.0 - 0.00669437999014 * s2)
+    a, flattening, m = 6378137.0, 1.0 / 298.257223563, 0.00344978650684
+    up = 1.0 - 2.0 / a * (1.0 + flattening + m - 2.0 * flattening * s2) * height_m + 3.0 * (height_m / a) ** 2
+    return surface * up
+
+
+@dataclass(frozen=True)
+class Loss:
+    """``n`` samples lost from the first one at or after ``time_s``."""
+
+    time_s: float
+    n: int = 1
 
 
 @dataclass(frozen=True)
 class Clock:
-    """When samples are taken."""
+    """When samples are taken and what the stamps say.
+
+    ``rate_error``: the true rate is ``rate_hz (1 + rate_error)`` while the stamps believe in ``rate_hz``. ``jitter_s``:
+    rms of the true instants about the grid; ``stamps_show_jitter`` writes it into the stamps. ``stamp_jitter_s``: rms
+    error of the stamps alone. ``gyroscope_offset_s``: the gyro samples that much later under the same stamp. Samples
+    are lost as listed in ``losses`` and at random with ``loss_probability``; ``restamped`` then counts on as if
+    nothing were missing. ``oversample`` fine steps per sample where a sensor has dynamics (0: 8).
+    """
 
     rate_hz: float = 100.0
+    rate_error: float = 0.0
+    jitter_s: float = 0.0
+    stamps_show_jitter: bool = False
+    stamp_jitter_s: float = 0.0
+    gyroscope_offset_s: float = 0.0
+    losses: tuple[Loss, ...] = ()
+    loss_probability: float = 0.0
+    restamped: bool = False
+    oversample: int = 0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.rate_hz < 1e6:
             raise ValueError(f"rate_hz must be a positive number, got {self.rate_hz}")
+        if not (0.0 <= self.loss_probability < 1.0 and self.jitter_s >= 0.0 and self.stamp_jitter_s >= 0.0):
+            raise ValueError("loss_probability must be in [0, 1); jitter_s and stamp_jitter_s must not be negative")
+        if not -0.5 < self.rate_error < 0.5:
+            raise ValueError(f"rate_error is a fraction, got {self.rate_error}")
+
+    @property
+    def true_rate_hz(self) -> float:
+        """Samples per true second."""
+        return self.rate_hz * (1.0 + self.rate_error)
 
 
 @dataclass(frozen=True)
@@ -37,3 +176,10 @@ class Scenario:
     gyroscope: Gyroscope = field(default_factory=Gyroscope)
     clock: Clock = field(default_factory=Clock)
     environment: Environment = field(default_factory=Environment)
+
+    @staticmethod
+    def from_toml(path: str | Path) -> Scenario:
+        """Read a scenario file (docs/simulation.md); see :func:`trihedron.simulate.scenario_file.read_scenario`."""
+        from trihedron.simulate.scenario_file import read_scenario
+
+        return read_scenario(path)

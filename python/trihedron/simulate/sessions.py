@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -68,14 +69,25 @@ def hand_session(
     return Motion(tuple(steps), start=attitude_with_up(directions[order[0]]))
 
 
+def poses_in_order(
+    ups: Sequence[tuple[float, float, float]],
+    hold_s: float = 5.0,
+    move_s: float = 3.0,
+    wobble_deg: float = 3.0,
+    arrive: bool = False,
+) -> Motion:
+    """Hold each of the directions up in turn; ``arrive`` puts a move in front of the first as well."""
+    steps: list[Step] = []
+    for count, up in enumerate(ups):
+        if count or arrive:
+            steps.append(MoveTo(up, move_s, wobble_deg=wobble_deg))
+        steps.append(Hold(hold_s, name="up " + " ".join(f"{c:+.0f}" for c in up)))
+    return Motion(tuple(steps), start=attitude_with_up(ups[0]))
+
+
 def six_faces(repeats: int = 1, hold_s: float = 5.0, move_s: float = 3.0) -> Motion:
     """The cube on each of its faces in turn, ``repeats`` times round."""
-    steps: list[Step] = []
-    for count, face in enumerate(FACES * repeats):
-        if count:
-            steps.append(MoveTo(face, move_s, wobble_deg=3.0))
-        steps.append(Hold(hold_s, name="face " + " ".join(f"{c:+.0f}" for c in face)))
-    return Motion(tuple(steps), start=attitude_with_up(FACES[0]))
+    return poses_in_order(FACES * repeats, hold_s, move_s)
 
 
 def table_turns(
@@ -83,15 +95,23 @@ def table_turns(
     hold_s: float = 3.0,
     speed_deg_s: float = 90.0,
     faces: tuple[tuple[float, float, float], ...] = FACES[::2],
+    error_deg: float = 0.0,
+    layout: int = 0,
 ) -> Motion:
-    """Turns on a table against a wall about the vertical, the cube on each of ``faces`` in turn."""
+    """Turns on a table against a wall about the vertical, the cube on each of ``faces`` in turn.
+
+    ``error_deg`` is the standard deviation of the true angle about the stated one, drawn by ``layout``.
+    """
+    rng = stream(layout, "table turns")
     steps: list[Step] = [Hold(10.0, name="rest")]
     for count, face in enumerate(faces):
         if count:
             steps += [MoveTo(face, 3.0, wobble_deg=3.0), Hold(hold_s, name="rest")]
         for turn in turns_deg:
             duration = max(1.0, abs(turn) / speed_deg_s * 1.25)
-            steps += [Turn(face, turn, duration, name=f"turn {turn:+g} deg"), Hold(hold_s, name="rest")]
+            error = error_deg * float(rng.standard_normal())
+            turned = Turn(face, turn, duration, error_deg=error, name=f"turn {turn:+g} deg")
+            steps += [turned, Hold(hold_s, name="rest")]
     return Motion(tuple(steps), start=attitude_with_up(faces[0]))
 
 
@@ -110,6 +130,29 @@ def dividing_head(hold_s: float = 2.0, move_s: float = 1.0) -> Motion:
                 steps.append(MoveTo(up, move_s))
             steps.append(Hold(hold_s, name=f"pitch {pitch} roll {roll}"))
     return Motion(tuple(steps), start=attitude_with_up(start))
+
+
+def rate_table(
+    rates_deg_s: tuple[float, ...] = (30.0, 60.0, 120.0, 240.0),
+    plateau_s: float = 6.0,
+    ramp_s: float = 2.0,
+    axes: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    arm_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Motion:
+    """Constant rates of both signs about each body axis, reached and left by smooth ramps; the axis stands upright."""
+    steps: list[Step] = [Hold(5.0, name="rest")]
+    for axis in axes:
+        steps += [MoveTo(axis, 3.0), Hold(3.0, name="rest")]
+        for rate in rates_deg_s:
+            for sign in (1.0, -1.0):
+                duration = plateau_s + 2.0 * ramp_s
+                angle = sign * rate * (plateau_s + ramp_s)
+                name = f"rate {sign * rate:+g} deg/s"
+                steps += [
+                    Turn(axis, angle, duration, ramp=ramp_s / duration, arm_m=arm_m, name=name),
+                    Hold(2.0, name="rest"),
+                ]
+    return Motion(tuple(steps))
 
 
 def long_rest(duration_s: float = 3600.0, up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Motion:

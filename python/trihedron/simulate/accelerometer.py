@@ -1,0 +1,123 @@
+"""The accelerometer: three proof masses, each at its own place, on springs between capacitor plates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.simulate.noise import NoiseTerms
+from trihedron.simulate.readout import IDENTITY, NO_MATRIX, NONE, Adc, Electronics, Matrix, Triple, sense_axes
+from trihedron.units import AccelerationUnit
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ProofMass:
+    """A mass on a spring in the gap of a differential capacitor, per channel.
+
+    ``resonance_hz`` f0 and ``gap_m`` x0 give the displacement over gap per acceleration, ξ = a/((2πf0)² x0).
+    ``moves`` lets the mass follow the second-order equation with ``quality`` Q; otherwise it follows at once.
+    ``reads_bridge`` reads the displacement through V/V_in = c0/(c1+c0) - c0/(c2+c0) (= 2ξ/(4-ξ²) for equal plates)
+    instead of a linear readout, with plates that differ by ``mismatch`` and a suspension of restoring force
+    k x0 (ξ + ``second`` ξ² + ``third`` ξ³). ``spring_per_k`` and ``gap_per_k``: relative change of k and x0 per kelvin.
+    """
+
+    resonance_hz: Triple = (3500.0, 3500.0, 3500.0)
+    quality: Triple = (0.7, 0.7, 0.7)
+    gap_m: Triple = (1.5e-6, 1.5e-6, 1.5e-6)
+    mismatch: Triple = NONE
+    second: Triple = NONE
+    third: Triple = NONE
+    spring_per_k: Triple = NONE
+    gap_per_k: Triple = NONE
+    moves: bool = False
+    reads_bridge: bool = False
+
+    def __post_init__(self) -> None:
+        if any(not v > 0.0 for v in (*self.resonance_hz, *self.quality, *self.gap_m)):
+            raise ValueError("resonance_hz, quality and gap_m of a proof mass must be positive")
+
+    @property
+    def deflection(self) -> FloatArray:
+        """(3,) ξ per m/s²."""
+        omega = 2.0 * np.pi * np.asarray(self.resonance_hz)
+        out: FloatArray = 1.0 / (omega**2 * np.asarray(self.gap_m))
+        return out
+
+
+@dataclass(frozen=True)
+class Hysteresis:
+    """Memory of earlier orientations, per channel.
+
+    Play: the reading differs by up to ``offset_m_s2``, with the sign of the way the input came, once the input has
+    turned back by more than ``width_m_s2``. Creep: ``creep_fraction`` of every change arrives with ``creep_tau_s``.
+    """
+
+    offset_m_s2: Triple = NONE
+    width_m_s2: Triple = (2.0, 2.0, 2.0)
+    creep_fraction: Triple = NONE
+    creep_tau_s: Triple = (20.0, 20.0, 20.0)
+
+
+@dataclass(frozen=True)
+class Accelerometer:
+    """``raw = S^-1 (f - b)`` for the linear instrument, direct form S [m/s² per raw unit], b [m/s²].
+
+    ``places_m`` (row per channel) are the places of the three proof masses from the body's reference point [m].
+    ``rectification`` [1/(m/s²)]: offset per mean square of the acceleration faster than ``rectification_corner_hz``.
+    """
+
+    S: Matrix = IDENTITY
+    b: Triple = NONE
+    unit: AccelerationUnit = AccelerationUnit.M_S2
+    places_m: Matrix = NO_MATRIX
+    mass: ProofMass = field(default_factory=ProofMass)
+    hysteresis: Hysteresis = field(default_factory=Hysteresis)
+    rectification: Triple = NONE
+    rectification_corner_hz: float = 5.0
+    electronics: Electronics = field(default_factory=Electronics)
+    noise: NoiseTerms = field(default_factory=NoiseTerms)
+    adc: Adc = field(default_factory=Adc)
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether readings depend on the motion between samples."""
+        return self.mass.moves or any(self.rectification) or self.electronics.is_dynamic
+
+    def sense(
+        self,
+        motion: tuple[FloatArray, FloatArray, FloatArray],
+        time_s: FloatArray,
+        dt: float,
+        die_k: FloatArray | None,
+    ) -> FloatArray:
+        """(n, 3) input-referred signal along the sensitive axes, from specific force, rate and its derivative."""
+        force, rate, change = motion
+        directions, _ = sense_axes(self.S, "accelerometer")
+        if any(any(place) for place in self.places_m):
+            signal = _core.simulate_force_at_places(force, rate, change, self.places_m, directions.tolist())
+        else:
+            signal = _core.simulate_project(force, directions.tolist())
+        mass = self.mass
+        if mass.moves:
+            signal = _core.simulate_second_order(signal, dt, mass.resonance_hz, mass.quality)
+        if die_k is not None and (any(mass.spring_per_k) or any(mass.gap_per_k)):
+            t = die_k[:, None]
+            softer = (1.0 + t * np.asarray(mass.spring_per_k)) * (1.0 + t * np.asarray(mass.gap_per_k))
+            signal = np.ascontiguousarray(signal / softer)
+        memory = self.hysteresis
+        if any(memory.offset_m_s2):
+            signal = _core.simulate_play(signal, memory.width_m_s2, memory.offset_m_s2)
+        if any(memory.creep_fraction):
+            signal = _core.simulate_creep(signal, dt, memory.creep_fraction, memory.creep_tau_s)
+        if mass.reads_bridge:
+            signal = _core.simulate_bridge(signal, mass.deflection.tolist(), mass.second, mass.third, mass.mismatch)
+        if any(self.rectification):
+            slow = _core.simulate_first_order(signal, dt, [0.5 / (math.pi * self.rectification_corner_hz)] * 3)
+            signal = signal + np.asarray(self.rectification) * (signal - slow) ** 2
+        return self.electronics.amplify(signal, time_s, die_k)

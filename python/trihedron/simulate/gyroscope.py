@@ -1,0 +1,82 @@
+"""The gyro: a driven mass whose Coriolis force moves a sense mass between capacitor plates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.simulate.noise import NoiseTerms
+from trihedron.simulate.readout import IDENTITY, NO_MATRIX, NONE, Adc, Electronics, Matrix, Triple, sense_axes
+from trihedron.units import RateUnit
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SenseMode:
+    """Drive and sense motion of the vibrating mass, per channel.
+
+    ``deflection_s_rad``: displacement of the sense mass over its gap per rad/s (0: linear readout); ``second``,
+    ``third``: its suspension, ``mismatch``: its plates, as in a proof mass. ``bandwidth_hz`` (0: unlimited) and
+    ``quality`` describe how the demodulated sense motion follows the rate.
+    """
+
+    deflection_s_rad: Triple = NONE
+    second: Triple = NONE
+    third: Triple = NONE
+    mismatch: Triple = NONE
+    bandwidth_hz: float = 0.0
+    quality: float = 0.7
+
+
+@dataclass(frozen=True)
+class Gyroscope:
+    """``raw = S^-1 (ω - b)`` for the linear instrument, direct form S [rad/s per raw unit], b [rad/s].
+
+    ``g_sensitivity`` (row per channel) [(rad/s)/(m/s²)]: rate seen per specific force; ``rectification``
+    [(rad/s)/(m/s²)²]: rate seen per mean square of the acceleration faster than ``rectification_corner_hz``.
+    """
+
+    S: Matrix = IDENTITY
+    b: Triple = NONE
+    unit: RateUnit = RateUnit.RAD_S
+    sense_mode: SenseMode = field(default_factory=SenseMode)
+    g_sensitivity: Matrix = NO_MATRIX
+    rectification: Triple = NONE
+    rectification_corner_hz: float = 5.0
+    electronics: Electronics = field(default_factory=Electronics)
+    noise: NoiseTerms = field(default_factory=NoiseTerms)
+    adc: Adc = field(default_factory=Adc)
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether readings depend on the motion between samples."""
+        return self.sense_mode.bandwidth_hz > 0.0 or any(self.rectification) or self.electronics.is_dynamic
+
+    def sense(
+        self,
+        motion: tuple[FloatArray, FloatArray, FloatArray],
+        time_s: FloatArray,
+        dt: float,
+        die_k: FloatArray | None,
+    ) -> FloatArray:
+        """(n, 3) input-referred signal along the sensitive axes, from specific force, rate and its derivative."""
+        force, rate, _ = motion
+        directions, _ = sense_axes(self.S, "gyroscope")
+        signal = _core.simulate_project(rate, directions.tolist())
+        if any(any(row) for row in self.g_sensitivity):
+            signal = signal + force @ np.asarray(self.g_sensitivity).T
+        if any(self.rectification):
+            slow = _core.simulate_first_order(force, dt, [0.5 / (math.pi * self.rectification_corner_hz)] * 3)
+            power = np.sum((force - slow) ** 2, axis=1)
+            signal = signal + power[:, None] * np.asarray(self.rectification)
+        mode = self.sense_mode
+        if mode.bandwidth_hz > 0.0:
+            signal = _core.simulate_second_order(signal, dt, [mode.bandwidth_hz] * 3, [mode.quality] * 3)
+        if any(mode.deflection_s_rad):
+            signal = _core.simulate_bridge(signal, mode.deflection_s_rad, mode.second, mode.third, mode.mismatch)
+        return self.electronics.amplify(signal, time_s, die_k)

@@ -1,0 +1,168 @@
+"""What both sensors share behind the moving part: electronics, filter, converter. Zero means: not there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+
+FloatArray = npt.NDArray[np.float64]
+Triple: TypeAlias = tuple[float, float, float]
+Matrix: TypeAlias = tuple[Triple, Triple, Triple]
+
+NONE: Triple = (0.0, 0.0, 0.0)
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+NO_MATRIX: Matrix = (NONE, NONE, NONE)
+
+
+@dataclass(frozen=True)
+class Adc:
+    """Converter, raw units: step ``lsb`` (0: none), range ``[low, high]``.
+
+    ``dead_band`` is the half-width around the zero reading inside which nothing moves; of every ``missing_every`` codes
+    one is never given (0: none is missing).
+    """
+
+    lsb: float = 0.0
+    low: float = -math.inf
+    high: float = math.inf
+    dead_band: float = 0.0
+    missing_every: int = 0
+
+    @property
+    def is_there(self) -> bool:
+        """Whether it changes anything."""
+        return self != Adc()
+
+    def convert(self, raw: FloatArray, zero: Triple = NONE) -> FloatArray:
+        """(n, 3) raw → (n, 3) codes times ``lsb``; ``zero`` is the reading at zero input."""
+        return _core.simulate_convert(raw, self.lsb, self.low, self.high, self.dead_band, zero, self.missing_every)
+
+
+@dataclass(frozen=True)
+class Thermal:
+    """Electronics against die temperature, relative to the reference: offset [SI/K, SI/K²], gain [1/K, 1/K²].
+
+    The die follows the environment with the lag ``lag_s``.
+    """
+
+    bias_per_k: Triple = NONE
+    bias_per_k2: Triple = NONE
+    scale_per_k: Triple = NONE
+    scale_per_k2: Triple = NONE
+    lag_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Offset that dies away after power-on: ``amplitude · exp(-t/tau_s)``, SI."""
+
+    amplitude: Triple = NONE
+    tau_s: float = 300.0
+
+
+@dataclass(frozen=True)
+class Interference:
+    """A line picked up electrically, in front of the filter: amplitude [SI] per channel, frequency, phase."""
+
+    frequency_hz: float = 50.0
+    amplitude: Triple = NONE
+    phase_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Butterworth low-pass in front of the sampler: ``cutoff_hz`` (0: none), ``order`` 1 to 8."""
+
+    cutoff_hz: float = 0.0
+    order: int = 2
+
+    def __post_init__(self) -> None:
+        if not (self.cutoff_hz >= 0.0 and 1 <= self.order <= 8):
+            raise ValueError(f"a filter needs cutoff_hz >= 0 and order 1..8, got {self.cutoff_hz} Hz, {self.order}")
+
+    def apply(self, signal: FloatArray, dt: float) -> FloatArray:
+        """(n, 3) → (n, 3), settled at the start."""
+        if self.cutoff_hz == 0.0:
+            return signal
+        for k in range(self.order // 2):
+            # Pole pairs stand at π(2k+1)/2n from the negative real axis for even n, at π(k+1)/n for odd n.
+            angle = math.pi * (2 * k + 1 + self.order % 2) / (2 * self.order)
+            quality = 0.5 / math.cos(angle)
+            signal = _core.simulate_second_order(signal, dt, [self.cutoff_hz] * 3, [quality] * 3)
+        if self.order % 2:
+            signal = _core.simulate_first_order(signal, dt, [0.5 / (math.pi * self.cutoff_hz)] * 3)
+        return signal
+
+
+@dataclass(frozen=True)
+class Electronics:
+    """Demodulator, amplifier, supply, filter.
+
+    ``asymmetry`` δ: gain 1+δ for positive and 1-δ for negative signals. ``ratiometric`` 1: the reading follows the
+    supply; 0: not at all. ``saturation`` [SI] clips in front of the filter. ``lag_s`` first-order lag per channel.
+    """
+
+    asymmetry: Triple = NONE
+    thermal: Thermal = field(default_factory=Thermal)
+    drift: Drift = field(default_factory=Drift)
+    interference: tuple[Interference, ...] = ()
+    saturation: Triple = (math.inf, math.inf, math.inf)
+    lag_s: Triple = NONE
+    filter: Filter = field(default_factory=Filter)
+    ratiometric: float = 0.0
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether the output depends on the signal between samples."""
+        return any(self.lag_s) or self.filter.cutoff_hz > 0.0
+
+    def amplify(self, signal: FloatArray, time_s: FloatArray, die_k: FloatArray | None) -> FloatArray:
+        """(n, 3) input-referred signal through asymmetry, temperature, drift, interference and saturation.
+
+        ``die_k`` (n,) is the die's temperature above the reference, None where it is at the reference.
+        """
+        if any(self.asymmetry):
+            signal = signal * (1.0 + np.asarray(self.asymmetry) * np.sign(signal))
+        thermal = self.thermal
+        if die_k is not None:
+            t = die_k[:, None]
+            if any(thermal.scale_per_k) or any(thermal.scale_per_k2):
+                signal = signal * (1.0 + t * (np.asarray(thermal.scale_per_k) + t * np.asarray(thermal.scale_per_k2)))
+            if any(thermal.bias_per_k) or any(thermal.bias_per_k2):
+                signal = signal + t * (np.asarray(thermal.bias_per_k) + t * np.asarray(thermal.bias_per_k2))
+        if any(self.drift.amplitude):
+            decay = np.exp(-np.maximum(time_s, 0.0) / self.drift.tau_s)
+            signal = signal + decay[:, None] * np.asarray(self.drift.amplitude)
+        for line in self.interference:
+            wave = np.sin(2.0 * np.pi * line.frequency_hz * time_s + line.phase_rad)
+            signal = signal + wave[:, None] * np.asarray(line.amplitude)
+        limit = np.asarray(self.saturation)
+        return np.clip(signal, -limit, limit) if np.isfinite(limit).any() else signal
+
+    def smooth(self, signal: FloatArray, dt: float) -> FloatArray:
+        """Lag, then filter, at the fine step ``dt``."""
+        if any(self.lag_s):
+            signal = _core.simulate_first_order(signal, dt, self.lag_s)
+        return self.filter.apply(signal, dt)
+
+
+def sense_axes(S: Matrix, name: str) -> tuple[FloatArray, FloatArray]:
+    """Unit sensitive directions (3, 3), row by row, and gains (3,) raw per SI: ``S^-1 = diag(gain) · directions``.
+
+    Raises
+    ------
+    ValueError
+        When S cannot be inverted.
+    """
+    matrix = np.asarray(S, dtype=np.float64)
+    if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)) or np.linalg.cond(matrix) > 1e12:
+        raise ValueError(f"S of the {name} must be an invertible 3x3 matrix, got {matrix.tolist()}")
+    inverse = np.linalg.inv(matrix)
+    gain: FloatArray = np.linalg.norm(inverse, axis=1)
+    return inverse / gain[:, None], gain

@@ -1,0 +1,172 @@
+"""Scenario files (TOML): a profile, a session or steps, overrides of any parameter, and effects by their id."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import sys
+import types
+import typing
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from trihedron.simulate.effects import with_effect
+from trihedron.simulate.library import SESSIONS
+from trihedron.simulate.motion import LEVEL, Disturb, Hold, Motion, MoveTo, Oscillate, Turn, Vibrate, attitude_with_up
+from trihedron.simulate.profiles import profile_by_name
+from trihedron.simulate.scenario import Environment, Scenario
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:  # pragma: no cover
+    import tomli as tomllib
+
+_STEPS: dict[str, type[Any]] = {
+    "hold": Hold,
+    "move": MoveTo,
+    "turn": Turn,
+    "oscillate": Oscillate,
+    "vibrate": Vibrate,
+    "disturb": Disturb,
+}
+_TOP = ("name", "profile", "unit", "session", "start_up", "table_tilt_deg", "step", "clock", "environment")
+_KEYS = (*_TOP, "accelerometer", "gyroscope", "effect")
+
+
+def read_scenario(path: str | Path) -> Scenario:
+    """Read a scenario file.
+
+    Raises
+    ------
+    ValueError
+        When the file is not TOML or asks for something that does not exist, naming the table and the key.
+    FileNotFoundError
+        When there is no such file.
+    """
+    path = Path(path)
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path.name} is not a TOML file: {error}") from None
+    try:
+        return scenario_from_table(table, path.stem)
+    except ValueError as error:
+        raise ValueError(f"{path.name}: {error}") from None
+
+
+def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Scenario:
+    """A scenario from the tables of a TOML file."""
+    _refuse_unknown(table, _KEYS, "the file")
+    profile = profile_by_name(str(table.get("profile", "mpu")))
+    accelerometer, gyroscope = profile.accelerometer, profile.gyroscope
+    if "unit" in table:
+        accelerometer, gyroscope = profile.unit(int(table["unit"]))
+    scenario = Scenario(
+        motion=_motion(table),
+        name=str(table.get("name", name)),
+        accelerometer=_changed(accelerometer, table.get("accelerometer", {}), "accelerometer"),
+        gyroscope=_changed(gyroscope, table.get("gyroscope", {}), "gyroscope"),
+        clock=_changed(profile.clock, table.get("clock", {}), "clock"),
+        environment=_changed(Environment(), table.get("environment", {}), "environment"),
+    )
+    effects = table.get("effect", [])
+    if not isinstance(effects, list):
+        raise ValueError("effects are written as [[effect]], each with its id")
+    for effect in effects:
+        size = dict(effect)
+        scenario = with_effect(scenario, str(size.pop("id", "")), **size)
+    return scenario
+
+
+def _motion(table: Mapping[str, Any]) -> Motion:
+    if "step" in table and "session" in table:
+        raise ValueError("give either a session or [[step]] tables, not both")
+    if "step" in table:
+        steps = []
+        for k, entry in enumerate(table["step"]):
+            values = dict(entry)
+            kind = str(values.pop("kind", ""))
+            if kind not in _STEPS:
+                raise ValueError(f"step {k} is of kind {kind!r}; there are {', '.join(_STEPS)}")
+            steps.append(_made(_STEPS[kind], values, f"step {k} ({kind})"))
+        start = attitude_with_up(table["start_up"]) if "start_up" in table else LEVEL
+        motion = Motion(tuple(steps), start)
+    else:
+        values = dict(table.get("session", {"kind": "hand"}))
+        kind = str(values.pop("kind", "hand"))
+        if kind not in SESSIONS:
+            raise ValueError(f"no session is of kind {kind!r}; there are {', '.join(SESSIONS)}")
+        values = {key: _tupled(value) for key, value in values.items()}
+        try:
+            motion = SESSIONS[kind](**values)
+        except TypeError as error:
+            raise ValueError(f"session {kind}: {str(error).split('() ', 1)[-1]}") from None
+    if "table_tilt_deg" in table:
+        a, b = table["table_tilt_deg"]
+        motion = dataclasses.replace(motion, table_tilt_deg=(float(a), float(b)))
+    return motion
+
+
+def _tupled(value: Any) -> Any:
+    return tuple(_tupled(v) for v in value) if isinstance(value, list) else value
+
+
+def _refuse_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+    for key in values:
+        if key not in known:
+            raise ValueError(f"{where} has no key {key!r}; it knows {', '.join(known)}")
+
+
+def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:
+    """A dataclass with some fields replaced by values of a table."""
+    if not isinstance(values, Mapping):
+        raise ValueError(f"{where} must be a table, got {values!r}")
+    cls = type(base)
+    names = tuple(f.name for f in dataclasses.fields(cls))
+    _refuse_unknown(values, names, where)
+    hints = typing.get_type_hints(cls)
+    changes = {key: _value(hints[key], value, getattr(base, key), f"{where}.{key}") for key, value in values.items()}
+    return dataclasses.replace(base, **changes)
+
+
+def _made(cls: type[Any], values: Mapping[str, Any], where: str) -> Any:
+    """A dataclass from a table, other fields at their defaults."""
+    names = tuple(f.name for f in dataclasses.fields(cls))
+    _refuse_unknown(values, names, where)
+    hints = typing.get_type_hints(cls)
+    try:
+        return cls(**{key: _value(hints[key], value, None, f"{where}.{key}") for key, value in values.items()})
+    except TypeError as error:
+        raise ValueError(f"{where}: {str(error).split('() ', 1)[-1]}") from None
+
+
+def _value(hint: Any, value: Any, base: Any, where: str) -> Any:
+    if dataclasses.is_dataclass(hint):
+        return _changed(base, value, where) if base is not None else _made(typing.cast(Any, hint), value, where)
+    if isinstance(hint, types.UnionType):
+        return value
+    if typing.get_origin(hint) is tuple:
+        return _tuple_value(typing.get_args(hint), value, where)
+    if isinstance(hint, type) and issubclass(hint, enum.Enum):
+        try:
+            return hint(value)
+        except ValueError:
+            raise ValueError(f"{where} is one of {', '.join(m.value for m in hint)}, got {value!r}") from None
+    if hint is float and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value)
+    if hint in (bool, int, str) and type(value) is hint:
+        return value
+    raise ValueError(f"{where} must be {getattr(hint, '__name__', hint)}, got {value!r}")
+
+
+def _tuple_value(items: tuple[Any, ...], value: Any, where: str) -> Any:
+    if len(items) == 2 and items[1] is Ellipsis:
+        if not isinstance(value, list):
+            raise ValueError(f"{where} must be a list, got {value!r}")
+        return tuple(_value(items[0], v, None, where) for v in value)
+    if isinstance(value, (int, float)) and all(item is float for item in items):
+        return tuple(float(value) for _ in items)
+    if not isinstance(value, list) or len(value) != len(items):
+        raise ValueError(f"{where} must hold {len(items)} values (or one for all), got {value!r}")
+    return tuple(_value(item, v, None, where) for item, v in zip(items, value, strict=True))
