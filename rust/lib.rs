@@ -3,14 +3,14 @@
 //! No module here reads files, prints, or knows Python; `python` (feature `python`) is the only seam.
 //! Vocabulary: `S`, `b` are the direct form `f = S a' + b` (raw to SI), `Mz` is the instrument trihedron.
 
-pub mod ellipsoid;
 pub mod banded;
+pub mod ellipsoid;
 pub mod error;
 pub mod gauss_newton;
 pub mod gyro_alignment;
 pub mod kalman;
-pub mod poisson;
 pub mod norm_invariant;
+pub mod poisson;
 pub mod rotation;
 pub mod simulate;
 

@@ -11,11 +11,11 @@ use pyo3::prelude::*;
 
 use crate::error::Result as KernelResult;
 
+mod accelerometer;
 mod gyro_alignment;
 mod kalman;
 mod kalman_norm;
 mod poisson;
-mod accelerometer;
 mod rotation;
 mod simulate;
 
