@@ -79,10 +79,11 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
             f"{table.path}: no accelerometer and no gyro columns recognised among: {listed[:300]}; "
             "name them, for example --columns time=1,ax=2,ay=3,az=4."
         )
-    return replace(chosen, findings=(*chosen.findings, _statement(table, chosen)))
+    return chosen
 
 
-def _statement(table: Table, columns: Columns) -> Finding:
+def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
+    """Which column became what, and what was kept aside."""
     parts = []
     for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
         value = getattr(columns, role)
@@ -90,7 +91,9 @@ def _statement(table: Table, columns: Columns) -> Finding:
             which = value if isinstance(value, tuple) else (value,)
             parts.append(f"{role} from {' '.join(table.label(c) for c in which)}")
     rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
-    seen = f"Columns: {', '.join(parts)}" + (f"; kept aside: {' '.join(rest[:24])}." if rest else ".")
+    seen = f"Columns{file_name and ' of ' + file_name}: {', '.join(parts)}" + (
+        f"; kept aside: {' '.join(rest[:24])}." if rest else "."
+    )
     return Finding(FindingCode.COLUMNS_RECOGNISED, Severity.NOTE, seen)
 
 

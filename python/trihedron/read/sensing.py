@@ -1,8 +1,4 @@
-"""Which unit, which triad: decided by names, by what the user says, and by what the readings can only be.
-
-The gyro's unit is decided by physics where the log allows it: between two rests gravity cannot turn further than the
-angle the gyro travels, so ``angle / ∫|ω - bias| dt`` comes near 1 for rad/s, near π/180 for deg/s.
-"""
+"""Which unit, which triad: decided by names, by what the user says, and by what the readings can only be."""
 
 from __future__ import annotations
 
@@ -15,14 +11,12 @@ import numpy as np
 from trihedron.read.errors import ReadError
 from trihedron.read.rest import Windows, is_integer, look
 from trihedron.read.table import FloatArray
+from trihedron.read.turning import unit_by_turning
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
+from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si
 
 NEAR_GRAVITY = 0.2
 """An uncalibrated accelerometer at rest may be this far off: scale a few per cent, zero offset a tenth of g."""
-MIN_TURN_RAD = 0.5
-MAX_MOVES = 400
-_RATIO_LOW, _RATIO_HIGH = 0.25, 1.2
 _ADVICE = {
     "accelerometer": "Say it with --accelerometer-unit m/s^2, g, mg or counts if this is wrong.",
     "gyroscope": "Say it with --gyroscope-unit rad/s, mrad/s, deg/s or counts if this is wrong.",
@@ -61,18 +55,22 @@ def _finding(code: FindingCode, severity: Severity, seen: str, cause: str, actio
     return Finding(code, severity, seen, cause, action, MappingProxyType(numbers))
 
 
-def rest_norm(windows: Windows | None) -> float:
-    """Median length of the accelerometer's reading in quiet windows, raw unit."""
+def rest_norm(readings: FloatArray, windows: Windows | None) -> float:
+    """Median length of single accelerometer readings in quiet windows, raw unit.
+
+    Of single readings, so that a table of pose means, where every row is another pose, gives the same.
+    """
     if windows is None:
         return math.nan
-    return float(np.median(np.linalg.norm(windows.quiet_mean("accelerometer"), axis=1)))
+    index = windows.start[windows.quiet][:, None] + np.arange(windows.length)
+    return float(np.median(np.linalg.norm(readings[index], axis=2)))
 
 
 def judge_accelerometer(
     readings: FloatArray, windows: Windows | None, named: str, given: str | AccelerationUnit | None
 ) -> Judged:
     """Unit of the accelerometer: as given, else as named, else from |a| at rest."""
-    norm = rest_norm(windows)
+    norm = rest_norm(readings, windows)
     whole = is_integer(readings)
     if given is not None or named not in {"", "raw"}:
         unit = parse_acceleration_unit(given if given is not None else named)
@@ -159,51 +157,21 @@ def _stated(
     return (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, f"The {sensor} is in {unit.value} {source}.", "", ""),)
 
 
-def turn_ratio(gyroscope: FloatArray, time_s: FloatArray, windows: Windows) -> tuple[float, int]:
-    """(largest usual ratio of gravity's turn [rad] to the gyro's path [raw unit * s], number of turns behind it)."""
-    index = np.flatnonzero(windows.quiet)
-    directions = windows.mean["accelerometer"][index]
-    norms = np.linalg.norm(directions, axis=1)
-    if not len(index) or not np.all(norms > 0):
-        return math.nan, 0
-    directions = directions / norms[:, None]
-    cosine = np.clip(np.einsum("ij,ij->i", directions[:-1], directions[1:]), -1.0, 1.0)
-    angle = np.arccos(cosine)
-    ratios = []
-    for k in np.flatnonzero(angle > MIN_TURN_RAD)[:MAX_MOVES]:
-        first, last = int(windows.start[index[k]]), int(windows.start[index[k + 1]]) + windows.length
-        bias = 0.5 * (windows.mean["gyroscope"][index[k]] + windows.mean["gyroscope"][index[k + 1]])
-        speed = np.linalg.norm(gyroscope[first:last] - bias, axis=1)
-        step = np.diff(time_s[first:last])
-        path = float(np.nansum(0.5 * (speed[1:] + speed[:-1]) * step))
-        if path > 0.0 and np.isfinite(path):
-            ratios.append(float(angle[k]) / path)
-    return (float(np.percentile(ratios, 80.0)), len(ratios)) if ratios else (math.nan, 0)
-
-
-def _unit_by_turn(ratio: float, n_turns: int) -> RateUnit | None:
-    if n_turns < 2 or not math.isfinite(ratio):
-        return None
-    for unit in (RateUnit.RAD_S, RateUnit.DEG_S, RateUnit.MRAD_S):
-        scale = rate_to_si(unit)
-        if scale is not None and _RATIO_LOW * scale <= ratio <= _RATIO_HIGH * scale:
-            return unit
-    return None
-
-
 def judge_gyroscope(
     readings: FloatArray,
-    has_accelerometer: bool,
+    accelerometer: FloatArray | None,
     time_s: FloatArray,
+    rate_hz: float,
     windows: Windows | None,
     named: str,
     given: str | RateUnit | None,
 ) -> Judged:
     """Unit of the gyro: as given, else as named, else by turning gravity, else by magnitude (a warning)."""
-    ratio, n_turns = math.nan, 0
-    if has_accelerometer and windows is not None:
-        ratio, n_turns = turn_ratio(readings, time_s, windows)
-    by_turn = _unit_by_turn(ratio, n_turns)
+    by_turn: RateUnit | None = None
+    evidence = ""
+    whole = is_integer(readings)
+    if accelerometer is not None and windows is not None and not whole:
+        by_turn, evidence = unit_by_turning(accelerometer, readings, time_s, rate_hz, windows)
     if given is not None or named not in {"", "raw"}:
         unit = parse_rate_unit(given if given is not None else named)
         source = "as you said" if given is not None else "by its column names"
@@ -212,19 +180,17 @@ def judge_gyroscope(
             against = _finding(
                 FindingCode.UNIT_CONTRADICTED,
                 Severity.SERIOUS,
-                f"The gyro is in {unit.value} {source}, but in {n_turns} turns gravity moved as if it were in "
-                f"{by_turn.value if by_turn else ''}.",
+                f"The gyro is in {unit.value} {source}, but {evidence}.",
                 "A wrong unit or a wrong sampling rate.",
                 _ADVICE["gyroscope"],
-                ratio=ratio,
             )
         return Judged(unit, _stated("gyro", unit, source, against))
-    if is_integer(readings):
+    if whole:
         seen = "The gyro's readings are whole numbers and were taken as counts."
         return Judged(RateUnit.COUNTS, (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, seen, "", ""),))
     if by_turn is not None:
-        seen = f"In {n_turns} turns of the log gravity moved as a gyro in {by_turn.value} says, so that is its unit."
-        return Judged(by_turn, (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, seen, "", "", ratio=ratio),))
+        seen = f"The gyro's unit is {by_turn.value}: {evidence}."
+        return Judged(by_turn, (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, seen, "", ""),))
     return _gyroscope_by_magnitude(readings, windows)
 
 

@@ -1,0 +1,119 @@
+"""Clipping: extreme values that the signal runs into and stays at. Found from the data, never from a nominal range."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.table import FloatArray
+from trihedron.records import Finding, FindingCode, Severity
+
+Place = Callable[[int], str]
+AXES = "xyz"
+STEEP = 5.0
+"""The wall is reached by steps this many times the noise: a quiet sensor resting on its largest count is no wall."""
+PILED = 3.0
+"""And it holds this many times more samples than the neighbouring values lead up to."""
+
+
+@dataclass(frozen=True)
+class Wall:
+    """One axis' extreme value: ``count`` samples in ``stretches``, the first steep one at ``sample``."""
+
+    axis: int
+    value: float
+    is_high: bool
+    count: int
+    stretches: int
+    sample: int
+
+
+def find_walls(readings: FloatArray, noise: FloatArray) -> list[Wall]:
+    """Walls of a triad (n, 3) with ``noise`` (3,) of one sample at rest."""
+    walls = []
+    for axis in range(3):
+        values = readings[:, axis]
+        finite = values[np.isfinite(values)]
+        if not len(finite):
+            continue
+        low, high = float(finite.min()), float(finite.max())
+        if low == high:
+            continue
+        for value in (high, low):
+            wall = _wall(values, finite, value, 0.01 * (high - low), float(noise[axis]))
+            if wall is not None:
+                count, stretches, sample = wall
+                walls.append(Wall(axis, value, value == high, count, stretches, sample))
+    return walls
+
+
+def _wall(
+    values: FloatArray, finite: FloatArray, value: float, depth: float, noise: float
+) -> tuple[int, int, int] | None:
+    at = np.flatnonzero(values == value)
+    if len(at) < 3:
+        return None
+    distance = np.abs(finite - value)
+    near = int(np.count_nonzero(distance <= depth)) - len(at)
+    width = float(distance[distance > 0].min())
+    # Towards the top of a smooth peak the density grows as one over the root of the distance, so the share of the
+    # topmost level among all within `depth` is the root of its width.
+    by_shape = near * min(math.sqrt(width / depth), 1.0)
+    starts, lengths = _runs(at)
+    before = np.abs(values[np.maximum(starts - 1, 0)] - value)
+    after = np.abs(values[np.minimum(starts + lengths, len(values) - 1)] - value)
+    steep = (lengths >= 2) & (np.fmax(before, after) > STEEP * max(noise, width))
+    # One stretch alone may be a channel that froze; at the end of an integer's range it is the range.
+    enough = 1 if _is_full_scale(value) else 2
+    if np.count_nonzero(steep) < enough or len(at) <= PILED * by_shape:
+        return None
+    return len(at), len(starts), int(starts[np.argmax(steep)])
+
+
+def _is_full_scale(value: float) -> bool:
+    """A code at the end of a converter's range: 2^k - 1, or -2^k, k from 7."""
+    if value != round(value) or abs(value) < 127:
+        return False
+    magnitude = int(value) + 1 if value > 0 else -int(value)
+    return magnitude & (magnitude - 1) == 0
+
+
+def _runs(at: npt.NDArray[np.intp]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """(start, length) of runs of consecutive indices."""
+    breaks = np.flatnonzero(np.diff(at) > 1)
+    starts = np.concatenate([at[:1], at[breaks + 1]])
+    ends = np.concatenate([at[breaks], at[-1:]])
+    return starts, ends - starts + 1
+
+
+def short(sensor: str) -> str:
+    """The sensor's name in a sentence."""
+    return "gyro" if sensor == "gyroscope" else sensor
+
+
+def audit_clipping(sensor: str, walls: list[Wall], place: Place) -> list[Finding]:
+    """One finding per sensor that names every wall."""
+    if not walls:
+        return []
+    listed = ", ".join(
+        f"{AXES[w.axis]} at {w.value:.7g} ({w.count} samples in {w.stretches} stretch{'es' if w.stretches > 1 else ''})"
+        for w in walls
+    )
+    first = min(w.sample for w in walls)
+    numbers = {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_count": float(w.count) for w in walls}
+    numbers |= {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_value": w.value for w in walls}
+    return [
+        Finding(
+            FindingCode.CLIPPING,
+            Severity.WARNING,
+            f"The {short(sensor)} is clipped: {listed}; first at {place(first)}.",
+            "The motion left the measuring range.",
+            "Turn more slowly, or set a wider range; angles integrated over clipped moves are too small.",
+            MappingProxyType({"count": float(sum(w.count for w in walls)), "sample": float(first), **numbers}),
+        )
+    ]

@@ -1,0 +1,265 @@
+"""One file's sensors on its clock; two files' sensors on one clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.clock import Clock, build_clock, mean_rate_hz
+from trihedron.read.columns import Columns, Sensor, find_columns, statement
+from trihedron.read.errors import ReadError
+from trihedron.read.merge import merge
+from trihedron.read.sensing import order_of_triads
+from trihedron.read.source import read_table
+from trihedron.read.table import FloatArray, Progress, Table
+from trihedron.records import Finding, FindingCode, Severity
+
+ASSUMED_RATE_HZ = 100.0
+_RATE_KEYS = frozenset(
+    f"{a}{b}"
+    for a in ("fs", "rate", "sampling rate", "sample rate", "sampling frequency", "frequency", "update rate")
+    for b in ("", " hz", " [hz]", " (hz)")
+)
+
+
+@dataclass(frozen=True)
+class Options:
+    columns: str | None
+    rate_hz: float | None
+    time_unit: str | None
+    device: int | None
+    progress: Progress | None
+
+
+@dataclass(frozen=True, eq=False)
+class Sensors:
+    """Both triads on one time base, and where each sample stood in the file."""
+
+    time_s: FloatArray
+    start_s: float
+    accelerometer: FloatArray | None
+    gyroscope: FloatArray | None
+    table: Table
+    columns: Columns
+    rows: npt.NDArray[np.int64] | None
+    offset: int
+    has_clock: bool
+    gyroscope_unit: str = ""
+    findings: tuple[Finding, ...] = field(default=())
+
+    def row(self, sample: int) -> int:
+        """Row of the base table that holds a sample."""
+        at = sample + self.offset
+        return int(self.rows[at]) if self.rows is not None else at
+
+    def place(self, sample: int) -> str:
+        """A sample's number, file line and time, for people."""
+        return f"sample {sample}, {self.table.place(self.row(sample))}, {self.time_s[sample]:.3f} s"
+
+
+def _triad(table: Table, triad: tuple[int, int, int] | None, rows: npt.NDArray[np.int64] | None) -> FloatArray | None:
+    if triad is None:
+        return None
+    out = np.empty((table.n_rows if rows is None else len(rows), 3))
+    for k, column in enumerate(triad):
+        values = table.columns[column]
+        if not len(values):
+            raise ReadError(
+                f"{table.path}: column {table.label(column)} holds words, not numbers; name another column."
+            )
+        out[:, k] = values if rows is None else values[rows]
+    return out
+
+
+def read_one(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
+    table = read_table(path, options.device, options.progress)
+    chosen = find_columns(table, options.columns, sensor)
+    if table.n_rows < 2:
+        raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
+    findings = [*table.findings, *chosen.findings]
+    clock, rate = _time_base(table, chosen, options, findings)
+    accelerometer = _triad(table, chosen.accelerometer, clock.rows)
+    gyroscope = _triad(table, chosen.gyroscope, clock.rows)
+    if sensor == "accelerometer":
+        gyroscope = None
+    elif sensor == "gyroscope":
+        accelerometer = None
+    if accelerometer is None and gyroscope is None:
+        raise ReadError(f"{path}: the {sensor} is not among its columns; the other sensor is: swap the two files.")
+    if chosen.positional and accelerometer is not None and gyroscope is not None:
+        is_swapped = _is_gyro_first(accelerometer, gyroscope, rate, findings)
+        if is_swapped:
+            accelerometer, gyroscope = gyroscope, accelerometer
+            chosen = replace(chosen, accelerometer=chosen.gyroscope, gyroscope=chosen.accelerometer)
+    findings.insert(len(table.findings), statement(table, chosen, path.name if sensor else ""))
+    for name, triad, where in (
+        ("accelerometer", accelerometer, chosen.accelerometer),
+        ("gyroscope", gyroscope, chosen.gyroscope),
+    ):
+        if triad is not None and where is not None:
+            _refuse_constant(table, name, triad, where)
+    return Sensors(
+        clock.time_s,
+        clock.start_s,
+        accelerometer,
+        gyroscope,
+        table,
+        chosen,
+        clock.rows,
+        0,
+        chosen.time is not None,
+        chosen.gyroscope_unit,
+        tuple(findings),
+    )
+
+
+def _refuse_constant(table: Table, name: str, triad: FloatArray, where: tuple[int, int, int]) -> None:
+    for k, column in enumerate(where):
+        finite = triad[np.isfinite(triad[:, k]), k]
+        if len(finite) == 0:
+            raise ReadError(f"{table.path}: column {table.label(column)} of the {name} holds no finite number.")
+        if finite[0] == finite[-1] and np.all(finite == finite[0]):
+            raise ReadError(
+                f"{table.path}: column {table.label(column)} of the {name} is {finite[0]:.6g} in all {len(finite)} "
+                f"rows from {table.place(0)} on: a dead channel, or the wrong column; name the columns with --columns."
+            )
+
+
+def _is_gyro_first(first: FloatArray, second: FloatArray, rate_hz: float, findings: list[Finding]) -> bool:
+    """Whether the first of two unnamed triads is the gyro; what was decided, and why, becomes a finding."""
+    is_first, why = order_of_triads(first, second, rate_hz)
+    if is_first is None:
+        seen = f"Six columns without names were taken as ax ay az gx gy gz, but {why}."
+        severity = Severity.SERIOUS
+    elif is_first:
+        seen = f"Six columns without names: the first three are the accelerometer, because {why}."
+        severity = Severity.NOTE
+    else:
+        seen = (
+            f"Six columns without names: the first three are the gyro, the last three the accelerometer, because {why}."
+        )
+        severity = Severity.WARNING
+    findings.append(
+        Finding(
+            FindingCode.COLUMNS_ASSUMED,
+            severity,
+            seen,
+            "A log without a header.",
+            "Name them with --columns, for example --columns ax,ay,az,gx,gy,gz.",
+        )
+    )
+    return is_first is False
+
+
+def _stated_rate(table: Table) -> float | None:
+    for key, text in table.metadata.items():
+        if key.strip().lower().replace("_", " ") in _RATE_KEYS:
+            try:
+                rate = float(text.split()[0].lower().removesuffix("hz"))
+            except (ValueError, IndexError):
+                continue
+            if 0 < rate < 1e7:
+                return rate
+    return None
+
+
+def _time_base(table: Table, chosen: Columns, options: Options, findings: list[Finding]) -> tuple[Clock, float]:
+    if chosen.time is not None:
+        clock = build_clock(table, chosen.time, chosen.time_unit, options.time_unit)
+        findings += clock.findings
+        rate = mean_rate_hz(clock.time_s)
+        told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)
+        if told is not None and abs(rate / told - 1.0) > 0.01:
+            findings.append(
+                Finding(
+                    FindingCode.RATE_CONTRADICTED,
+                    Severity.WARNING,
+                    f"The rate was given as {told:.6g} Hz but the time column runs at {rate:.6g} Hz; "
+                    "the column was used.",
+                    "A nominal rate, or a clock that is wrong.",
+                    "To use the given rate, read with --columns time=none.",
+                    MappingProxyType({"given_hz": told, "clock_hz": rate}),
+                )
+            )
+        return clock, rate
+    stated = _stated_rate(table)
+    if options.rate_hz is not None:
+        rate = float(options.rate_hz)
+        findings.append(_rate_stated(rate, "as you said"))
+    elif stated is not None:
+        rate = stated
+        findings.append(_rate_stated(rate, "as the file states above its numbers or beside them"))
+    else:
+        rate = ASSUMED_RATE_HZ
+        severe = chosen.gyroscope is not None
+        findings.append(
+            Finding(
+                FindingCode.RATE_ASSUMED,
+                Severity.SERIOUS if severe else Severity.WARNING,
+                f"The log has no time column and no rate; {rate:g} Hz was assumed.",
+                "Only readings were logged.",
+                "Give --rate HZ."
+                + (" Gyro scale is inversely proportional to it: 1 % of rate is 1 % of scale." if severe else ""),
+                MappingProxyType({"rate_hz": rate}),
+            )
+        )
+    return Clock(np.arange(table.n_rows) / rate, 0.0, None, ()), rate
+
+
+def _rate_stated(rate: float, source: str) -> Finding:
+    return Finding(
+        FindingCode.RATE_STATED,
+        Severity.NOTE,
+        f"No time column; the rate is {rate:.6g} Hz {source}.",
+        numbers=MappingProxyType({"rate_hz": rate}),
+    )
+
+
+def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
+    assert accelerometer.accelerometer is not None
+    assert gyroscope.gyroscope is not None
+    if accelerometer.has_clock != gyroscope.has_clock:
+        blind = gyroscope if accelerometer.has_clock else accelerometer
+        raise ReadError(f"{blind.table.path}: this file has no time column and the other one has; log both alike.")
+    if not accelerometer.has_clock and len(accelerometer.time_s) != len(gyroscope.time_s):
+        raise ReadError(
+            f"{accelerometer.table.path}: {len(accelerometer.time_s)} rows here and {len(gyroscope.time_s)} in "
+            f"{gyroscope.table.path.name}, and no time column to match them by; log both with time stamps."
+        )
+    merged = merge(
+        accelerometer.accelerometer,
+        accelerometer.time_s,
+        accelerometer.start_s,
+        gyroscope.gyroscope,
+        gyroscope.time_s,
+        gyroscope.start_s,
+        f"{accelerometer.table.path} and {gyroscope.table.path.name}",
+    )
+    base = accelerometer if merged.base == "accelerometer" else gyroscope
+    seen = {(f.code, f.seen) for f in accelerometer.findings}
+    extra = [f for f in gyroscope.findings if (f.code, f.seen) not in seen]
+    return Sensors(
+        merged.time_s,
+        merged.start_s,
+        merged.accelerometer,
+        merged.gyroscope,
+        base.table,
+        Columns(
+            time=base.columns.time,
+            accelerometer=accelerometer.columns.accelerometer if base is accelerometer else None,
+            gyroscope=gyroscope.columns.gyroscope if base is gyroscope else None,
+            temperature=base.columns.temperature,
+            supply=base.columns.supply,
+            counter=base.columns.counter,
+            accelerometer_unit=accelerometer.columns.accelerometer_unit,
+        ),
+        base.rows,
+        merged.first,
+        base.has_clock,
+        gyroscope.gyroscope_unit,
+        (*accelerometer.findings, *extra, *merged.findings),
+    )
