@@ -1,62 +1,342 @@
-"""Reading: any layout in, the same numbers out; what was assumed is said; what cannot be read is refused in words."""
+"""Reading: any layout in, the same numbers out, and every choice said."""
 
 import gzip
+import hashlib
+import os
 
 import numpy as np
+import polars as pl
 import pytest
 
 from trihedron.read import ReadError, read_recording
-from trihedron.records import FindingCode
+from trihedron.records import FindingCode, Recording, Severity
+from trihedron.units import AccelerationUnit, RateUnit
+
+HEADER = "t,ax,ay,az,gx,gy,gz\n"
 
 
-def readings(n: int = 200, seed: int = 1) -> np.ndarray:
+def readings(n: int = 200, seed: int = 1, rate_hz: float = 100.0) -> np.ndarray:
     """(n, 7) time [s], accelerometer [m/s^2], gyro [rad/s] of a sensor lying still, rounded to what text holds."""
     rng = np.random.default_rng(seed)
     table = np.empty((n, 7))
-    table[:, 0] = np.arange(n) / 100.0
+    table[:, 0] = np.arange(n) / rate_hz
     table[:, 1:4] = [0.1, -0.2, 9.8] + 0.02 * rng.standard_normal((n, 3))
     table[:, 4:] = [0.01, -0.02, 0.003] + 0.002 * rng.standard_normal((n, 3))
     return np.round(table, 6)
 
 
-def write(path, table, header="", separator=",", decimal=".", lead="", end=""):
+def write(path, table, header=HEADER, separator=",", decimal=".", lead="", end="", line_end="\n"):
     lines = [lead + separator.join(repr(float(v)).replace(".", decimal) for v in row) + end for row in table]
-    path.write_text(header + "\n".join(lines) + "\n")
+    path.write_bytes((header + "\n".join(lines) + "\n").replace("\n", line_end).encode())
     return path
 
 
-@pytest.mark.parametrize(
-    ("header", "separator", "decimal", "lead", "end"),
-    [
-        ("t,ax,ay,az,gx,gy,gz\n", ",", ".", "", ""),
-        ("t\tax\tay\taz\tgx\tgy\tgz\n", "\t", ".", "", ""),
-        ("t;ax;ay;az;gx;gy;gz\n", ";", ",", "", ""),
-        ("", "   ", ".", "  ", "  "),
-        ("# time tx ty tz wx wy wz\n", " ", ".", "", " "),
-        ("t,ax,ay,az,gx,gy,gz\n", ",", ".", "", ","),
-        ("Fs,100\nDevice,none\n\nt, ax, ay, az, gx, gy, gz\n", ", ", ".", "", ""),
-    ],
-    ids=["csv", "tsv", "decimal-comma", "blanks", "comment-header", "trailing-comma", "preamble"],
-)
-def test_every_text_layout_gives_the_numbers_that_were_written(tmp_path, header, separator, decimal, lead, end):
-    table = readings()
-    recording = read_recording(write(tmp_path / "log.txt", table, header, separator, decimal, lead, end))
+def codes(recording: Recording) -> set[FindingCode]:
+    return {finding.code for finding in recording.findings}
+
+
+def finding(recording: Recording, code: FindingCode):
+    (found,) = [f for f in recording.findings if f.code is code]
+    return found
+
+
+def assert_same(recording: Recording, table: np.ndarray) -> None:
     np.testing.assert_array_equal(recording.accelerometer, table[:, 1:4])
     np.testing.assert_array_equal(recording.gyroscope, table[:, 4:])
-    # Times are made relative to the first stamp: one rounding.
+    # Times are made relative to the first stamp: one rounding of numbers up to 100 s.
     np.testing.assert_allclose(recording.time_s, table[:, 0] - table[0, 0], rtol=0, atol=1e-12)
 
 
-def test_a_truncated_gzip_is_one_sentence(tmp_path):
-    path = write(tmp_path / "log.csv", readings(2000), "t,ax,ay,az,gx,gy,gz\n")
-    packed = tmp_path / "log.csv.gz"
-    packed.write_bytes(gzip.compress(path.read_bytes())[:-2000])
-    with pytest.raises(ReadError, match="copy the file again"):
-        read_recording(packed)
+@pytest.mark.parametrize(
+    ("header", "separator", "decimal", "lead", "end", "line_end"),
+    [
+        (HEADER, ",", ".", "", "", "\n"),
+        (HEADER, ",", ".", "", "", "\r\n"),
+        (HEADER, ",", ".", "", "", "\r"),
+        ("\ufeff" + HEADER, ",", ".", "", "", "\n"),
+        (HEADER.replace(",", "\t"), "\t", ".", "", "", "\n"),
+        (HEADER.replace(",", ";"), ";", ",", "", "", "\n"),
+        (HEADER.replace(",", "\t"), "\t", ",", "", "", "\n"),
+        ("", "   ", ".", "  ", "  ", "\n"),
+        ("# time tx ty tz wx wy wz\n", " ", ".", "", " ", "\n"),
+        (HEADER, ",", ".", "", ",", "\n"),
+        ("Fs,100\nDevice,none\n\n" + HEADER, ", ", ".", "", "", "\n"),
+        ('"t","ax","ay","az","gx","gy","gz"\n"', '","', ".", "", '"', '\n"'),
+    ],
+    ids=[
+        "csv",
+        "crlf",
+        "cr",
+        "byte-order-mark",
+        "tsv",
+        "decimal-comma",
+        "tab-decimal-comma",
+        "blanks",
+        "comment-header",
+        "trailing-comma",
+        "preamble",
+        "quoted",
+    ],
+)
+def test_every_text_layout_gives_the_numbers_that_were_written(
+    tmp_path, header, separator, decimal, lead, end, line_end
+):
+    table = readings()
+    path = tmp_path / "log.txt"
+    if line_end == '\n"':
+        rows = ['"' + '","'.join(repr(float(v)) for v in row) + '"' for row in table]
+        path.write_text(header.rstrip('"') + "\n".join(rows) + "\n")
+    else:
+        write(path, table, header, separator, decimal, lead, end, line_end)
+    assert_same(read_recording(path), table)
+
+
+def test_utf16_as_windows_tools_write_it_is_read(tmp_path):
+    table = readings()
+    path = tmp_path / "log.csv"
+    path.write_bytes(write(path, table).read_text().encode("utf-16"))
+    assert_same(read_recording(path), table)
+
+
+@pytest.mark.parametrize("extension", [".csv", ".csv.gz", ".npz", ".parquet"])
+def test_the_format_is_told_by_the_content_and_not_by_the_name(tmp_path, extension):
+    table = readings()
+    text = write(tmp_path / f"text{extension}", table)
+    assert_same(read_recording(text), table)
+    packed = tmp_path / f"packed{extension}"
+    packed.write_bytes(gzip.compress(text.read_bytes()))
+    assert_same(read_recording(packed), table)
+    parquet = tmp_path / f"table{extension}"
+    pl.DataFrame(table, schema=HEADER.strip().split(",")).write_parquet(parquet)
+    assert_same(read_recording(parquet), table)
+
+
+def test_numpy_files_give_the_numbers_that_were_saved(tmp_path):
+    table = readings()
+    np.save(tmp_path / "a.npy", table)
+    assert_same(read_recording(tmp_path / "a.npy"), table)
+    np.savez(tmp_path / "b.npz", t_s=table[:, 0], acc=table[:, 1:4], gyr=table[:, 4:])
+    assert_same(read_recording(tmp_path / "b.npz"), table)
+    fields = np.rec.fromarrays(list(table.T), names="t_s,ax,ay,az,gx,gy,gz")
+    np.save(tmp_path / "c.npy", np.asarray(fields))
+    assert_same(read_recording(tmp_path / "c.npy"), table)
+
+
+def test_an_archive_of_several_devices_asks_which(tmp_path):
+    table = readings()
+    both = np.stack([table[:, 1:] + 1.0, table[:, 1:]], axis=1)
+    path = tmp_path / "two.npz"
+    np.savez(path, t_s=table[:, 0], counts=both)
+    with pytest.raises(ReadError, match=r"holds 2 devices .* --device, 1 to 2"):
+        read_recording(path)
+    assert_same(read_recording(path, device=2), table)
+    with pytest.raises(ReadError, match="no device 3"):
+        read_recording(path, device=3)
+    with pytest.raises(ReadError, match="leave --device out"):
+        read_recording(write(tmp_path / "log.csv", table), device=1)
+
+
+def test_comments_and_blank_lines_between_rows_are_passed_over_and_lines_still_counted(tmp_path):
+    table = readings(40)
+    rows = [",".join(map(repr, map(float, row))) for row in table]
+    rows[10] = "# battery changed\n\n" + rows[10]
+    rows[30] = rows[30].replace(repr(float(table[30, 3])), "oops")
+    path = tmp_path / "log.csv"
+    path.write_text(HEADER + "\n".join(rows) + "\n")
+    # Header is line 1, row 0 line 2; the comment and the blank line push row 30 to line 34.
+    with pytest.raises(ReadError, match=r"line 34, column 'az': 'oops' is not a number"):
+        read_recording(path)
+
+
+def test_words_for_missing_become_nan_and_are_counted(tmp_path):
+    table = readings(100)
+    rows = [[repr(float(v)) for v in row] for row in table]
+    for i, word in enumerate(["", "NA", "null", "nan", "-"]):
+        rows[10 + i][2] = word
+    path = tmp_path / "log.csv"
+    path.write_text(HEADER + "\n".join(map(",".join, rows)) + "\n")
+    recording = read_recording(path)
+    assert np.flatnonzero(np.isnan(recording.accelerometer[:, 1])).tolist() == [10, 11, 12, 13, 14]
+    assert finding(recording, FindingCode.NON_FINITE).numbers["count"] == 5
+
+
+def test_a_column_of_words_is_left_out_and_said(tmp_path):
+    table = readings(50)
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "activity," + HEADER + "\n".join("walk," + ",".join(map(repr, map(float, row))) for row in table) + "\n"
+    )
+    recording = read_recording(path)
+    assert_same(recording, table)
+    assert "activity" in finding(recording, FindingCode.COLUMN_LEFT_OUT).seen
+
+
+def test_an_incomplete_last_line_costs_one_sample_and_is_said(tmp_path):
+    table = readings(50)
+    path = write(tmp_path / "log.csv", table)
+    path.write_text(path.read_text()[:-20])
+    recording = read_recording(path)
+    assert_same(recording, table[:-1])
+    assert FindingCode.LINE_INCOMPLETE in codes(recording)
+
+
+def test_a_log_longer_than_one_block_is_read_whole_and_lines_stay_right(tmp_path, monkeypatch):
+    monkeypatch.setattr("trihedron.read.text.BLOCK_BYTES", 4096)
+    monkeypatch.setattr("trihedron.read.text._PIECE_BYTES", 1000)
+    table = readings(3000)
+    path = write(tmp_path / "log.csv", table)
+    seen = []
+    recording = read_recording(path, progress=lambda done, text: seen.append((done, text)))
+    assert_same(recording, table)
+    assert len(seen) > 10
+    assert all(0.0 <= done <= 1.0 and text for done, text in seen)
+    text = path.read_text().split("\n")
+    text[2500] = text[2500].replace(",", ",x", 1)
+    path.write_text("\n".join(text))
+    with pytest.raises(ReadError, match="line 2501, column 'ax'"):
+        read_recording(path)
+
+
+def test_other_columns_are_kept_aside_untouched(tmp_path):
+    table = readings()
+    extra = np.column_stack([table, 20.0 + table[:, 0], 3.3 + 0 * table[:, 0], table[:, 1] * 7])
+    recording = read_recording(write(tmp_path / "log.csv", extra, "t,ax,ay,az,gx,gy,gz,temp_C,vdd,lidar\n"))
+    np.testing.assert_array_equal(recording.temperature_degc, extra[:, 7])
+    np.testing.assert_array_equal(recording.supply_v, extra[:, 8])
+    assert list(recording.auxiliary) == ["lidar"]
+    np.testing.assert_array_equal(recording.auxiliary["lidar"], extra[:, 9])
+
+
+def test_the_hash_is_that_of_the_file(tmp_path):
+    path = write(tmp_path / "log.csv", readings())
+    assert read_recording(path).sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize(
+    "mapping",
+    ["time=t,ax=acc1,ay=acc2,az=acc3,gx=5,gy=6,gz=7", "t,ax,ay,az,gx,gy,gz", "gz=7,t=1,ax=2,ay=3,az=4,wx=5,wy=6"],
+)
+def test_an_explicit_mapping_takes_names_numbers_or_roles_in_order(tmp_path, mapping):
+    table = readings()
+    assert_same(read_recording(write(tmp_path / "log.csv", table, "t,acc1,acc2,acc3,u,v,w\n"), columns=mapping), table)
+
+
+@pytest.mark.parametrize(
+    ("mapping", "complaint"),
+    [
+        ("ax=nowhere,ay=3,az=4", "there is no column 'nowhere' for ax"),
+        ("ax=2,ay=3", "az is missing"),
+        ("ax=2,ay=3,az=99", "there is no column '99'"),
+        ("color=2", "'color' is not a role"),
+        ("ax=2,ax=3,ay=4,az=5", "given twice"),
+    ],
+)
+def test_a_wrong_mapping_is_refused_in_words(tmp_path, mapping, complaint):
+    with pytest.raises(ReadError, match=complaint):
+        read_recording(write(tmp_path / "log.csv", readings()), columns=mapping)
 
 
 def test_a_missing_rate_is_said_and_serious_with_a_gyro(tmp_path):
     path = write(tmp_path / "log.csv", readings()[:, 1:], "ax,ay,az,gx,gy,gz\n")
+    assert finding(read_recording(path), FindingCode.RATE_ASSUMED).severity is Severity.SERIOUS
+    given = read_recording(path, rate_hz=50)
+    assert FindingCode.RATE_ASSUMED not in codes(given)
+    assert given.rate_hz == pytest.approx(50, rel=1e-12)
+    only = write(tmp_path / "acc.csv", readings()[:, 1:4], "ax,ay,az\n")
+    assert finding(read_recording(only), FindingCode.RATE_ASSUMED).severity is Severity.WARNING
+
+
+def test_a_rate_in_the_preamble_is_used_and_a_contradicting_clock_is_said(tmp_path):
+    path = write(tmp_path / "a.csv", readings()[:, 1:], "Fs,250\nax,ay,az,gx,gy,gz\n")
+    assert read_recording(path).rate_hz == pytest.approx(250, rel=1e-9)
+    path = write(tmp_path / "b.csv", readings())
+    recording = read_recording(path, rate_hz=120)
+    assert recording.rate_hz == pytest.approx(100, rel=1e-9)
+    assert FindingCode.RATE_CONTRADICTED in codes(recording)
+    assert read_recording(path, rate_hz=120, columns="time=none").rate_hz == pytest.approx(120, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("scale", "unit", "start"),
+    [(1, "s", 0), (1e3, "ms", 0), (1e6, "us", 0), (1e9, "ns", 0), (1, "s", 1.6e9), (1e3, "ms", 1.6e12)],
+)
+def test_the_unit_of_time_is_told_by_its_step_or_its_date(tmp_path, scale, unit, start):
+    table = readings()
+    stamped = table.copy()
+    stamped[:, 0] = np.round(table[:, 0] * scale + start, 3)
+    recording = read_recording(write(tmp_path / "log.csv", stamped))
+    assert f"its unit is {unit} " in finding(recording, FindingCode.TIME_UNIT_DETECTED).seen
+    # A date in seconds leaves 2.4e-7 s per digit of a float.
+    np.testing.assert_allclose(recording.time_s, table[:, 0], atol=5e-7)
+    assert recording.start_epoch_s == pytest.approx(start / scale)
+
+
+def test_a_given_time_unit_wins(tmp_path):
+    recording = read_recording(write(tmp_path / "log.csv", readings()), time_unit="ms")
+    assert recording.rate_hz == pytest.approx(1e5, rel=1e-9)
+    with pytest.raises(ReadError, match="not a time unit"):
+        read_recording(write(tmp_path / "log.csv", readings()), time_unit="fortnight")
+
+
+def test_seconds_and_nanoseconds_in_two_columns_are_one_clock(tmp_path):
+    table = readings(250)
+    rows = [
+        f"{1600000000 + i // 100},{(i % 100) * 10_000_000}," + ",".join(map(repr, map(float, table[i, 1:])))
+        for i in range(250)
+    ]
+    names = "header.stamp.secs,header.stamp.nsecs"
+    for topic in ("linear_acceleration", "angular_velocity"):
+        names += "".join(f",{topic}.{axis}" for axis in "xyz")
+    path = tmp_path / "ros.csv"
+    path.write_text(names + "\n" + "\n".join(rows) + "\n")
     recording = read_recording(path)
-    assert [f.severity.value for f in recording.findings if f.code is FindingCode.RATE_ASSUMED] == ["serious"]
-    assert FindingCode.RATE_ASSUMED not in {f.code for f in read_recording(path, rate_hz=50).findings}
+    np.testing.assert_allclose(recording.time_s, table[:, 0], atol=1e-9)
+    assert recording.start_epoch_s == 1600000000
+
+
+def test_dates_as_text_become_a_clock(tmp_path):
+    table = readings()
+    rows = [
+        f"2024-02-29T23:59:{i * 0.01:09.6f}Z," + ",".join(map(repr, map(float, row[1:]))) for i, row in enumerate(table)
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text(HEADER.replace("t,", "timestamp,") + "\n".join(rows) + "\n")
+    recording = read_recording(path)
+    np.testing.assert_allclose(recording.time_s, table[:, 0], atol=5e-7)
+    assert recording.start_epoch_s == 1709251140.0
+
+
+def test_a_counter_that_starts_again_from_zero_is_continued(tmp_path):
+    table = readings()
+    ticks = table.copy()
+    ticks[:, 0] = (2**32 - 500_000 + np.arange(200) * 10_000) % 2**32
+    recording = read_recording(write(tmp_path / "log.csv", ticks, HEADER.replace("t,", "micros,")))
+    np.testing.assert_allclose(recording.time_s, table[:, 0], atol=1e-9)
+    assert FindingCode.TIME_WRAPPED in codes(recording)
+
+
+def test_one_sensor_alone_is_a_recording(tmp_path):
+    table = readings()
+    recording = read_recording(write(tmp_path / "Gyroscope.csv", table[:, [0, 4, 5, 6]], "t,X,Y,Z\n"))
+    assert recording.accelerometer is None
+    np.testing.assert_array_equal(recording.gyroscope, table[:, 4:])
+    path = write(tmp_path / "log.csv", table)
+    assert read_recording(accelerometer_path=path).gyroscope is None
+    assert read_recording(gyroscope_path=path).accelerometer is None
+
+
+def test_given_units_win_and_a_wrong_one_is_contradicted(tmp_path):
+    path = write(tmp_path / "log.csv", readings())
+    recording = read_recording(path, accelerometer_unit="g", gyroscope_unit="deg/s")
+    assert recording.accelerometer_unit is AccelerationUnit.G
+    assert recording.gyroscope_unit is RateUnit.DEG_S
+    assert finding(recording, FindingCode.UNIT_CONTRADICTED).severity is Severity.SERIOUS
+    with pytest.raises(ReadError, match="not an acceleration unit"):
+        read_recording(path, accelerometer_unit="furlong")
+
+
+def test_arrays_of_a_recording_are_frozen_and_not_copied(tmp_path):
+    recording = read_recording(write(tmp_path / "log.csv", readings()))
+    with pytest.raises(ValueError, match="read-only"):
+        recording.accelerometer[0, 0] = 1.0
+    assert os.path.basename(recording.source) == "log.csv"

@@ -31,7 +31,7 @@ def read_npy(path: Path) -> Table:
 def read_npz(path: Path, device: int | None) -> Table:
     """Named arrays: one per column, or a block ``counts`` (n, k) or (n, units, k), ``t_s``, ``fs_hz``."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
     except OSError as error:
         raise from_os_error(path, error) from None

@@ -14,7 +14,7 @@ from trihedron.records import Finding, FindingCode, Severity
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "100us": 1e-4}
 PLAUSIBLE_HZ = (2.0, 20000.0)
-MAX_DISPLACEMENT = 256
+MAX_DISPLACEMENT = 64
 """Rows a packet may arrive late. Anything further is another recording, not another order."""
 _MODULI = (2.0**16, 2.0**24, 2.0**32)
 
@@ -38,8 +38,8 @@ def parse_time_unit(text: str) -> str:
     return unit
 
 
-def build_clock(table: Table, column: int, named: str, given: str | None) -> Clock:
-    """Seconds from a time column.
+def build_clock(table: Table, column: int, named: str, given: str | None, nanoseconds: int | None = None) -> Clock:
+    """Seconds from a time column, or from whole seconds and a column of ``nanoseconds`` beside them.
 
     Raises
     ------
@@ -47,6 +47,12 @@ def build_clock(table: Table, column: int, named: str, given: str | None) -> Clo
         When the column is constant, runs backward as a whole, or jumps back further than rows can be late.
     """
     raw = table.columns[column]
+    base = 0.0
+    if nanoseconds is not None:
+        # Relative to the first second, so that no digit of the nanoseconds is lost.
+        base = float(raw[0]) if np.isfinite(raw[0]) else 0.0
+        raw = (raw - base) + 1e-9 * table.columns[nanoseconds]
+        named = "s"
     findings: list[Finding] = []
     rows: npt.NDArray[np.int64] | None = None
     finite = np.isfinite(raw)
@@ -78,7 +84,7 @@ def build_clock(table: Table, column: int, named: str, given: str | None) -> Clo
         rows = order if rows is None else rows[order]
     unit = _time_unit(raw, named, given, wraps, findings)
     scale = SECONDS[unit]
-    return Clock((raw - raw[0]) * scale, float(raw[0]) * scale, rows, tuple(findings))
+    return Clock((raw - raw[0]) * scale, float(base + raw[0]) * scale, rows, tuple(findings))
 
 
 def _place(table: Table, rows: npt.NDArray[np.int64] | None, sample: int) -> str:
@@ -197,8 +203,8 @@ def mean_rate_hz(time_s: FloatArray) -> float:
     positive = step[step > 0]
     usual = float(np.median(positive))
     if np.count_nonzero(step == 0) > 0.2 * len(step):
-        inside = step[step <= 5.0 * usual]
-    else:
-        inside = step[step <= 1.5 * usual]
-    total = float(inside.sum())
-    return len(inside) / total if total > 0 else 1.0 / usual
+        # Stamped in batches: samples before the last stamp, over the time they took.
+        before_last = int(np.searchsorted(time_s, time_s[-1]))
+        return before_last / float(step[step <= 5.0 * usual].sum())
+    inside = step[step <= 1.5 * usual]
+    return len(inside) / float(inside.sum())

@@ -33,6 +33,7 @@ class Columns:
     temperature: int | None = None
     supply: int | None = None
     counter: int | None = None
+    nanoseconds: int | None = None
     accelerometer_unit: str = ""
     gyroscope_unit: str = ""
     time_unit: str = ""
@@ -41,7 +42,7 @@ class Columns:
 
     def used(self) -> set[int]:
         """Columns that are not auxiliary."""
-        single = {c for c in (self.time, self.temperature, self.supply) if c is not None}
+        single = {c for c in (self.time, self.nanoseconds, self.temperature, self.supply) if c is not None}
         return single | set(self.accelerometer or ()) | set(self.gyroscope or ())
 
 
@@ -56,7 +57,7 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
     ReadError
         When no sensor is found, or the mapping names a column that does not exist.
     """
-    explicit = _mapped(table, mapping) if mapping is not None and mapping.strip() else None
+    explicit = _mapped(table, mapping, sensor) if mapping is not None and mapping.strip() else None
     if explicit is not None and (explicit.accelerometer or explicit.gyroscope):
         chosen = explicit
     elif table.names is not None:
@@ -97,7 +98,7 @@ def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
     return Finding(FindingCode.COLUMNS_RECOGNISED, Severity.NOTE, seen)
 
 
-def _mapped(table: Table, mapping: str) -> Columns:
+def _mapped(table: Table, mapping: str, sensor: Sensor | None) -> Columns:
     roles: dict[str, int] = {}
     for position, item in enumerate(part.strip() for part in mapping.split(",")):
         role_text, equals, column_text = item.partition("=")
@@ -107,10 +108,12 @@ def _mapped(table: Table, mapping: str) -> Columns:
                 continue
             column_text = str(position + 1)
         role = _ALIASES.get(role_key)
+        if role_key in {"x", "y", "z"} and sensor is not None:
+            role = f"{sensor[0]}{role_key}"
         if role is None:
             raise ReadError(
                 f"--columns: '{role_text.strip()}' is not a role; "
-                "the roles are time, ax ay az, gx gy gz, temperature, supply."
+                "the roles are time, ax ay az, gx gy gz, temperature, supply (x y z with one file per sensor)."
             )
         if column_text.strip().lower() in {"none", "-"}:
             continue
@@ -119,14 +122,14 @@ def _mapped(table: Table, mapping: str) -> Columns:
         roles[role] = _column_number(table, column_text.strip(), role)
     triads: dict[str, Triad | None] = {}
     units: dict[str, str] = {}
-    for sensor, letter in (("accelerometer", "a"), ("gyroscope", "g")):
+    for name, letter in (("accelerometer", "a"), ("gyroscope", "g")):
         axes = [roles.get(f"{letter}{axis}") for axis in "xyz"]
         given = [axis for axis in axes if axis is not None]
         if given and len(given) < 3:
             missing = " ".join(f"{letter}{n}" for n, axis in zip("xyz", axes, strict=True) if axis is None)
-            raise ReadError(f"--columns: the {sensor} needs three columns; {missing} is missing.")
-        triads[sensor] = (given[0], given[1], given[2]) if given else None
-        units[sensor] = _unit_from_name(table, given[0] if given else None, sensor)
+            raise ReadError(f"--columns: the {name} needs three columns; {missing} is missing.")
+        triads[name] = (given[0], given[1], given[2]) if given else None
+        units[name] = _unit_from_name(table, given[0] if given else None, name)
     time = roles.get("time")
     return Columns(
         time=time,
@@ -227,12 +230,24 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         temperature=first["temperature"],
         supply=first["supply"],
         counter=first["counter"],
+        nanoseconds=_nanoseconds_beside(table.names, time),
         accelerometer_unit=units["accelerometer"],
         gyroscope_unit=units["gyroscope"],
         time_unit=parsed[time].time_unit if time is not None else "",
         positional=unnamed == 6 and not any(p.role in _SENSORS for p in parsed),
         findings=tuple(notes),
     )
+
+
+def _nanoseconds_beside(names: tuple[str, ...], time: int | None) -> int | None:
+    """``stamp.nsecs`` beside ``stamp.secs``, as ROS writes it."""
+    if time is None:
+        return None
+    stem = re.fullmatch(r"(.*?)secs?", names[time].strip().lower())
+    if stem is None:
+        return None
+    wanted = {f"{stem.group(1)}{word}" for word in ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")}
+    return next((i for i, name in enumerate(names) if name.strip().lower() in wanted), None)
 
 
 _SENSORS = ("accelerometer", "gyroscope")

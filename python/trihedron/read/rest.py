@@ -55,24 +55,25 @@ def look(sensors: dict[str, FloatArray], rate_hz: float) -> Windows | None:
     mean: dict[str, FloatArray] = {}
     noise: dict[str, FloatArray] = {}
     spread: dict[str, FloatArray] = {}
+    enough = np.ones(len(start), dtype=bool)
+    for array in sensors.values():
+        # Half of a window may be missing; fewer readings tell nothing about its noise.
+        pairs = np.isfinite(np.diff(array[index], axis=1)).all(axis=2)
+        enough &= pairs.sum(axis=1) >= max(1, length // 2 if length > 2 else 1)
+    if not enough.any():
+        return None
+    start, index = start[enough], index[enough]
     for name, array in sensors.items():
         block = array[index]
-        mean[name] = block.mean(axis=1)
-        noise[name] = np.diff(block, axis=1).std(axis=1) / np.sqrt(2.0)
-        spread[name] = np.linalg.norm(block.std(axis=1), axis=1)
-    complete = np.logical_and.reduce([np.isfinite(m).all(axis=1) for m in mean.values()])
-    if not complete.any():
-        return None
-    start = start[complete]
-    mean = {k: v[complete] for k, v in mean.items()}
-    noise = {k: v[complete] for k, v in noise.items()}
+        mean[name] = np.nanmean(block, axis=1)
+        noise[name] = np.nanstd(np.diff(block, axis=1), axis=1) / np.sqrt(2.0)
+        spread[name] = np.linalg.norm(np.nanstd(block, axis=1), axis=1)
     quiet = np.ones(len(start), dtype=bool)
     for value in spread.values():
-        kept = value[complete]
         # The quietest tenth shows the sensor's own noise; three times that still is no hand motion.
-        quiet &= kept <= 3.0 * np.percentile(kept, 10.0)
+        quiet &= value <= 3.0 * np.percentile(value, 10.0)
     if not quiet.any():
-        total = sum(v[complete] / max(float(np.median(v[complete])), 1e-300) for v in spread.values())
+        total = sum(v / max(float(np.median(v)), 1e-300) for v in spread.values())
         quiet = np.asarray(total <= np.percentile(total, 10.0))
     return Windows(start, length, mean, noise, quiet)
 

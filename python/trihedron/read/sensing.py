@@ -63,7 +63,7 @@ def rest_norm(readings: FloatArray, windows: Windows | None) -> float:
     if windows is None:
         return math.nan
     index = windows.start[windows.quiet][:, None] + np.arange(windows.length)
-    return float(np.median(np.linalg.norm(readings[index], axis=2)))
+    return float(np.nanmedian(np.linalg.norm(readings[index], axis=2)))
 
 
 def judge_accelerometer(
@@ -105,10 +105,13 @@ def judge_accelerometer(
             return Judged(unit, (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, seen, "", "", rest_norm=norm),))
     if norm < 1.0 and not whole:
         return Judged(AccelerationUnit.M_S2, (_gravity_missing(norm),))
-    seen = (
-        f"The accelerometer reads {norm:.4g} in its quietest stretches, which is gravity in no known unit; "
-        "taken as raw counts."
-    )
+    if math.isnan(norm):
+        seen = "The accelerometer has no stretch without missing readings to tell its unit by; taken as raw counts."
+    else:
+        seen = (
+            f"The accelerometer reads {norm:.4g} in its quietest stretches, which is gravity in no known unit; "
+            "taken as raw counts."
+        )
     cause = "A raw reading of unknown scale, a log that never rests, or wrong columns."
     return Judged(
         AccelerationUnit.COUNTS,

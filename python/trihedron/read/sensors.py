@@ -82,6 +82,7 @@ def read_one(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
         raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
     findings = [*table.findings, *chosen.findings]
     clock, rate = _time_base(table, chosen, options, findings)
+    clock = _without_copies(table, chosen, clock, findings)
     accelerometer = _triad(table, chosen.accelerometer, clock.rows)
     gyroscope = _triad(table, chosen.gyroscope, clock.rows)
     if sensor == "accelerometer":
@@ -115,6 +116,34 @@ def read_one(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
         chosen.gyroscope_unit,
         tuple(findings),
     )
+
+
+def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:
+    """Rows written twice (same stamp, same readings) once; they are no samples."""
+    again = np.flatnonzero(np.diff(clock.time_s) == 0) + 1
+    if chosen.time is None or not len(again):
+        return clock
+    rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
+    copied = np.ones(len(again), dtype=bool)
+    for column in (*(chosen.accelerometer or ()), *(chosen.gyroscope or ())):
+        values = table.columns[column]
+        if len(values):
+            copied &= values[rows[again]] == values[rows[again - 1]]
+    if not copied.any() or np.count_nonzero(~copied) + 2 > len(clock.time_s):
+        return clock
+    drop = again[copied]
+    findings.append(
+        Finding(
+            FindingCode.REPEATED_ROWS,
+            Severity.WARNING,
+            f"{len(drop)} rows are copies of the row before, time stamp included (first: "
+            f"{table.place(int(rows[drop[0]]))}); they were left out.",
+            "A logger that writes a row twice, or a stream joined with itself.",
+            "",
+            MappingProxyType({"count": float(len(drop)), "row": float(rows[drop[0]])}),
+        )
+    )
+    return Clock(np.delete(clock.time_s, drop), clock.start_s, np.delete(rows, drop), clock.findings)
 
 
 def _refuse_constant(table: Table, name: str, triad: FloatArray, where: tuple[int, int, int]) -> None:
@@ -169,7 +198,7 @@ def _stated_rate(table: Table) -> float | None:
 
 def _time_base(table: Table, chosen: Columns, options: Options, findings: list[Finding]) -> tuple[Clock, float]:
     if chosen.time is not None:
-        clock = build_clock(table, chosen.time, chosen.time_unit, options.time_unit)
+        clock = build_clock(table, chosen.time, chosen.time_unit, options.time_unit, chosen.nanoseconds)
         findings += clock.findings
         rate = mean_rate_hz(clock.time_s)
         told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)

@@ -41,7 +41,7 @@ class Table:
     @property
     def n_rows(self) -> int:
         """Number of rows."""
-        return len(self.columns[0]) if self.columns else 0
+        return max((len(column) for column in self.columns), default=0)
 
     def line(self, row: int) -> int:
         """Line of the file that holds a row; 0 where the format has no lines."""

@@ -27,6 +27,7 @@ from trihedron.records import Finding, FindingCode, Severity
 BLOCK_BYTES = 1 << 25
 """Text parsed at a time: large enough for polars to use every core, small enough not to matter."""
 
+_PIECE_BYTES = 1 << 18
 _COMPRESSED = {b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
 _DATETIME = r"^\d{4}[-/]\d\d[-/]\d\d[T ]\d\d:\d\d:\d\d"
 
@@ -57,15 +58,20 @@ class _Cursor:
 
 def _blocks(path: Path, compression: str | None, cursor: _Cursor) -> Iterator[bytes]:
     """Blocks that end with a complete line, line ends as ``\\n``."""
-    rest = b""
+    rest, lines = b"", 0
     try:
         with open_binary(path, compression) as stream:
             while True:
-                block = stream.read(BLOCK_BYTES)
-                data = rest + block
-                cursor.is_last = len(block) < BLOCK_BYTES
+                pieces = [rest]
+                size = 0
+                # Piecewise, so that a damaged archive can be said to break off after so many lines.
+                while size < BLOCK_BYTES and (piece := stream.read1(_PIECE_BYTES)):
+                    pieces.append(piece)
+                    size += len(piece)
+                    lines += piece.count(b"\n") if compression else 0
+                data = b"".join(pieces)
+                cursor.is_last = size < BLOCK_BYTES
                 if cursor.is_last:
-                    # A full last block is followed by an empty one; a short read means the end was reached.
                     if data:
                         yield data
                     return
@@ -76,7 +82,7 @@ def _blocks(path: Path, compression: str | None, cursor: _Cursor) -> Iterator[by
                 yield data[:cut]
     except (EOFError, zlib.error, lzma.LZMAError, gzip.BadGzipFile) as error:
         raise ReadError(
-            f"{path}: the {compression} data is damaged or ends too early, after {cursor.lines} complete lines "
+            f"{path}: the {compression} data is damaged or ends too early, after about {lines} lines "
             f"({error}); copy the file again or unpack what is left of it."
         ) from None
     except OSError as error:

@@ -1,0 +1,133 @@
+"""What cannot be read is refused in one sentence that names the file, the line and the remedy; never a traceback."""
+
+import gzip
+
+import numpy as np
+import pytest
+
+from test_read import HEADER, readings, write
+from trihedron.read import ReadError, read_recording
+from trihedron.read.table import check_memory
+
+ROWS = [",".join(map(repr, map(float, row))) for row in readings(300)]
+TEXT = HEADER + "\n".join(ROWS) + "\n"
+
+
+def with_row(index: int, row: str) -> str:
+    return HEADER + "\n".join([*ROWS[:index], row, *ROWS[index + 1 :]]) + "\n"
+
+
+CASES = {
+    "empty": (b"", "the file is empty"),
+    "only-line-ends": (b"\n\n\n", "no line of numbers"),
+    "header-only": (HEADER.encode(), "no line of numbers"),
+    "one-row": ((HEADER + ROWS[0] + "\n").encode(), "one row of numbers only"),
+    "text-in-numbers": (with_row(40, "0.4,1,2,abc,5,6,7").encode(), "line 42, column 'az': 'abc' is not a number"),
+    "too-few-fields": (with_row(40, "1,2,3").encode(), "line 42 has 3 fields where the others have 7"),
+    "too-many-fields": (with_row(40, ROWS[40] + ",9").encode(), "line 42 has 8 fields"),
+    "header-again": (with_row(100, HEADER.strip()).encode(), "line 102, column 't': 't' is not a number"),
+    "reversed": ((HEADER + "\n".join(ROWS[::-1]) + "\n").encode(), "time runs backward .*first at line 3"),
+    "clock-set-back": ((HEADER + "\n".join(ROWS[150:] + ROWS[:150])).encode(), "jumps back by 2.99 .*line 152"),
+    "constant-channel": (
+        (HEADER + "\n".join(",".join([r.split(",")[0], "0.0", *r.split(",")[2:]]) for r in ROWS)).encode(),
+        "column 'ax' of the accelerometer is 0 in all 300 rows",
+    ),
+    "constant-time": (
+        (HEADER + "\n".join(",".join(["1.0", *r.split(",")[1:]]) for r in ROWS)).encode(),
+        "time column 't' holds 1 in every row",
+    ),
+    "binary": (bytes(range(256)) * 20, "zero byte|no line of numbers"),
+    "zero-bytes-at-the-end": (TEXT.encode() + b"\0" * 512, "line 302 holds binary data"),
+    "web-page": (b"<html><body>404 not found</body></html>\n" * 3, "no line of numbers"),
+    "truncated-gzip": (gzip.compress(TEXT.encode())[:-900], "gzip data is damaged or ends too early, after about"),
+    "damaged-gzip": (b"\x1f\x8b\x08" + b"junk" * 40, "gzip data is damaged"),
+    "not-an-npz": (b"PK\x03\x04" + bytes(range(256)), "damaged"),
+    "not-an-npy": (b"\x93NUMPY" + bytes(range(256)), "damaged"),
+    "not-parquet": (b"PAR1" + bytes(range(256)), "damaged or cut off"),
+    "hdf5": (b"\x89HDF\r\n\x1a\n" + bytes(100), "HDF5 .*export the log as CSV"),
+    "ros-bag": (b"#ROSBAG V2.0\n" + bytes(100), "ROS bag"),
+    "other-table": (b"sensor,freq\nA,100\nB,200\nC,300\n", "no accelerometer and no gyro"),
+    "nine-unnamed-columns": ((",".join("123456789") + "\n").encode() * 9, "9 columns without names"),
+    "all-nan": ((HEADER + "\n".join(f"{i},nan,1,{i},3,{i},5" for i in range(9))).encode(), "holds no finite number"),
+}
+
+
+@pytest.mark.parametrize("content, complaint", CASES.values(), ids=CASES.keys())  # noqa: PT006
+def test_a_bad_file_is_one_sentence(tmp_path, content, complaint):
+    path = tmp_path / "log.csv"
+    path.write_bytes(content)
+    with pytest.raises(ReadError, match=complaint) as caught:
+        read_recording(path)
+    sentence = str(caught.value)
+    assert "log.csv" in sentence
+    assert "\n" not in sentence
+
+
+def test_what_is_not_a_file_is_said(tmp_path):
+    with pytest.raises(ReadError, match="no such file"):
+        read_recording(tmp_path / "nothing.csv")
+    with pytest.raises(ReadError, match="this is a directory"):
+        read_recording(tmp_path)
+    with pytest.raises(ReadError, match="not a possible file name"):
+        read_recording("a\0b")
+    with pytest.raises(ReadError, match="no log was named"):
+        read_recording()
+
+
+def test_no_permission_is_said(tmp_path, monkeypatch):
+    path = write(tmp_path / "log.csv", readings())
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with pytest.raises(ReadError, match="no permission to read"):
+        read_recording(path)
+
+
+@pytest.mark.parametrize("opener", ["open", "read"])
+def test_an_error_of_the_disk_is_said(tmp_path, monkeypatch, opener):
+    path = write(tmp_path / "log.csv", readings())
+
+    def broken(*_args, **_keywords):
+        raise OSError(5, "Input/output error")
+
+    if opener == "open":
+        monkeypatch.setattr("pathlib.Path.open", broken)
+    else:
+        monkeypatch.setattr("trihedron.read.text.open_binary", broken)
+    with pytest.raises(ReadError, match="Input/output error"):
+        read_recording(path)
+
+
+def test_a_log_larger_than_the_memory_is_refused_before_it_is_read(tmp_path):
+    with pytest.raises(ReadError, match=r"about 1e\+08 rows of 7 columns need 16.8 GB .* cut the log into parts"):
+        check_memory(tmp_path / "huge.csv", 10**8, 7, available=8 * 10**9)
+    check_memory(tmp_path / "huge.csv", 10**6, 7, available=8 * 10**9)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
+def test_an_impossible_rate_is_refused(tmp_path, rate):
+    with pytest.raises(ReadError, match="positive number of samples per second"):
+        read_recording(write(tmp_path / "log.csv", readings()), rate_hz=rate)
+
+
+def test_two_files_that_do_not_belong_together_are_refused(tmp_path):
+    table = readings()
+    acc = write(tmp_path / "acc.csv", table[:, :4], "t,x,y,z\n")
+    later = table.copy()
+    later[:, 0] += 1000.0
+    gyr = write(tmp_path / "gyr.csv", later[:, [0, 4, 5, 6]], "t,x,y,z\n")
+    with pytest.raises(ReadError, match="clocks do not overlap"):
+        read_recording(accelerometer_path=acc, gyroscope_path=gyr)
+    blind = write(tmp_path / "blind.csv", table[:, 4:], "x,y,z\n")
+    with pytest.raises(ReadError, match="no time column and the other one has"):
+        read_recording(accelerometer_path=acc, gyroscope_path=blind)
+    with pytest.raises(ReadError, match="not both"):
+        read_recording(acc, gyroscope_path=gyr)
+    named = write(tmp_path / "named.csv", table[:, :4], "t,ax,ay,az\n")
+    with pytest.raises(ReadError, match="swap the two files"):
+        read_recording(accelerometer_path=acc, gyroscope_path=named)
+
+
+def test_python_objects_in_an_archive_are_not_unpickled(tmp_path):
+    path = tmp_path / "objects.npz"
+    np.savez(path, data=np.array([{"a": 1}, None], dtype=object))
+    with pytest.raises(ReadError, match="Python objects"):
+        read_recording(path)
