@@ -2,6 +2,7 @@
 
 import gzip
 import hashlib
+import importlib
 import os
 
 import numpy as np
@@ -12,6 +13,8 @@ from trihedron.read import ReadError, read_recording
 from trihedron.records import FindingCode, Recording, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
+# By name: the package also exports a function called `read`.
+text_module = importlib.import_module("trihedron.read.text")
 HEADER = "t,ax,ay,az,gx,gy,gz\n"
 
 
@@ -181,8 +184,8 @@ def test_an_incomplete_last_line_costs_one_sample_and_is_said(tmp_path):
 
 
 def test_a_log_longer_than_one_block_is_read_whole_and_lines_stay_right(tmp_path, monkeypatch):
-    monkeypatch.setattr("trihedron.read.text.BLOCK_BYTES", 4096)
-    monkeypatch.setattr("trihedron.read.text._PIECE_BYTES", 1000)
+    monkeypatch.setattr(text_module, "BLOCK_BYTES", 4096)
+    monkeypatch.setattr(text_module, "_PIECE_BYTES", 1000)
     table = readings(3000)
     path = write(tmp_path / "log.csv", table)
     seen = []

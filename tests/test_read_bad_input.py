@@ -5,7 +5,7 @@ import gzip
 import numpy as np
 import pytest
 
-from test_read import HEADER, readings, write
+from test_read import HEADER, readings, text_module, write
 from trihedron.read import ReadError, read_recording
 from trihedron.read.table import check_memory
 
@@ -91,7 +91,7 @@ def test_an_error_of_the_disk_is_said(tmp_path, monkeypatch, opener):
     if opener == "open":
         monkeypatch.setattr("pathlib.Path.open", broken)
     else:
-        monkeypatch.setattr("trihedron.read.text.open_binary", broken)
+        monkeypatch.setattr(text_module, "open_binary", broken)
     with pytest.raises(ReadError, match="Input/output error"):
         read_recording(path)
 

@@ -49,7 +49,8 @@ def resample(
     same_left = np.abs(base_s - time_s[left]) <= SAME_TICK * step_s
     same_right = np.abs(base_s - time_s[right]) <= SAME_TICK * step_s
     alpha = np.where(same_left, 0.0, np.where(same_right, 1.0, alpha))
-    usable = (alpha >= 0) & (alpha <= 1) & (same_left | same_right | (width <= NEIGHBOUR_STEPS * step_s))
+    near = (width > 0) & (width <= NEIGHBOUR_STEPS * step_s)
+    usable = (alpha >= 0) & (alpha <= 1) & (same_left | same_right | near)
     weight = alpha[:, None]
     # Written as a selection at the ends, so that a NaN in the unused neighbour does not spread.
     out = np.where(weight == 0, values[left], np.where(weight == 1, values[right], 0.0))

@@ -19,7 +19,7 @@ _SENSOR_WORDS = {
 }
 _LETTER = {"a": "accelerometer", "f": "accelerometer", "g": "gyroscope", "w": "gyroscope", "t": "translation"}
 _GLUED = re.compile(
-    r"^(acc|accel|accelero?|accelerometer|acceleration|gyr|gyro|gyroscope|omega|linacc|[agwft])_?([xyz])(raw|adc)?$"
+    r"^(acc|accel|accelero?|accelerometer|acceleration|gyr|gyro|gyroscope|omega|linacc|[agwft])_?([xyz])(raw|adc|out)?$"
 )
 _TIME_WORDS = {"t", "time", "timestamp", "timestamps", "ts", "stamp", "elapsed", "epoch", "clock", "datetime"}
 _TIME_WORDS |= {"millis", "micros", "seconds", "secs", "ticks", "unix"}
@@ -118,11 +118,12 @@ def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName
     glued_axis = ""
     expanded: list[str] = []
     for word in words:
+        word = {"xout": "x", "yout": "y", "zout": "z"}.get(word, word)
         match = _GLUED.match(word)
         if match and not glued_axis and not (len(match.group(1)) == 1 and len(words) > 1 and words[0] != word):
             glued_axis = match.group(2)
             expanded.append(match.group(1))
-            if match.group(3):
+            if match.group(3) in {"adc", "raw"}:
                 expanded.append("adc" if match.group(3) == "adc" else "raw")
         else:
             expanded.append(word)
