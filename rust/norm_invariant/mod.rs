@@ -170,8 +170,10 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
         loss: settings.loss,
         ..Options::default()
     };
-    let mut theta = pack(&begin, &standard);
+    let first = pack(&begin, &standard);
+    let mut theta = first.clone();
     let volume = (begin.s * standard.size).determinant().abs();
+    let mut anchor = None;
     let mut iterations = 0;
     for renewal in 0.. {
         let frozen = Frozen::at(
@@ -185,8 +187,9 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
             standard,
             frozen: &frozen,
             volume,
+            anchor: anchor.clone(),
         };
-        let solution = if readings.values.len() > ROWS_KEPT {
+        let solution = if readings.values.len() > ROWS_KEPT && anchor.is_none() {
             gauss_newton::minimise_problem(&SampleProblem(&problem), theta.clone(), &options)?
         } else {
             gauss_newton::minimise(
@@ -197,10 +200,16 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
             )?
         };
         iterations += solution.iterations;
+        if solution.certainty.rank < N_PARAMETERS && anchor.is_none() {
+            // Steps along the determined directions alone would still drag the others along: hold them at the start.
+            anchor = Some(first.clone());
+            theta = first.clone();
+            continue;
+        }
         let change = (&solution.parameters - &theta).norm() / theta.norm();
         theta = solution.parameters.clone();
         // σ moves with the parameters at first order only through S: 1e-7 in S is 1e-7 in σ, far below its own error.
-        if change < 1e-7 || renewal + 1 == RENEWALS {
+        if change < 1e-7 || renewal >= RENEWALS {
             return finish(&problem, &solution, iterations);
         }
     }
@@ -213,9 +222,21 @@ fn finish(
     iterations: usize,
 ) -> Result<Fit> {
     let settings = problem.settings;
+    let certainty = match problem.anchor {
+        None => solution.certainty.clone(),
+        Some(_) => gauss_newton::certainty(
+            &problem.data_jacobian(&solution.parameters),
+            settings.loss.covariance_factor(1),
+            Options::default().rank_tolerance,
+        ),
+    };
     // Noise in a reading enters residual and derivative alike and draws S towards zero, by (σ/g)² of itself.
-    let theta = &solution.parameters
-        + &solution.certainty.covariance * problem.noise_in_gradient(&solution.parameters);
+    let theta = if certainty.rank == N_PARAMETERS {
+        &solution.parameters
+            + &certainty.covariance * problem.noise_in_gradient(&solution.parameters)
+    } else {
+        solution.parameters.clone()
+    };
     let model = unpack(&theta, settings.frame, &problem.standard);
     let shrink = (model.s * problem.standard.size).determinant().abs() / problem.volume;
     if shrink < 2.0 * problem::SMALLEST_VOLUME {
@@ -224,7 +245,7 @@ fn finish(
         ));
     }
     let map = map_to_entries(settings.frame, &problem.standard);
-    let covariance = &map * &solution.certainty.covariance * map.transpose();
+    let covariance = &map * &certainty.covariance * map.transpose();
     let residuals = problem.in_m_s2(&model);
     let squared: Vec<f64> = residuals
         .iter()
@@ -241,7 +262,7 @@ fn finish(
         residuals,
         sigmas: problem.frozen.sigma.clone(),
         weights,
-        certainty: solution.certainty.clone(),
+        certainty,
         stop: solution.stop,
         iterations,
     })

@@ -58,6 +58,8 @@ pub(super) struct PoseProblem<'a> {
     pub frozen: &'a Frozen,
     /// `|det S|` of the start, in standardised readings.
     pub volume: f64,
+    /// Where the parameters are held with a standard error of |g| each (100 % of scale), when the poses leave some free.
+    pub anchor: Option<DVector<f64>>,
 }
 
 impl PoseProblem<'_> {
@@ -86,29 +88,51 @@ impl PoseProblem<'_> {
         model.s.determinant().abs() < SMALLEST_VOLUME * self.volume
     }
 
+    /// Rows of the readings, and of the anchor below them.
     pub(super) fn linearise(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let model = unpack_standardised(x, self.settings.frame);
         let n = self.readings.values.len();
-        let mut residuals = DVector::zeros(n);
-        let mut jacobian = DMatrix::zeros(n, N_PARAMETERS);
+        let extra = self.anchor.as_ref().map_or(0, DVector::len);
+        let mut residuals = DVector::zeros(n + extra);
+        let mut jacobian = DMatrix::zeros(n + extra, N_PARAMETERS);
         for i in 0..n {
             let (residual, slope) = self.row(&model, i);
             residuals[i] = residual;
             jacobian.row_mut(i).tr_copy_from(&slope);
         }
+        if let Some(anchor) = &self.anchor {
+            let g = self.settings.gravity;
+            residuals.rows_mut(n, extra).copy_from(&((x - anchor) / g));
+            jacobian
+                .view_mut((n, 0), (extra, N_PARAMETERS))
+                .fill_diagonal(1.0 / g);
+        }
         (residuals, jacobian)
+    }
+
+    /// Rows of the readings alone.
+    pub(super) fn data_jacobian(&self, x: &DVector<f64>) -> DMatrix<f64> {
+        let (_, jacobian) = self.linearise(x);
+        jacobian.rows(0, self.readings.values.len()).into_owned()
     }
 
     pub(super) fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
         let model = unpack_standardised(x, self.settings.frame);
         let n = self.readings.values.len();
+        let extra = self.anchor.as_ref().map_or(0, DVector::len);
+        let mut residuals = DVector::from_element(n + extra, f64::INFINITY);
         if self.collapses(&model) {
-            return DVector::from_element(n, f64::INFINITY);
+            return residuals;
         }
-        DVector::from_fn(n, |i, _| {
+        for i in 0..n {
             let f = model.correct(&self.standard.apply(&self.readings.values[i]));
-            self.misfit(&f, i) / self.frozen.sigma[i]
-        })
+            residuals[i] = self.misfit(&f, i) / self.frozen.sigma[i];
+        }
+        if let Some(anchor) = &self.anchor {
+            let held = (x - anchor) / self.settings.gravity;
+            residuals.rows_mut(n, extra).copy_from(&held);
+        }
+        residuals
     }
 
     /// `E[Jᵀr]` at the truth: what the noise common to a whitened residual and its own derivative leaves on average.

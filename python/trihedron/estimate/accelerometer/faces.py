@@ -1,0 +1,331 @@
+"""Method 1: the faces of the case on a level table (docs/model.md, section 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from trihedron.estimate.accelerometer import face_poses, inputs, verdict
+from trihedron.estimate.accelerometer.face_poses import IntArray
+from trihedron.estimate.accelerometer.norm import norm_residual
+from trihedron.records.calibration import FitQuality, FloatArray, Frame, Observability, SensorCalibration
+from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.sensor_model import other_form, other_form_jacobian, reframing
+from trihedron.units import AccelerationUnit, degrees_from_radians
+
+METHOD = "method 1: faces of the case on a level table"
+
+
+@dataclass(frozen=True, eq=False)
+class _Estimate:
+    """Inverse form ``a' = S_a f + b_a`` of some face poses; ``tilt_rad`` is the rms tilt charged to each pose."""
+
+    S_a: FloatArray
+    b_a: FloatArray
+    covariance: FloatArray
+    residual: FloatArray
+    tilt_rad: float
+    chi2_noise: float
+    dof: int
+
+
+def calibrate_faces(
+    means: npt.ArrayLike,
+    sigma_means: npt.ArrayLike,
+    gravity_m_s2: float,
+    *,
+    up: Sequence[int] | None = None,
+    raw_unit: AccelerationUnit | str = AccelerationUnit.COUNTS,
+    method: Literal["least-squares", "closed-form"] = "least-squares",
+    frame: Frame = "case",
+) -> tuple[SensorCalibration, tuple[Finding, ...]]:
+    """Accelerometer triad from poses with one axis of the case along the vertical.
+
+    ``a'[i] = S_a (±|g| e) + b_a + δa[i]`` by weighted least squares over all poses (repeats and missing faces welcome),
+    or in closed form from the means of the six faces (eq. 7 and 8).
+
+    Faces that contradict each other beyond their noise were not level: the tilt per pose that makes them consistent is
+    estimated, reported (TABLE_TILT) and carried into weights and error bars as a horizontal error of each pose. A tilt
+    that is common to all poses in the case's own axes cannot be seen by this method; it turns Mz against the case.
+
+    Parameters
+    ----------
+    means : (n, 3)
+        Mean raw reading of each pose.
+    sigma_means : (3,), (n, 3) or (n, 3, 3)
+        Standard errors of the means in raw units, or their covariances.
+    gravity_m_s2 : float
+        |g| where the recording was made.
+    up : (n,) of ±1, ±2, ±3, optional
+        Axis of the case that points up in each pose (0: leave the pose out). Without it the axis with the largest
+        reading is taken, which also decides that a positive reading is up: handedness is then not tested.
+    raw_unit : AccelerationUnit
+        Unit of ``means``.
+    method : "least-squares" or "closed-form"
+        The closed form weighs the six faces equally.
+    frame : "case", "lower" or "symmetric"
+        Frame of the answer; the others than ``case`` by exact conversion.
+
+    Raises
+    ------
+    ValueError
+        When arrays do not fit or faces are missing; names them.
+    """
+    values, noise = inputs.pose_means(means, sigma_means)
+    g = inputs.gravity(gravity_m_s2)
+    unit = AccelerationUnit(raw_unit)
+    if method not in ("least-squares", "closed-form"):
+        raise ValueError(f"method must be 'least-squares' or 'closed-form', got {method!r}")
+    if len(values) == 0:
+        raise ValueError("there are no still poses: hold each of the six faces still for some seconds")
+    faces = face_poses.identify(values, unit) if up is None else face_poses.given(up, len(values))
+    used = np.flatnonzero(faces)
+    closed = method == "closed-form"
+    face_poses.check_sufficient(faces[used], all_six=closed)
+    estimate = _estimate(values[used], noise[used], faces[used], g, closed=closed)
+    S, b = other_form(estimate.S_a, estimate.b_a)
+    jacobian = other_form_jacobian(estimate.S_a, estimate.b_a)
+    quality, apart = _quality(values, noise, faces, g, estimate, closed=closed)
+    findings = [
+        *_left_out(faces, values),
+        *_tilt_findings(estimate, S, faces[used], used),
+        *verdict.model_findings(S, unit, signs_are_known=up is not None),
+        *verdict.held_out_findings(apart[:, 0], apart[:, 1], np.ones(len(values)), estimate.dof),
+    ]
+    observability = _observability(noise[used], faces[used], estimate, g)
+    change = reframing(S, b, frame)
+    jacobian = change.jacobian @ jacobian
+    sensor = SensorCalibration(
+        S=change.rotation @ S,
+        b=change.rotation @ b,
+        covariance=jacobian @ estimate.covariance @ jacobian.T,
+        raw_unit=unit.value,
+        si_unit="m/s^2",
+        method=METHOD + (", closed form" if closed else ", least squares"),
+        quality=quality,
+        observability=observability,
+    )
+    return sensor, tuple(findings)
+
+
+def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float, *, closed: bool) -> _Estimate:
+    """Fit with the noise alone; if that is contradicted, with the rms tilt per pose that makes χ² equal its dof."""
+    fit = _closed_form if closed else _least_squares
+    S_a, b_a, covariance = fit(values, noise, faces, g)
+    dof = 3 * len(values) - 12
+    residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
+    chi2_noise = _chi2(values, noise, faces, g)
+    if dof <= 0 or chi2_noise <= stats.chi2.ppf(1.0 - verdict.SIGNIFICANCE, dof):
+        return _Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof)
+    low, high = 0.0, 0.5
+    for _ in range(60):
+        tilt = 0.5 * (low + high)
+        if _chi2(values, _tilted(noise, faces, S_a, g, tilt), faces, g) > dof:
+            low = tilt
+        else:
+            high = tilt
+    widened = _tilted(noise, faces, S_a, g, high)
+    S_a, b_a, covariance = fit(values, widened, faces, g)
+    residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
+    return _Estimate(S_a, b_a, covariance, residual, high, chi2_noise, dof)
+
+
+def _tilted(noise: FloatArray, faces: IntArray, S_a: FloatArray, g: float, tilt_rad: float) -> FloatArray:
+    """Covariances (n, 3, 3) of raw means with a horizontal error of ``g tilt`` rms per component on top (eq. 9)."""
+    unit = face_poses.direction_of(faces)
+    horizontal = np.eye(3) - unit[:, :, None] * unit[:, None, :]
+    widened: FloatArray = noise + (g * tilt_rad) ** 2 * np.einsum("ij,njk,lk->nil", S_a, horizontal, S_a)
+    return widened
+
+
+def _inverses(noise: FloatArray) -> FloatArray:
+    """Weights; an axis without noise (stuck) gets a millionth of the others' instead of an infinite one."""
+    floor = 1e-6 * np.trace(noise, axis1=1, axis2=2)
+    inverse: FloatArray = np.linalg.inv(noise + floor[:, None, None] * np.eye(3))
+    return inverse
+
+
+def _design(faces: IntArray, g: float) -> FloatArray:
+    """(n, 3, 12) derivative of each reading with respect to S_a row by row, then b_a."""
+    f = g * face_poses.direction_of(faces)
+    design = np.zeros((len(f), 3, 12))
+    for row in range(3):
+        design[:, row, 3 * row : 3 * row + 3] = f
+        design[:, row, 9 + row] = 1.0
+    return design
+
+
+def _least_squares(
+    values: FloatArray, noise: FloatArray, faces: IntArray, g: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    design = _design(faces, g)
+    weighted = np.einsum("nij,njk->nik", _inverses(noise), design)
+    # Columns of S_a carry |g|, those of b_a one: scaled for a well conditioned inverse.
+    scale = np.concatenate([np.full(9, g), np.ones(3)])
+    normal = np.einsum("nij,nik->jk", design, weighted) / np.outer(scale, scale)
+    # Readings are taken from their mean: counts near 32768 would otherwise cost digits.
+    centre = values.mean(axis=0)
+    right = np.einsum("nij,ni->j", weighted, values - centre) / scale
+    covariance = np.linalg.inv(normal) / np.outer(scale, scale)
+    solution = np.linalg.solve(normal, right) / scale
+    return solution[:9].reshape(3, 3), solution[9:] + centre, covariance
+
+
+def _closed_form(
+    values: FloatArray, noise: FloatArray, faces: IntArray, g: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """``S_a = [a'(+1)-a'(-1), ...]/2|g|`` and ``b_a`` the mean of the six faces; repeats are averaged by weight."""
+    S_a, b_a = np.zeros((3, 3)), np.zeros(3)
+    map_to_parameters = np.zeros((6, 12, 3))
+    covariance = np.zeros((12, 12))
+    for k, face in enumerate(face_poses.FACES):
+        of_face = faces == face
+        weights = _inverses(noise[of_face])
+        spread = np.linalg.inv(weights.sum(axis=0))
+        mean = spread @ np.einsum("nij,nj->i", weights, values[of_face])
+        sign, axis = np.sign(face), abs(face) - 1
+        S_a[:, axis] += sign * mean / (2.0 * g)
+        b_a += mean / 6.0
+        for row in range(3):
+            map_to_parameters[k, 3 * row + axis, row] = sign / (2.0 * g)
+            map_to_parameters[k, 9 + row, row] = 1.0 / 6.0
+        covariance += map_to_parameters[k] @ spread @ map_to_parameters[k].T
+    return S_a, b_a, covariance
+
+
+def _chi2(values: FloatArray, noise: FloatArray, faces: IntArray, g: float) -> float:
+    """χ² of the least-squares fit with these weights, which judges the closed form too: its own has no χ² law."""
+    S_a, b_a, _ = _least_squares(values, noise, faces, g)
+    residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
+    return float(np.einsum("ni,nij,nj->", residual, _inverses(noise), residual))
+
+
+def _quality(
+    values: FloatArray, noise: FloatArray, faces: IntArray, g: float, estimate: _Estimate, *, closed: bool
+) -> tuple[FitQuality, FloatArray]:
+    """Norm residual per pose in sample and left out (NaN for poses that are no faces), and the vector residual's χ²."""
+    used = np.flatnonzero(faces)
+    S, b = other_form(estimate.S_a, estimate.b_a)
+    residual, sigma = (np.full(len(values), np.nan) for _ in range(2))
+    residual[used], sigma[used] = norm_residual(values[used] @ S.T + b, S, noise[used], g)
+    apart = np.full((len(values), 2), np.nan)
+    for pose in map(int, used):
+        others = used[used != pose]
+        try:
+            face_poses.check_sufficient(faces[others], all_six=closed)
+        except ValueError:
+            continue
+        apart[pose] = _left_out_pose(values, noise, faces, g, pose, others, estimate.tilt_rad, closed=closed)
+    seen = np.isfinite(apart[:, 0])
+    in_m_s2 = estimate.residual @ S.T
+    floor = np.einsum("ij,njk,ik->", S, noise[used], S) / (3 * len(used))
+    quality = FitQuality(
+        unit="m/s^2",
+        residual=residual,
+        sigma=sigma,
+        chi2=estimate.chi2_noise,
+        dof=max(estimate.dof, 0),
+        rms=float(np.sqrt(np.mean(in_m_s2**2))),
+        rms_dof=float(np.sqrt(np.sum(in_m_s2**2) / estimate.dof)) if estimate.dof > 0 else float("nan"),
+        floor=float(np.sqrt(floor)),
+        held_out=apart[:, 0],
+        held_out_sigma=apart[:, 1],
+        held_out_rms=float(np.sqrt(np.mean(apart[seen, 0] ** 2))) if seen.any() else None,
+        stopped_because="closed form" if closed else "linear least squares",
+    )
+    return quality, apart
+
+
+def _left_out_pose(
+    values: FloatArray,
+    noise: FloatArray,
+    faces: IntArray,
+    g: float,
+    pose: int,
+    others: IntArray,
+    tilt_rad: float,
+    *,
+    closed: bool,
+) -> tuple[float, float]:
+    """Norm error of one pose by the model of the others, and its standard error."""
+    fit = _closed_form if closed else _least_squares
+    S_a, _, _ = fit(values[others], noise[others], faces[others], g)
+    widened = _tilted(noise[others], faces[others], S_a, g, tilt_rad)
+    S_a, b_a, covariance = fit(values[others], widened, faces[others], g)
+    S, b = other_form(S_a, b_a)
+    f = values[pose] @ S.T + b
+    error, sigma = norm_residual(f[None], S, noise[pose][None], g)
+    up = f / np.linalg.norm(f)
+    slope = np.concatenate([np.outer(up, values[pose]).ravel(), up]) @ other_form_jacobian(S_a, b_a)
+    return float(error[0]), float(np.sqrt(sigma[0] ** 2 + slope @ covariance @ slope))
+
+
+def _left_out(faces: IntArray, values: FloatArray) -> list[Finding]:
+    left = np.flatnonzero(faces == 0)
+    if len(left) == 0:
+        return []
+    poses = ", ".join(str(i) for i in left)
+    return [
+        Finding(
+            FindingCode.POSE_NOT_A_FACE,
+            Severity.NOTE,
+            f"{len(left)} of {len(values)} still poses have no axis within {face_poses.LARGEST_TILT_DEG:.0f}° of the "
+            f"vertical and are not used by method 1 (poses {poses}).",
+            "They are edges, corners or leaning poses.",
+            "Method 2 uses them all.",
+            MappingProxyType({"n_left_out": float(len(left))}),
+        )
+    ]
+
+
+def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: IntArray) -> list[Finding]:
+    """Faces that contradict each other."""
+    if estimate.tilt_rad == 0.0:
+        return []
+    horizontal = estimate.residual @ S.T
+    horizontal[np.arange(len(faces)), np.abs(faces) - 1] = 0.0
+    worst = int(np.argmax(np.linalg.norm(horizontal, axis=1)))
+    tilt_deg = degrees_from_radians(estimate.tilt_rad)
+    chi2_per_dof = estimate.chi2_noise / estimate.dof
+    return [
+        Finding(
+            FindingCode.TABLE_TILT,
+            Severity.WARNING,
+            f"The faces contradict each other (χ² per degree of freedom {chi2_per_dof:.3g}) as if "
+            f"each pose were tilted by {tilt_deg:.2g}° rms; most in pose {int(used[worst])} "
+            f"({face_poses.face_in_words(int(faces[worst]))}). The standard errors include this tilt.",
+            "The table is not level, the case is not square or did not lie flat; a drifting zero looks the same.",
+            "Level the table, press the case flat, or use method 2, which needs neither.",
+            MappingProxyType(
+                {
+                    "tilt_deg": tilt_deg,
+                    "chi2_per_dof": chi2_per_dof,
+                    "pose": float(used[worst]),
+                }
+            ),
+        )
+    ]
+
+
+def _observability(noise: FloatArray, faces: IntArray, estimate: _Estimate, g: float) -> Observability:
+    """Of the twelve parameters, from the whitened design."""
+    roots = np.linalg.cholesky(_inverses(_tilted(noise, faces, estimate.S_a, g, estimate.tilt_rad)))
+    rows = np.einsum("nji,njk->nik", roots, _design(faces, g)).reshape(-1, 12)
+    rows = rows / np.linalg.norm(rows, axis=0)
+    s = np.linalg.svd(rows, compute_uv=False)
+    present = {int(face) for face in faces}
+    missing = tuple(face_poses.face_in_words(face) for face in face_poses.FACES if face not in present)
+    return Observability(
+        rank=12,
+        n_parameters=12,
+        condition=float(s[0] / s[-1]),
+        singular_values=s,
+        weakest="all faces present" if not missing else f"scale and zero are told apart without {', '.join(missing)}",
+        advice=missing,
+    )
