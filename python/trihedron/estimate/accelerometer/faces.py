@@ -146,8 +146,9 @@ def _tilted(noise: FloatArray, faces: IntArray, S_a: FloatArray, g: float, tilt_
 
 def _inverses(noise: FloatArray) -> FloatArray:
     """Weights; an axis without noise (stuck) gets a millionth of the others' instead of an infinite one."""
-    floor = 1e-6 * np.trace(noise, axis1=1, axis2=2)
-    inverse: FloatArray = np.linalg.inv(noise + floor[:, None, None] * np.eye(3))
+    variance, axes = np.linalg.eigh(noise)
+    variance = np.maximum(variance, 1e-6 * variance.sum(axis=1, keepdims=True))
+    inverse: FloatArray = np.einsum("nij,nj,nkj->nik", axes, 1.0 / variance, axes)
     return inverse
 
 

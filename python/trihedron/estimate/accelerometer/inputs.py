@@ -9,7 +9,8 @@ from trihedron.records.calibration import FloatArray
 
 
 def pose_means(means: npt.ArrayLike, sigma_means: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Means (n, 3) and their noise (n, 3, 3), from standard errors (3,), (n, 3) or covariances (n, 3, 3).
+    """Means (n, 3) and their noise (n, 3, 3), from standard errors (), (3,), (n, 3) or covariances
+    (n, 3, 3).
 
     Raises
     ------
@@ -24,7 +25,7 @@ def pose_means(means: npt.ArrayLike, sigma_means: npt.ArrayLike) -> tuple[FloatA
         pose = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
         raise ValueError(f"the mean reading of pose {pose} is not finite: leave that pose out")
     sigma = np.asarray(sigma_means, dtype=np.float64)
-    if sigma.shape == (3,):
+    if sigma.shape in ((), (3,)):
         sigma = np.broadcast_to(sigma, (n, 3))
     if sigma.shape == (n, 3):
         if not np.all(np.isfinite(sigma)) or np.any(sigma < 0) or np.any(sigma.max(axis=1, initial=0.0) <= 0):
