@@ -13,7 +13,6 @@ use crate::error::Result as KernelResult;
 
 mod accelerometer;
 mod gyro_alignment;
-mod accelerometer;
 mod kalman;
 mod kalman_norm;
 mod poisson;
