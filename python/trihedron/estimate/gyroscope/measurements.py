@@ -145,7 +145,7 @@ def measure_moves(
     change = zero[links[:, 1]] - zero[links[:, 0]]
     expected = var_zero[links[:, 1]] + var_zero[links[:, 0]]
     walk = np.maximum(np.mean(change**2 - expected, axis=0), 0.0)
-    weights, mean, var_mean, excess = _pool(zero, var_zero)
+    weights, mean, var_mean, excess, _ = pool_zeros(zero, var_zero)
     steps = np.diff(recording.time_s)
     nominal = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 1.0 / recording.rate_hz
     jitter = float(np.median(np.abs(steps - nominal))) * 1.4826 / np.sqrt(2.0)
@@ -252,8 +252,14 @@ def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArra
     return excess / gains
 
 
-def _pool(zero: FloatArray, var_zero: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Random-effects mean of the zeros (DerSimonian & Laird 1986): weights, mean, variance, χ² against constancy."""
+def pool_zeros(
+    zero: FloatArray, var_zero: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Random-effects mean of zero readings (n, 3) of variance (n, 3) (DerSimonian & Laird 1986).
+
+    Returns weights (n, 3), mean (3,), its variance (3,), χ² against constancy (3,) with n − 1 degrees of freedom, and the
+    variance (3,) of the true zero between holds, nothing where χ² is within chance.
+    """
     floor = np.maximum(var_zero, 1e-30 + 1e-24 * zero**2)
     weight = 1.0 / floor
     total = weight.sum(axis=0)
@@ -267,4 +273,4 @@ def _pool(zero: FloatArray, var_zero: FloatArray) -> tuple[FloatArray, FloatArra
     weight /= weight.sum(axis=0)
     mean = (weight * zero).sum(axis=0)
     variance = (weight**2 * (floor + spread)).sum(axis=0)
-    return np.ascontiguousarray(weight), mean, variance, chi2
+    return np.ascontiguousarray(weight), mean, variance, chi2, spread

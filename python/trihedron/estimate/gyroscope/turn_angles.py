@@ -1,0 +1,190 @@
+"""Turns as measured, and by which known angle about which case axis each of them was."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron._core import integrate_raw_rate
+from trihedron.estimate.gyroscope.measurements import BLOCK_S, pool_zeros, resolution_of
+from trihedron.records.recording import Recording
+from trihedron.units import rate_to_si
+
+FloatArray = npt.NDArray[np.float64]
+
+QUARTER = math.pi / 2.0
+
+SCALE_TOLERANCE = 0.05
+"""How far a nominal scale may be from the truth: data sheets promise 1 to 3 %."""
+
+SLACK_RAD = math.radians(10.0)
+"""A turn further than this from every multiple was not made against a wall at all."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A turn to be used: samples ``[start, stop)``; ``axis`` 0, 1, 2 of the case and the signed ``angle_rad`` if known."""
+
+    start: int
+    stop: int
+    axis: int | None = None
+    angle_rad: float | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.start < self.stop - 1:
+            raise ValueError(f"a turn must hold at least two samples, got {self.start}..{self.stop}")
+        if self.axis is not None and self.axis not in (0, 1, 2):
+            raise ValueError(f"the axis of a turn is 0, 1 or 2, got {self.axis}")
+        if self.angle_rad is not None and not math.isfinite(self.angle_rad):
+            raise ValueError("the angle of a turn must be finite")
+
+
+@dataclass(frozen=True)
+class KnownTurn:
+    """What a turn was taken for: ``angle_rad`` about ``axis``; ``is_used`` is false when it is no such turn.
+
+    ``seen_rad`` is the angle by the nominal scale, ``off_axis_rad`` how far its axis lies from the case axis.
+    """
+
+    axis: int
+    angle_rad: float
+    is_used: bool
+    seen_rad: float
+    off_axis_rad: float
+    was_given: bool
+
+    @property
+    def vector(self) -> FloatArray:
+        """Rotation about the case axis, (3,), rad."""
+        vector = np.zeros(3)
+        vector[self.axis] = self.angle_rad
+        return vector
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredTurns:
+    """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns, the same of the zero turns, and their noise.
+
+    ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``zero_spread`` (3,) the variance of the true zero reading between zero
+    turns, ``zero_excess`` (3,) the χ² of its constancy.
+    """
+
+    raw_angle: FloatArray
+    duration_s: FloatArray
+    zero_angle: FloatArray
+    zero_duration_s: FloatArray
+    var_rate: FloatArray
+    zero_spread: FloatArray
+    zero_excess: FloatArray
+    zero_mean: FloatArray
+
+
+def measure_turns(
+    recording: Recording, turns: Sequence[Turn], zeros: Sequence[tuple[int, int]]
+) -> MeasuredTurns:
+    """Integrate turns and zero turns; noise from the zero turns.
+
+    Raises
+    ------
+    ValueError
+        When there is no gyro, no turn, or no zero turn of a second or more to learn the noise from.
+    """
+    if recording.gyroscope is None:
+        raise ValueError("the recording has no gyroscope")
+    if not turns:
+        raise ValueError("method 1 needs turns: none were given and none were found")
+    if not zeros:
+        raise ValueError("method 1 needs a stretch without rotation (a zero turn): hold the sensor still for some seconds")
+    gyroscope = recording.gyroscope
+    edges = np.array([[turn.start, turn.stop] for turn in turns], dtype=np.int64)
+    raw_angle, duration = integrate_raw_rate(recording.time_s, gyroscope, edges, 3)
+    zero_edges = np.array([[a, b] for a, b in zeros], dtype=np.int64)
+    zero_angle, zero_duration = integrate_raw_rate(recording.time_s, gyroscope, zero_edges, 1)
+    step_s = 1.0 / recording.rate_hz
+    sums, count = np.zeros(3), 0
+    for start, stop in zeros:
+        block = gyroscope[start:stop]
+        block = block[np.all(np.isfinite(block), axis=1)]
+        length = min(max(1, round(BLOCK_S / step_s)), len(block) // 4)
+        if length < 1:
+            continue
+        means = block[: len(block) // length * length].reshape(-1, length, 3).mean(axis=1)
+        sums += 0.5 * np.sum(np.diff(means, axis=0) ** 2, axis=0) * length * step_s
+        count += len(means) - 1
+    if count < 4:
+        raise ValueError("the zero turns are too short to tell the gyro's noise: hold still for some seconds")
+    var_rate = np.maximum(sums / count, resolution_of(gyroscope) ** 2 / 12.0 * step_s)
+    zero_s = np.array(zero_duration)
+    rates = zero_angle / zero_s[:, None]
+    _, mean, _, excess, spread = pool_zeros(rates, var_rate / zero_s[:, None])
+    return MeasuredTurns(
+        raw_angle, np.array(duration), zero_angle, zero_s, var_rate, spread, excess, mean
+    )
+
+
+def nominal_matrix(
+    recording: Recording, measured: MeasuredTurns, nominal_scale: FloatArray | float | None, quantum_rad: float
+) -> FloatArray:
+    """Nominal scale (3, 3), rad/s per raw unit: as given, from the unit, or from the turns themselves.
+
+    For counts without a scale, the turns are taken for the smallest whole numbers of ``quantum_rad`` that fit all.
+
+    Raises
+    ------
+    ValueError
+        When they fit no such numbers.
+    """
+    if nominal_scale is not None:
+        value = np.asarray(nominal_scale, dtype=np.float64)
+        if value.shape not in ((), (3, 3)) or not np.all(np.isfinite(value)):
+            raise ValueError("nominal_scale must be a finite number or a (3, 3) matrix, rad/s per raw unit")
+        return value * np.eye(3) if value.ndim == 0 else value
+    unit = rate_to_si(recording.gyroscope_unit)
+    if unit is not None:
+        return unit * np.eye(3)
+    sizes = np.linalg.norm(measured.raw_angle - np.outer(measured.duration_s, measured.zero_mean), axis=1)
+    for divisor in range(1, 17):
+        quantum_raw = float(sizes.min()) / divisor
+        ratio = sizes / quantum_raw
+        if np.all(np.abs(ratio - np.round(ratio)) < SCALE_TOLERANCE * ratio) and ratio.max() < 0.5 / SCALE_TOLERANCE:
+            return quantum_rad / quantum_raw * np.eye(3)
+    raise ValueError(
+        "the readings are counts and the turns are no small multiples of one angle: give nominal_scale in rad/s per count"
+    )
+
+
+def identify_turns(
+    measured: MeasuredTurns, turns: Sequence[Turn], nominal: FloatArray, quantum_rad: float
+) -> list[KnownTurn]:
+    """Nearest case axis and nearest multiple of ``quantum_rad`` for every turn that does not say.
+
+    Small turns come first: each refines the scale by which the next larger one is read, so that eight whole turns are
+    recognised although the nominal scale is off by some per cent.
+    """
+    seen = (measured.raw_angle - np.outer(measured.duration_s, measured.zero_mean)) @ nominal.T
+    size = np.linalg.norm(seen, axis=1)
+    axes = [turn.axis if turn.axis is not None else int(np.argmax(np.abs(v))) for turn, v in zip(turns, seen, strict=True)]
+    sums = np.zeros((3, 2))
+    known: list[KnownTurn | None] = [None] * len(turns)
+    for index in sorted(range(len(turns)), key=lambda i: size[i]):
+        turn, axis, vector = turns[index], axes[index], seen[index]
+        scale = sums[axis, 0] / sums[axis, 1] if sums[axis, 1] > 0.0 else 1.0
+        along = float(vector[axis]) / scale
+        off_axis = math.atan2(float(np.linalg.norm(np.delete(vector, axis))), abs(float(vector[axis])))
+        angle = turn.angle_rad if turn.angle_rad is not None else quantum_rad * round(along / quantum_rad)
+        if turn.angle_rad is None:
+            unsure = abs(along) * (SCALE_TOLERANCE if sums[axis, 1] == 0.0 else 0.1 * SCALE_TOLERANCE)
+            # A turn of unknown size can only be read when the doubt about the scale is below half a multiple.
+            is_used = angle != 0.0 and abs(along - angle) < SLACK_RAD + min(unsure, 0.2 * quantum_rad)
+            is_used = is_used and unsure < 0.5 * quantum_rad
+        else:
+            is_used = angle != 0.0 and abs(along - angle) < max(SLACK_RAD, 0.3 * abs(angle))
+        is_used = is_used and off_axis < 2.0 * SLACK_RAD
+        known[index] = KnownTurn(axis, angle, is_used, along, off_axis, turn.angle_rad is not None)
+        if is_used:
+            sums[axis] += (float(vector[axis]) * angle, angle * angle)
+    return [turn for turn in known if turn is not None]

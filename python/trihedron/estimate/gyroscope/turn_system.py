@@ -1,0 +1,221 @@
+"""The linear system of method 1: ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` for turns and zero turns, weighed by noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import chi2 as chi2_distribution
+
+from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+FALSE_ALARM = 1e-3
+"""Chance that sound turns raise a statistical finding of one kind."""
+
+LARGEST_SIGMA_TURN = math.radians(20.0)
+
+
+@dataclass(frozen=True, eq=False)
+class TurnSystem:
+    """Turns with their known ``angles`` (k, 3), rad; ``S_w`` (3, 3) roughly, to turn ``sigma_turn`` (rad) into raw units."""
+
+    measured: MeasuredTurns
+    angles: FloatArray
+    S_w: FloatArray
+    sigma_turn: float = 0.0
+
+    def row_covariance(self, index: int) -> FloatArray:
+        """Covariance (3, 3) of turn ``index``: rate noise ``N² Δt``, wandering zero, and the error of the turn itself."""
+        return self._noise(float(self.measured.duration_s[index])) + self.sigma_turn**2 * self.S_w @ self.S_w.T
+
+    def _noise(self, duration_s: float) -> FloatArray:
+        return np.diag(self.measured.var_rate * duration_s + self.measured.zero_spread * duration_s**2)
+
+    @staticmethod
+    def design(angle: FloatArray, duration_s: float) -> FloatArray:
+        """(3, 12) derivative of a raw turn with respect to (S_w row by row, b_w)."""
+        matrix = np.zeros((3, 12))
+        for i in range(3):
+            matrix[i, 3 * i : 3 * i + 3] = angle
+            matrix[i, 9 + i] = duration_s
+        return matrix
+
+    def whitened(self, used: BoolArray, with_zeros: bool = True) -> tuple[FloatArray, FloatArray]:
+        """Whitened design (n, 12) and raw turns (n,) of the used turns, then of the zero turns."""
+        designs, sides = [], []
+        for index in np.flatnonzero(used):
+            factor = np.linalg.inv(np.linalg.cholesky(self.row_covariance(int(index))))
+            designs.append(factor @ self.design(self.angles[index], float(self.measured.duration_s[index])))
+            sides.append(factor @ self.measured.raw_angle[index])
+        if with_zeros:
+            for angle, duration in zip(self.measured.zero_angle, self.measured.zero_duration_s, strict=True):
+                factor = np.linalg.inv(np.linalg.cholesky(self._noise(float(duration))))
+                designs.append(factor @ self.design(np.zeros(3), float(duration)))
+                sides.append(factor @ angle)
+        return np.concatenate(designs), np.concatenate(sides)
+
+    def residuals(self, fit: Solution) -> FloatArray:
+        """(k, 3) measured minus predicted raw turns."""
+        out: FloatArray = (
+            self.measured.raw_angle - self.angles @ fit.S_w.T - np.outer(self.measured.duration_s, fit.b_w)
+        )
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Inverse form ``S_w``, ``b_w``, its covariance (12, 12) for the stated noise, χ² and degrees of freedom."""
+
+    S_w: FloatArray
+    b_w: FloatArray
+    covariance: FloatArray
+    chi2: float
+    dof: int
+
+
+def solve(system: TurnSystem, used: BoolArray) -> Solution:
+    """Weighted least squares over turns and zero turns at once."""
+    matrix, side = system.whitened(used)
+    size = np.linalg.norm(matrix, axis=0)
+    q, r = np.linalg.qr(matrix / size)
+    inverse = np.linalg.inv(r)
+    solution = (inverse @ (q.T @ side)) / size
+    covariance = (inverse @ inverse.T) / np.outer(size, size)
+    chi2 = float(np.sum((side - matrix @ solution) ** 2))
+    return Solution(solution[:9].reshape(3, 3), solution[9:], covariance, chi2, len(side) - 12)
+
+
+def solve_zero_first(system: TurnSystem, used: BoolArray) -> Solution:
+    """``b_w`` from the zero turns alone, then ``S_w`` by least squares from the turns freed of it.
+
+    The error of ``b_w`` reaches ``S_w`` through every turn at once: ``δS_w = −G δb_w``.
+    """
+    measured = system.measured
+    var = measured.var_rate / measured.zero_duration_s[:, None] + measured.zero_spread
+    weight = 1.0 / var
+    total = weight.sum(axis=0)
+    rates = measured.zero_angle / measured.zero_duration_s[:, None]
+    b_w = (weight * rates).sum(axis=0) / total
+    cov_b = np.diag(1.0 / total)
+    chi2 = float(np.sum(weight * (rates - b_w) ** 2))
+    matrix, side = system.whitened(used, with_zeros=False)
+    to_scale, to_bias = matrix[:, :9], matrix[:, 9:]
+    inner = np.linalg.inv(to_scale.T @ to_scale)
+    gain = inner @ to_scale.T
+    scale = gain @ (side - to_bias @ b_w)
+    through = -gain @ to_bias
+    covariance = np.zeros((12, 12))
+    covariance[:9, :9] = inner + through @ cov_b @ through.T
+    covariance[:9, 9:] = through @ cov_b
+    covariance[9:, :9] = covariance[:9, 9:].T
+    covariance[9:, 9:] = cov_b
+    chi2 += float(np.sum((side - to_bias @ b_w - to_scale @ scale) ** 2))
+    return Solution(scale.reshape(3, 3), b_w, covariance, chi2, len(side) - 9 + 3 * len(rates) - 3)
+
+
+def left_out(system: TurnSystem, used: BoolArray, index: int) -> tuple[FloatArray, FloatArray] | None:
+    """Residual (3,) of a turn predicted by all others and its covariance (3, 3), raw; ``None`` when they cannot."""
+    others = used.copy()
+    others[index] = False
+    axes = {int(np.argmax(np.abs(angle))) for angle in system.angles[others]}
+    if len(axes) < 3:
+        return None
+    fit = solve(system, others)
+    design = system.design(system.angles[index], float(system.measured.duration_s[index]))
+    residual = system.measured.raw_angle[index] - design @ np.concatenate([fit.S_w.ravel(), fit.b_w])
+    return residual, system.row_covariance(index) + design @ fit.covariance @ design.T
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """What remains after screening: ``used`` turns, ``suspects`` that the others contradict, those of them ``removed``."""
+
+    system: TurnSystem
+    used: BoolArray
+    suspects: tuple[int, ...]
+    removed: tuple[int, ...]
+    unchecked_axes: tuple[int, ...]
+
+
+def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) -> Screened:
+    """Find turns that the others contradict, and the standard error of a turn when it is not given.
+
+    Each turn is predicted by all others. The scatter of a turn is first read from the median of these predictions, which
+    one wrong turn does not move; a turn far beyond it is a suspect. It is removed when two others about its axis remain to
+    say so. The scatter is then matched to χ² of the rest, zero where the rate noise explains it.
+    """
+    axes = np.argmax(np.abs(system.angles), axis=1)
+    counts = {axis: int(np.count_nonzero(used & (axes == axis))) for axis in range(3)}
+    unchecked = tuple(axis for axis in range(3) if counts[axis] < 2)
+    suspects: list[int] = []
+    removed: list[int] = []
+    system = replace(system, S_w=solve(system, used).S_w)
+    while True:
+        distances = _distances(_with_scatter(system, used, sigma_turn_rad), used)
+        if not distances:
+            break
+        limit = float(chi2_distribution.isf(FALSE_ALARM / len(distances), 3))
+        worst = max(distances, key=lambda index: distances[index])
+        if distances[worst] <= limit:
+            break
+        if np.count_nonzero(used & (axes == axes[worst])) < 3:
+            suspects += [i for i in distances if axes[i] == axes[worst] and distances[i] > limit and i not in suspects]
+            break
+        suspects.append(worst)
+        removed.append(worst)
+        used = used.copy()
+        used[worst] = False
+    if sigma_turn_rad is None:
+        sigma = _matching_scatter(system, used)
+    else:
+        sigma = sigma_turn_rad
+    return Screened(replace(system, sigma_turn=sigma), used, tuple(suspects), tuple(removed), unchecked)
+
+
+def _distances(system: TurnSystem, used: BoolArray) -> dict[int, float]:
+    found = {}
+    for index in np.flatnonzero(used):
+        left = left_out(system, used, int(index))
+        if left is not None:
+            residual, covariance = left
+            found[int(index)] = float(residual @ np.linalg.solve(covariance, residual))
+    return found
+
+
+def _with_scatter(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) -> TurnSystem:
+    """The scatter of a turn from the median of the predictions, at most that of turns made by eye."""
+    if sigma_turn_rad is not None:
+        return replace(system, sigma_turn=sigma_turn_rad)
+
+    def median(sigma: float) -> float:
+        distances = list(_distances(replace(system, sigma_turn=sigma), used).values())
+        return float(np.median(distances)) if distances else 0.0
+
+    target = float(chi2_distribution.median(3))
+    return replace(system, sigma_turn=_solve_for(median, target))
+
+
+def _matching_scatter(system: TurnSystem, used: BoolArray) -> float:
+    fit = solve(system, used)
+    if fit.dof < 1 or chi2_distribution.sf(fit.chi2, fit.dof) > FALSE_ALARM:
+        return 0.0
+    return _solve_for(lambda sigma: solve(replace(system, sigma_turn=sigma), used).chi2, float(fit.dof))
+
+
+def _solve_for(statistic: Callable[[float], float], target: float) -> float:
+    """The scatter at which a statistic that falls with it meets its target; zero when it is below already."""
+    if statistic(0.0) <= target:
+        return 0.0
+    low, high = 1e-7, LARGEST_SIGMA_TURN
+    if statistic(high) >= target:
+        return high
+    for _ in range(40):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if statistic(middle) > target else (low, middle)
+    return math.sqrt(low * high)

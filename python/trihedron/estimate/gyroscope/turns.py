@@ -1,0 +1,169 @@
+"""Method 1: gyro calibration from turns by known angles about the axes of the case (a table, a wall, a square case)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import chi2 as chi2_distribution
+
+from trihedron.estimate.gyroscope.turn_angles import (
+    QUARTER,
+    KnownTurn,
+    Turn,
+    identify_turns,
+    measure_turns,
+    nominal_matrix,
+)
+from trihedron.estimate.gyroscope.turn_findings import turn_findings
+from trihedron.estimate.gyroscope.turn_system import (
+    FALSE_ALARM,
+    Solution,
+    TurnSystem,
+    left_out,
+    screen,
+    solve,
+    solve_zero_first,
+)
+from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
+from trihedron.records.finding import Finding
+from trihedron.records.recording import Recording
+from trihedron.records.segments import Segments
+from trihedron.sensor_model import other_form, other_form_jacobian
+
+FloatArray = npt.NDArray[np.float64]
+Route = Literal["least-squares", "zero-turn-first"]
+
+def turns_from_segments(segments: Segments) -> tuple[list[Turn], list[tuple[int, int]]]:
+    """Every move as a turn of unknown angle and axis, every hold as a zero turn ``(start, stop)``."""
+    turns = [Turn(move.start, move.stop) for move in segments.moves if move.stop - move.start >= 2]
+    return turns, [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2]
+
+
+def calibrate_turns(
+    recording: Recording,
+    turns: Sequence[Turn],
+    zeros: Sequence[tuple[int, int]],
+    *,
+    nominal_scale: FloatArray | float | None = None,
+    quantum_rad: float = QUARTER,
+    route: Route = "least-squares",
+    sigma_turn_rad: float | None = None,
+) -> tuple[SensorCalibration, tuple[Finding, ...]]:
+    """Calibrate the gyro from turns about case axes: ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` (equation 5.12).
+
+    Parameters
+    ----------
+    recording : Recording
+        With raw gyro readings.
+    turns : sequence of Turn
+        Where the turns are; axis and angle (whole turns too) are found from the data where they are not given.
+    zeros : sequence of (start, stop)
+        Stretches without rotation: zero turns.
+    nominal_scale : (3, 3) or float, optional
+        rad/s per raw unit, to recognise the multiples of ``quantum_rad``; the unit tells it unless readings are counts.
+    route : "least-squares" or "zero-turn-first"
+        All rows at once (default), or ``b_w`` from the zero turns alone, then ``S_w`` from ``Δw' = w' − b_w``.
+    sigma_turn_rad : float, optional
+        Standard error of a turn's angle (wall, corners); estimated from the residuals when not given.
+
+    Returns
+    -------
+    SensorCalibration, tuple of Finding
+        Direct form ``ω = S raw + b`` in the case frame, and what was noticed.
+
+    Raises
+    ------
+    ValueError
+        When an axis was never turned, no zero turn and no second duration fixes the bias, or counts come without any
+        way to recognise the angles.
+
+    Notes
+    -----
+    White rate noise ``N`` [unit/√Hz] gives ``var δφ = N² Δt``. For the same turns the covariance of the second route is
+    never smaller: it does not use the turns for ``b_w``.
+    """
+    measured = measure_turns(recording, turns, zeros)
+    nominal = nominal_matrix(recording, measured, nominal_scale, quantum_rad)
+    known = identify_turns(measured, turns, nominal, quantum_rad)
+    used = np.array([turn.is_used for turn in known], dtype=bool)
+    _require_every_axis(known, used)
+    system = TurnSystem(measured, np.array([turn.vector for turn in known]), np.linalg.inv(nominal))
+    screened = screen(system, used, sigma_turn_rad)
+    system, used = screened.system, screened.used
+    fit = solve_zero_first(system, used) if route == "zero-turn-first" else solve(system, used)
+    S, b = other_form(fit.S_w, fit.b_w)
+    jacobian = other_form_jacobian(fit.S_w, fit.b_w)
+    inflation = 1.0
+    if fit.dof > 0 and chi2_distribution.sf(fit.chi2, fit.dof) < FALSE_ALARM:
+        inflation = fit.chi2 / fit.dof
+    covariance = inflation * jacobian @ fit.covariance @ jacobian.T
+    calibration = SensorCalibration(
+        S=S,
+        b=b,
+        covariance=0.5 * (covariance + covariance.T),
+        raw_unit=recording.gyroscope_unit.value,
+        si_unit="rad/s",
+        method="turns" if route == "least-squares" else "turns, zero turn first",
+        quality=_quality(system, used, fit, S),
+        observability=_observability(system, used, fit),
+    )
+    deviation = (measured.raw_angle - np.outer(measured.duration_s, fit.b_w)) @ S.T - system.angles
+    return calibration, turn_findings(
+        known, screened, deviation, S, inflation, fit.dof, quantum_rad, is_sigma_given=sigma_turn_rad is not None
+    )
+
+
+def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_]) -> None:
+    missing = [axis for axis in range(3) if not any(t.axis == axis and u for t, u in zip(known, used, strict=True))]
+    if missing:
+        names = " and ".join(str(axis + 1) for axis in missing)
+        raise ValueError(
+            f"no usable turn about body axis {names} was found among {len(known)}: turn the sensor about it by a known "
+            "angle, there and back, or give the angle of each turn"
+        )
+
+
+def _quality(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solution, S: FloatArray) -> FitQuality:
+    """Deviation of each turn from its known angle, (k, 3) rad, in sample and with the turn left out of the fit."""
+    k = len(used)
+    residual = system.residuals(fit)[:k] @ S.T
+    noise = np.array([S @ system.row_covariance(i) @ S.T for i in range(k)])
+    held, held_sigma = np.full((k, 3), np.nan), np.full((k, 3), np.nan)
+    for index in np.flatnonzero(used):
+        left = left_out(system, used, int(index))
+        if left is not None:
+            held[index] = S @ left[0]
+            held_sigma[index] = np.sqrt(np.diag(S @ left[1] @ S.T))
+    n = 3 * int(np.count_nonzero(used))
+    total = float(np.sum(residual[used] ** 2))
+    dof = n - 9
+    is_held = np.all(np.isfinite(held), axis=1)
+    return FitQuality(
+        unit="rad",
+        residual=residual,
+        sigma=np.sqrt(np.einsum("mii->mi", noise)),
+        chi2=fit.chi2,
+        dof=fit.dof,
+        rms=math.sqrt(total / n),
+        rms_dof=math.sqrt(total / dof) if dof > 0 else float("nan"),
+        floor=float(np.sqrt(np.einsum("mii->m", noise)[used].sum() / n)),
+        held_out=held if np.any(is_held) else None,
+        held_out_sigma=held_sigma if np.any(is_held) else None,
+        held_out_rms=float(np.sqrt(np.mean(held[is_held] ** 2))) if np.any(is_held) else None,
+        weights=np.where(used, 1.0, 0.0),
+        n_iterations=1,
+        stopped_because="closed form",
+    )
+
+
+def _observability(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solution) -> Observability:
+    matrix, _ = system.whitened(used)
+    singular = np.linalg.svd(matrix / np.linalg.norm(matrix, axis=0), compute_uv=False)
+    sigma = np.sqrt(np.diag(fit.covariance)[:9]).reshape(3, 3) / np.linalg.norm(fit.S_w, 2)
+    i, j = (int(v) for v in np.unravel_index(int(np.argmax(sigma)), (3, 3)))
+    weakest = f"answer of gyro axis {i + 1} to turns about case axis {j + 1}, known to {100 * sigma[i, j]:.2g} %"
+    return Observability(12, 12, float(singular[0] / singular[-1]), singular, weakest)
