@@ -64,6 +64,7 @@ class FindingCode(str, Enum):
     OUTLIER_MOVE = "outlier-move"
     TABLE_TILT = "table-tilt"
     TURN_NOT_A_MULTIPLE = "turn-not-a-multiple"
+    TURN_UNCHECKED = "turn-unchecked"
     GYRO_BIAS_DRIFT = "gyro-bias-drift"
     NOT_CONVERGED = "not-converged"
     # kalman

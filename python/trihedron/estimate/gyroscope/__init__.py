@@ -2,5 +2,7 @@
 
 from trihedron.estimate.gyroscope.alignment import MoveOptions
 from trihedron.estimate.gyroscope.moves import calibrate_moves
+from trihedron.estimate.gyroscope.turn_angles import Turn
+from trihedron.estimate.gyroscope.turns import calibrate_turns, turns_from_segments
 
-__all__ = ["MoveOptions", "calibrate_moves"]
+__all__ = ["MoveOptions", "Turn", "calibrate_moves", "calibrate_turns", "turns_from_segments"]

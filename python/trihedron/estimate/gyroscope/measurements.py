@@ -257,8 +257,8 @@ def pool_zeros(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Random-effects mean of zero readings (n, 3) of variance (n, 3) (DerSimonian & Laird 1986).
 
-    Returns weights (n, 3), mean (3,), its variance (3,), χ² against constancy (3,) with n − 1 degrees of freedom, and the
-    variance (3,) of the true zero between holds, nothing where χ² is within chance.
+    Returns weights (n, 3), mean (3,), its variance (3,), χ² against constancy (3,) with n − 1 degrees of freedom, and
+    the variance (3,) of the true zero between holds, nothing where χ² is within chance.
     """
     floor = np.maximum(var_zero, 1e-30 + 1e-24 * zero**2)
     weight = 1.0 / floor

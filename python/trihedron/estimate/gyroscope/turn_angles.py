@@ -27,7 +27,7 @@ SLACK_RAD = math.radians(10.0)
 
 @dataclass(frozen=True)
 class Turn:
-    """A turn to be used: samples ``[start, stop)``; ``axis`` 0, 1, 2 of the case and the signed ``angle_rad`` if known."""
+    """Samples ``[start, stop)`` of a turn; ``axis`` 0, 1, 2 of the case and the signed ``angle_rad`` where known."""
 
     start: int
     stop: int
@@ -69,8 +69,8 @@ class KnownTurn:
 class MeasuredTurns:
     """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns, the same of the zero turns, and their noise.
 
-    ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``zero_spread`` (3,) the variance of the true zero reading between zero
-    turns, ``zero_excess`` (3,) the χ² of its constancy.
+    ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``zero_spread`` (3,) the variance of the true zero reading between
+    zero turns, ``zero_excess`` (3,) the χ² of its constancy.
     """
 
     raw_angle: FloatArray
@@ -83,9 +83,7 @@ class MeasuredTurns:
     zero_mean: FloatArray
 
 
-def measure_turns(
-    recording: Recording, turns: Sequence[Turn], zeros: Sequence[tuple[int, int]]
-) -> MeasuredTurns:
+def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[tuple[int, int]]) -> MeasuredTurns:
     """Integrate turns and zero turns; noise from the zero turns.
 
     Raises
@@ -98,7 +96,9 @@ def measure_turns(
     if not turns:
         raise ValueError("method 1 needs turns: none were given and none were found")
     if not zeros:
-        raise ValueError("method 1 needs a stretch without rotation (a zero turn): hold the sensor still for some seconds")
+        raise ValueError(
+            "method 1 needs a stretch without rotation (a zero turn): hold the sensor still for some seconds"
+        )
     gyroscope = recording.gyroscope
     edges = np.array([[turn.start, turn.stop] for turn in turns], dtype=np.int64)
     raw_angle, duration = integrate_raw_rate(recording.time_s, gyroscope, edges, 3)
@@ -121,9 +121,7 @@ def measure_turns(
     zero_s = np.array(zero_duration)
     rates = zero_angle / zero_s[:, None]
     _, mean, _, excess, spread = pool_zeros(rates, var_rate / zero_s[:, None])
-    return MeasuredTurns(
-        raw_angle, np.array(duration), zero_angle, zero_s, var_rate, spread, excess, mean
-    )
+    return MeasuredTurns(raw_angle, np.array(duration), zero_angle, zero_s, var_rate, spread, excess, mean)
 
 
 def nominal_matrix(
@@ -153,7 +151,7 @@ def nominal_matrix(
         if np.all(np.abs(ratio - np.round(ratio)) < SCALE_TOLERANCE * ratio) and ratio.max() < 0.5 / SCALE_TOLERANCE:
             return quantum_rad / quantum_raw * np.eye(3)
     raise ValueError(
-        "the readings are counts and the turns are no small multiples of one angle: give nominal_scale in rad/s per count"
+        "the readings are counts and the turns are no small multiples of one angle: give nominal_scale, rad/s per count"
     )
 
 
@@ -167,7 +165,9 @@ def identify_turns(
     """
     seen = (measured.raw_angle - np.outer(measured.duration_s, measured.zero_mean)) @ nominal.T
     size = np.linalg.norm(seen, axis=1)
-    axes = [turn.axis if turn.axis is not None else int(np.argmax(np.abs(v))) for turn, v in zip(turns, seen, strict=True)]
+    axes = [
+        turn.axis if turn.axis is not None else int(np.argmax(np.abs(v))) for turn, v in zip(turns, seen, strict=True)
+    ]
     sums = np.zeros((3, 2))
     known: list[KnownTurn | None] = [None] * len(turns)
     for index in sorted(range(len(turns)), key=lambda i: size[i]):

@@ -55,8 +55,8 @@ def turn_findings(
             Finding(
                 FindingCode.TURN_NOT_A_MULTIPLE,
                 Severity.WARNING,
-                f"the turns scatter by {degrees_from_radians(sigma):.2g} deg about the multiples they were taken for; the "
-                "error bars contain it.",
+                f"the turns scatter by {degrees_from_radians(sigma):.2g} deg about the multiples they were taken for; "
+                "the error bars contain it.",
                 "turned by eye, without a wall",
                 "Push the case against a wall before and after each turn.",
                 MappingProxyType({"sigma_turn_rad": sigma}),
@@ -89,8 +89,8 @@ def turn_findings(
             Finding(
                 FindingCode.RESIDUAL_ABOVE_NOISE,
                 Severity.WARNING,
-                f"the turns are missed by more than their noise explains: χ²/dof = {inflation:.1f} with {dof} degrees of "
-                "freedom; the error bars are widened by its root.",
+                f"the turns are missed by more than their noise explains: χ²/dof = {inflation:.1f} with {dof} degrees "
+                "of freedom; the error bars are widened by its root.",
                 "turns that were not the stated angle, a table that is not level, or a drifting zero",
                 "Repeat the turns against a wall.",
                 MappingProxyType({"chi2_per_dof": inflation, "dof": float(dof)}),

@@ -23,42 +23,44 @@ LARGEST_SIGMA_TURN = math.radians(20.0)
 
 @dataclass(frozen=True, eq=False)
 class TurnSystem:
-    """Turns with their known ``angles`` (k, 3), rad; ``S_w`` (3, 3) roughly, to turn ``sigma_turn`` (rad) into raw units."""
+    """Turns with known ``angles`` (k, 3), rad; a rough ``S_w`` (3, 3) turns ``sigma_turn`` (rad) into raw units."""
 
     measured: MeasuredTurns
     angles: FloatArray
     S_w: FloatArray
     sigma_turn: float = 0.0
 
-    def row_covariance(self, index: int) -> FloatArray:
-        """Covariance (3, 3) of turn ``index``: rate noise ``N² Δt``, wandering zero, and the error of the turn itself."""
-        return self._noise(float(self.measured.duration_s[index])) + self.sigma_turn**2 * self.S_w @ self.S_w.T
+    def covariances(self) -> FloatArray:
+        """(k, 3, 3) of the raw turns: rate noise ``N² Δt``, a zero that wanders between holds, the turn's own error."""
+        return self._noise(self.measured.duration_s) + self.sigma_turn**2 * self.S_w @ self.S_w.T
 
-    def _noise(self, duration_s: float) -> FloatArray:
-        return np.diag(self.measured.var_rate * duration_s + self.measured.zero_spread * duration_s**2)
+    def _noise(self, duration_s: FloatArray) -> FloatArray:
+        t = duration_s[:, None]
+        variance = self.measured.var_rate * t + self.measured.zero_spread * t**2
+        noise: FloatArray = variance[:, :, None] * np.eye(3)
+        return noise
 
     @staticmethod
-    def design(angle: FloatArray, duration_s: float) -> FloatArray:
-        """(3, 12) derivative of a raw turn with respect to (S_w row by row, b_w)."""
-        matrix = np.zeros((3, 12))
+    def designs(angles: FloatArray, duration_s: FloatArray) -> FloatArray:
+        """(k, 3, 12) derivative of the raw turns with respect to (S_w row by row, b_w)."""
+        matrix = np.zeros((len(angles), 3, 12))
         for i in range(3):
-            matrix[i, 3 * i : 3 * i + 3] = angle
-            matrix[i, 9 + i] = duration_s
+            matrix[:, i, 3 * i : 3 * i + 3] = angles
+            matrix[:, i, 9 + i] = duration_s
         return matrix
 
     def whitened(self, used: BoolArray, with_zeros: bool = True) -> tuple[FloatArray, FloatArray]:
         """Whitened design (n, 12) and raw turns (n,) of the used turns, then of the zero turns."""
-        designs, sides = [], []
-        for index in np.flatnonzero(used):
-            factor = np.linalg.inv(np.linalg.cholesky(self.row_covariance(int(index))))
-            designs.append(factor @ self.design(self.angles[index], float(self.measured.duration_s[index])))
-            sides.append(factor @ self.measured.raw_angle[index])
+        measured = self.measured
+        factor = np.linalg.inv(np.linalg.cholesky(self.covariances()[used]))
+        design = factor @ self.designs(self.angles[used], measured.duration_s[used])
+        side = (factor @ measured.raw_angle[used, :, None])[:, :, 0]
         if with_zeros:
-            for angle, duration in zip(self.measured.zero_angle, self.measured.zero_duration_s, strict=True):
-                factor = np.linalg.inv(np.linalg.cholesky(self._noise(float(duration))))
-                designs.append(factor @ self.design(np.zeros(3), float(duration)))
-                sides.append(factor @ angle)
-        return np.concatenate(designs), np.concatenate(sides)
+            factor = np.linalg.inv(np.linalg.cholesky(self._noise(measured.zero_duration_s)))
+            still = self.designs(np.zeros_like(measured.zero_angle), measured.zero_duration_s)
+            design = np.concatenate([design, factor @ still])
+            side = np.concatenate([side, (factor @ measured.zero_angle[:, :, None])[:, :, 0]])
+        return design.reshape(-1, 12), side.ravel()
 
     def residuals(self, fit: Solution) -> FloatArray:
         """(k, 3) measured minus predicted raw turns."""
@@ -119,22 +121,41 @@ def solve_zero_first(system: TurnSystem, used: BoolArray) -> Solution:
     return Solution(scale.reshape(3, 3), b_w, covariance, chi2, len(side) - 9 + 3 * len(rates) - 3)
 
 
-def left_out(system: TurnSystem, used: BoolArray, index: int) -> tuple[FloatArray, FloatArray] | None:
-    """Residual (3,) of a turn predicted by all others and its covariance (3, 3), raw; ``None`` when they cannot."""
-    others = used.copy()
-    others[index] = False
-    axes = {int(np.argmax(np.abs(angle))) for angle in system.angles[others]}
-    if len(axes) < 3:
-        return None
-    fit = solve(system, others)
-    design = system.design(system.angles[index], float(system.measured.duration_s[index]))
-    residual = system.measured.raw_angle[index] - design @ np.concatenate([fit.S_w.ravel(), fit.b_w])
-    return residual, system.row_covariance(index) + design @ fit.covariance @ design.T
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """Turns predicted by all others: raw ``residual`` (k, 3), its ``covariance`` (k, 3, 3), ``distance2`` (k,).
+
+    NaN where the others do not determine the prediction, and for turns that are not used.
+    """
+
+    residual: FloatArray
+    covariance: FloatArray
+    distance2: FloatArray
+
+
+def left_out(system: TurnSystem, used: BoolArray) -> LeftOut:
+    """Leave-one-out prediction in closed form: ``r₋ᵢ = (1 − Hᵢ)⁻¹ rᵢ`` with the block ``Hᵢ`` of the hat matrix."""
+    k = len(used)
+    out = LeftOut(np.full((k, 3), np.nan), np.full((k, 3, 3), np.nan), np.full(k, np.nan))
+    matrix, side = system.whitened(used)
+    fit = solve(system, used)
+    residual = side - matrix @ np.concatenate([fit.S_w.ravel(), fit.b_w])
+    factors = np.linalg.cholesky(system.covariances())
+    for row, index in enumerate(np.flatnonzero(used)):
+        block = slice(3 * row, 3 * row + 3)
+        remaining = np.eye(3) - matrix[block] @ fit.covariance @ matrix[block].T
+        if np.linalg.eigvalsh(remaining)[0] < 1e-6:
+            continue
+        without = np.linalg.inv(remaining)
+        out.residual[index] = factors[index] @ without @ residual[block]
+        out.covariance[index] = factors[index] @ without @ factors[index].T
+        out.distance2[index] = float(residual[block] @ without @ residual[block])
+    return out
 
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """What remains after screening: ``used`` turns, ``suspects`` that the others contradict, those of them ``removed``."""
+    """What remains: ``used`` turns, ``suspects`` that the others contradict, those of them that were ``removed``."""
 
     system: TurnSystem
     used: BoolArray
@@ -146,9 +167,9 @@ class Screened:
 def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) -> Screened:
     """Find turns that the others contradict, and the standard error of a turn when it is not given.
 
-    Each turn is predicted by all others. The scatter of a turn is first read from the median of these predictions, which
-    one wrong turn does not move; a turn far beyond it is a suspect. It is removed when two others about its axis remain to
-    say so. The scatter is then matched to χ² of the rest, zero where the rate noise explains it.
+    Each turn is predicted by all others. The scatter of a turn is first read from the median of these predictions,
+    which one wrong turn does not move; a turn far beyond it is a suspect. It is removed when two others about its
+    axis remain to say so. The scatter is then matched to χ² of the rest, zero where the rate noise explains it.
     """
     axes = np.argmax(np.abs(system.angles), axis=1)
     counts = {axis: int(np.count_nonzero(used & (axes == axis))) for axis in range(3)}
@@ -179,13 +200,8 @@ def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) ->
 
 
 def _distances(system: TurnSystem, used: BoolArray) -> dict[int, float]:
-    found = {}
-    for index in np.flatnonzero(used):
-        left = left_out(system, used, int(index))
-        if left is not None:
-            residual, covariance = left
-            found[int(index)] = float(residual @ np.linalg.solve(covariance, residual))
-    return found
+    distance2 = left_out(system, used).distance2
+    return {int(i): float(distance2[i]) for i in np.flatnonzero(np.isfinite(distance2))}
 
 
 def _with_scatter(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) -> TurnSystem:

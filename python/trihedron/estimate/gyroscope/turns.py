@@ -37,10 +37,27 @@ from trihedron.sensor_model import other_form, other_form_jacobian
 FloatArray = npt.NDArray[np.float64]
 Route = Literal["least-squares", "zero-turn-first"]
 
+TILT = 0.05
+"""Change of the accelerometer reading, in g, above which a move was no turn about the vertical."""
+
+
 def turns_from_segments(segments: Segments) -> tuple[list[Turn], list[tuple[int, int]]]:
-    """Every move as a turn of unknown angle and axis, every hold as a zero turn ``(start, stop)``."""
-    turns = [Turn(move.start, move.stop) for move in segments.moves if move.stop - move.start >= 2]
-    return turns, [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2]
+    """Moves as turns of unknown angle and axis, holds as zero turns ``(start, stop)``.
+
+    A turn on a table leaves the accelerometer's reading where it was; a move that changes it by more than 3 degrees (or
+    noise) put the case on another face and is no turn of method 1.
+    """
+    moves = [move for move in segments.moves if move.stop - move.start >= 2]
+    mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma
+    if mean is not None and sigma is not None and len(mean) > 1:
+        # Opposite faces are two g apart; with fewer poses the farthest pair underestimates g, which only makes it
+        # strict.
+        one_g = 0.5 * float(np.max(np.linalg.norm(mean[:, None] - mean[None], axis=2)))
+        allowed = max(TILT * one_g, 6.0 * float(np.linalg.norm(sigma)))
+        moves = [m for m in moves if np.linalg.norm(mean[m.hold_after] - mean[m.hold_before]) < allowed]
+    return [Turn(move.start, move.stop) for move in moves], [
+        (hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2
+    ]
 
 
 def calibrate_turns(
@@ -91,7 +108,8 @@ def calibrate_turns(
     known = identify_turns(measured, turns, nominal, quantum_rad)
     used = np.array([turn.is_used for turn in known], dtype=bool)
     _require_every_axis(known, used)
-    system = TurnSystem(measured, np.array([turn.vector for turn in known]), np.linalg.inv(nominal))
+    roughly = np.asarray(np.linalg.inv(nominal), dtype=np.float64)
+    system = TurnSystem(measured, np.array([turn.vector for turn in known]), roughly)
     screened = screen(system, used, sigma_turn_rad)
     system, used = screened.system, screened.used
     fit = solve_zero_first(system, used) if route == "zero-turn-first" else solve(system, used)
@@ -129,15 +147,11 @@ def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_])
 
 def _quality(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solution, S: FloatArray) -> FitQuality:
     """Deviation of each turn from its known angle, (k, 3) rad, in sample and with the turn left out of the fit."""
-    k = len(used)
-    residual = system.residuals(fit)[:k] @ S.T
-    noise = np.array([S @ system.row_covariance(i) @ S.T for i in range(k)])
-    held, held_sigma = np.full((k, 3), np.nan), np.full((k, 3), np.nan)
-    for index in np.flatnonzero(used):
-        left = left_out(system, used, int(index))
-        if left is not None:
-            held[index] = S @ left[0]
-            held_sigma[index] = np.sqrt(np.diag(S @ left[1] @ S.T))
+    residual = system.residuals(fit) @ S.T
+    noise = S @ system.covariances() @ S.T
+    left = left_out(system, used)
+    held = left.residual @ S.T
+    held_sigma = np.sqrt(np.einsum("mii->mi", S @ left.covariance @ S.T))
     n = 3 * int(np.count_nonzero(used))
     total = float(np.sum(residual[used] ** 2))
     dof = n - 9
