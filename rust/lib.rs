@@ -13,6 +13,7 @@ pub mod norm_invariant;
 pub mod poisson;
 pub mod rotation;
 pub mod simulate;
+pub mod stillness;
 
 #[cfg(feature = "python")]
 mod python;

@@ -6,6 +6,8 @@ mod gauss_newton;
 mod poisson;
 #[path = "kernels/rotation.rs"]
 mod rotation;
+#[path = "kernels/stillness.rs"]
+mod stillness;
 
 #[path = "kernels/kalman.rs"]
 mod kalman;

@@ -72,6 +72,9 @@ def integrate_raw_rate(
     rate_degree: int,
 ) -> tuple[FloatArray, list[float]]: ...
 
+# stillness
+def block_statistics(readings: FloatArray, length: int) -> tuple[FloatArray, FloatArray, npt.NDArray[np.uint32]]: ...
+
 # simulate
 def simulate_motion(
     segments: FloatArray,

@@ -18,6 +18,7 @@ mod kalman_norm;
 mod poisson;
 mod rotation;
 mod simulate;
+mod stillness;
 
 /// The one doorway: run a kernel without holding the interpreter, map its refusal to `ValueError`.
 pub(crate) fn run<T: Send>(
@@ -37,6 +38,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     kalman_norm::register(module)?;
     rotation::register(module)?;
     simulate::register(module)?;
+    stillness::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
     module.delattr("__all__")?;
     Ok(())

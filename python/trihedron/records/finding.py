@@ -51,6 +51,8 @@ class FindingCode(str, Enum):
     NO_INITIAL_REST = "no-initial-rest"
     HOLD_CREEPS = "hold-creeps"
     HOLD_BUMPED = "hold-bumped"
+    HOLD_UNSTEADY = "hold-unsteady"
+    SLOW_TURN = "slow-turn"
     FEW_POSES = "few-poses"
     NOT_STATIC = "not-static"
     # calibrate

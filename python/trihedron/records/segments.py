@@ -18,7 +18,8 @@ class Hold:
 
     ``[start, stop)`` are the samples that may be averaged: edges trimmed, so that no motion leaks in.
     ``[outer_start, outer_stop)`` is the stretch as detected, before trimming. ``disturbed`` are sub-ranges
-    ``(start, stop)`` inside ``[start, stop)`` that were bumped and are left out of means.
+    ``(start, stop)`` inside ``[start, stop)`` that were bumped and are left out of means. ``is_unsteady`` says that the
+    hold nowhere comes down to the sensor's own noise: held in the hand, or on a support that shakes.
     """
 
     index: int
@@ -27,6 +28,7 @@ class Hold:
     outer_start: int
     outer_stop: int
     disturbed: tuple[tuple[int, int], ...] = ()
+    is_unsteady: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.outer_start <= self.start < self.stop <= self.outer_stop:

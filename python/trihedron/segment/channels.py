@@ -1,0 +1,95 @@
+"""The log as short blocks of all channels: everything after this file works on blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.records import Recording
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+BLOCK_S = 0.1
+"""Shorter than any motion of a hand (a few hertz), long enough for a variance at 50 Hz and more."""
+BLOCK_SAMPLES = 5
+"""Fewer readings have no useful variance: slow logs get longer blocks."""
+WINDOW_BLOCKS = 5
+"""Stillness is judged over five blocks (half a second): long enough to see a turn of 1 deg/s in gravity, and shorter
+than the shortest hold by half."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """Blocks of ``length`` samples, accelerometer axes first, then gyro axes.
+
+    ``mean``, ``variance`` (m, c) in raw units; ``is_valid`` (m,) is false where readings are missing or time jumps;
+    ``quantum`` (c,) is the converter's step; ``is_gyroscope`` (c,).
+    """
+
+    length: int
+    step_s: float
+    mean: FloatArray
+    variance: FloatArray
+    is_valid: BoolArray
+    quantum: FloatArray
+    is_gyroscope: BoolArray
+
+    @property
+    def n_blocks(self) -> int:
+        """Number of whole blocks."""
+        return len(self.mean)
+
+    @property
+    def quantisation_variance(self) -> FloatArray:
+        """(c,) variance of rounding to a step, q²/12: no reading is known better than this."""
+        out: FloatArray = self.quantum**2 / 12.0
+        return out
+
+    def blocks(self, duration_s: float) -> int:
+        """Blocks in a duration, at least one."""
+        return max(1, round(duration_s / self.step_s))
+
+
+def split_into_blocks(recording: Recording) -> Channels:
+    """Block means and variances of every channel."""
+    length = max(BLOCK_SAMPLES, round(BLOCK_S * recording.rate_hz))
+    triads = [a for a in (recording.accelerometer, recording.gyroscope) if a is not None]
+    parts = [_core.block_statistics(a, length) for a in triads]
+    mean = np.hstack([p[0] for p in parts])
+    variance = np.hstack([p[1] for p in parts])
+    # Half of the readings must be there for a block to speak for its whole length.
+    is_valid = np.logical_and.reduce([2 * p[2] > length for p in parts]) & np.isfinite(variance).all(axis=1)
+    step_s = length / recording.rate_hz
+    if len(mean):
+        gap = np.diff(recording.time_s, prepend=recording.time_s[0]) > step_s
+        is_valid &= ~gap[: len(mean) * length].reshape(-1, length).any(axis=1)
+    gyroscope = np.repeat([a is recording.gyroscope for a in triads], 3)
+    return Channels(length, step_s, mean, variance, is_valid, np.concatenate([_quantum(a) for a in triads]), gyroscope)
+
+
+def _quantum(readings: FloatArray) -> FloatArray:
+    """(3,) smallest step between different readings of each axis, from at most 20000 readings."""
+    probe = readings[:: max(1, len(readings) // 20000)]
+    out = np.zeros(3)
+    for axis in range(3):
+        values = np.unique(probe[np.isfinite(probe[:, axis]), axis])
+        if len(values) > 1:
+            steps = np.diff(values)
+            # Rounding of the arithmetic that made the numbers is no step of a converter.
+            real = steps[steps > 1e-12 * np.abs(values).max()]
+            out[axis] = real.min() if len(real) else 0.0
+    return out
+
+
+def rolling_mean(values: FloatArray, width: int) -> FloatArray:
+    """(m, c) mean over ``width`` blocks centred on each; at the ends the nearest whole window."""
+    n = len(values)
+    width = min(width, n)
+    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
+    first = np.clip(np.arange(n) - width // 2, 0, n - width)
+    out: FloatArray = (total[first + width] - total[first]) / width
+    return out

@@ -1,0 +1,105 @@
+"""The sensor's own noise, from the log itself, and the two activities measured against it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, rolling_mean
+
+SEED_FRACTION = 0.02
+SEED_S = 1.0
+"""The quietest 2 % of a log, and no less than one second of it, is taken for still to begin with."""
+FALSE_ALARM = 1e-4
+"""Chance that a still window is called moving: once in minutes of windows, and so short a gap is closed again."""
+_MAX_ROUNDS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class Activity:
+    """How much every block moves, as logarithms of power over the sensor's own noise.
+
+    ``fast`` (m,) is the scatter inside blocks, ``slow`` (m,) the scatter of block means, both over the window round the
+    block and averaged over channels (log of a ratio: 0 is still). ``is_quiet`` (m,) is at the noise floor in both.
+    ``fast_limit``, ``slow_limit`` are the limits of a still sensor; ``white_variance`` and ``slow_variance`` (c,) the
+    floors themselves: variance of a reading inside a block, and of a block mean inside a window [raw unit squared].
+    """
+
+    fast: FloatArray
+    slow: FloatArray
+    fast_limit: float
+    slow_limit: float
+    is_quiet: BoolArray
+    white_variance: FloatArray
+    slow_variance: FloatArray
+
+    def is_wandering(self, channels: Channels) -> bool:
+        """The floor itself moves: block means scatter as those of a random walk do, or more.
+
+        For white noise the variance of block means is that of a reading over the block's length n; for a random walk
+        it is 5n times that (for a ramp 30n). A sensor at rest is near the first, a body in motion near the last; half
+        of the walk's is the limit, for the median channel.
+        """
+        live = (self.white_variance > 0.0) & (self.slow_variance > 0.0)
+        if not live.any():
+            return False
+        ratio = channels.length * self.slow_variance[live] / self.white_variance[live]
+        return bool(np.median(ratio) > 0.5 * WINDOW_BLOCKS * channels.length)
+
+
+def measure_activity(channels: Channels) -> Activity:
+    """Noise floor by growing the quietest windows until they hold every window that the same noise explains.
+
+    The floor of a channel is the median over the quiet windows, so neither axes of different noise nor a few
+    disturbed windows matter; the limit lies at the false-alarm quantile of a log-normal whose width is that of the
+    chi-square law, or the width of the quiet windows' lower half where that is larger (coloured noise, rounding).
+    """
+    width = min(WINDOW_BLOCKS, channels.n_blocks)
+    n_channels = channels.mean.shape[1]
+    rounding = channels.quantisation_variance
+    centre = np.nanmean(channels.mean[channels.is_valid], axis=0)
+    mean = np.where(channels.is_valid[:, None], channels.mean - centre, 0.0)
+    variance = np.where(channels.is_valid[:, None], channels.variance, 0.0)
+    whole = rolling_mean((~channels.is_valid)[:, None].astype(np.float64), width)[:, 0] == 0.0
+    inside = np.maximum(rolling_mean(variance, width), rounding)
+    between = (rolling_mean(mean**2, width) - rolling_mean(mean, width) ** 2) * (width / max(width - 1, 1))
+    between = np.maximum(between, rounding / channels.length)
+    alive = (np.median(inside[whole], axis=0) > 0.0) & (np.median(between[whole], axis=0) > 0.0)
+    if not alive.any():
+        nothing = np.zeros(channels.n_blocks)
+        return Activity(nothing, nothing, 0.0, 0.0, whole, rounding, rounding / channels.length)
+    tiny = 1e-12 * np.median(inside[whole], axis=0)[alive]
+    inside_alive, between_alive = inside[:, alive] + tiny, between[:, alive] + tiny / channels.length
+    total = np.log(inside_alive + between_alive).mean(axis=1)
+    total[~whole] = np.inf
+    n_seed = min(max(int(SEED_FRACTION * whole.sum()), channels.blocks(SEED_S)), int(whole.sum()))
+    quiet = total <= np.partition(total, n_seed - 1)[n_seed - 1]
+    n_alive = int(alive.sum())
+    freedom = (width * (channels.length - 1) * n_alive, max(width - 1, 1) * n_alive)
+    fast = slow = total
+    limits = [0.0, 0.0]
+    for _ in range(_MAX_ROUNDS):
+        fast = np.log((inside_alive / np.median(inside_alive[quiet], axis=0)).mean(axis=1))
+        slow = np.log((between_alive / np.median(between_alive[quiet], axis=0)).mean(axis=1))
+        limits = [_limit(a[quiet], nu) for a, nu in zip((fast, slow), freedom, strict=True)]
+        grown = whole & (fast <= limits[0]) & (slow <= limits[1])
+        if not grown.any() or np.array_equal(grown, quiet):
+            break
+        quiet = grown
+    white, wander = np.maximum(rounding, 0.0), rounding / channels.length
+    white = white.copy()
+    white[alive] = np.median(inside_alive[quiet], axis=0)
+    wander[alive] = np.median(between_alive[quiet], axis=0) / _chi2_median_ratio(max(width - 1, 1))
+    return Activity(fast, slow, limits[0], limits[1], quiet, white, wander + np.zeros(n_channels))
+
+
+def _limit(activity: FloatArray, freedom: int) -> float:
+    median = float(np.median(activity))
+    lower = median - float(np.quantile(activity, stats.norm.cdf(-1.0)))
+    return median + float(stats.norm.isf(FALSE_ALARM)) * max(lower, float(np.sqrt(2.0 / freedom)))
+
+
+def _chi2_median_ratio(freedom: int) -> float:
+    return float(stats.chi2.median(freedom) / freedom)

@@ -1,0 +1,116 @@
+"""The mean reading of every hold, and its standard error without the assumption of whiteness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron.records import Hold, Recording
+from trihedron.segment.channels import BoolArray, Channels, FloatArray
+from trihedron.segment.noise import MeanNoise, two_sample_differences
+from trihedron.segment.runs import Run
+
+OCTAVES = 4
+"""A hold's own excess noise is judged on stretches from a half down to a sixteenth of it: the four octaves that weigh
+in the error of its mean."""
+
+
+@dataclass(frozen=True, eq=False)
+class HoldMeans:
+    """``mean``, ``sigma`` (h, c) raw units; ``n_averaged`` (h,) finite samples."""
+
+    mean: FloatArray
+    sigma: FloatArray
+    n_averaged: np.ndarray[tuple[int], np.dtype[np.int64]]
+
+
+def average_holds(
+    recording: Recording, channels: Channels, runs: list[Run], holds: tuple[Hold, ...], noise: MeanNoise
+) -> HoldMeans:
+    """Means over the samples of each hold; their variances are the pooled law times the hold's own excess.
+
+    The excess of a hold is the ratio of its own two-sample variances to the pooled law over the four coarsest octaves;
+    being uncertain, it is drawn towards 1 by as many degrees of freedom as the ratios' scatter over holds leaves room
+    for (empirical Bayes). An unsteady hold is taken at its own word.
+    """
+    n_channels = channels.mean.shape[1]
+    mean = np.empty((len(holds), n_channels))
+    n_averaged = np.empty(len(holds), dtype=np.int64)
+    triads = [a for a in (recording.accelerometer, recording.gyroscope) if a is not None]
+    for k, hold in enumerate(holds):
+        rows = hold.samples() if hold.disturbed else slice(hold.start, hold.stop)
+        readings = [a[rows] for a in triads]
+        finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
+        n_averaged[k] = int(np.logical_and.reduce(finite).sum())
+        mean[k] = np.concatenate([_mean(r, f) for r, f in zip(readings, finite, strict=True)])
+    ratio, freedom = _excess(channels, runs, noise)
+    steady = np.array([not run.is_unsteady for run in runs], dtype=bool)
+    shrunk = ratio.copy()
+    for triad in range(n_channels // 3):
+        axes = slice(3 * triad, 3 * triad + 3)
+        # The three axes of a triad shake together: their excess is one number.
+        r, nu = ratio[:, axes].mean(axis=1), freedom * 3.0
+        prior = _prior_freedom(r[steady], nu[steady])
+        pulled = np.where(steady, (prior + nu * r) / (prior + nu), np.maximum(r, 1.0))
+        shrunk[:, axes] = pulled[:, None]
+    duration = np.array([sum(b - a for a, b in run.quiet_ranges()) * channels.step_s for run in runs])
+    variance = np.array([noise.variance(t) for t in duration]).reshape(len(runs), n_channels) * shrunk
+    variance += rounding_bias_variance(channels, runs)
+    return HoldMeans(mean, np.sqrt(variance), n_averaged)
+
+
+def _mean(readings: FloatArray, finite: BoolArray) -> FloatArray:
+    rows = readings if finite.all() else readings[finite]
+    # About the first row: a large offset costs no digits.
+    out: FloatArray = rows[0] + (rows - rows[0]).mean(axis=0)
+    return out
+
+
+def _excess(channels: Channels, runs: list[Run], noise: MeanNoise) -> tuple[FloatArray, FloatArray]:
+    """(h, c) own over pooled variance, and (h,) its degrees of freedom per channel."""
+    ratio = np.ones((len(runs), channels.mean.shape[1]))
+    freedom = np.zeros(len(runs))
+    for k, run in enumerate(runs):
+        total = np.zeros(channels.mean.shape[1])
+        count = 0
+        longest = max(b - a for a, b in run.quiet_ranges())
+        top = int(np.log2(max(longest // 2, 1)))
+        for octave in range(max(0, top - OCTAVES + 1), top + 1):
+            size = 2**octave
+            expected = noise.variance(size * channels.step_s) + 1e-6 * channels.quantisation_variance
+            expected = np.where(expected > 0.0, expected, 1.0)
+            for a, b in run.quiet_ranges():
+                squares = two_sample_differences(channels.mean[a:b], size)
+                total += (squares / expected).sum(axis=0)
+                count += len(squares)
+        if count:
+            ratio[k], freedom[k] = total / count, count
+    return ratio, freedom
+
+
+def _prior_freedom(ratio: FloatArray, freedom: FloatArray) -> float:
+    """Degrees of freedom of the holds' common law: few when holds truly differ, many when sampling explains it all."""
+    seen = freedom > 0.0
+    if seen.sum() < 2:
+        return 1e3
+    # E[(r-1)^2] = 2/ν of sampling + 2/ν0 of real differences; the median keeps one odd hold from deciding.
+    spread = float(np.mean(np.minimum((ratio[seen] - 1.0) ** 2, 4.0)))
+    real = spread - float(np.mean(2.0 / freedom[seen]))
+    return float(np.clip(2.0 / max(real, 1e-9), 1.0, 1e3))
+
+
+def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
+    """(c,) variance of what rounding leaves in a mean however long, where the noise is too small to dither.
+
+    The mean of a rounded Gaussian of deviation σ is off by (q/π) exp(-2π²σ²/q²) sin(2πx/q) to first order, and by
+    q/√12 rms where there is no noise at all.
+    """
+    if not runs:
+        return np.zeros(channels.mean.shape[1])
+    pooled = np.vstack([channels.variance[a:b] for run in runs for a, b in run.quiet_ranges()])
+    noise = np.maximum(np.nanmean(pooled, axis=0) - channels.quantisation_variance, 0.0)
+    q2 = np.where(channels.quantum > 0.0, channels.quantum**2, 1.0)
+    first = q2 / (2.0 * np.pi**2) * np.exp(-4.0 * np.pi**2 * noise / q2)
+    out: FloatArray = np.where(channels.quantum > 0.0, np.minimum(first, q2 / 12.0), 0.0)
+    return out

@@ -1,0 +1,188 @@
+"""One recording into holds and moves: the composition of the room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+
+from trihedron.records import Finding, Hold, Move, Recording, Segments
+from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, split_into_blocks
+from trihedron.segment.floor import Activity, measure_activity
+from trihedron.segment.judge import judge_log, judge_runs
+from trihedron.segment.means import average_holds
+from trihedron.segment.noise import MeanNoise, pool_mean_noise
+from trihedron.segment.runs import (
+    Run,
+    find_unsteady,
+    join_quiet,
+    loose_blocks,
+    ranges_of,
+    trim_edges,
+    turning_blocks,
+)
+from trihedron.units import AccelerationUnit
+
+Progress = Callable[[float, str], None]
+
+
+def segment_recording(recording: Recording, *, progress: Progress | None = None) -> Segments:
+    """Find still poses and the moves between them; no threshold is asked for, the sensor's own noise sets it.
+
+    Parameters
+    ----------
+    recording : Recording
+        Either sensor, or both (both vote).
+    progress : callable
+        Called with (done fraction, text).
+
+    Returns
+    -------
+    Segments
+        Weak answers (too few poses, a log that never rests, creep, bumps) are findings in it.
+
+    Notes
+    -----
+    See ``docs/segmentation.md``.
+    """
+    report = progress or (lambda _done, _text: None)
+    report(0.0, "noise of short blocks")
+    channels = split_into_blocks(recording)
+    if channels.is_valid.sum() < WINDOW_BLOCKS:
+        return _nothing_found(recording, channels)
+    activity = measure_activity(channels)
+    if activity.is_wandering(channels):
+        return _nothing_found(recording, channels)
+    report(0.4, "still stretches")
+    turning = turning_blocks(channels, activity.is_quiet)
+    quiet = activity.is_quiet & ~turning
+    loose = loose_blocks(activity, channels.is_valid) & ~turning
+    runs = _find_runs(recording, channels, quiet, loose)
+    report(0.7, "means and their errors")
+    return _describe(recording, channels, activity, runs, turning)
+
+
+def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose: BoolArray) -> list[Run]:
+    seen = [r for r in ranges_of(quiet) if r[1] - r[0] >= WINDOW_BLOCKS] or ranges_of(quiet)
+    if not seen:
+        return []
+    noise = pool_mean_noise(channels, seen, is_robust=True)
+    steady = [trim_edges(channels, run, noise) for run in join_quiet(channels, quiet, loose, noise)]
+    unsteady = find_unsteady(channels, loose, steady, _gravity_reading(recording, channels))
+    return sorted([*steady, *unsteady], key=lambda run: run.first)
+
+
+def _gravity_reading(recording: Recording, channels: Channels) -> float | None:
+    """Roughly what |g| reads in raw units: known by the unit, or half the widest range of the calmer readings."""
+    if recording.accelerometer is None:
+        return None
+    if recording.accelerometer_unit is AccelerationUnit.M_S2:
+        return 9.8
+    if recording.accelerometer_unit is AccelerationUnit.G:
+        return 1.0
+    low, high = np.quantile(channels.mean[channels.is_valid][:, ~channels.is_gyroscope], [0.01, 0.99], axis=0)
+    return float((high - low).max() / 2.0) or None
+
+
+def _describe(
+    recording: Recording, channels: Channels, activity: Activity, runs: list[Run], turning: BoolArray
+) -> Segments:
+    steady = [r for run in runs if not run.is_unsteady for r in run.quiet_ranges()]
+    pooled = steady or [r for run in runs for r in run.quiet_ranges()]
+    noise = pool_mean_noise(channels, pooled) if pooled else _no_noise(channels)
+    holds = tuple(_hold(k, run, runs, channels, recording.n_samples) for k, run in enumerate(runs))
+    moves = tuple(Move(k, k, k + 1, before.stop, after.start) for k, (before, after) in enumerate(pairwise(holds)))
+    means = average_holds(recording, channels, runs, holds, noise)
+    if pooled:
+        white = np.vstack([channels.variance[a:b] for a, b in pooled]).mean(axis=0)
+    else:
+        white = activity.white_variance
+    sigma = np.sqrt(np.maximum(white, channels.quantisation_variance))
+    time_s = recording.time_s
+    findings: list[Finding] = [
+        *judge_runs(recording, channels, runs, holds, noise),
+        *judge_log(recording, channels, runs, holds, turning),
+    ]
+    return _assemble(
+        recording,
+        holds,
+        moves,
+        sigma,
+        (means.mean, means.sigma),
+        means.n_averaged,
+        np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in holds], dtype=np.float64),
+        np.array([time_s[h.stop - 1] - time_s[h.start] + 1.0 / recording.rate_hz for h in holds], dtype=np.float64),
+        tuple(findings),
+    )
+
+
+def _hold(index: int, run: Run, runs: list[Run], channels: Channels, n_samples: int) -> Hold:
+    m = channels.length
+    # Quiet blocks are centres of quiet windows: the window reaches two blocks further on either side.
+    reach = WINDOW_BLOCKS // 2
+    lower = runs[index - 1].last if index else 0
+    upper = runs[index + 1].first if index + 1 < len(runs) else channels.n_blocks
+    outer_start = max(run.outer_first - reach, lower, 0)
+    outer_stop = min(run.outer_last + reach, upper, channels.n_blocks)
+    stop = run.last * m
+    bumps = tuple((a * m, b * m) for a, b in run.bumps)
+    return Hold(
+        index,
+        run.first * m,
+        min(stop, n_samples),
+        min(outer_start, run.first) * m,
+        max(outer_stop, run.last) * m,
+        bumps,
+        run.is_unsteady,
+    )
+
+
+def _no_noise(channels: Channels) -> MeanNoise:
+    zero = np.zeros(channels.mean.shape[1])
+    return MeanNoise(zero, zero, zero)
+
+
+def _nothing_found(recording: Recording, channels: Channels) -> Segments:
+    n_channels = channels.mean.shape[1]
+    empty = np.zeros((0, n_channels))
+    none = np.zeros(0)
+    findings = tuple(judge_log(recording, channels, [], (), np.zeros(0, dtype=bool)))
+    sigma = np.full(n_channels, np.nan)
+    return _assemble(recording, (), (), sigma, (empty, empty), np.zeros(0, dtype=np.int64), none, none, findings)
+
+
+def _assemble(
+    recording: Recording,
+    holds: tuple[Hold, ...],
+    moves: tuple[Move, ...],
+    sigma: FloatArray,
+    means: tuple[FloatArray, FloatArray],
+    n_averaged: np.ndarray[tuple[int], np.dtype[np.int64]],
+    time_mid_s: FloatArray,
+    duration_s: FloatArray,
+    findings: tuple[Finding, ...],
+) -> Segments:
+    """Channels back to sensors."""
+    accelerometer = slice(0, 3) if recording.accelerometer is not None else None
+    gyroscope = None
+    if recording.gyroscope is not None:
+        gyroscope = slice(3, 6) if accelerometer is not None else slice(0, 3)
+
+    def part(values: FloatArray, which: slice | None) -> FloatArray | None:
+        return None if which is None else np.ascontiguousarray(values[..., which])
+
+    return Segments(
+        holds=holds,
+        moves=moves,
+        accelerometer_sigma=part(sigma, accelerometer),
+        gyroscope_sigma=part(sigma, gyroscope),
+        accelerometer_mean=part(means[0], accelerometer),
+        gyroscope_mean=part(means[0], gyroscope),
+        accelerometer_sigma_mean=part(means[1], accelerometer),
+        gyroscope_sigma_mean=part(means[1], gyroscope),
+        n_averaged=n_averaged,
+        time_mid_s=time_mid_s,
+        duration_s=duration_s,
+        findings=findings,
+    )

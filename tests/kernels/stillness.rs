@@ -1,0 +1,41 @@
+//! Blocks: the mean and the variance that the definition gives, gaps skipped, offsets harmless.
+
+use trihedron::stillness::block_statistics;
+
+#[test]
+fn blocks_give_mean_and_unbiased_variance() {
+    let readings: Vec<f64> = (0..6)
+        .flat_map(|k| [f64::from(k), 1.0, -2.0 * f64::from(k)])
+        .collect();
+    let blocks = block_statistics(&readings, 3).expect("legal question");
+    assert_eq!(blocks.mean, vec![[1.0, 1.0, -2.0], [4.0, 1.0, -8.0]]);
+    assert_eq!(blocks.variance, vec![[1.0, 0.0, 4.0], [1.0, 0.0, 4.0]]);
+    assert_eq!(blocks.count, vec![3, 3]);
+}
+
+#[test]
+fn rows_that_are_missing_are_skipped() {
+    let nan = f64::NAN;
+    let readings = [
+        1.0, 1.0, 1.0, 9.0, nan, 9.0, 3.0, 3.0, 3.0, nan, nan, nan, nan, nan, nan, 5.0, 5.0, nan,
+    ];
+    let blocks = block_statistics(&readings, 3).expect("legal question");
+    assert_eq!(blocks.count, vec![2, 0]);
+    assert_eq!(blocks.mean[..1], [[2.0; 3]]);
+    assert_eq!(blocks.variance[..1], [[2.0; 3]]);
+    assert!(blocks.mean[1].iter().all(|x| x.is_nan()));
+}
+
+#[test]
+fn a_large_offset_costs_no_digits_of_the_variance() {
+    let readings: Vec<f64> = (0..8).flat_map(|k| [1e9 + f64::from(k % 2); 3]).collect();
+    let blocks = block_statistics(&readings, 8).expect("legal question");
+    // Eight readings alternating by one: 8 * 0.25 / 7.
+    assert!((blocks.variance[0][0] - 2.0 / 7.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_block_of_one_is_refused() {
+    assert!(block_statistics(&[1.0, 2.0, 3.0], 1).is_err());
+    assert!(block_statistics(&[1.0, 2.0], 2).is_err());
+}
