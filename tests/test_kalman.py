@@ -82,7 +82,10 @@ def covariance_by_hand(mix, start, hold):
     terms["slope"] = terms.pop("ramp", 0.0)
     flicker, rates = terms.pop("flicker", 0.0), terms.pop("rates", ())
     sigma = flicker * np.sqrt(np.log(10.0) / np.pi)
-    return covariance_of_hold_means(start, hold, gauss_markov=[(beta, sigma) for beta in rates], **terms)
+    ends = {min(rates, default=0.0), max(rates, default=0.0)}
+    # The slowest and fastest process also stand for what lies beyond them.
+    processes = [(beta, sigma * np.sqrt(1.25 if beta in ends else 1.0)) for beta in rates]
+    return covariance_of_hold_means(start, hold, gauss_markov=processes, **terms)
 
 
 @pytest.mark.parametrize("mix", MIXES.values(), ids=MIXES)

@@ -46,6 +46,12 @@ pub struct ShapingModel {
 /// Peak of the Allan variance of a Gauss-Markov process of unit variance, at τ = 1.893/β (docs/kalman.md, eq. 6).
 const GAUSS_MARKOV_PEAK: f64 = 0.381_138_658;
 
+/// Variance of the slowest and the fastest of several Gauss-Markov processes, over that of the others.
+///
+/// With one process per decade from 0.3/T to 6/hold the Allan deviation then follows 0.664 B within 2 % between one hold
+/// and a third of the session T (benches/kalman_shaping.py).
+const END_SHARE: f64 = 1.25;
+
 /// The continuous system behind a [`ShapingModel`], with states of unit amplitude: `n(t) = h·s`.
 #[derive(Debug, Clone)]
 pub struct Shaping {
@@ -135,19 +141,24 @@ impl ShapingModel {
         Ok(())
     }
 
-    /// Standard deviation of each Gauss-Markov process that stands for flicker.
+    /// Standard deviations of the Gauss-Markov processes that stand for flicker.
     ///
     /// One process: the peak of its Allan variance equals the floor `(2 ln 2/π) B²`. Several, with rates in a geometric
-    /// series of ratio ρ: `σ² = B² ln ρ/π` makes the sum of their spectra `B²/(2πf)` between the extreme rates.
-    fn flicker_sigma(&self) -> f64 {
+    /// series of ratio ρ: `σ² = B² ln ρ/π` makes the sum of their spectra `B²/(2πf)` between the extreme rates; the first
+    /// and the last also stand for what lies beyond them ([`END_SHARE`]).
+    fn flicker_sigmas(&self) -> Vec<f64> {
         let rates = &self.flicker_rates;
-        let variance = if rates.len() == 1 {
-            2.0 * LN_2 / PI / GAUSS_MARKOV_PEAK
-        } else {
-            let span = (rates[rates.len() - 1] / rates[0]).ln();
-            span / (rates.len() - 1) as f64 / PI
+        let n = rates.len();
+        let variance = |i: usize| {
+            if n == 1 {
+                return 2.0 * LN_2 / PI / GAUSS_MARKOV_PEAK;
+            }
+            let share = if i == 0 || i + 1 == n { END_SHARE } else { 1.0 };
+            share * (rates[n - 1] / rates[0]).ln() / (n - 1) as f64 / PI
         };
-        self.terms.flicker * variance.sqrt()
+        (0..n)
+            .map(|i| self.terms.flicker * variance(i).sqrt())
+            .collect()
     }
 
     /// The continuous system.
@@ -167,11 +178,12 @@ impl ShapingModel {
         let mut qc = DMatrix::zeros(n, n);
         let mut h = DVector::zeros(n);
         let mut p0 = DMatrix::zeros(n, n);
+        let sigmas = self.flicker_sigmas();
         for i in 0..n_flicker {
             let beta = self.flicker_rates[i];
             f[(i, i)] = -beta;
             qc[(i, i)] = 2.0 * beta;
-            h[i] = self.flicker_sigma();
+            h[i] = sigmas[i];
             p0[(i, i)] = 1.0;
         }
         let mut i = n_flicker;

@@ -9,8 +9,9 @@ import numpy as np
 from trihedron import _core
 from trihedron.records.kalman import AxisNoise
 
-RATES_PER_DECADE = 1.5
-"""Gauss-Markov processes per decade: their Allan deviation follows flicker within 1.5 % (benches/kalman_shaping.py)."""
+SLOWEST_PER_SESSION, FASTEST_PER_HOLD = 0.3, 6.0
+"""Extreme inverse correlation times, over those of the session and of a hold. With one Gauss-Markov process per decade
+between them the Allan deviation follows flicker within 2 % (benches/kalman_shaping.py)."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,8 @@ def shaping_model(
     """Compiled shaping filter of one axis for a session of ``session_s`` with holds of about ``hold_s``."""
     rates = options.flicker_rates_per_s
     if not rates:
-        slow, fast = 0.3 / session_s, 3.0 / hold_s
-        n = max(2, int(np.ceil(np.log10(fast / slow) * RATES_PER_DECADE)) + 1)
+        slow, fast = SLOWEST_PER_SESSION / session_s, FASTEST_PER_HOLD / hold_s
+        n = max(2, int(np.ceil(np.log10(fast / slow))) + 1)
         rates = tuple(float(rate) for rate in np.geomspace(slow, fast, n))
     return _core.AxisKalmanModel(
         quantisation=noise.quantisation,
