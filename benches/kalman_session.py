@@ -56,6 +56,7 @@ MIXES = (
     Mix("white + walk to 0.11", white=WHITE, walk=SIGMA / np.sqrt(SESSION_S)),
     Mix("white + walk to 0.55", white=WHITE, walk=5 * SIGMA / np.sqrt(SESSION_S)),
     Mix("white/10 + walk to 0.55", white=WHITE / 10, walk=5 * SIGMA / np.sqrt(SESSION_S)),
+    Mix("white/30 + walk to 1.1", white=WHITE / 30, walk=10 * SIGMA / np.sqrt(SESSION_S)),
     Mix("white + ramp to 0.11", white=WHITE, ramp=SIGMA / SESSION_S),
     Mix("white + ramp to 0.55", white=WHITE, ramp=5 * SIGMA / SESSION_S),
     Mix("white/10 + ramp to 0.55", white=WHITE / 10, ramp=5 * SIGMA / SESSION_S),

@@ -1,22 +1,22 @@
 """Calibration by Kalman filter in known attitudes: against closed forms, exact arithmetic and simulated truth."""
 
+import functools
+
 import numpy as np
 import pytest
 from scipy import stats
 
 from trihedron import _core
 from trihedron.estimate.kalman import (
-    DIVIDING_HEAD_POSES,
     Goal,
     LiveCalibration,
     Prior,
     ShapingOptions,
     calibrate_with_references,
     normalised_error_squared,
-    pose_table_from_angles,
 )
 from trihedron.estimate.kalman.shaping import shaping_model
-from trihedron.records import AxisNoise, FindingCode, PoseTable
+from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
 from twins_kalman import (
     ARTICLE_CONSTANTS,
     GRAVITY,
@@ -147,16 +147,21 @@ def test_factors_keep_their_digits_where_the_printed_covariance_form_loses_them_
     assert np.max(np.abs(naive / [float(v) for v in exact_variance] - 1.0)) > 0.5
 
 
+START, HOLD = 10.0 * np.arange(324), np.full(324, 5.0)
+
+
+@functools.cache
+def noise_factor(noise):
+    """(324, 324) root of the covariance of the article's poses: 5 s each with 5 s between."""
+    model = shaping_model(noise, ShapingOptions(), session_s=float(START[-1] + 5.0), hold_s=5.0)
+    return np.linalg.cholesky(_core.kalman_noise_covariance(model, START, HOLD, np.zeros(324)))
+
+
 def article_readings(seed, noise):
-    """One axis' noise drawn from the model of hold means; 324 poses of 5 s with 5 s between."""
-    n = len(DIVIDING_HEAD_POSES)
-    start, hold = 10.0 * np.arange(n), np.full(n, 5.0)
-    options = ShapingOptions()
-    model = shaping_model(noise, options, session_s=float(start[-1] + 5.0), hold_s=5.0)
-    c = _core.kalman_noise_covariance(model, start, hold, np.zeros(n))
-    draws = np.linalg.cholesky(c) @ np.random.default_rng(seed).standard_normal((n, 3))
-    table = pose_table_from_angles(*DIVIDING_HEAD_POSES.T, gravity_m_s2=GRAVITY)
-    return table, table.specific_force @ ARTICLE_CONSTANTS[:, :3].T + ARTICLE_CONSTANTS[:, 3] + draws, start, hold
+    """References and readings of the article's session, noise drawn from the model of hold means."""
+    draws = noise_factor(noise) @ np.random.default_rng(seed).standard_normal((324, 3))
+    table = PoseTable.from_angles(*DIVIDING_HEAD_ANGLES_DEG.T, gravity_m_s2=GRAVITY)
+    return table, table.specific_force @ ARTICLE_CONSTANTS[:, :3].T + ARTICLE_CONSTANTS[:, 3] + draws, START, HOLD
 
 
 ARTICLE_MIX = AxisNoise(white=0.9 * SIGMA * 5**0.5, flicker=0.3 * SIGMA, walk=SIGMA / 60.0, ramp=SIGMA / 3000.0)
@@ -183,8 +188,8 @@ def test_the_articles_experiment_gives_its_constants_back_with_honest_error_bars
 def test_the_articles_experiment_has_its_absolute_error():
     """12 bits over 5 V are 0.11 m/s² rms and ±0.19 m/s² at most: the article's two figures are one converter's step."""
     step = 5.0 / 4096
-    n = len(DIVIDING_HEAD_POSES)
-    table = pose_table_from_angles(*DIVIDING_HEAD_POSES.T, gravity_m_s2=GRAVITY)
+    n = len(DIVIDING_HEAD_ANGLES_DEG)
+    table = PoseTable.from_angles(*DIVIDING_HEAD_ANGLES_DEG.T, gravity_m_s2=GRAVITY)
     clean = table.specific_force @ ARTICLE_CONSTANTS[:, :3].T + ARTICLE_CONSTANTS[:, 3]
     readings = np.round(clean / step) * step
     result = calibrate_with_references(
@@ -312,14 +317,14 @@ def test_a_plan_that_cannot_reach_the_goal_is_said_so():
 
 
 def test_angles_become_the_specific_force_of_the_dividing_head():
-    assert DIVIDING_HEAD_POSES.shape == (324, 2)
-    table = pose_table_from_angles([0.0, 90.0, 0.0], [0.0, 0.0, 90.0], gravity_m_s2=GRAVITY, sigma_angle_deg=0.1)
+    assert DIVIDING_HEAD_ANGLES_DEG.shape == (324, 2)
+    table = PoseTable.from_angles([0.0, 90.0, 0.0], [0.0, 0.0, 90.0], gravity_m_s2=GRAVITY, sigma_angle_deg=0.1)
     np.testing.assert_allclose(table.specific_force / GRAVITY, [[0, 0, 1], [-1, 0, 0], [0, 1, 0]], atol=1e-15)
     assert table.sigma_m_s2 == pytest.approx(GRAVITY * np.radians(0.1))
 
 
 def test_one_angle_alone_does_not_determine_an_axis():
-    table = pose_table_from_angles(np.arange(0.0, 360.0, 10.0), gravity_m_s2=GRAVITY)
+    table = PoseTable.from_angles(np.arange(0.0, 360.0, 10.0), gravity_m_s2=GRAVITY)
     with pytest.raises(ValueError, match="do not determine the four constants"):
         calibrate_with_references(
             table.specific_force, table, AxisNoise(white=0.01), start_s=10.0 * np.arange(36), hold_s=5.0

@@ -218,6 +218,12 @@ impl ShapingModel {
         let t = &self.terms;
         t.white * t.white / hold + undithered_variance(t.resolution, self.dither)
     }
+
+    /// Variance of a reading without the slow terms: white, rounding, and the quantisation errors at both ends.
+    #[must_use]
+    pub fn fast_variance(&self, hold: f64) -> f64 {
+        self.white_variance(hold) + 2.0 * (self.terms.quantisation / hold).powi(2)
+    }
 }
 
 /// Part of the rounding error of a converter of step `resolution` that averaging does not remove, as a variance.

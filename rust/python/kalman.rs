@@ -141,6 +141,11 @@ impl AxisKalmanModel {
     fn white_variance(&self, hold_s: f64) -> f64 {
         self.inner.white_variance(hold_s)
     }
+
+    /// Variance of a reading without the slow terms.
+    fn fast_variance(&self, hold_s: f64) -> f64 {
+        self.inner.fast_variance(hold_s)
+    }
 }
 
 fn prior(

@@ -13,6 +13,7 @@ from trihedron.records.calibration import (
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.kalman import (
     CONSTANT_NAMES,
+    DIVIDING_HEAD_ANGLES_DEG,
     AxisKalmanResult,
     AxisNoise,
     Consistency,
@@ -28,6 +29,7 @@ from trihedron.records.truth import TrueSegment, Truth
 
 __all__ = [
     "CONSTANT_NAMES",
+    "DIVIDING_HEAD_ANGLES_DEG",
     "PARAMETER_NAMES",
     "AxisKalmanResult",
     "AxisNoise",

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from trihedron.records.calibration import FloatArray, SensorCalibration
 from trihedron.records.finding import Finding, Severity
+from trihedron.units import radians_from_degrees
 
 CONSTANT_NAMES: tuple[str, ...] = ("kx", "ky", "kz", "U0")
 """Order of an axis' constants: sensitivity to the three reference components [raw/(m/s²)], zero reading [raw]."""
@@ -43,17 +44,70 @@ class AxisNoise:
         return AxisNoise(**{name: factor * value for name, value in vars(self).items()})
 
 
+def _dividing_head() -> FloatArray:
+    roll, pitch = np.meshgrid(np.arange(0.0, 81.0, 10.0), np.arange(0.0, 351.0, 10.0), indexing="ij")
+    angles: FloatArray = np.column_stack([pitch.ravel(), roll.ravel()])
+    angles.setflags(write=False)
+    return angles
+
+
+DIVIDING_HEAD_ANGLES_DEG: FloatArray = _dividing_head()
+"""(324, 2) pitch and roll of an optical dividing head: a full circle of pitch by 10° at each roll of 0, 10 … 80°."""
+
+
 @dataclass(frozen=True, eq=False)
 class PoseTable:
     """Known attitudes: specific force (n, 3) [m/s²] along the reference axes while the sensor stands still.
 
     ``sigma_m_s2`` is the uncertainty of each component (angle errors of the head times g). ``source`` says where the
-    table came from, ``has_two_axes`` whether both angles vary.
+    table came from. ``hold`` (n,) says which still pose of the log each row belongs to, ``start_s``, ``stop_s`` (n,)
+    when it was held; without either the rows are the still poses in order.
     """
 
     specific_force: FloatArray
     sigma_m_s2: float = 0.0
     source: str = "memory"
+    hold: npt.NDArray[np.int64] | None = None
+    start_s: FloatArray | None = None
+    stop_s: FloatArray | None = None
+
+    @classmethod
+    def from_angles(
+        cls,
+        pitch_deg: npt.ArrayLike,
+        roll_deg: npt.ArrayLike = 0.0,
+        *,
+        gravity_m_s2: float,
+        sigma_angle_deg: float = 0.0,
+        source: str = "memory",
+    ) -> PoseTable:
+        """Specific force in the body for known pitch and roll (docs/kalman.md, eq. 1).
+
+        The body's z axis points up at zero angles; pitch θ turns about y, then roll φ about the new x:
+        ``f = g (−sin θ, cos θ sin φ, cos θ cos φ)``. A head with one axis gives one angle and zero for the other.
+        An angle is set with standard error ``sigma_angle_deg``, which makes the reference uncertain by ``g σ``.
+
+        Parameters
+        ----------
+        pitch_deg, roll_deg : (n,) or scalar
+            Angles, degrees.
+
+        Raises
+        ------
+        ValueError
+            When the angles do not form one list of finite numbers.
+        """
+        pitch, roll = (
+            np.atleast_1d(np.asarray(pitch_deg, dtype=float)),
+            np.atleast_1d(np.asarray(roll_deg, dtype=float)),
+        )
+        if pitch.ndim != 1 or roll.ndim != 1 or (len(pitch) != len(roll) and 1 not in (len(pitch), len(roll))):
+            raise ValueError(f"pitch and roll must have one entry per pose each, got {pitch.shape} and {roll.shape}")
+        if not (np.isfinite(gravity_m_s2) and gravity_m_s2 > 0):
+            raise ValueError(f"gravity must be positive, got {gravity_m_s2} m/s²")
+        theta, phi = np.broadcast_arrays(np.radians(pitch), np.radians(roll))
+        f = np.column_stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
+        return cls(gravity_m_s2 * f, sigma_m_s2=gravity_m_s2 * radians_from_degrees(sigma_angle_deg), source=source)
 
     def __post_init__(self) -> None:
         f = np.array(self.specific_force, dtype=np.float64)
@@ -66,6 +120,10 @@ class PoseTable:
             raise ValueError(f"sigma_m_s2 must be zero or positive, got {self.sigma_m_s2}")
         f.setflags(write=False)
         object.__setattr__(self, "specific_force", f)
+        for name in ("hold", "start_s", "stop_s"):
+            column = getattr(self, name)
+            if column is not None and np.shape(column) != (len(f),):
+                raise ValueError(f"{name} must have one entry per pose ({len(f)}), got shape {np.shape(column)}")
 
     def __len__(self) -> int:
         return len(self.specific_force)

@@ -5,11 +5,9 @@ from trihedron.estimate.kalman.guide import Goal
 from trihedron.estimate.kalman.live import LiveCalibration
 from trihedron.estimate.kalman.norm_invariant import LiveNormCalibration, NormStart, calibrate_without_references
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
-from trihedron.estimate.kalman.reference import DIVIDING_HEAD_POSES, pose_table_from_angles
 from trihedron.estimate.kalman.shaping import ShapingOptions
 
 __all__ = [
-    "DIVIDING_HEAD_POSES",
     "Goal",
     "LiveCalibration",
     "LiveNormCalibration",
@@ -20,5 +18,4 @@ __all__ = [
     "calibrate_without_references",
     "check_innovations",
     "normalised_error_squared",
-    "pose_table_from_angles",
 ]

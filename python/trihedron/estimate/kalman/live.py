@@ -55,7 +55,7 @@ class LiveCalibration:
         self._hold, self._pause = hold_s, pause_s
         options = options or ShapingOptions()
         models = [shaping_model(n, options, session_s=session_s, hold_s=hold_s) for n in noise_per_axis(noise)]
-        prior = prior or Prior.diffuse([model.white_variance(hold_s) ** 0.5 for model in models])
+        prior = prior or Prior.diffuse([model.fast_variance(hold_s) ** 0.5 for model in models])
         self._filters = [
             _core.AxisKalman(model, prior.mean[i].copy(), prior.sigma[i].copy(), prior.walk[i].copy())
             for i, model in enumerate(models)

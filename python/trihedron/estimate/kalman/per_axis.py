@@ -114,7 +114,7 @@ def calibrate_with_references(
         # An angle error moves the reference sideways by σ; the axis' own sensitivity turns it into raw units.
         extra = extra + (table.sigma_m_s2 * _sensitivity(z, f)) ** 2
     if prior is None:
-        prior = Prior.diffuse([max(model.white_variance(float(np.min(hold))), 1e-300) ** 0.5 for model in models])
+        prior = Prior.diffuse([model.fast_variance(float(np.min(hold))) ** 0.5 for model in models])
 
     axes: list[AxisKalmanResult] = []
     findings: list[Finding] = []
@@ -164,8 +164,8 @@ def _one_axis(
     tracks = [ConstantsTrack("kalman", constants, stated)]
     batch: dict[str, tuple[FloatArray, FloatArray]] = {}
     if with_baselines:
-        # Ordinary least squares is told the white noise only, which is all it can use.
-        white = model.white_variance(float(np.median(hold))) + float(np.median(extra))
+        # Ordinary least squares is told the scatter of one reading, which is all it can use.
+        white = model.fast_variance(float(np.median(hold))) + float(np.median(extra))
         recursive = _core.kalman_least_squares(z, f, white, mean, sigma)
         ols, ols_cov, gls, gls_cov, track, track_sigma = _core.kalman_generalised_least_squares(
             model, mean, sigma, z, f, start, hold, extra
