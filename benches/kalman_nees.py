@@ -1,9 +1,9 @@
 """Are the error bars right? `PYTHONPATH=python python benches/kalman_nees.py [seeds]` (200 seeds: about 1 min).
 
 Mean of the normalised estimation error squared over seeds after 60, 100, 200 and 324 poses (expected 4, with its 99 %
-interval), share of final errors within 1, 2 and 3 sigma, mean of the normalised innovation squared (expected 1), and in how many seeds the
-NIS test and the whiteness test raise an alarm at 1 %.
-Noise is simulated sample by sample, apart from the filter's model (`kalman_session.py`).
+interval), share of final errors within 1, 2 and 3 sigma, mean of the normalised innovation squared (expected 1), and in
+how many seeds the NIS test and the whiteness test raise an alarm at 1 %. Noise is simulated sample by sample, apart
+from the filter's model (`kalman_session.py`).
 """
 
 import sys
