@@ -263,21 +263,14 @@ pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Resul
 /// Which half axes no reading points to within 55° (the angle from an axis to the corner of a cube), in words.
 #[must_use]
 pub fn missing_directions(u: &[Vector3<f64>]) -> String {
-    // Measured from the middle of the range: the mean leans towards wherever there are more poses.
-    let low = u
-        .iter()
-        .fold(Vector3::repeat(f64::INFINITY), |a, b| a.inf(b));
-    let high = u
-        .iter()
-        .fold(Vector3::repeat(f64::NEG_INFINITY), |a, b| a.sup(b));
-    let middle = (low + high) / 2.0;
-    let reach = (high - low).max() / 2.0;
+    // Seen from the centre of the sphere through them: mean and mid-range lean towards wherever there are more poses.
+    let centre = fit_sphere(u).map_or_else(Vector3::zeros, |(centre, _)| centre);
     let mut missing = Vec::new();
     for axis in 0..3 {
         for (sign, word) in [(1.0, "up"), (-1.0, "down")] {
             let seen = u.iter().any(|point| {
-                let from_middle = point - middle;
-                sign * from_middle[axis] > 0.57 * from_middle.norm().max(0.5 * reach)
+                let from_centre = point - centre;
+                sign * from_centre[axis] > 0.57 * from_centre.norm()
             });
             if !seen {
                 missing.push(format!("axis {} {word}", axis + 1));

@@ -1,7 +1,11 @@
 //! Property and derivative tests of the kernels, one module per room.
 
+#[path = "kernels/ellipsoid.rs"]
+mod ellipsoid;
 #[path = "kernels/gauss_newton.rs"]
 mod gauss_newton;
+#[path = "kernels/norm_invariant.rs"]
+mod norm_invariant;
 #[path = "kernels/poisson.rs"]
 mod poisson;
 #[path = "kernels/rotation.rs"]

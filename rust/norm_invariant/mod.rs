@@ -10,6 +10,7 @@ mod problem;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 pub use held_out::{HeldOut, held_out};
+pub use problem::residual_gradient;
 use problem::{Frozen, PoseProblem, SampleProblem};
 
 use crate::ellipsoid::{self, Standardisation};
@@ -170,6 +171,9 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
         loss: settings.loss,
         ..Options::default()
     };
+    if spread(&begin, &standard) < SMALLEST_SPREAD * settings.gravity {
+        return Err(Error::not_determined(WORTHLESS));
+    }
     let first = pack(&begin, &standard);
     let mut theta = first.clone();
     let volume = (begin.s * standard.size).determinant().abs();
@@ -216,6 +220,17 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
     unreachable!("the loop returns at its last renewal")
 }
 
+/// Poses whose specific forces differ by less than this fraction of |g|, half a degree, are one pose, or `S` is nothing.
+const SMALLEST_SPREAD: f64 = 1e-2;
+
+const WORTHLESS: &str = "the fit runs into the worthless minimum S = 0, |b| = |g|: the poses hardly differ, or are not \
+                         still; hold the sensor still in clearly different orientations";
+
+/// Root mean square size of `S (a' - mean)`, m/s².
+fn spread(model: &Model, standard: &Standardisation) -> f64 {
+    (model.s * standard.size).norm() / 3.0_f64.sqrt()
+}
+
 fn finish(
     problem: &PoseProblem<'_>,
     solution: &gauss_newton::Solution,
@@ -239,10 +254,10 @@ fn finish(
     };
     let model = unpack(&theta, settings.frame, &problem.standard);
     let shrink = (model.s * problem.standard.size).determinant().abs() / problem.volume;
-    if shrink < 2.0 * problem::SMALLEST_VOLUME {
-        return Err(Error::not_determined(
-            "the fit runs into the worthless minimum S = 0, |b| = |g|: the poses do not differ enough, or are not still",
-        ));
+    if shrink < 2.0 * problem::SMALLEST_VOLUME
+        || spread(&model, &problem.standard) < SMALLEST_SPREAD * settings.gravity
+    {
+        return Err(Error::not_determined(WORTHLESS));
     }
     let map = map_to_entries(settings.frame, &problem.standard);
     let covariance = &map * &certainty.covariance * map.transpose();

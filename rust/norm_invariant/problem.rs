@@ -68,7 +68,7 @@ impl PoseProblem<'_> {
         let u = self.standard.apply(&self.readings.values[i]);
         let f = model.correct(&u);
         let residual = self.misfit(&f, i);
-        let slope = gradient(&f, &u, self.settings);
+        let slope = residual_gradient(&f, &u, self.settings);
         (
             residual / self.frozen.sigma[i],
             slope / self.frozen.sigma[i],
@@ -183,8 +183,10 @@ impl PoseProblem<'_> {
     }
 }
 
-/// Gradient of the residual in m/s² with respect to the solver's parameters.
-pub(super) fn gradient(
+/// Gradient of the residual in m/s² with respect to the solver's parameters, `S11 S21 S22 S31 S32 S33` and `b`, at a
+/// (standardised) reading `u` with `f = S u + b`.
+#[must_use]
+pub fn residual_gradient(
     f: &Vector3<f64>,
     u: &Vector3<f64>,
     settings: &Settings,

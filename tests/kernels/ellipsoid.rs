@@ -1,0 +1,175 @@
+//! Factors of a quadric, and the quadric of a triad.
+
+use nalgebra::{Matrix3, Vector3};
+use proptest::prelude::*;
+use trihedron::ellipsoid::{
+    Standardisation, calibrate, fit_ellipsoid, fit_quadric, missing_directions, reversed_cholesky,
+    symmetric_root,
+};
+use trihedron::norm_invariant::{Frame, Model};
+
+const G: f64 = 9.81;
+
+/// Six faces and twelve edges of a cube.
+pub fn cube_poses() -> Vec<Vector3<f64>> {
+    let mut poses = Vec::new();
+    for x in -1..=1 {
+        for y in -1..=1 {
+            for z in -1..=1 {
+                let v = Vector3::new(f64::from(x), f64::from(y), f64::from(z));
+                if v.norm() > 0.5 && v.norm() < 1.6 {
+                    poses.push(v.normalize());
+                }
+            }
+        }
+    }
+    poses
+}
+
+/// Readings of a lower-triangular triad in these poses.
+pub fn readings(model: &Model, up: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let inverse = model.s.try_inverse().expect("regular");
+    up.iter().map(|u| inverse * (u * G - model.b)).collect()
+}
+
+/// A triad in counts: zero near mid-range, axes a few per cent and degrees off.
+pub fn triad(e: [f64; 9]) -> Model {
+    let s = Matrix3::new(
+        1.0 + 0.1 * e[0],
+        0.0,
+        0.0,
+        0.1 * e[1],
+        1.0 + 0.1 * e[2],
+        0.0,
+        0.1 * e[3],
+        0.1 * e[4],
+        1.0 + 0.1 * e[5],
+    ) * 2.4e-3;
+    let zero = Vector3::new(
+        32768.0 + 800.0 * e[6],
+        32768.0 + 800.0 * e[7],
+        32768.0 + 800.0 * e[8],
+    );
+    Model { s, b: -s * zero }
+}
+
+pub fn nine() -> impl Strategy<Value = [f64; 9]> {
+    prop::array::uniform9(-1.0..1.0f64)
+}
+
+proptest! {
+    #[test]
+    fn both_factors_give_back_their_matrix(e in nine()) {
+        let a = Matrix3::from_row_slice(&e) + Matrix3::identity() * 2.0;
+        let m = a.transpose() * a;
+        let lower = reversed_cholesky(&m).expect("positive definite");
+        let root = symmetric_root(&m).expect("positive definite");
+        // Products of numbers of order ten.
+        prop_assert!((lower.transpose() * lower - m).norm() < 1e-12);
+        prop_assert!((root * root - m).norm() < 1e-12);
+        prop_assert!(lower[(0, 1)] == 0.0 && lower[(0, 2)] == 0.0 && lower[(1, 2)] == 0.0);
+        prop_assert!(lower.diagonal().min() > 0.0);
+        prop_assert!((root - root.transpose()).norm() == 0.0);
+    }
+
+    #[test]
+    fn exact_readings_give_the_triad(e in nine()) {
+        let truth = triad(e);
+        let found = calibrate(&readings(&truth, &cube_poses()), G, Frame::Lower).expect("an ellipsoid");
+        // 32768 counts of zero against 4000 of signal, condition of the poses about ten: 1e-16 · 10² · 10.
+        prop_assert!((found.s - truth.s).norm() < 1e-12 * truth.s.norm() * 100.0);
+        prop_assert!((found.b - truth.b).norm() < 1e-9);
+    }
+
+    #[test]
+    fn the_constrained_fit_agrees_where_the_free_one_is_an_ellipsoid(e in nine()) {
+        let points = readings(&triad(e), &cube_poses());
+        let standard = Standardisation::of(&points).expect("spread");
+        let u: Vec<_> = points.iter().map(|a| standard.apply(a)).collect();
+        let free = fit_quadric(&u).expect("nine coefficients").model(G, Frame::Symmetric).expect("ellipsoid");
+        let bound = fit_ellipsoid(&u).expect("ellipsoid").model(G, Frame::Symmetric).expect("ellipsoid");
+        // The ridge of 1e-12 against the smallest eigenvalue of the scatter, about 1e-3.
+        prop_assert!((free.s - bound.s).norm() < 1e-6 * free.s.norm());
+    }
+}
+
+#[test]
+fn where_noise_makes_a_hyperboloid_the_constrained_fit_is_still_an_ellipsoid() {
+    // All poses within 25° of one axis: the far side is extrapolated and noise decides its sign.
+    let mut hyperboloids = 0;
+    let mut state = 1_u64;
+    let mut noise = || {
+        // A linear congruential generator is random enough to spoil a fit.
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as f64 / f64::from(u32::MAX) * 2.0 - 0.5
+    };
+    for _ in 0..50 {
+        let cap: Vec<Vector3<f64>> = (0..12)
+            .map(|_| {
+                let tilt = Vector3::new(0.4 * noise(), 0.4 * noise(), 1.0).normalize();
+                tilt * (1.0 + 0.02 * noise())
+            })
+            .collect();
+        let standard = Standardisation::of(&cap).expect("spread");
+        let u: Vec<_> = cap.iter().map(|a| standard.apply(a)).collect();
+        let free = fit_quadric(&u).expect("determined").model(G, Frame::Lower);
+        if free.is_none() {
+            hyperboloids += 1;
+            assert!(
+                fit_ellipsoid(&u)
+                    .expect("scatter")
+                    .model(G, Frame::Lower)
+                    .is_some()
+            );
+        }
+    }
+    assert!(
+        hyperboloids > 5,
+        "the case under test did not occur: {hyperboloids}"
+    );
+}
+
+#[test]
+fn too_few_poses_are_refused_naming_directions() {
+    let half: Vec<Vector3<f64>> = cube_poses()
+        .into_iter()
+        .filter(|u| u.z >= 0.0)
+        .take(8)
+        .collect();
+    let error = calibrate(&half, G, Frame::Lower)
+        .expect_err("eight poses")
+        .to_string();
+    assert!(error.contains("8 still poses"), "{error}");
+    assert!(error.contains("axis"), "{error}");
+    let planar: Vec<Vector3<f64>> = (0..12)
+        .map(|k| {
+            let angle = f64::from(k) * 0.5;
+            Vector3::new(angle.cos(), angle.sin(), 0.0)
+        })
+        .collect();
+    let error = calibrate(&planar, G, Frame::Lower)
+        .expect_err("one plane")
+        .to_string();
+    assert!(
+        error.contains("axis 3 up") && error.contains("axis 3 down"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_full_set_of_poses_misses_no_direction() {
+    assert!(missing_directions(&cube_poses()).contains("between the faces"));
+}
+
+#[test]
+fn equal_readings_are_refused() {
+    let same = vec![Vector3::new(1.0, 2.0, 3.0); 20];
+    assert!(
+        calibrate(&same, G, Frame::Lower)
+            .expect_err("equal")
+            .to_string()
+            .contains("read the same")
+    );
+}

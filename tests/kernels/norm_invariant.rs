@@ -1,0 +1,248 @@
+//! The norm fit: derivatives, recovery, and the minimum it must never find.
+
+use nalgebra::{DVector, Matrix3, Vector3};
+use proptest::prelude::*;
+use trihedron::gauss_newton::Loss;
+use trihedron::norm_invariant::{
+    Frame, Model, Objective, Readings, Settings, fit, held_out, in_frame, residual_gradient,
+};
+
+use super::ellipsoid::{cube_poses, nine, readings, triad};
+
+fn settings(frame: Frame, objective: Objective) -> Settings {
+    Settings {
+        gravity: 9.81,
+        frame,
+        objective,
+        loss: Loss::Linear,
+    }
+}
+
+/// One count per axis.
+fn quiet() -> [Matrix3<f64>; 1] {
+    [Matrix3::identity() * 1e-6]
+}
+
+proptest! {
+    #[test]
+    fn the_jacobian_is_the_derivative(e in nine(), u in prop::array::uniform3(-1.0..1.0f64), symmetric: bool, squared: bool) {
+        let frame = if symmetric { Frame::Symmetric } else { Frame::Lower };
+        let objective = if squared { Objective::SquaredNorm } else { Objective::Norm };
+        let settings = settings(frame, objective);
+        let u = Vector3::from(u);
+        let unpack = |x: &DVector<f64>| {
+            let mut s = Matrix3::new(x[0], 0.0, 0.0, x[1], x[2], 0.0, x[3], x[4], x[5]);
+            if symmetric {
+                s.fill_upper_triangle_with_lower_triangle();
+            }
+            s * u + Vector3::new(x[6], x[7], x[8])
+        };
+        let residual = |x: &DVector<f64>| {
+            let f = unpack(x);
+            match objective {
+                Objective::Norm => f.norm(),
+                Objective::SquaredNorm => f.norm_squared() / (2.0 * 9.81),
+            }
+        };
+        let x = DVector::from_iterator(9, e.iter().enumerate().map(|(k, v)| v + if k > 5 { 9.0 } else { 0.0 }));
+        let analytic = residual_gradient(&unpack(&x), &u, &settings);
+        for k in 0..9 {
+            let h = 1e-5;
+            let (mut up, mut down) = (x.clone(), x.clone());
+            up[k] += h;
+            down[k] -= h;
+            // Central differences of step 1e-5 on a function of order ten: 1e-10 and 1e-15/1e-5.
+            prop_assert!(((residual(&up) - residual(&down)) / (2.0 * h) - analytic[k]).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn exact_readings_give_the_triad_in_both_frames_by_both_objectives(e in nine(), symmetric: bool, squared: bool) {
+        let frame = if symmetric { Frame::Symmetric } else { Frame::Lower };
+        let objective = if squared { Objective::SquaredNorm } else { Objective::Norm };
+        let truth = in_frame(&triad(e), frame).expect("regular");
+        let values = readings(&truth, &cube_poses());
+        let noise = quiet();
+        let found = fit(Readings { values: &values, noise: &noise }, &settings(frame, objective), None).expect("fits");
+        prop_assert!(found.stop.is_converged());
+        prop_assert_eq!(found.certainty.rank, 9);
+        // The predicted inflation by noise of 1e-3 counts, 1e-12 m/s², is the largest effect left.
+        prop_assert!((found.model.s - truth.s).norm() < 1e-9 * truth.s.norm());
+    }
+
+    #[test]
+    fn no_start_leads_to_the_worthless_minimum(e in nine(), scale in -3.0..3.0f64, shift in prop::array::uniform3(-20.0..20.0f64)) {
+        // S = 0, |b| = |g| fits exactly. From starts wrong by factors up to twenty the fit finds the triad or says no.
+        let truth = triad(e);
+        let values = readings(&truth, &cube_poses());
+        let noise = [Matrix3::identity()];
+        let start = Model { s: truth.s * scale.exp(), b: truth.b * scale.exp() + Vector3::from(shift) };
+        if let Ok(found) = fit(Readings { values: &values, noise: &noise }, &settings(Frame::Lower, Objective::Norm), Some(start)) {
+            let volume = (found.model.s.determinant() / truth.s.determinant()).abs();
+            prop_assert!(volume > 1e-3, "collapsed to {volume}");
+            if found.stop.is_converged() && found.chi2 < 1.0 {
+                let same = found.model.s.transpose() * found.model.s - truth.s.transpose() * truth.s;
+                prop_assert!(same.norm() < 1e-5 * truth.s.norm_squared());
+            }
+        }
+    }
+}
+
+#[test]
+fn the_worthless_start_itself_is_left_or_refused() {
+    let values = readings(&triad([0.3; 9]), &cube_poses());
+    let noise = [Matrix3::identity()];
+    let start = Model {
+        s: Matrix3::identity() * 1e-9,
+        b: Vector3::new(9.81, 0.0, 0.0),
+    };
+    let outcome = fit(
+        Readings {
+            values: &values,
+            noise: &noise,
+        },
+        &settings(Frame::Lower, Objective::Norm),
+        Some(start),
+    );
+    if let Ok(found) = outcome {
+        assert!(found.model.s.norm() > 1e-4, "{}", found.model.s);
+    }
+}
+
+/// Many samples of each pose: more than the solver keeps rows for.
+fn many(copies: usize) -> Vec<Vector3<f64>> {
+    let values = readings(
+        &triad([0.2, -0.4, 0.1, 0.9, -0.3, 0.5, 0.7, -0.8, 0.1]),
+        &cube_poses(),
+    );
+    (0..copies)
+        .flat_map(|k| {
+            values
+                .iter()
+                .map(move |a| a + Vector3::new((k as f64).sin(), (2.0 * k as f64).cos(), 0.3))
+        })
+        .collect()
+}
+
+#[test]
+fn summed_normal_equations_and_kept_rows_agree() {
+    let values = many(1200);
+    let noise = [Matrix3::identity()];
+    let settings = settings(Frame::Lower, Objective::Norm);
+    let summed = fit(
+        Readings {
+            values: &values,
+            noise: &noise,
+        },
+        &settings,
+        None,
+    )
+    .expect("fits");
+    // The same problem with each sample's noise multiplied keeps weights equal, in halves that fit into rows.
+    let half = fit(
+        Readings {
+            values: &values[..10_800],
+            noise: &noise,
+        },
+        &settings,
+        None,
+    )
+    .expect("fits");
+    let rest = fit(
+        Readings {
+            values: &values[10_800..],
+            noise: &noise,
+        },
+        &settings,
+        None,
+    )
+    .expect("fits");
+    let mean = (half.model.s + rest.model.s) / 2.0;
+    // Halves have equal information, so the whole is their mean up to the square of their difference.
+    let curvature = (half.model.s - rest.model.s).norm_squared() / summed.model.s.norm();
+    assert!((summed.model.s - mean).norm() < 1e-9 * mean.norm() + 10.0 * curvature);
+    assert!((summed.covariance[(0, 0)] / half.covariance[(0, 0)] - 0.5).abs() < 1e-3);
+}
+
+#[test]
+fn the_answer_does_not_depend_on_the_number_of_threads() {
+    let values = many(1500);
+    let noise = [Matrix3::identity()];
+    let settings = settings(Frame::Symmetric, Objective::Norm);
+    let run = |threads| {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("pool")
+            .install(|| {
+                fit(
+                    Readings {
+                        values: &values,
+                        noise: &noise,
+                    },
+                    &settings,
+                    None,
+                )
+                .expect("fits")
+                .model
+            })
+    };
+    assert_eq!(run(1), run(3));
+}
+
+#[test]
+fn poses_held_out_are_predicted_within_their_own_error() {
+    let mut values = readings(&triad([0.1; 9]), &cube_poses());
+    values[4].x += 500.0;
+    let noise = [Matrix3::identity()];
+    let settings = settings(Frame::Lower, Objective::Norm);
+    let readings = Readings {
+        values: &values,
+        noise: &noise,
+    };
+    let full = fit(readings, &settings, None).expect("fits");
+    let folds: Vec<usize> = (0..values.len()).collect();
+    let apart = held_out(readings, &settings, &full, &folds).expect("folds");
+    // Pose 4 is wrong: the fit that did not see it is exact, all others are bent by it.
+    assert!(apart[4].chi2_per_dof < 1e-6, "{}", apart[4].chi2_per_dof);
+    assert!(apart[4].residual.abs() > 100.0 * apart[4].sigma);
+    assert!(
+        apart
+            .iter()
+            .enumerate()
+            .all(|(i, pose)| i == 4 || pose.chi2_per_dof > 10.0)
+    );
+}
+
+#[test]
+fn malformed_readings_are_refused_in_words() {
+    let good = readings(&triad([0.0; 9]), &cube_poses());
+    let settings = settings(Frame::Lower, Objective::Norm);
+    let refuse = |values: &[Vector3<f64>], noise: &[Matrix3<f64>], words: &str| {
+        let error = fit(Readings { values, noise }, &settings, None)
+            .expect_err(words)
+            .to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    refuse(&[], &[Matrix3::identity()], "no still poses");
+    refuse(&good, &[Matrix3::identity(); 2], "do not belong");
+    refuse(&good, &[Matrix3::zeros()], "positive");
+    let mut bad = good.clone();
+    bad[3].y = f64::NAN;
+    refuse(&bad, &[Matrix3::identity()], "reading 3 is not finite");
+    let wrong = Settings {
+        gravity: 0.0,
+        ..settings
+    };
+    assert!(
+        fit(
+            Readings {
+                values: &good,
+                noise: &[Matrix3::identity()]
+            },
+            &wrong,
+            None
+        )
+        .is_err()
+    );
+}

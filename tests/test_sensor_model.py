@@ -1,0 +1,183 @@
+"""Directions, forms and frames of the linear model, with their uncertainty."""
+
+import numpy as np
+import pytest
+
+from trihedron.gravity import EARTH_RATE_RAD_S, earth_rate_north_up, normal_gravity
+from trihedron.records import Calibration, SensorCalibration
+from trihedron.sensor_model import correct, distort, in_frame, other_form, other_form_jacobian, reframing, rotated
+
+MANUAL_S = np.array([[-0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
+MANUAL_B = np.array([19.5696, -22.4746, -20.3088])
+
+
+def triad(seed: int, *, left_handed: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    S = np.diag(1 + 0.1 * rng.uniform(-1, 1, 3)) + 0.05 * rng.uniform(-1, 1, (3, 3))
+    if left_handed:
+        S = S * [1, -1, 1]
+    return S, rng.uniform(-1, 1, 3)
+
+
+def parameters(S, b):
+    return np.concatenate([np.ravel(S), b])
+
+
+def numeric_jacobian(function, S, b, step=1e-6):
+    x = parameters(S, b)
+    columns = []
+    for k in range(12):
+        up, down = x.copy(), x.copy()
+        up[k] += step
+        down[k] -= step
+        columns.append((function(up) - function(down)) / (2 * step))
+    return np.column_stack(columns)
+
+
+def test_distort_undoes_correct():
+    S, b = triad(0)
+    readings = np.random.default_rng(1).normal(0, 10, (50, 3))
+    np.testing.assert_allclose(distort(correct(readings, S, b), S, b), readings, atol=1e-12)
+
+
+def test_the_two_forms_are_inverse_to_each_other():
+    S, b = triad(2)
+    S_a, b_a = other_form(S, b)
+    f = np.array([[1.0, -2.0, 9.0]])
+    np.testing.assert_allclose(f @ S_a.T + b_a, distort(f, S, b), atol=1e-13)
+    back = other_form(S_a, b_a)
+    np.testing.assert_allclose(back[0], S, atol=1e-14)
+    np.testing.assert_allclose(back[1], b, atol=1e-14)
+
+
+def test_a_triad_with_parallel_axes_is_refused():
+    with pytest.raises(ValueError, match="parallel"):
+        other_form(np.ones((3, 3)), np.zeros(3))
+
+
+def test_the_change_of_form_has_the_stated_derivative():
+    S, b = triad(3)
+    numeric = numeric_jacobian(lambda x: parameters(*other_form(x[:9].reshape(3, 3), x[9:])), S, b)
+    # Central differences of step 1e-6: rounding 1e-16/1e-6.
+    np.testing.assert_allclose(other_form_jacobian(S, b), numeric, atol=1e-8)
+
+
+@pytest.mark.parametrize("left_handed", [False, True])
+@pytest.mark.parametrize("frame", ["lower", "symmetric"])
+def test_a_frame_is_reached_by_a_proper_rotation_of_the_stated_derivative(frame, left_handed):
+    for seed in range(20):
+        S, b = triad(seed, left_handed=left_handed)
+        change = reframing(S, b, frame)
+        R = change.rotation
+        np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-14)
+        assert np.linalg.det(R) == pytest.approx(1.0)
+        new = R @ S
+        if frame == "lower":
+            assert np.abs(np.triu(new, 1)).max() < 1e-14
+        else:
+            signs = np.sign(np.diag(new))
+            np.testing.assert_allclose(new * signs, (new * signs).T, atol=1e-14)
+        # The sign of the determinant, handedness, is kept and not turned into a half turn.
+        assert np.sign(np.linalg.det(new)) == np.sign(np.linalg.det(S))
+        assert np.trace(R) > 2.9
+
+        def moved(x, frame=frame):
+            S, b = x[:9].reshape(3, 3), x[9:]
+            R = reframing(S, b, frame).rotation
+            return parameters(R @ S, R @ b)
+
+        np.testing.assert_allclose(change.jacobian, numeric_jacobian(moved, S, b), atol=1e-8)
+
+
+def test_a_triad_already_in_its_frame_stays():
+    for S in (MANUAL_S, np.diag([-1.0, 1.0, 1.0]), np.diag([1.0, 1.0, -1.0]) * 2.4e-3):
+        np.testing.assert_allclose(reframing(S, MANUAL_B, "lower").rotation, np.eye(3), atol=1e-14)
+
+
+def both_sensors(seed: int) -> Calibration:
+    S, b = triad(seed)
+    S_w, b_w = triad(seed + 100)
+    rng = np.random.default_rng(seed)
+    root = 1e-3 * rng.standard_normal((24, 24))
+    covariance = root @ root.T
+    accelerometer = SensorCalibration(S, b, covariance[:12, :12], "m/s^2", "m/s^2", "test")
+    gyroscope = SensorCalibration(S_w, b_w, covariance[12:, 12:], "rad/s", "rad/s", "test")
+    return Calibration(accelerometer, gyroscope, covariance, "case", 9.81, "test")
+
+
+@pytest.mark.parametrize("frame", ["lower", "symmetric"])
+def test_the_gyro_turns_with_the_accelerometer_and_shares_its_uncertainty(frame):
+    calibration = both_sensors(7)
+    new = in_frame(calibration, frame)
+    R = new.accelerometer.S @ np.linalg.inv(calibration.accelerometer.S)
+    np.testing.assert_allclose(new.gyroscope.S, R @ calibration.gyroscope.S, atol=1e-14)
+
+    def moved(x):
+        a, w = x[:12], x[12:]
+        R = reframing(a[:9].reshape(3, 3), a[9:], frame).rotation
+        return np.concatenate([(R @ s[:9].reshape(3, 3)).ravel() for s in (a, w)] + [R @ a[9:], R @ w[9:]])
+
+    x = np.concatenate(
+        [parameters(s.S, s.b) for s in (calibration.accelerometer, calibration.gyroscope)],
+    )
+    columns = []
+    for k in range(24):
+        step = np.zeros(24)
+        step[k] = 1e-6
+        columns.append((moved(x + step) - moved(x - step)) / 2e-6)
+    order = [*range(9), *range(18, 21), *range(9, 18), *range(21, 24)]
+    jacobian = np.column_stack(columns)[order]
+    expected = jacobian @ calibration.covariance @ jacobian.T
+    # Entries of 1e-5; differences are good to eight digits.
+    np.testing.assert_allclose(new.covariance, expected, atol=1e-11)
+    np.testing.assert_array_equal(new.covariance[12:, 12:], new.gyroscope.covariance)
+
+
+def test_frames_can_be_changed_there_and_back():
+    lower = in_frame(both_sensors(3), "lower")
+    again = in_frame(in_frame(lower, "symmetric"), "lower")
+    np.testing.assert_allclose(again.accelerometer.S, lower.accelerometer.S, atol=1e-14)
+    np.testing.assert_allclose(again.gyroscope.S, lower.gyroscope.S, atol=1e-14)
+    np.testing.assert_allclose(again.covariance, lower.covariance, atol=1e-15)
+    # What the frame makes zero has no error.
+    assert np.all(lower.accelerometer.sigma_S[np.triu_indices(3, 1)] < 1e-10)
+    with pytest.raises(ValueError, match="case"):
+        in_frame(lower, "case")
+
+
+def test_a_known_rotation_leaves_norms_and_their_errors_alone():
+    sensor = both_sensors(5).accelerometer
+    angle = 0.7
+    R = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    turned = rotated(sensor, R)
+    reading = np.array([[0.3, -2.0, 9.0]])
+
+    def norm_and_sigma(s):
+        f = correct(reading, s.S, s.b)[0]
+        u = f / np.linalg.norm(f)
+        slope = np.concatenate([np.outer(u, reading[0]).ravel(), u])
+        return np.linalg.norm(f), np.sqrt(slope @ s.covariance @ slope)
+
+    np.testing.assert_allclose(norm_and_sigma(turned), norm_and_sigma(sensor), rtol=1e-12)
+
+
+def test_normal_gravity_has_its_published_values():
+    # Equator and pole by definition of WGS 84; 45° from NIMA TR8350.2.
+    assert normal_gravity(0.0) == pytest.approx(9.7803253359, abs=1e-10)
+    assert normal_gravity(90.0) == pytest.approx(9.8321849378, abs=1e-9)
+    assert normal_gravity(45.0) == pytest.approx(9.806197769, abs=1e-8)
+    assert normal_gravity(-45.0) == normal_gravity(45.0)
+    # Free-air gradient, 3.086e-6 s⁻² at mid latitudes, to its third digit.
+    assert (normal_gravity(45.0) - normal_gravity(45.0, 1000.0)) / 1000.0 == pytest.approx(3.086e-6, abs=3e-9)
+
+
+@pytest.mark.parametrize(("latitude", "height"), [(91.0, 0.0), (float("nan"), 0.0), (0.0, 1e6)])
+def test_impossible_places_are_refused(latitude, height):
+    with pytest.raises(ValueError, match="must be between"):
+        normal_gravity(latitude, height)
+
+
+def test_earth_rate_is_split_by_latitude():
+    north, up = earth_rate_north_up(30.0)
+    assert np.hypot(north, up) == pytest.approx(EARTH_RATE_RAD_S)
+    assert up == pytest.approx(EARTH_RATE_RAD_S / 2)
