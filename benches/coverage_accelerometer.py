@@ -1,4 +1,4 @@
-"""Do the accelerometer's error bars cover the truth? `python benches/coverage_accelerometer.py`: 200 sessions per method.
+"""Do the error bars of the accelerometer cover the truth? `python benches/coverage_accelerometer.py`: 200 seeds each.
 
 Every seed draws another instrument (zeros to half of |g|, scales to 10 %, axes to 2°), other small leanings of the
 poses, and unequal noise per axis and pose. z = (estimate - truth)/sigma of every free parameter should be standard
