@@ -1,0 +1,264 @@
+"""Every real recording reads with the right shape, order and unit, and the audit finds what is wrong with it."""
+
+import time
+
+import numpy as np
+import pytest
+
+from test_read import codes, finding
+from trihedron.read import ReadError, read_recording
+from trihedron.records import FindingCode, Severity
+from trihedron.units import AccelerationUnit, RateUnit
+
+QUIET = {FindingCode.COLUMNS_RECOGNISED, FindingCode.UNIT_DETECTED, FindingCode.TIME_UNIT_DETECTED}
+
+
+def rest_norm(recording, samples=slice(0, 100)) -> float:
+    return float(np.linalg.norm(recording.accelerometer[samples].mean(axis=0)))
+
+
+def pair(real_data, stem):
+    return read_recording(
+        accelerometer_path=real_data / "phone" / f"{stem}__Acceleration.csv",
+        gyroscope_path=real_data / "phone" / f"{stem}__AngularVelocity.csv",
+    )
+
+
+def test_xsens_two_files_read_alike_and_fast(real_data):
+    folder = real_data / "xsens_mti"
+    best = np.inf
+    for _ in range(3):
+        start = time.perf_counter()
+        recording = read_recording(
+            accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt"
+        )
+        best = min(best, time.perf_counter() - start)
+    expected = np.loadtxt(folder / "xsens_acc.txt")
+    np.testing.assert_array_equal(recording.accelerometer, expected[:, 1:])
+    np.testing.assert_array_equal(recording.gyroscope, np.loadtxt(folder / "xsens_gyro.txt")[:, 1:])
+    np.testing.assert_allclose(recording.time_s, expected[:, 0] - expected[0, 0], atol=1e-12)
+    assert recording.accelerometer_unit is AccelerationUnit.COUNTS
+    assert recording.gyroscope_unit is RateUnit.COUNTS
+    assert recording.rate_hz == pytest.approx(100, rel=1e-3)
+    # A good log: nothing but statements.
+    assert codes(recording) <= QUIET | {FindingCode.CLOCKS_MERGED}
+    # 0.13 s alone on two cores; the limit leaves room for a shared machine.
+    assert best < 0.8
+
+
+@pytest.mark.parametrize("experiment", [2, 3, 4, 5])
+def test_mimu4444_one_of_eight_devices(real_data, experiment):
+    path = real_data / "mimu4444" / f"exp_{experiment}.npz"
+    with pytest.raises(ReadError, match="8 devices"):
+        read_recording(path)
+    recording = read_recording(path, device=5)
+    with np.load(path) as archive:
+        np.testing.assert_array_equal(recording.accelerometer, archive["counts"][:, 4, :3])
+        np.testing.assert_array_equal(recording.gyroscope, archive["counts"][:, 4, 3:])
+    assert recording.rate_hz == pytest.approx(62.5, rel=1e-3)
+    assert recording.accelerometer_unit is AccelerationUnit.COUNTS
+    assert rest_norm(recording) == pytest.approx(2048, rel=0.1)
+    # The last 100 s are violent: the gyro leaves its range on every axis.
+    clipped = finding(recording, FindingCode.CLIPPING)
+    assert clipped.numbers["sample"] > 0.75 * recording.n_samples
+    assert {clipped.numbers[f"{axis}_high_value"] for axis in "xyz"} == {32767.0}
+    assert {clipped.numbers[f"{axis}_low_value"] for axis in "xyz"} == {-32768.0}
+    assert "gyro" in clipped.seen
+
+
+@pytest.mark.parametrize("stem", ["rec_2_All_corners_and_120sec_static", "rec_3_gyro_dynamic"])
+def test_phone_two_clocks_are_merged(real_data, stem):
+    recording = pair(real_data, stem)
+    merged = finding(recording, FindingCode.CLOCKS_MERGED)
+    assert merged.numbers["accelerometer_rate_hz"] == pytest.approx(99.75, abs=0.01)
+    assert merged.numbers["lost_rows"] == 0
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    assert recording.gyroscope_unit is RateUnit.RAD_S
+    # The unit is told by the turns, not guessed.
+    assert FindingCode.UNIT_ASSUMED not in codes(recording)
+    assert np.isfinite(recording.gyroscope).all()
+
+
+@pytest.mark.parametrize(
+    "stem",
+    [
+        "imu_rec_X_up_300_sec",
+        "imu_rec_X_down_300_sec",
+        "imu_rec_Y_up_300sec",
+        "imu_rec_Y_down_300_sec",
+        "imu_rec_z_up_310_sec",
+        "imu_rec_z_down_300_sec",
+    ],
+)
+def test_phone_faces_keep_every_accelerometer_sample(real_data, stem):
+    recording = pair(real_data, stem)
+    written = np.loadtxt(real_data / "phone" / f"{stem}__Acceleration.csv", delimiter=",", skiprows=1)
+    # At most one sample at either end lies outside the gyro's clock.
+    cut = len(written) - recording.n_samples
+    assert cut <= 2
+    assert finding(recording, FindingCode.CLOCKS_MERGED).numbers["cut_rows"] == cut
+    first = np.searchsorted(written[:, 0], recording.start_epoch_s - 1e-9)
+    np.testing.assert_array_equal(recording.accelerometer, written[first : first + recording.n_samples, 1:])
+    # Local gravity is 9.7974; the phone's zero readings are a few hundredths.
+    assert np.linalg.norm(np.median(recording.accelerometer, axis=0)) == pytest.approx(9.797, abs=0.06)
+
+
+@pytest.mark.parametrize("unit", [0, 1, 2])
+def test_mpu9150_without_header_or_time(real_data, unit):
+    path = real_data / "mpu9150" / f"imu{unit}.log"
+    recording = read_recording(path)
+    expected = np.loadtxt(path)
+    np.testing.assert_array_equal(recording.accelerometer, expected[:, :3])
+    np.testing.assert_array_equal(recording.gyroscope, expected[:, 3:])
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    assert recording.gyroscope_unit is RateUnit.RAD_S
+    assert finding(recording, FindingCode.RATE_ASSUMED).severity is Severity.SERIOUS
+    assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is Severity.NOTE
+    given = read_recording(path, rate_hz=100)
+    assert codes(given) <= QUIET | {FindingCode.COLUMNS_ASSUMED, FindingCode.RATE_STATED}
+
+
+@pytest.mark.parametrize("unit", [1, 2])
+def test_adis16405_puts_the_gyro_last_where_the_file_has_it_first(real_data, unit):
+    path = real_data / "adis16405" / f"adis16405_imu{unit}.npz"
+    recording = read_recording(path)
+    with np.load(path) as archive:
+        np.testing.assert_array_equal(recording.accelerometer, archive["counts"][:, 3:])
+        np.testing.assert_array_equal(recording.gyroscope, archive["counts"][:, :3])
+    assert finding(recording, FindingCode.RATE_STATED).numbers["rate_hz"] == 100
+    assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is Severity.WARNING
+    assert FindingCode.CLIPPING not in codes(recording)
+    assert FindingCode.STUCK_VALUES not in codes(recording)
+
+
+def test_galaxy_s5_repeats_rows_and_has_two_gyros(real_data):
+    recording = read_recording(real_data / "galaxy_s5" / "samsung_galaxy_s5.csv.gz", rate_hz=10)
+    assert recording.n_samples == 214800
+    assert "gx_measured" in finding(recording, FindingCode.COLUMNS_ASSUMED).seen
+    assert set(recording.auxiliary) == {"gx_output", "gy_output", "gz_output"}
+    repeated = [f for f in recording.findings if f.code is FindingCode.REPEATED_ROWS]
+    assert {f.seen.split()[1] for f in repeated} == {"accelerometer", "gyro"}
+    assert all(f.numbers["fraction"] == pytest.approx(0.065, abs=0.002) for f in repeated)
+    # A still log cannot tell rad/s from deg/s: it must be said to be a guess.
+    assert finding(recording, FindingCode.UNIT_ASSUMED).severity is Severity.WARNING
+
+
+def test_cats_tag_has_temperature_and_an_unusual_gyro_unit(real_data):
+    path = real_data / "cats_tag" / "cats_temperature_2poses.csv.gz"
+    recording = read_recording(path)
+    assert recording.n_samples == 183600
+    assert recording.rate_hz == pytest.approx(1, rel=1e-6)
+    assert 4 < recording.temperature_degc.min() < recording.temperature_degc.max() < 30
+    assert set(recording.auxiliary) == {"mx", "my", "mz", "depth_m"}
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    # A bias of 36 deg/s is no gyro's: mrad/s, but asked for.
+    assert recording.gyroscope_unit is RateUnit.MRAD_S
+    assert finding(recording, FindingCode.UNIT_ASSUMED).severity is Severity.WARNING
+    assert read_recording(path, gyroscope_unit="mrad/s").gyroscope_unit is RateUnit.MRAD_S
+
+
+@pytest.mark.parametrize("run", [1, 2, 3, 4, 5])
+def test_analog6dof_has_its_gyro_axes_in_odd_order_and_a_coarse_converter(real_data, run):
+    path = real_data / "analog6dof" / f"imuRaw{run}.csv"
+    recording = read_recording(path)
+    written = np.loadtxt(path, delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(recording.accelerometer, written[:, 1:4])
+    np.testing.assert_array_equal(recording.gyroscope, written[:, [5, 6, 4]])
+    assert recording.start_epoch_s == pytest.approx(written[0, 0])
+    assert recording.rate_hz == pytest.approx(99.95, abs=0.1)
+    assert {FindingCode.COARSE_RESOLUTION, FindingCode.TIME_JITTER} <= codes(recording)
+    assert FindingCode.CLIPPING not in codes(recording)
+    stuck = [f for f in recording.findings if f.code is FindingCode.STUCK_VALUES]
+    if run != 3:
+        # The gyro's z channel freezes at 382 for over a second while the board is turned.
+        assert [f.numbers["axis"] for f in stuck] == [2.0]
+        start, length = int(stuck[0].numbers["sample"]), int(stuck[0].numbers["longest_run"])
+        assert set(recording.gyroscope[start : start + length, 2]) == {382.0}
+        assert length > 100
+    else:
+        assert stuck == []
+
+
+@pytest.mark.parametrize("name", ["imu_a_45_1", "imu_a_45_2", "imu_b_45_1", "imu_b_45_2"])
+def test_dual_xsens_ticks_of_100_microseconds(real_data, name):
+    recording = read_recording(real_data / "dual_xsens" / f"{name}.csv")
+    assert recording.rate_hz == pytest.approx(114.2, abs=0.1)
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    assert recording.gyroscope_unit is RateUnit.RAD_S
+    jitter = finding(recording, FindingCode.TIME_JITTER)
+    # Steps of 7.5 and 10 ms alternate.
+    assert jitter.numbers["jitter_s"] == pytest.approx(0.00125, rel=0.01)
+    # The packet counter runs with the inner 400 Hz and wraps at 65536; nothing was lost.
+    assert FindingCode.SAMPLES_LOST not in codes(recording)
+    assert {"PacketCounter", "Roll", "Pitch", "Yaw"} <= set(recording.auxiliary)
+
+
+def test_imucal_ferraris_units_and_missing_rate(real_data):
+    path = real_data / "imucal_ferraris" / "example_ferraris_session.csv"
+    recording = read_recording(path)
+    written = np.loadtxt(path, delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(recording.gyroscope, written[:, 1:4])
+    np.testing.assert_array_equal(recording.accelerometer, written[:, 4:])
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    assert recording.gyroscope_unit is RateUnit.DEG_S
+    assert list(recording.auxiliary) == ["n_samples"]
+    assert finding(recording, FindingCode.RATE_ASSUMED).severity is Severity.SERIOUS
+    assert read_recording(path, rate_hz=102.4).gyroscope_unit is RateUnit.DEG_S
+
+
+@pytest.mark.parametrize("axis", "xyz")
+def test_ctu_turns_are_a_gyro_alone(real_data, axis):
+    recording = read_recording(real_data / "ctu" / f"{axis}_rotation.csv", rate_hz=100)
+    assert recording.accelerometer is None
+    assert recording.gyroscope.shape == (4001, 3)
+    assert recording.gyroscope_unit is RateUnit.DEG_S
+
+
+def test_ctu_pose_means_are_read_as_rows_in_g(real_data):
+    recording = read_recording(real_data / "ctu" / "measured_accelerations.csv")
+    assert recording.accelerometer.shape == (24, 3)
+    assert recording.accelerometer_unit is AccelerationUnit.G
+    assert FindingCode.UNIT_CONTRADICTED not in codes(recording)
+
+
+@pytest.mark.parametrize(
+    ("name", "n", "clipped"),
+    [
+        ("tomi_example_data_calibration", 10245, True),
+        ("tomi_example_data_tinit_calc", 44930, False),
+        ("tomi_imu_90_x_rot", 9987, False),
+        ("tomi_imu_static_test", 9986, False),
+    ],
+)
+def test_mpu6050_tomi_preamble_and_clipping(real_data, name, n, clipped):
+    recording = read_recording(real_data / "mpu6050_tomi" / f"{name}.csv")
+    assert recording.accelerometer.shape == (n, 3)
+    assert recording.accelerometer_unit is AccelerationUnit.COUNTS
+    assert finding(recording, FindingCode.RATE_STATED).numbers["rate_hz"] == 100
+    assert (FindingCode.CLIPPING in codes(recording)) is clipped
+    if clipped:
+        assert finding(recording, FindingCode.CLIPPING).numbers["x_low_value"] == -32768
+        assert "line 6668" in finding(recording, FindingCode.CLIPPING).seen
+
+
+@pytest.mark.parametrize(("run", "n_gaps"), [(1, 3), (2, 7), (3, 6)])
+def test_kim_has_jitter_and_a_few_gaps(real_data, run, n_gaps):
+    path = real_data / "kim" / f"kim_imu_good{run}.txt"
+    recording = read_recording(path)
+    written = np.loadtxt(path)
+    np.testing.assert_array_equal(recording.accelerometer, written[:, 1:4])
+    np.testing.assert_array_equal(recording.gyroscope, written[:, 4:7])
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    assert recording.gyroscope_unit is RateUnit.RAD_S
+    assert recording.start_epoch_s == pytest.approx(written[0, 0])
+    jitter = finding(recording, FindingCode.TIME_JITTER)
+    assert jitter.numbers["jitter_s"] == pytest.approx(1.17e-3, rel=0.02)
+    assert jitter.numbers["median_rate_hz"] == pytest.approx(97.6, abs=0.1)
+    assert finding(recording, FindingCode.TIME_GAP).numbers["count"] == n_gaps
+    assert {"qx", "qy", "qz", "qw", "mx", "my", "mz"} == set(recording.auxiliary)
+
+
+@pytest.mark.parametrize("name", ["allan_curves/adis_av.csv", "analog6dof/viconRot1.csv", "mimu4444/IMU_positions.csv"])
+def test_a_table_that_is_no_log_is_refused_by_its_columns(real_data, name):
+    with pytest.raises(ReadError, match="no accelerometer and no gyro columns recognised among"):
+        read_recording(real_data / name)
