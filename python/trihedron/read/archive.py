@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import tokenize
 import zipfile
 import zlib
 from pathlib import Path
@@ -14,7 +16,12 @@ from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.table import FloatArray, Table, check_memory, file_sha256
 
 _BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
-_DAMAGE = (ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error, NotImplementedError, MemoryError, TypeError)
+# NumPy evaluates a header as Python text, so a damaged one fails in the ways of a parser.
+_DAMAGE = (
+    *(ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, OverflowError, MemoryError),
+    *(SyntaxError, tokenize.TokenError, RecursionError, NotImplementedError),
+    *(zipfile.BadZipFile, zlib.error, struct.error),
+)
 
 
 def read_npy(path: Path) -> Table:

@@ -16,6 +16,8 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "100us": 1e-4}
 PLAUSIBLE_HZ = (2.0, 20000.0)
 MAX_DISPLACEMENT = 64
 """Rows a packet may arrive late. Anything further is another recording, not another order."""
+_LONGEST_S = 3.2e9
+"""A century."""
 _MODULI = (2.0**16, 2.0**24, 2.0**32)
 
 
@@ -84,6 +86,11 @@ def build_clock(table: Table, column: int, named: str, given: str | None, nanose
         rows = order if rows is None else rows[order]
     unit = _time_unit(raw, named, given, wraps, findings)
     scale = SECONDS[unit]
+    if not (raw[-1] - raw[0]) * scale < _LONGEST_S:
+        raise ReadError(
+            f"{table.path}: column {table.label(column)} read as time in {unit} spans "
+            f"{(raw[-1] - raw[0]) * scale:.3g} s, which no log does; give --time-unit, or name another time column."
+        )
     return Clock((raw - raw[0]) * scale, float(base + raw[0]) * scale, rows, tuple(findings))
 
 

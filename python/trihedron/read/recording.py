@@ -21,6 +21,8 @@ from trihedron.records import Recording
 from trihedron.units import AccelerationUnit, RateUnit
 
 
+# Absurd readings (1e300) overflow squares; they then fail every test of plausibility, which is what they should.
+@np.errstate(over="ignore", invalid="ignore")
 def read_recording(
     path: str | os.PathLike[str] | None = None,
     *,

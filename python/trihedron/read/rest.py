@@ -75,6 +75,8 @@ def look(sensors: dict[str, FloatArray], rate_hz: float) -> Windows | None:
     if not quiet.any():
         total = sum(v / max(float(np.median(v)), 1e-300) for v in spread.values())
         quiet = np.asarray(total <= np.percentile(total, 10.0))
+    if not quiet.any():
+        quiet[:] = True
     return Windows(start, length, mean, noise, quiet)
 
 

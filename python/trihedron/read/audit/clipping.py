@@ -17,6 +17,8 @@ Place = Callable[[int], str]
 AXES = "xyz"
 STEEP = 5.0
 """The wall is reached by steps this many times the noise: a quiet sensor resting on its largest count is no wall."""
+FLAT = 6
+"""So many equal readings in a row at the wall do the same for a sensor whose noise is above its resolution."""
 PILED = 3.0
 """And it holds this many times more samples than the neighbouring values lead up to."""
 
@@ -68,6 +70,9 @@ def _wall(
     before = np.abs(values[np.maximum(starts - 1, 0)] - value)
     after = np.abs(values[np.minimum(starts + lengths, len(values) - 1)] - value)
     steep = (lengths >= 2) & (np.fmax(before, after) > STEEP * max(noise, width))
+    if noise > quantum(values):
+        # Noise that moves the last digit never leaves one value alone for so long, however slowly the wall is reached.
+        steep |= lengths >= FLAT
     # One stretch alone may be a channel that froze; at the end of an integer's range it is the range.
     enough = 1 if _is_full_scale(value) else 2
     if np.count_nonzero(steep) < enough or len(at) <= PILED * by_shape:
@@ -81,6 +86,17 @@ def _is_full_scale(value: float) -> bool:
         return False
     magnitude = int(value) + 1 if value > 0 else -int(value)
     return magnitude & (magnitude - 1) == 0
+
+
+def quantum(values: FloatArray) -> float:
+    """Step between neighbouring possible readings; zero where the values do not repeat, as those of a fine sensor."""
+    probe = values[:: max(1, len(values) // 200_000)]
+    levels = np.unique(probe[np.isfinite(probe)])
+    if len(levels) < 2 or len(levels) > 0.2 * len(probe):
+        return 0.0
+    # Decimals as written may differ in the last digit for one and the same code: the tenth percentile passes over that.
+    step: np.float64 = np.percentile(np.diff(levels), 10.0)
+    return float(step)
 
 
 def _runs(at: npt.NDArray[np.intp]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from trihedron.read.audit.clipping import AXES, audit_clipping, find_walls, short
+from trihedron.read.audit.clipping import AXES, audit_clipping, find_walls, quantum, short
 from trihedron.read.audit.repeats import CHUNK, Repeats, longest_by_chance
 from trihedron.read.rest import Windows
 from trihedron.read.table import FloatArray
@@ -140,14 +140,3 @@ def _coarse(sensor: str, readings: FloatArray, windows: Windows | None) -> list[
             MappingProxyType({f"{AXES[k]}_step": step for k, step, _ in found}),
         )
     ]
-
-
-def quantum(values: FloatArray) -> float:
-    """Step between neighbouring possible readings; zero where the values do not repeat, as those of a fine sensor."""
-    probe = values[:: max(1, len(values) // 200_000)]
-    levels = np.unique(probe[np.isfinite(probe)])
-    if len(levels) < 2 or len(levels) > 0.2 * len(probe):
-        return 0.0
-    # Decimals as written may differ in the last digit for one and the same code: the tenth percentile passes over that.
-    step: np.float64 = np.percentile(np.diff(levels), 10.0)
-    return float(step)

@@ -1,0 +1,218 @@
+"""The audit finds what was put into a log, at its place and with its number, and nothing in a good one."""
+
+import importlib
+
+import numpy as np
+import pytest
+
+from test_read import HEADER, codes, finding, write
+from trihedron.read import read_recording
+from trihedron.read.audit import audit_counter
+from trihedron.read.audit.clipping import find_walls
+from trihedron.read.audit.repeats import Repeats
+from trihedron.records import FindingCode, Severity
+
+N = 4000
+ALARMS = {
+    FindingCode.TIME_GAP,
+    FindingCode.TIME_JITTER,
+    FindingCode.TIME_DUPLICATE,
+    FindingCode.TIME_BACKWARD,
+    FindingCode.STUCK_VALUES,
+    FindingCode.CLIPPING,
+    FindingCode.REPEATED_ROWS,
+    FindingCode.NON_FINITE,
+    FindingCode.COARSE_RESOLUTION,
+    FindingCode.SAMPLES_LOST,
+}
+
+
+def counts(seed: int = 1, moving: bool = True) -> np.ndarray:
+    """(N, 7) time [s] and 16-bit counts: rests and swings of a sensor of 20 counts noise."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(N) / 100.0
+    swing = np.where((t % 8) > 5, np.sin(2 * np.pi * (t % 8 - 5) / 3), 0.0) if moving else np.zeros(N)
+    acc = np.array([300.0, -500.0, 16000.0]) + np.outer(swing, [4000.0, 2500.0, -1500.0])
+    gyr = np.array([-50.0, 20.0, 10.0]) + np.outer(swing, [9000.0, -7000.0, 5000.0])
+    readings = np.rint(np.column_stack([acc, gyr]) + 20.0 * rng.standard_normal((N, 6)))
+    return np.column_stack([t, readings])
+
+
+def read(tmp_path, table, header=HEADER):
+    return read_recording(write(tmp_path / "log.csv", table, header))
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_good_log_raises_no_alarm(tmp_path, seed, moving):
+    assert codes(read(tmp_path, counts(seed, moving))) & ALARMS == set()
+
+
+def test_gaps_are_counted_with_place_and_length(tmp_path):
+    table = np.delete(counts(), [*range(1000, 1025), 3000], axis=0)
+    gap = finding(read(tmp_path, table), FindingCode.TIME_GAP)
+    assert gap.numbers["count"] == 2
+    assert gap.numbers["lost_samples"] == 26
+    assert gap.numbers["longest_s"] == pytest.approx(0.26, abs=1e-9)
+    assert gap.numbers["sample"] == 1000
+    # Row 1000 stands in line 1002: the header is line 1.
+    assert "line 1002" in gap.seen
+    assert gap.severity is Severity.WARNING
+
+
+def test_many_lost_samples_are_serious(tmp_path):
+    table = np.delete(counts(), np.arange(0, N, 10), axis=0)
+    assert finding(read(tmp_path, table), FindingCode.TIME_GAP).severity is Severity.SERIOUS
+
+
+def test_jitter_is_given_in_milliseconds_and_does_not_change_the_rate(tmp_path):
+    table = counts()
+    table[:, 0] += 0.0008 * np.random.default_rng(2).standard_normal(N)
+    recording = read(tmp_path, table)
+    # Steps are differences of two stamps: √2 times their jitter.
+    jitter = finding(recording, FindingCode.TIME_JITTER).numbers["jitter_s"]
+    assert jitter == pytest.approx(0.0008 * np.sqrt(2), rel=0.05)
+    assert recording.rate_hz == pytest.approx(100, rel=1e-3)
+
+
+def test_stamps_rounded_to_milliseconds_do_not_bias_the_rate(tmp_path):
+    table = counts()
+    table[:, 0] = np.round(np.arange(N) / 99.75, 3)
+    # The median step says 100 Hz; the log's length says 99.75.
+    assert read(tmp_path, table).rate_hz == pytest.approx(99.75, rel=1e-4)
+
+
+def test_batched_stamps_are_said_and_do_not_bias_the_rate(tmp_path):
+    table = counts()
+    table[:, 0] = np.floor(np.arange(N) / 10) / 10
+    recording = read(tmp_path, table)
+    assert finding(recording, FindingCode.TIME_DUPLICATE).numbers["fraction"] == pytest.approx(0.9, abs=0.01)
+    assert recording.rate_hz == pytest.approx(100, rel=1e-6)
+    assert FindingCode.TIME_GAP not in codes(recording)
+
+
+def test_rows_written_twice_are_dropped_and_said(tmp_path):
+    table = counts()
+    recording = read(tmp_path, np.repeat(table, 2, axis=0))
+    assert recording.n_samples == N
+    np.testing.assert_array_equal(recording.accelerometer, table[:, 1:4])
+    assert finding(recording, FindingCode.REPEATED_ROWS).numbers["count"] == N
+
+
+def test_late_packets_are_sorted_and_said(tmp_path):
+    table = counts()
+    order = np.arange(N)
+    order[[500, 501, 900, 903]] = order[[501, 500, 903, 900]]
+    recording = read(tmp_path, table[order])
+    np.testing.assert_array_equal(recording.accelerometer, table[:, 1:4])
+    backward = finding(recording, FindingCode.TIME_BACKWARD)
+    assert backward.severity is Severity.WARNING
+    assert backward.numbers["displaced_rows"] == 3
+    assert backward.numbers["sample"] == 501
+
+
+@pytest.mark.parametrize("sensor", [0, 1])
+def test_a_sensor_slower_than_its_log_repeats_itself(tmp_path, sensor):
+    table = counts()
+    columns = slice(1 + 3 * sensor, 4 + 3 * sensor)
+    table[1::2, columns] = table[0::2, columns]
+    recording = read(tmp_path, table)
+    repeated = finding(recording, FindingCode.REPEATED_ROWS)
+    assert repeated.numbers["fraction"] == pytest.approx(0.5, abs=0.01)
+    assert ("accelerometer", "gyro")[sensor] in repeated.seen
+
+
+@pytest.mark.parametrize("column", range(1, 7))
+def test_a_frozen_channel_is_found_with_its_place(tmp_path, column):
+    table = counts()
+    table[1500:1600, column] = table[1500, column]
+    stuck = finding(read(tmp_path, table), FindingCode.STUCK_VALUES)
+    assert stuck.numbers["axis"] == (column - 1) % 3
+    assert stuck.numbers["longest_run"] == 100
+    assert stuck.numbers["sample"] == 1500
+
+
+@pytest.mark.parametrize("limit", [6000.0, 6789.0, 4096.0])
+def test_clipping_is_found_from_the_data_whatever_the_range(tmp_path, limit):
+    table = counts()
+    table[:, 4:] = np.clip(table[:, 4:], -limit, limit)
+    clipped = finding(read(tmp_path, table), FindingCode.CLIPPING)
+    assert clipped.numbers["x_high_value"] == limit
+    assert clipped.numbers["x_low_value"] == -limit
+    assert clipped.numbers["x_high_count"] == np.count_nonzero(table[:, 4] == limit)
+    # The z axis swings to 5000 only.
+    assert ("z_high_value" in clipped.numbers) is (limit < 5000)
+    assert "accelerometer" not in clipped.seen
+
+
+def test_clipping_survives_a_change_of_unit(tmp_path):
+    table = counts()
+    table[:, 4:] = np.clip(table[:, 4:], -6000, 6000) / 131.0
+    assert finding(read(tmp_path, table), FindingCode.CLIPPING).numbers["x_high_value"] == pytest.approx(6000 / 131.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_round_top_of_a_swing_is_not_clipping(seed):
+    # A slow swing seen by a coarse converter stays at its top for many samples; nothing is cut off.
+    rng = np.random.default_rng(seed)
+    t = np.arange(20_000) / 100.0
+    swing = np.rint(100 * np.sin(0.7 * t + rng.uniform(0, 6)) + 0.3 * rng.standard_normal(len(t)))
+    assert find_walls(np.column_stack([swing, swing, swing]), np.full(3, 0.3)) == []
+
+
+def test_a_quiet_coarse_sensor_resting_on_its_largest_count_is_coarse_and_neither_clipped_nor_stuck(tmp_path):
+    rng = np.random.default_rng(4)
+    table = counts(moving=False)
+    table[:, 1:] = np.rint([511, 501, 605, 374, 376, 370] + 0.15 * rng.standard_normal((N, 6)))
+    found = codes(read(tmp_path, table, "t,ax_adc,ay_adc,az_adc,gx_adc,gy_adc,gz_adc\n"))
+    assert FindingCode.COARSE_RESOLUTION in found
+    assert not found & {FindingCode.CLIPPING, FindingCode.STUCK_VALUES, FindingCode.REPEATED_ROWS}
+
+
+def test_non_finite_readings_become_nan_at_their_place(tmp_path):
+    table = counts()
+    table[700, 2] = np.inf
+    table[701, 5] = np.nan
+    recording = read(tmp_path, table)
+    found = [f for f in recording.findings if f.code is FindingCode.NON_FINITE]
+    assert [f.numbers["sample"] for f in found] == [700, 701]
+    assert np.isnan(recording.accelerometer[700, 1])
+    assert np.isnan(recording.gyroscope[701, 1])
+
+
+def test_a_row_without_time_is_left_out_and_lines_stay_right(tmp_path):
+    table = counts()
+    table[10, 0] = np.nan
+    table[900, 4] = np.nan
+    recording = read(tmp_path, table)
+    assert recording.n_samples == N - 1
+    # Sample 899 was row 900, line 902.
+    assert any("sample 899, line 902" in f.seen for f in recording.findings)
+
+
+@pytest.mark.parametrize("modulus", [256, 65536])
+def test_a_packet_counter_tells_lost_samples_and_may_wrap(modulus):
+    counter = (np.arange(1000) + 200).astype(float)
+    place = "sample {}".format
+    assert audit_counter(counter % modulus, "'seq'", place) == []
+    (found,) = audit_counter(np.delete(counter, [300, 301, 700]) % modulus, "'seq'", place)
+    assert found.numbers["lost_samples"] == 3
+    assert found.numbers["count"] == 2
+    assert found.numbers["sample"] == 300
+
+
+def test_runs_are_the_same_whatever_the_chunk(monkeypatch):
+    rng = np.random.default_rng(8)
+    readings = rng.integers(0, 2, (997, 3)).astype(float)
+    whole = Repeats(readings)
+    monkeypatch.setattr(importlib.import_module("trihedron.read.audit.repeats"), "CHUNK", 10)
+    parts = Repeats(readings)
+    np.testing.assert_array_equal(parts.count, whole.count)
+    np.testing.assert_array_equal(parts.longest, whole.longest)
+    np.testing.assert_array_equal(parts.longest_start, whole.longest_start)
+    # The slow obvious way.
+    for k in range(3):
+        runs = np.split(np.arange(997), np.flatnonzero(np.diff(readings[:, k]) != 0) + 1)
+        longest = max(runs, key=len)
+        assert whole.longest[k] == len(longest)
+        assert whole.longest_start[k] == longest[0]
