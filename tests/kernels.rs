@@ -15,3 +15,6 @@ mod stillness;
 
 #[path = "kernels/kalman.rs"]
 mod kalman;
+
+#[path = "kernels/simulate.rs"]
+mod simulate;

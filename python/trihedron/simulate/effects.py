@@ -399,7 +399,10 @@ def effects_of(scenario: Scenario) -> MappingProxyType[str, MappingProxyType[str
         _note_electronics(note, prefix, name, sensor.electronics, place.temperature)
         if any(sensor.rectification):
             note("vibration-rectification", **{name: sensor.rectification})
-        if sensor.adc.dead_band or sensor.adc.missing_every:
+        # A step matters when the noise of one sample does not smear it.
+        smear = max(sensor.noise.N) * math.sqrt(clock.rate_hz)
+        coarse = 0.5 * sensor.adc.lsb * float(np.linalg.norm(np.asarray(sensor.S), axis=0).max()) > smear
+        if sensor.adc.dead_band or sensor.adc.missing_every or (coarse and sensor.adc.lsb > 0.0):
             note("quantisation", **{name: (sensor.adc.lsb, sensor.adc.dead_band, sensor.adc.missing_every)})
         if np.linalg.det(np.asarray(sensor.S)) < 0.0:
             note("axis-handedness", **{name: "left-handed"})
@@ -445,11 +448,11 @@ def _note_motion(note: Callable[..., None], motion: Motion) -> None:
     errors = [step.error_deg for step in motion.steps if isinstance(step, Turn)]
     if any(errors):
         note("turn-angle-error", errors_deg=tuple(errors))
-    holds, disturbed = -1, []
-    for step in motion.steps:
-        if isinstance(step, Hold):
-            holds += 1
+    pose, disturbed = -1, []
+    for before, step in zip((None, *motion.steps), motion.steps, strict=False):
+        if isinstance(step, Hold) and not isinstance(before, Disturb):
+            pose += 1
         elif isinstance(step, Disturb):
-            disturbed.append(holds)
+            disturbed.append(pose)
     if disturbed:
-        note("disturbed-pose", after_hold=tuple(disturbed))
+        note("disturbed-pose", poses=tuple(disturbed))

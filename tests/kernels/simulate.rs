@@ -1,0 +1,339 @@
+//! The simulated instrument against closed forms.
+
+use nalgebra::Vector3;
+use proptest::prelude::*;
+use std::f64::consts::TAU;
+use trihedron::simulate::jet::{Jet, QuaternionJet, progress, window};
+use trihedron::simulate::mechanism::{Bridge, creep, first_order, play, second_order};
+use trihedron::simulate::motion::Replay;
+use trihedron::simulate::noise::flicker_poles;
+use trihedron::simulate::random::Stream;
+use trihedron::simulate::sampling::{Converter, resample};
+
+fn one_channel(values: impl Iterator<Item = f64>) -> Vec<[f64; 3]> {
+    values.map(|v| [v; 3]).collect()
+}
+
+#[test]
+fn normal_deviates_have_the_normal_distribution() {
+    let n = 2_000_000;
+    let mut stream = Stream::new(11);
+    // P(x < edge), from tables of the normal distribution; the last two reach into the ziggurat's tail.
+    let edges = [
+        (-1.0, 0.158_655_253_931_457),
+        (0.0, 0.5),
+        (0.3, 0.617_911_422_188_953),
+        (2.0, 0.977_249_868_051_821),
+        (3.7, 0.999_892_200_266_523),
+        (-4.2, 1.334_574_901_590_631e-5),
+    ];
+    let mut below = [0.0_f64; 6];
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for _ in 0..n {
+        let x = stream.normal();
+        sum += x;
+        squares += x * x;
+        for (count, (edge, _)) in below.iter_mut().zip(edges) {
+            *count += f64::from(u8::from(x < edge));
+        }
+    }
+    let n = f64::from(n);
+    for (count, (edge, p)) in below.iter().zip(edges) {
+        // Four standard deviations of a binomial count.
+        let limit = 4.0 * (n * p * (1.0 - p)).sqrt();
+        assert!(
+            (count - n * p).abs() < limit,
+            "below {edge}: {count} of {n}"
+        );
+    }
+    assert!((sum / n).abs() < 4.0 / n.sqrt());
+    assert!((squares / n - 1.0).abs() < 4.0 * (2.0 / n).sqrt());
+}
+
+#[test]
+fn a_stream_is_the_same_for_the_same_key_and_another_for_another() {
+    let draw = |key| {
+        let mut s = Stream::new(key);
+        [s.normal(), s.normal(), s.uniform()]
+    };
+    assert!(
+        draw(1)
+            .iter()
+            .zip(draw(1))
+            .all(|(a, b)| a.to_bits() == b.to_bits())
+    );
+    assert!(
+        draw(1)
+            .iter()
+            .zip(draw(2))
+            .all(|(a, b)| a.to_bits() != b.to_bits())
+    );
+}
+
+#[test]
+fn a_resonator_settles_on_a_step_as_its_closed_form_says() {
+    let (dt, f0, q) = (1e-3, 12.0, 2.5);
+    let w = TAU * f0;
+    // Straight lines between samples: the step is a ramp of one dt, whose exact response is the integral of the step's.
+    let mut x = one_channel((0..400).map(|i| f64::from(u8::from(i > 0))));
+    second_order(&mut x, dt, &[f0; 3], &[q; 3]).unwrap();
+    let (damping, ringing) = (w / (2.0 * q), w * (1.0 - 1.0 / (4.0 * q * q)).sqrt());
+    // ∫0^t step response: t - c + e^{-dt}(c cos + ((c d - 1)/ω) sin) with c = 1/(Q w).
+    let c = 1.0 / (q * w);
+    let integral = |t: f64| {
+        if t <= 0.0 {
+            return 0.0;
+        }
+        let (s, co) = (ringing * t).sin_cos();
+        t - c + (-damping * t).exp() * (c * co + (c * damping - 1.0) / ringing * s)
+    };
+    for (i, row) in x.iter().enumerate() {
+        let t = i as f64 * dt;
+        let exact = (integral(t) - integral(t - dt)) / dt;
+        assert!((row[0] - exact).abs() < 1e-11, "{i}: {} {exact}", row[0]);
+    }
+}
+
+#[test]
+fn low_passes_pass_a_sine_as_their_transfer_functions_say() {
+    let (dt, f) = (1e-4, 7.0);
+    let n = 60_000;
+    let signal = one_channel((0..n).map(|i| (TAU * f * f64::from(i) * dt).sin()));
+    // A straight line between samples of a sine scales it by sinc²: 1 - (ωdt)²/12 = 1 - 1.6e-6.
+    for (name, mut x, gain_phase) in [
+        {
+            let (f0, q) = (20.0, 0.9);
+            let mut x = signal.clone();
+            second_order(&mut x, dt, &[f0; 3], &[q; 3]).unwrap();
+            let r: f64 = f / f0;
+            let (re, im) = (1.0 - r * r, r / q);
+            ("second order", x, (1.0 / re.hypot(im), -im.atan2(re)))
+        },
+        {
+            let mut x = signal.clone();
+            first_order(&mut x, dt, &[0.03; 3]).unwrap();
+            let wt = TAU * f * 0.03;
+            ("first order", x, (1.0 / 1.0_f64.hypot(wt), -wt.atan()))
+        },
+    ] {
+        for i in 50_000..60_000 {
+            let exact = gain_phase.0 * (TAU * f * f64::from(i) * dt + gain_phase.1).sin();
+            let got = x[usize::try_from(i).unwrap()][0];
+            assert!((got - exact).abs() < 5e-6, "{name} at {i}: {got} {exact}");
+        }
+        x.clear();
+    }
+}
+
+#[test]
+fn stages_rest_at_rest_and_far_too_stiff_ones_follow_at_once() {
+    let mut x = one_channel((0..50).map(|_| 3.0));
+    second_order(&mut x, 0.01, &[5.0; 3], &[0.7; 3]).unwrap();
+    first_order(&mut x, 0.01, &[1.0; 3]).unwrap();
+    creep(&mut x, 0.01, &[0.01; 3], &[20.0; 3]).unwrap();
+    play(&mut x, &[1.0; 3], &[0.1; 3]).unwrap();
+    assert!(x.iter().flatten().all(|v| (v - 3.0).abs() < 1e-12));
+    let mut ramp = one_channel((0..50).map(f64::from));
+    // 5 kHz and Q = 0.02: the slow root of an overdamped pair sits at 100 Hz, still settled within one 0.1 s step.
+    second_order(&mut ramp, 0.1, &[5000.0; 3], &[0.02; 3]).unwrap();
+    let lag = 1.0 / (0.02 * TAU * 5000.0) / 0.1;
+    assert!((ramp[40][1] - (40.0 - lag)).abs() < 1e-9);
+    assert!(second_order(&mut ramp, 0.1, &[0.0; 3], &[1.0; 3]).is_err());
+    assert!(first_order(&mut ramp, 0.1, &[-1.0; 3]).is_err());
+}
+
+#[test]
+fn equal_plates_read_two_xi_over_four_minus_xi_squared() {
+    for x in [-0.7, -0.1, 0.0, 1e-4, 0.3, 0.9] {
+        let exact = 2.0 * x / (4.0 - x * x);
+        assert!((Bridge::voltage(x, 0.0) - exact).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn the_bridge_bends_a_response_by_the_stated_second_and_third_order() {
+    let (d, second, third) = (1e-3, -0.08, 0.3);
+    let bridge = Bridge {
+        deflection: [d; 3],
+        second: [second; 3],
+        third: [third; 3],
+        mismatch: [0.0; 3],
+    };
+    let (k2, k3) = (-second * d, d * d * (0.25 - third + 2.0 * second * second));
+    let mut x = one_channel((-20..=20).map(f64::from));
+    bridge.respond(&mut x).unwrap();
+    for (row, a) in x.iter().zip(-20..=20) {
+        let a = f64::from(a);
+        // Fourth order is left: d³ (5 s2 s3 - 5 s2³ - ¾ s2) a⁴ = -5.7e-11 a⁴, and what follows it.
+        assert!((row[2] - (a + k2 * a * a + k3 * a * a * a)).abs() < 6e-11 * a.powi(4).max(1e-2));
+    }
+    assert!(
+        bridge
+            .respond(&mut one_channel([2000.0].into_iter()))
+            .is_err()
+    );
+}
+
+#[test]
+fn mismatched_plates_keep_rest_at_zero_and_the_small_signal_gain_at_one() {
+    let bridge = Bridge {
+        deflection: [1e-3; 3],
+        second: [0.0; 3],
+        third: [0.0; 3],
+        mismatch: [0.05, -0.1, 0.0],
+    };
+    let h = 1e-3;
+    let mut x = one_channel([0.0, h, -h].into_iter());
+    bridge.respond(&mut x).unwrap();
+    for k in 0..3 {
+        assert!(x[0][k].abs() < 1e-12);
+        assert!(((x[1][k] - x[2][k]) / (2.0 * h) - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn play_remembers_the_way_it_came() {
+    let (w, o) = (2.0, 0.03);
+    // Up by 10, down by 10, up by 1: offsets -o, +o, and half way through the play again.
+    let path = (0..=100)
+        .map(|i| 0.1 * f64::from(i))
+        .chain((0..=100).map(|i| 10.0 - 0.1 * f64::from(i)))
+        .chain((0..=20).map(|i| 0.1 * f64::from(i)));
+    let mut x = one_channel(path);
+    play(&mut x, &[w; 3], &[o; 3]).unwrap();
+    assert!((x[100][0] - (10.0 - o)).abs() < 1e-12);
+    assert!((x[201][0] - o).abs() < 1e-12);
+    assert!((x[222][0] - 2.0).abs() < 1e-12);
+}
+
+#[test]
+fn creep_brings_the_rest_of_a_step_with_its_time_constant() {
+    let (dt, tau, part) = (0.01, 3.0, 0.02);
+    let mut x = one_channel((0..1000).map(|i| f64::from(u8::from(i > 0))));
+    creep(&mut x, dt, &[part; 3], &[tau; 3]).unwrap();
+    for i in 1..1000 {
+        let t = i as f64 * dt;
+        // The step is a ramp of one dt: averaging the exponential over it.
+        let late = tau / dt * (-t / tau).exp() * ((dt / tau).exp() - 1.0);
+        assert!((x[i][0] - (1.0 - part * late)).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn resampling_is_exact_for_cubics_and_refuses_what_lies_outside() {
+    let f = |t: f64| 1.0 + t * (2.0 + t * (-0.5 + 0.25 * t));
+    let signal = one_channel((0..20).map(|i| f(0.1 * f64::from(i) - 0.3)));
+    let times = [-0.3, -0.25, 0.0, 0.777, 1.5, 1.6];
+    let out = resample(&signal, -0.3, 0.1, &times).unwrap();
+    for (row, t) in out.iter().zip(times) {
+        assert!((row[0] - f(t)).abs() < 1e-13);
+    }
+    assert!(resample(&signal, -0.3, 0.1, &[1.7]).is_err());
+    assert!(resample(&signal[..3], -0.3, 0.1, &[0.0]).is_err());
+}
+
+#[test]
+fn a_converter_rounds_clips_skips_codes_and_sleeps_in_its_dead_band() {
+    let converter = Converter {
+        lsb: 0.5,
+        low: -4.0,
+        high: 4.0,
+        dead_band: 0.8,
+        zero: [0.0, 1.0, 0.0],
+        missing_every: 5,
+    };
+    let mut x = one_channel([0.6, 1.1, 2.4, 2.6, 9.0, -9.0].into_iter());
+    converter.convert(&mut x).unwrap();
+    // Code 5 (2.5) and code 0 are missing; 0.6 is asleep in channels 1 (at 0, whose code is missing) and 2 (at 1).
+    assert_eq!(x[0], [-0.5, 1.0, -0.5]);
+    assert_eq!(x[1], [1.0, 1.0, 1.0]);
+    assert_eq!(x[2][0].to_bits(), 2.0_f64.to_bits());
+    assert_eq!(x[3][0].to_bits(), 2.0_f64.to_bits());
+    assert_eq!((x[4][0], x[5][0]), (4.0, -4.0));
+    let malformed = Converter {
+        low: 5.0,
+        ..converter
+    };
+    assert!(malformed.convert(&mut x).is_err());
+}
+
+#[test]
+fn flicker_poles_add_up_to_one_over_f() {
+    let (n, dt) = (1_000_000, 0.01);
+    let (poles, variance) = flicker_poles(n, dt);
+    let mut f = 1.0 / (n as f64 * dt);
+    while f < 0.45 / dt {
+        let w = TAU * f;
+        // Discrete spectrum of the sampled processes, two-sided.
+        let psd: f64 = poles
+            .iter()
+            .map(|p| {
+                let keep = (-p * dt).exp();
+                variance * dt * (1.0 - keep * keep)
+                    / (1.0 - 2.0 * keep * (w * dt).cos() + keep * keep)
+            })
+            .sum();
+        // Ripple 0.3 %; at both ends of the band the sum is cut, at the upper one aliasing nearly makes up for it.
+        assert!((psd * w - 1.0).abs() < 0.08, "{f} Hz: {}", psd * w);
+        f *= 1.3;
+    }
+}
+
+fn jet_of(f: impl Fn(f64) -> f64, t: f64) -> (f64, f64) {
+    let h = 1e-4;
+    (
+        (f(t - 2.0 * h) - 8.0 * f(t - h) + 8.0 * f(t + h) - f(t + 2.0 * h)) / (12.0 * h),
+        (f(t + h) - 2.0 * f(t) + f(t - h)) / (h * h),
+    )
+}
+
+proptest! {
+    #[test]
+    fn progress_and_window_carry_their_derivatives(tau in 0.01..0.99f64, ramp in 0.05..0.5f64) {
+        // A joint of the pieces inside the difference would show its jump in the third derivative.
+        prop_assume!((tau - ramp).abs() > 1e-3 && (tau - 1.0 + ramp).abs() > 1e-3);
+        let at = |v: f64| Jet { v, d: 1.0, dd: 0.0 };
+        for f in [progress as fn(Jet, f64) -> Jet, window as fn(Jet, f64) -> Jet] {
+            let got = f(at(tau), ramp);
+            let (d, dd) = jet_of(|t| f(at(t), ramp).v, tau);
+            // Second difference of step 1e-4: truncation h²/12 f'''' with f'''' up to 360/ramp⁴.
+            prop_assert!((got.d - d).abs() < 1e-7 / ramp.powi(4));
+            prop_assert!((got.dd - dd).abs() < 1e-6 / ramp.powi(4));
+        }
+        prop_assert!((progress(at(1.0), ramp).v - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_moving_exponential_has_the_rate_of_its_attitude(
+        a in prop::array::uniform3(-2.0..2.0f64), b in prop::array::uniform3(-2.0..2.0f64),
+        c in prop::array::uniform3(-2.0..2.0f64), scale in prop_oneof![Just(1e-6), Just(1.0)],
+    ) {
+        let q = |t: f64| {
+            let u = [0, 1, 2].map(|k| Jet {
+                v: scale * (a[k] + b[k] * t + c[k] * t * t),
+                d: scale * (b[k] + 2.0 * c[k] * t),
+                dd: scale * 2.0 * c[k],
+            });
+            QuaternionJet::exp(&u)
+        };
+        let h = 1e-4;
+        let (rate, change) = q(0.3).rate_and_acceleration();
+        let (before, after) = (q(0.3 - h), q(0.3 + h));
+        // Central difference of the quaternion: 2 q* (q(t+h) - q(t-h))/2h.
+        let (p, m, o) = (after.value(), before.value(), q(0.3).value());
+        let d: Vec<f64> = (0..4).map(|k| (p[k] - m[k]) / (2.0 * h)).collect();
+        let v = Vector3::new(o[1], o[2], o[3]);
+        let dv = Vector3::new(d[1], d[2], d[3]);
+        let numeric = (dv * o[0] - v * d[0] - v.cross(&dv)) * 2.0;
+        // h²/6 times a third derivative of at most (2+4)³ scale.
+        prop_assert!((numeric - rate).norm() < 1e-6 * scale.max(1e-6));
+        let slope = (after.rate_and_acceleration().0 - before.rate_and_acceleration().0) / (2.0 * h);
+        prop_assert!((slope - change).norm() < 1e-5 * scale.max(1e-6));
+    }
+}
+
+#[test]
+fn a_replay_needs_two_knots() {
+    let one = vec![Vector3::zeros()];
+    assert!(Replay::new([1.0, 0.0, 0.0, 0.0], 1.0, one.clone(), one).is_err());
+}

@@ -1,0 +1,90 @@
+"""Each noise term has the Allan variance that defines it, and its own stream."""
+
+import numpy as np
+import pytest
+
+from trihedron.simulate import NoiseTerms, make_noise
+from twins_simulate import slow_allan_variance
+
+DT = 0.02
+N_SAMPLES = 4096
+CLUSTERS = (1, 4, 16, 64, 256)
+# Realisations: seeds times three axes.
+N_SEEDS = 20
+
+
+def flicker_expected(m):
+    """(2/m²) ∫ sin⁴(ωm/2)/sin²(ω/2) S dω with S = B²/|ω| up to the Nyquist frequency, ∫ S = variance."""
+    w = (np.arange(200_000) + 0.5) * np.pi / 200_000
+    spectrum = 1.0 / (2.0 * np.pi * w)
+    return 2.0 * 2.0 / m**2 * np.sum(np.sin(w * m / 2) ** 4 / np.sin(w / 2) ** 2 * spectrum) * np.pi / 200_000
+
+
+# Exact discrete expectations at m samples of DT for a unit coefficient.
+EXPECTED = {
+    "Q": lambda m: 3.0 / (m * DT) ** 2,
+    "N": lambda m: 1.0 / (m * DT),
+    "B": flicker_expected,
+    "K": lambda m: DT * (2.0 * m * m + 1.0) / (6.0 * m),
+    "R": lambda m: 0.5 * (m * DT) ** 2,
+}
+
+
+def realisations(term, size=1.0):
+    terms = NoiseTerms(**{term: (size, size, size)})
+    return np.concatenate([make_noise(terms, N_SAMPLES, DT, seed, "gyroscope").T for seed in range(N_SEEDS)])
+
+
+def test_the_expected_flicker_tends_to_the_flat_floor():
+    # 2 ln 2/π B² where the cluster is long; the tail above the Nyquist frequency, which is missing, falls as 1/m².
+    assert abs(flicker_expected(64) / (2.0 * np.log(2.0) / np.pi) - 1.0) < 1e-3
+
+
+@pytest.mark.parametrize("term", list(EXPECTED))
+def test_the_allan_variance_of_a_term_is_the_one_that_defines_it(term):
+    series = realisations(term)
+    for m in CLUSTERS:
+        variances = np.array([slow_allan_variance(x, m) for x in series])
+        error = variances.std(ddof=1) / np.sqrt(len(variances))
+        # Four standard errors of the mean over realisations; the 1/f spectrum itself is made to 3 %, and the ramp has
+        # no randomness but rounding.
+        slack = {"B": 0.03, "R": 1e-9}.get(term, 0.0) * EXPECTED[term](m)
+        assert abs(variances.mean() - EXPECTED[term](m)) < 4.0 * error + slack, (term, m)
+
+
+def test_white_noise_has_density_over_root_step_and_no_memory():
+    x = realisations("N", 0.3)
+    n = x.size
+    assert abs(x.std() / (0.3 / np.sqrt(DT)) - 1.0) < 4.0 / np.sqrt(2.0 * n)
+    assert abs(np.mean(x[:, 1:] * x[:, :-1])) * DT / 0.09 < 4.0 / np.sqrt(n)
+
+
+def test_a_walk_starts_at_zero_and_spreads_as_the_root_of_time():
+    x = realisations("K", 2.0)
+    assert not x[:, 0].any()
+    z = x[:, -1] / (2.0 * np.sqrt((N_SAMPLES - 1) * DT))
+    # 60 normal deviates: their mean square is chi-square/60.
+    assert 0.4 < np.mean(z**2) < 1.9
+
+
+def test_terms_axes_sensors_and_seeds_have_independent_streams():
+    def draw(seed, sensor):
+        return make_noise(NoiseTerms(N=(1.0, 1.0, 1.0)), 20_000, 1.0, seed, sensor)
+
+    columns = [*draw(1, "gyroscope").T, *draw(1, "accelerometer").T, *draw(2, "gyroscope").T]
+    correlation = np.corrcoef(columns) - np.eye(9)
+    # 36 pairs of correlation coefficients of 1/√n each: 4.5 standard deviations leave 1e-4 for an accident.
+    assert np.abs(correlation).max() < 4.5 / np.sqrt(20_000)
+
+
+def test_one_term_does_not_change_another():
+    one = make_noise(NoiseTerms(N=(1.0, 0.0, 0.0)), 500, DT, 3, "a")
+    two = make_noise(NoiseTerms(N=(1.0, 0.0, 0.0), B=(0.0, 2.0, 0.0), K=(1.0, 0.0, 0.0)), 500, DT, 3, "a")
+    walk = make_noise(NoiseTerms(K=(1.0, 0.0, 0.0)), 500, DT, 3, "a")
+    # The sum is formed in another order: a few ulp.
+    assert np.allclose(two[:, 0], one[:, 0] + walk[:, 0], rtol=0, atol=1e-13)
+
+
+def test_a_negative_coefficient_is_refused():
+    with pytest.raises(ValueError, match="noise term N"):
+        NoiseTerms(N=(-1.0, 0.0, 0.0))
