@@ -10,6 +10,11 @@ use trihedron::simulate::noise::flicker_poles;
 use trihedron::simulate::random::Stream;
 use trihedron::simulate::sampling::{Converter, resample};
 
+/// Equal to the last bit.
+fn same((a, b): (&f64, f64)) -> bool {
+    a.to_bits() == b.to_bits()
+}
+
 fn one_channel(values: impl Iterator<Item = f64>) -> Vec<[f64; 3]> {
     values.map(|v| [v; 3]).collect()
 }
@@ -76,7 +81,7 @@ fn a_resonator_settles_on_a_step_as_its_closed_form_says() {
     let w = TAU * f0;
     // Straight lines between samples: the step is a ramp of one dt, whose exact response is the integral of the step's.
     let mut x = one_channel((0..400).map(|i| f64::from(u8::from(i > 0))));
-    second_order(&mut x, dt, &[f0; 3], &[q; 3]).unwrap();
+    second_order(&mut x, dt, &[f0; 3], &[q; 3]).expect("legal question");
     let (damping, ringing) = (w / (2.0 * q), w * (1.0 - 1.0 / (4.0 * q * q)).sqrt());
     // ∫0^t step response: t - c + e^{-dt}(c cos + ((c d - 1)/ω) sin) with c = 1/(Q w).
     let c = 1.0 / (q * w);
@@ -104,21 +109,21 @@ fn low_passes_pass_a_sine_as_their_transfer_functions_say() {
         {
             let (f0, q) = (20.0, 0.9);
             let mut x = signal.clone();
-            second_order(&mut x, dt, &[f0; 3], &[q; 3]).unwrap();
+            second_order(&mut x, dt, &[f0; 3], &[q; 3]).expect("legal question");
             let r: f64 = f / f0;
             let (re, im) = (1.0 - r * r, r / q);
             ("second order", x, (1.0 / re.hypot(im), -im.atan2(re)))
         },
         {
             let mut x = signal.clone();
-            first_order(&mut x, dt, &[0.03; 3]).unwrap();
+            first_order(&mut x, dt, &[0.03; 3]).expect("legal question");
             let wt = TAU * f * 0.03;
             ("first order", x, (1.0 / 1.0_f64.hypot(wt), -wt.atan()))
         },
     ] {
         for i in 50_000..60_000 {
             let exact = gain_phase.0 * (TAU * f * f64::from(i) * dt + gain_phase.1).sin();
-            let got = x[usize::try_from(i).unwrap()][0];
+            let got = x[usize::try_from(i).expect("legal question")][0];
             assert!((got - exact).abs() < 5e-6, "{name} at {i}: {got} {exact}");
         }
         x.clear();
@@ -128,14 +133,14 @@ fn low_passes_pass_a_sine_as_their_transfer_functions_say() {
 #[test]
 fn stages_rest_at_rest_and_far_too_stiff_ones_follow_at_once() {
     let mut x = one_channel((0..50).map(|_| 3.0));
-    second_order(&mut x, 0.01, &[5.0; 3], &[0.7; 3]).unwrap();
-    first_order(&mut x, 0.01, &[1.0; 3]).unwrap();
-    creep(&mut x, 0.01, &[0.01; 3], &[20.0; 3]).unwrap();
-    play(&mut x, &[1.0; 3], &[0.1; 3]).unwrap();
+    second_order(&mut x, 0.01, &[5.0; 3], &[0.7; 3]).expect("legal question");
+    first_order(&mut x, 0.01, &[1.0; 3]).expect("legal question");
+    creep(&mut x, 0.01, &[0.01; 3], &[20.0; 3]).expect("legal question");
+    play(&mut x, &[1.0; 3], &[0.1; 3]).expect("legal question");
     assert!(x.iter().flatten().all(|v| (v - 3.0).abs() < 1e-12));
     let mut ramp = one_channel((0..50).map(f64::from));
     // 5 kHz and Q = 0.02: the slow root of an overdamped pair sits at 100 Hz, still settled within one 0.1 s step.
-    second_order(&mut ramp, 0.1, &[5000.0; 3], &[0.02; 3]).unwrap();
+    second_order(&mut ramp, 0.1, &[5000.0; 3], &[0.02; 3]).expect("legal question");
     let lag = 1.0 / (0.02 * TAU * 5000.0) / 0.1;
     assert!((ramp[40][1] - (40.0 - lag)).abs() < 1e-9);
     assert!(second_order(&mut ramp, 0.1, &[0.0; 3], &[1.0; 3]).is_err());
@@ -161,7 +166,7 @@ fn the_bridge_bends_a_response_by_the_stated_second_and_third_order() {
     };
     let (k2, k3) = (-second * d, d * d * (0.25 - third + 2.0 * second * second));
     let mut x = one_channel((-20..=20).map(f64::from));
-    bridge.respond(&mut x).unwrap();
+    bridge.respond(&mut x).expect("legal question");
     for (row, a) in x.iter().zip(-20..=20) {
         let a = f64::from(a);
         // Fourth order is left: d³ (5 s2 s3 - 5 s2³ - ¾ s2) a⁴ = -5.7e-11 a⁴, and what follows it.
@@ -184,7 +189,7 @@ fn mismatched_plates_keep_rest_at_zero_and_the_small_signal_gain_at_one() {
     };
     let h = 1e-3;
     let mut x = one_channel([0.0, h, -h].into_iter());
-    bridge.respond(&mut x).unwrap();
+    bridge.respond(&mut x).expect("legal question");
     for k in 0..3 {
         assert!(x[0][k].abs() < 1e-12);
         assert!(((x[1][k] - x[2][k]) / (2.0 * h) - 1.0).abs() < 1e-9);
@@ -200,7 +205,7 @@ fn play_remembers_the_way_it_came() {
         .chain((0..=100).map(|i| 10.0 - 0.1 * f64::from(i)))
         .chain((0..=20).map(|i| 0.1 * f64::from(i)));
     let mut x = one_channel(path);
-    play(&mut x, &[w; 3], &[o; 3]).unwrap();
+    play(&mut x, &[w; 3], &[o; 3]).expect("legal question");
     assert!((x[100][0] - (10.0 - o)).abs() < 1e-12);
     assert!((x[201][0] - o).abs() < 1e-12);
     assert!((x[222][0] - 2.0).abs() < 1e-12);
@@ -210,7 +215,7 @@ fn play_remembers_the_way_it_came() {
 fn creep_brings_the_rest_of_a_step_with_its_time_constant() {
     let (dt, tau, part) = (0.01, 3.0, 0.02);
     let mut x = one_channel((0..1000).map(|i| f64::from(u8::from(i > 0))));
-    creep(&mut x, dt, &[part; 3], &[tau; 3]).unwrap();
+    creep(&mut x, dt, &[part; 3], &[tau; 3]).expect("legal question");
     for i in 1..1000 {
         let t = i as f64 * dt;
         // The step is a ramp of one dt: averaging the exponential over it.
@@ -224,7 +229,7 @@ fn resampling_is_exact_for_cubics_and_refuses_what_lies_outside() {
     let f = |t: f64| 1.0 + t * (2.0 + t * (-0.5 + 0.25 * t));
     let signal = one_channel((0..20).map(|i| f(0.1 * f64::from(i) - 0.3)));
     let times = [-0.3, -0.25, 0.0, 0.777, 1.5, 1.6];
-    let out = resample(&signal, -0.3, 0.1, &times).unwrap();
+    let out = resample(&signal, -0.3, 0.1, &times).expect("legal question");
     for (row, t) in out.iter().zip(times) {
         assert!((row[0] - f(t)).abs() < 1e-13);
     }
@@ -243,13 +248,13 @@ fn a_converter_rounds_clips_skips_codes_and_sleeps_in_its_dead_band() {
         missing_every: 5,
     };
     let mut x = one_channel([0.6, 1.1, 2.4, 2.6, 9.0, -9.0].into_iter());
-    converter.convert(&mut x).unwrap();
+    converter.convert(&mut x).expect("legal question");
     // Code 5 (2.5) and code 0 are missing; 0.6 is asleep in channels 1 (at 0, whose code is missing) and 2 (at 1).
-    assert_eq!(x[0], [-0.5, 1.0, -0.5]);
-    assert_eq!(x[1], [1.0, 1.0, 1.0]);
+    assert!(x[0].iter().zip([-0.5, 1.0, -0.5]).all(same));
+    assert!(x[1].iter().zip([1.0; 3]).all(same));
     assert_eq!(x[2][0].to_bits(), 2.0_f64.to_bits());
     assert_eq!(x[3][0].to_bits(), 2.0_f64.to_bits());
-    assert_eq!((x[4][0], x[5][0]), (4.0, -4.0));
+    assert!([x[4][0], x[5][0]].iter().zip([4.0, -4.0]).all(same));
     let malformed = Converter {
         low: 5.0,
         ..converter

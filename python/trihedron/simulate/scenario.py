@@ -9,15 +9,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.gravity import earth_rate_north_up, normal_gravity
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion import Motion
 from trihedron.units import STANDARD_GRAVITY_M_S2, radians_from_degrees
 
 FloatArray = npt.NDArray[np.float64]
-
-EARTH_RATE_RAD_S = 7.292115e-5
-"""WGS84 angular velocity of the Earth."""
 
 
 @dataclass(frozen=True)
@@ -108,18 +106,9 @@ class Environment:
         """Angular velocity of the Earth in the level frame [rad/s]."""
         if not self.earth_rate:
             return (0.0, 0.0, 0.0)
-        latitude, heading = radians_from_degrees(self.latitude_deg), radians_from_degrees(self.heading_deg)
-        north = EARTH_RATE_RAD_S * math.cos(latitude)
-        return (north * math.cos(heading), north * math.sin(heading), EARTH_RATE_RAD_S * math.sin(latitude))
-
-
-def normal_gravity(latitude_deg: float, height_m: float) -> float:
-    """WGS84 normal gravity (Somigliana) continued upward to second order in height [m/s²]."""
-    s2 = math.sin(radians_from_degrees(latitude_deg)) ** 2
-    surface = 9.7803253359 * (1.0 + 0.001931852652458 * s2) / math.sqrt(1.0 - 0.00669437999014 * s2)
-    a, flattening, m = 6378137.0, 1.0 / 298.257223563, 0.00344978650684
-    up = 1.0 - 2.0 / a * (1.0 + flattening + m - 2.0 * flattening * s2) * height_m + 3.0 * (height_m / a) ** 2
-    return surface * up
+        north, up = earth_rate_north_up(self.latitude_deg)
+        heading = radians_from_degrees(self.heading_deg)
+        return (north * math.cos(heading), north * math.sin(heading), up)
 
 
 @dataclass(frozen=True)
