@@ -62,3 +62,13 @@ def radians_from_degrees(angle_deg: float) -> float:
 def mg_from_m_s2(acceleration_m_s2: float) -> float:
     """Acceleration in thousandths of standard gravity."""
     return 1000.0 * acceleration_m_s2 / STANDARD_GRAVITY_M_S2
+
+
+def mm_s2_from_m_s2(acceleration_m_s2: float) -> float:
+    """Acceleration, m/s² → mm/s²."""
+    return 1000.0 * acceleration_m_s2
+
+
+def mrad_from_radians(angle_rad: float) -> float:
+    """Angle, rad → mrad."""
+    return 1000.0 * angle_rad

@@ -7,6 +7,7 @@ from trihedron.records.calibration import (
     PARAMETER_NAMES,
     Calibration,
     FitQuality,
+    Frame,
     Observability,
     SensorCalibration,
 )
@@ -26,6 +27,7 @@ from trihedron.records.kalman import (
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Hold, Move, Segments
 from trihedron.records.truth import TrueSegment, Truth
+from trihedron.records.verification import Verification
 
 __all__ = [
     "CONSTANT_NAMES",
@@ -39,6 +41,7 @@ __all__ = [
     "Finding",
     "FindingCode",
     "FitQuality",
+    "Frame",
     "Hold",
     "KalmanCalibration",
     "LiveEstimate",
@@ -52,4 +55,5 @@ __all__ = [
     "Severity",
     "TrueSegment",
     "Truth",
+    "Verification",
 ]

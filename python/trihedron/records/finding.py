@@ -69,6 +69,11 @@ class FindingCode(str, Enum):
     TURN_UNCHECKED = "turn-unchecked"
     GYRO_BIAS_DRIFT = "gyro-bias-drift"
     NOT_CONVERGED = "not-converged"
+    GYROSCOPE_LEFT_OUT = "gyroscope-left-out"
+    # verify, check
+    LIMIT_EXCEEDED = "limit-exceeded"
+    SAME_RECORDING = "same-recording"
+    NOT_FIT = "not-fit"
     # kalman
     INNOVATIONS_TOO_LARGE = "innovations-too-large"
     INNOVATIONS_TOO_SMALL = "innovations-too-small"

@@ -1,4 +1,4 @@
-"""PIPELINE: the stages composed. Everything that a person asks for is one function here, about twenty lines long."""
+"""Log in, audited recording out; recording in, still poses out."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from trihedron.read import read_recording
 from trihedron.records import Recording, Segments
+from trihedron.segment import segment_recording
 from trihedron.units import AccelerationUnit, RateUnit
 
 Progress = Callable[[float, str], None]
@@ -46,26 +47,6 @@ def read(
     )
 
 
-def segment(recording: Recording) -> Segments:
-    """Still poses and the moves between them, from the sensor's own noise."""
-    raise NotImplementedError(recording)
-
-
-def calibrate(recording: Recording) -> object:
-    """Both sensors from one recording of still poses and moves."""
-    raise NotImplementedError(recording)
-
-
-def apply(recording: Recording) -> Recording:
-    """A recording in SI."""
-    raise NotImplementedError(recording)
-
-
-def verify(recording: Recording) -> object:
-    """A calibration against another recording."""
-    raise NotImplementedError(recording)
-
-
-def check(recording: Recording) -> object:
-    """Is this log fit for calibration?"""
-    raise NotImplementedError(recording)
+def segment(recording: Recording, *, progress: Progress | None = None) -> Segments:
+    """Still poses and the moves between them, told apart by the sensor's own noise: nothing to set."""
+    return segment_recording(recording, progress=progress)

@@ -1,0 +1,23 @@
+"""PIPELINE: the stages composed. Everything that a person asks for is one function here."""
+
+from trihedron.pipeline.applying import apply
+from trihedron.pipeline.calibrating import METHODS, calibrate
+from trihedron.pipeline.checking import check
+from trihedron.pipeline.choices import settle_gravity
+from trihedron.pipeline.reading import read, segment
+from trihedron.pipeline.results import CalibrationResult, CheckResult, VerificationResult
+from trihedron.pipeline.verifying import verify
+
+__all__ = [
+    "METHODS",
+    "CalibrationResult",
+    "CheckResult",
+    "VerificationResult",
+    "apply",
+    "calibrate",
+    "check",
+    "read",
+    "segment",
+    "settle_gravity",
+    "verify",
+]

@@ -1,0 +1,88 @@
+"""Apply a calibration: raw recording in, SI recording out."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.calibration_file import read_calibration
+from trihedron.pipeline.results import CalibrationResult
+from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
+from trihedron.sensor_model import correct
+from trihedron.units import AccelerationUnit, RateUnit
+
+FloatArray = npt.NDArray[np.float64]
+AnyCalibration = CalibrationResult | Calibration | str | os.PathLike[str]
+
+
+def calibration_of(given: AnyCalibration) -> Calibration:
+    """A calibration as a record, whether it comes from a fit, a file or is one already."""
+    if isinstance(given, CalibrationResult):
+        return given.calibration
+    return given if isinstance(given, Calibration) else read_calibration(given)
+
+
+def apply(calibration: AnyCalibration, recording: Recording) -> Recording:
+    """The recording in SI, in the calibration's instrument trihedron: ``S raw + b`` for every row.
+
+    Raises
+    ------
+    ValueError
+        When the recording is in other units than the calibration was made for, or has no sensor that was calibrated.
+    """
+    known = calibration_of(calibration)
+    check_units(known, recording)
+    accelerometer, gyroscope = recording.accelerometer, recording.gyroscope
+    findings = recording.findings
+    if gyroscope is not None and known.gyroscope is None:
+        gyroscope = None
+        findings = (*findings, _left_out())
+    if accelerometer is None and gyroscope is None:
+        raise ValueError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
+    return replace(
+        recording,
+        accelerometer=_corrected(accelerometer, known.accelerometer),
+        gyroscope=_corrected(gyroscope, known.gyroscope),
+        accelerometer_unit=AccelerationUnit.M_S2,
+        gyroscope_unit=RateUnit.RAD_S,
+        source=f"{recording.source}, calibrated",
+        findings=findings,
+    )
+
+
+def check_units(calibration: Calibration, recording: Recording) -> None:
+    """Refuse readings in other units than a calibration was made for.
+
+    Raises
+    ------
+    ValueError
+        Naming both units.
+    """
+    pairs = (
+        ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value, calibration.accelerometer),
+        ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value, calibration.gyroscope),
+    )
+    for name, readings, unit, sensor in pairs:
+        if readings is not None and sensor is not None and unit != sensor.raw_unit:
+            raise ValueError(
+                f"{recording.source}: its {name} is in {unit}, and this calibration maps {sensor.raw_unit}: "
+                f"apply it to a "
+                f"log in {sensor.raw_unit}, or state the log's unit if it was detected wrongly."
+            )
+
+
+def _corrected(readings: FloatArray | None, sensor: SensorCalibration | None) -> FloatArray | None:
+    return None if readings is None or sensor is None else correct(readings, sensor.S, sensor.b)
+
+
+def _left_out() -> Finding:
+    return Finding(
+        FindingCode.GYROSCOPE_LEFT_OUT,
+        Severity.WARNING,
+        "The gyro was left out: the calibration holds none.",
+        "It was made without gyro readings, or they did not suffice.",
+        "Calibrate both sensors in one recording.",
+    )

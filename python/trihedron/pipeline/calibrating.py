@@ -1,0 +1,246 @@
+"""Calibrate: still poses and moves in, both sensors with their certainty out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm
+from trihedron.estimate.accelerometer.face_poses import identify
+from trihedron.estimate.gyroscope import MoveOptions, Turn, calibrate_moves, calibrate_turns
+from trihedron.estimate.joint import calibrate_joint
+from trihedron.pipeline.choices import settle_gravity
+from trihedron.pipeline.reading import Progress, segment
+from trihedron.pipeline.results import CalibrationResult
+from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
+from trihedron.sensor_model import in_frame
+
+Method = Literal["joint", "separate", "faces"]
+METHODS: tuple[Method, ...] = get_args(Method)
+"""``joint``: any poses, both sensors in one fit (method 2). ``separate``: the same, one sensor after the other.
+``faces``: faces of the case and turns by known angles (method 1)."""
+
+Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
+
+Found = tuple[Finding, ...]
+
+
+def calibrate(
+    recording: Recording,
+    *,
+    segments: Segments | None = None,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    method: Method = "joint",
+    frame: Frame | None = None,
+    faces: Sequence[int] | None = None,
+    turns_deg: Sequence[float] | None = None,
+    axis_signs: Sequence[int] | None = None,
+    loss: Loss = "linear",
+    gyroscope_nominal: float | None = None,
+    progress: Progress | None = None,
+) -> CalibrationResult:
+    """Calibrate both sensors from one recording of still poses and moves.
+
+    Parameters
+    ----------
+    recording : Recording
+        As :func:`trihedron.read` gives it. Without a gyro the accelerometer is calibrated alone.
+    segments : Segments, optional
+        Still poses and moves; found when not given.
+    gravity_m_s2 or latitude_deg, height_m : float
+        |g| at the place. When nothing is said a standard value is used, and a finding says what that may cost.
+    method : "joint", "separate" or "faces"
+        Method 2 with both sensors in one fit (default) or one after the other; or method 1.
+    frame : "lower", "symmetric" or "case"
+        Instrument trihedron: ``lower`` for method 2 and ``case`` for method 1 unless said.
+    faces : sequence of ±1, ±2, ±3 or 0
+        Method 1: the axis of the case that points up in every still pose; 0 leaves a pose out.
+    turns_deg : sequence of float
+        Method 1: the angle of every turn between poses on the same face, about the axis that points up; 0 leaves a turn
+        out. Multiples of 90° are recognised when nothing is said.
+    axis_signs : three of ±1
+        Method 2: the sign with which each raw axis follows its axis of Mz, by the board's documentation.
+    loss : "linear", "huber", "soft_l1" or "cauchy"
+        Method 2: how far outlying poses count.
+    gyroscope_nominal : float
+        rad/s per raw unit, where readings are counts and too few moves tell it.
+
+    Raises
+    ------
+    ValueError
+        When the question cannot be answered; one sentence says why and what to do.
+    """
+    if method not in METHODS:
+        raise ValueError(f"there is no method {method!r}; choose one of {', '.join(METHODS)}.")
+    gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    segments = segment(recording, progress=progress) if segments is None else segments
+    _require_poses(recording, segments)
+    if method == "faces":
+        calibration = _by_faces(recording, segments, gravity, source, faces, turns_deg, gyroscope_nominal)
+        wanted: Frame = frame or "case"
+    else:
+        if faces is not None or turns_deg is not None:
+            raise ValueError(f"faces and turns belong to method 1: say --method faces, or leave them out of {method}.")
+        wanted = frame or "lower"
+        options = MoveOptions(nominal_scale=gyroscope_nominal)
+        calibration = _by_poses(recording, segments, gravity, source, method, wanted, axis_signs, loss, options)
+    calibration = in_frame(calibration, wanted)
+    findings = (*said, *recording.findings, *segments.findings, *calibration.findings)
+    return CalibrationResult(replace(calibration, findings=findings), segments, recording)
+
+
+def _require_poses(recording: Recording, segments: Segments) -> None:
+    if recording.accelerometer is None:
+        raise ValueError(
+            f"{recording.source}: a gyro alone cannot be calibrated by gravity; log the accelerometer as well, "
+            f"or name its "
+            "columns with --columns."
+        )
+    if segments.n_holds < 3:
+        found = (
+            "no still pose was found" if segments.n_holds == 0 else f"only {segments.n_holds} still poses were found"
+        )
+        why = segments.findings[0].seen + " " if segments.findings else ""
+        raise ValueError(
+            f"{recording.source}: {found}. {why}Hold the sensor still for 3 to 5 seconds in each of 18 or more "
+            f"different "
+            "poses (docs/procedure.md); `trihedron segment LOG` shows what was seen."
+        )
+
+
+def _by_poses(
+    recording: Recording,
+    segments: Segments,
+    gravity: float,
+    source: str,
+    method: Method,
+    frame: Frame,
+    axis_signs: Sequence[int] | None,
+    loss: Loss,
+    options: MoveOptions,
+) -> Calibration:
+    assert segments.accelerometer_mean is not None
+    assert segments.accelerometer_sigma_mean is not None
+    accelerometer, found = calibrate_norm(
+        segments.accelerometer_mean,
+        segments.accelerometer_sigma_mean,
+        gravity,
+        raw_unit=recording.accelerometer_unit,
+        frame=frame,
+        loss=loss,
+        axis_signs=axis_signs,
+    )
+    alone = _alone(accelerometer, found, frame, gravity, source, recording)
+    if recording.gyroscope is None:
+        return alone
+    if not alone.is_trustworthy:
+        return _without_gyroscope(alone, "the accelerometer, which the gyro is measured by, is not determined")
+    try:
+        if method == "joint":
+            both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
+            return replace(both, findings=(*found, *both.findings))
+        gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
+    except ValueError as error:
+        return _without_gyroscope(alone, str(error))
+    return _together(alone, gyroscope, more)
+
+
+def _by_faces(
+    recording: Recording,
+    segments: Segments,
+    gravity: float,
+    source: str,
+    faces: Sequence[int] | None,
+    turns_deg: Sequence[float] | None,
+    nominal: float | None,
+) -> Calibration:
+    assert segments.accelerometer_mean is not None
+    assert segments.accelerometer_sigma_mean is not None
+    unit = recording.accelerometer_unit
+    up = identify(segments.accelerometer_mean, unit) if faces is None else np.asarray(faces, dtype=np.int64)
+    accelerometer, found = calibrate_faces(
+        segments.accelerometer_mean, segments.accelerometer_sigma_mean, gravity, up=faces, raw_unit=unit
+    )
+    alone = _alone(accelerometer, found, "case", gravity, source, recording)
+    if recording.gyroscope is None:
+        return alone
+    turns = _turns_on_faces(segments, up, turns_deg)
+    zeros = [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2]
+    try:
+        gyroscope, more = calibrate_turns(recording, turns, zeros, nominal_scale=nominal)
+    except ValueError as error:
+        if turns_deg is not None:
+            raise
+        return _without_gyroscope(alone, str(error))
+    return _together(alone, gyroscope, more)
+
+
+def _turns_on_faces(
+    segments: Segments, up: np.ndarray[tuple[int], np.dtype[np.int64]], turns_deg: Sequence[float] | None
+) -> list[Turn]:
+    """The moves that begin and end on the same face, as turns about the axis that points up."""
+    moves = [
+        move
+        for move in segments.moves
+        if move.stop - move.start >= 2 and up[move.hold_before] == up[move.hold_after] != 0
+    ]
+    if turns_deg is None:
+        return [Turn(move.start, move.stop) for move in moves]
+    if len(turns_deg) != len(moves):
+        raise ValueError(
+            f"{len(turns_deg)} turns were given and {len(moves)} were found between poses on the same face: "
+            f"give one angle "
+            "in degrees for each, 0 to leave it out."
+        )
+    return [
+        Turn(
+            move.start,
+            move.stop,
+            abs(int(up[move.hold_before])) - 1,
+            math.radians(angle) * np.sign(up[move.hold_before]),
+        )
+        for move, angle in zip(moves, turns_deg, strict=True)
+        if angle != 0.0
+    ]
+
+
+def _alone(
+    accelerometer: SensorCalibration, found: Found, frame: Frame, gravity: float, source: str, recording: Recording
+) -> Calibration:
+    return Calibration(
+        accelerometer=accelerometer,
+        gyroscope=None,
+        covariance=accelerometer.covariance,
+        frame=frame,
+        gravity_m_s2=gravity,
+        gravity_source=source,
+        recording_source=recording.source,
+        recording_sha256=recording.sha256,
+        findings=found,
+    )
+
+
+def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) -> Calibration:
+    """Both sensors, one after the other: what the accelerometer's error does to the gyro is in the gyro's
+    covariance."""
+    covariance = np.zeros((24, 24))
+    covariance[:12, :12] = alone.accelerometer.covariance
+    covariance[12:, 12:] = gyroscope.covariance
+    return replace(alone, gyroscope=gyroscope, covariance=covariance, findings=(*alone.findings, *found))
+
+
+def _without_gyroscope(alone: Calibration, why: str) -> Calibration:
+    finding = Finding(
+        FindingCode.GYROSCOPE_LEFT_OUT,
+        Severity.WARNING,
+        f"The gyro was not calibrated: {why.rstrip('.')}.",
+        "The recording does not hold what the gyro needs.",
+        "Turn the sensor about all three axes between still poses; docs/procedure.md shows how.",
+    )
+    return replace(alone, findings=(*alone.findings, finding))

@@ -1,0 +1,36 @@
+"""Check: may a calibration be made from this log, and how sure would it be?"""
+
+from __future__ import annotations
+
+from trihedron.pipeline.calibrating import calibrate
+from trihedron.pipeline.reading import Progress, segment
+from trihedron.pipeline.results import CheckResult
+from trihedron.records import Finding, FindingCode, Recording, Severity
+from trihedron.units import STANDARD_GRAVITY_M_S2
+
+
+def check(recording: Recording, *, progress: Progress | None = None) -> CheckResult:
+    """Audit of the log, still poses, and the error bars that a calibration from it would have.
+
+    The error bars come from the poses, the moves and the sensor's noise; gravity hardly matters for them and is not
+    asked for.
+    """
+    segments = segment(recording, progress=progress)
+    # A standard value: here only the size of the error bars is wanted, to which an error of 0.4 % means nothing.
+    try:
+        result = calibrate(recording, segments=segments, gravity_m_s2=STANDARD_GRAVITY_M_S2)
+    except ValueError as error:
+        return CheckResult(
+            recording, segments, None, (*recording.findings, *segments.findings, _impossible(str(error)))
+        )
+    return CheckResult(recording, segments, result.calibration, result.findings)
+
+
+def _impossible(why: str) -> Finding:
+    return Finding(
+        FindingCode.NOT_FIT,
+        Severity.SERIOUS,
+        f"No calibration can be made from this log: {why}",
+        "The log does not hold what a calibration needs.",
+        "docs/procedure.md shows how to move the sensor.",
+    )

@@ -1,0 +1,51 @@
+"""What a person may say or leave unsaid, settled in one place: gravity, faces, signs of axes."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+from trihedron.gravity import normal_gravity
+from trihedron.records import Finding, FindingCode, Severity
+from trihedron.units import STANDARD_GRAVITY_M_S2
+
+
+def settle_gravity(
+    gravity_m_s2: float | None = None, latitude_deg: float | None = None, height_m: float | None = None
+) -> tuple[float, str, tuple[Finding, ...]]:
+    """|g| [m/s²], where it comes from, and what must be said about it.
+
+    Raises
+    ------
+    ValueError
+        When two sources contradict each other, a height comes without a latitude, or a value is no gravity.
+    """
+    if gravity_m_s2 is not None:
+        if latitude_deg is not None or height_m is not None:
+            raise ValueError("gravity is given twice, as a value and by a place: give either --gravity or --latitude.")
+        if not 1.0 < gravity_m_s2 < 100.0:
+            raise ValueError(f"gravity is given in m/s², about 9.8 on Earth, and cannot be {gravity_m_s2:g}.")
+        return float(gravity_m_s2), "given", ()
+    if latitude_deg is not None:
+        height = 0.0 if height_m is None else height_m
+        value = normal_gravity(latitude_deg, height)
+        return value, f"WGS 84 normal gravity at latitude {latitude_deg:g}°, height {height:g} m", ()
+    if height_m is not None:
+        raise ValueError("a height alone does not tell gravity: give --latitude with --height, or --gravity.")
+    return STANDARD_GRAVITY_M_S2, "not given, standard value", (_defaulted(),)
+
+
+def _defaulted() -> Finding:
+    low, high = normal_gravity(0.0, 3000.0), normal_gravity(90.0)
+    wrong = 100.0 * max(STANDARD_GRAVITY_M_S2 - low, high - STANDARD_GRAVITY_M_S2) / STANDARD_GRAVITY_M_S2
+    return Finding(
+        FindingCode.GRAVITY_DEFAULTED,
+        Severity.WARNING,
+        f"Gravity was not given; {STANDARD_GRAVITY_M_S2} m/s² was used. Where people live it lies between "
+        f"{low:.3f} and "
+        f"{high:.3f} m/s², and its error goes into every scale and zero of the accelerometer: up to {wrong:.1f} "
+        f"% that no "
+        "residual shows and no ± contains.",
+        "Neither --gravity nor --latitude was said.",
+        "Give --latitude DEG (and --height M), or --gravity M_S2.",
+        MappingProxyType({"gravity_m_s2": STANDARD_GRAVITY_M_S2, "possible_error_percent": wrong}),
+    )

@@ -1,0 +1,97 @@
+"""What the pipeline hands back: records together, readable as a laboratory report with ``print``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibrationResult:
+    """A calibration with the segments and the recording that it was made from. ``print`` gives the report."""
+
+    calibration: Calibration
+    segments: Segments
+    recording: Recording
+
+    @property
+    def accelerometer(self) -> SensorCalibration:
+        """``f = S a' + b`` with ``.S``, ``.b``, ``.sigma_S``, ``.sigma_b``, ``.covariance``, ``.quality``."""
+        return self.calibration.accelerometer
+
+    @property
+    def gyroscope(self) -> SensorCalibration | None:
+        """``ω = S w' + b``, or ``None`` where there was no gyro or it was not determined."""
+        return self.calibration.gyroscope
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Everything noticed, by every stage."""
+        return self.calibration.findings
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No serious finding."""
+        return self.calibration.is_trustworthy
+
+    def __repr__(self) -> str:
+        sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
+        return f"<CalibrationResult of {self.recording.source}: {sensors}, {self.segments.n_holds} still poses>"
+
+    def __str__(self) -> str:
+        from trihedron.report import calibration_report, to_text
+
+        return to_text(calibration_report(self.calibration, self.segments, self.recording))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class VerificationResult:
+    """A calibration judged on another recording. ``print`` gives the report."""
+
+    verification: Verification
+    calibration: Calibration
+    segments: Segments
+    recording: Recording
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Everything noticed."""
+        return self.verification.findings
+
+    @property
+    def is_passed(self) -> bool:
+        """No serious finding."""
+        return self.verification.is_passed
+
+    def __repr__(self) -> str:
+        return f"<VerificationResult on {self.recording.source}: {self.verification.norm_rms:.3g} m/s² rms>"
+
+    def __str__(self) -> str:
+        from trihedron.report import to_text, verification_report
+
+        return to_text(verification_report(self.verification, self.segments, self.recording))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CheckResult:
+    """Is a log fit for calibration? ``calibration`` holds the error bars to expect, ``None`` where it cannot be
+    made."""
+
+    recording: Recording
+    segments: Segments
+    calibration: Calibration | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def is_fit(self) -> bool:
+        """No serious finding."""
+        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
+
+    def __repr__(self) -> str:
+        return f"<CheckResult of {self.recording.source}: {'fit' if self.is_fit else 'not fit'} for calibration>"
+
+    def __str__(self) -> str:
+        from trihedron.report import check_report, to_text
+
+        return to_text(check_report(self.recording, self.segments, self.calibration, self.findings))

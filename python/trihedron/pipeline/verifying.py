@@ -1,0 +1,82 @@
+"""Verify: a calibration against a recording that it was not made from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import MappingProxyType
+
+from trihedron.estimate.verification import verify_calibration
+from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units
+from trihedron.pipeline.choices import settle_gravity
+from trihedron.pipeline.reading import Progress, segment
+from trihedron.pipeline.results import VerificationResult
+from trihedron.records import Finding, FindingCode, Recording, Segments, Severity, Verification
+from trihedron.units import mg_from_m_s2
+
+
+def verify(
+    calibration: AnyCalibration,
+    recording: Recording,
+    *,
+    segments: Segments | None = None,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    limit_mg: float | None = None,
+    limit_deg: float | None = None,
+    progress: Progress | None = None,
+) -> VerificationResult:
+    """Norm of gravity at rest and gravity carried through moves, in a recording that the calibration has not seen.
+
+    Without ``gravity_m_s2`` or a place, gravity is that of the calibration. ``limit_mg`` and ``limit_deg`` are what the
+    user can accept (rms): beyond them a serious finding says so.
+
+    Raises
+    ------
+    ValueError
+        When units differ, or the recording has no accelerometer or no still pose.
+    """
+    known = calibration_of(calibration)
+    check_units(known, recording)
+    segments = segment(recording, progress=progress) if segments is None else segments
+    if gravity_m_s2 is None and latitude_deg is None and height_m is None:
+        gravity, source = known.gravity_m_s2, "that of the calibration"
+    else:
+        gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    judged = verify_calibration(known, recording, segments, gravity, source)
+    findings = (*recording.findings, *segments.findings, *judged.findings, *_limits(judged, limit_mg, limit_deg))
+    findings += _same_recording(known.recording_sha256, recording.sha256)
+    return VerificationResult(replace(judged, findings=findings), known, segments, recording)
+
+
+def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | None) -> tuple[Finding, ...]:
+    rows = (
+        (mg_from_m_s2(judged.norm_rms), limit_mg, "Gravity at rest is missed by", "mg"),
+        (judged.angle_rms_deg, limit_deg, "Gravity carried through moves is missed by", "deg"),
+    )
+    return tuple(
+        Finding(
+            FindingCode.LIMIT_EXCEEDED,
+            Severity.SERIOUS,
+            f"{words} {value:.3g} {unit} rms; the limit is {limit:g} {unit}.",
+            "The calibration does not hold here as well as was asked for.",
+            "Calibrate again, or accept a wider limit.",
+            MappingProxyType({f"rms_{unit}": value, f"limit_{unit}": limit}),
+        )
+        for value, limit, words, unit in rows
+        if limit is not None and not value <= limit
+    )
+
+
+def _same_recording(made_from: str, tested_on: str) -> tuple[Finding, ...]:
+    if not made_from or made_from != tested_on:
+        return ()
+    return (
+        Finding(
+            FindingCode.SAME_RECORDING,
+            Severity.WARNING,
+            "This is the recording that the calibration was made from: what it says here proves nothing.",
+            "The same file was named twice.",
+            "Verify on another session; the calibration's own report already holds out poses and moves.",
+        ),
+    )

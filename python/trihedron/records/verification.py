@@ -1,0 +1,52 @@
+"""A calibration judged on a recording that it was not made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records.finding import Finding, Severity
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """What a calibration says about another recording, with what it should have said.
+
+    ``norm_error`` (n,) is ``|S a' + b| - |g|`` of every still pose [m/s²], ``norm_noise`` (n,) what the noise of the
+    mean allows, ``norm_sigma`` (n,) that and the calibration's own uncertainty. ``angle_deg`` (m,) is the angle between
+    gravity carried through a move by the gyro and gravity measured after it; ``angle_noise_deg`` and
+    ``angle_sigma_deg`` (m,) the same two predictions for it. ``rest_rate`` (n, 3) is the calibrated rate in every
+    still pose [rad/s], where the truth is zero: how far the gyro's zero has moved.
+    """
+
+    source: str
+    sha256: str
+    gravity_m_s2: float
+    gravity_source: str
+    norm_error: FloatArray
+    norm_noise: FloatArray
+    norm_sigma: FloatArray
+    angle_deg: FloatArray
+    angle_noise_deg: FloatArray
+    angle_sigma_deg: FloatArray
+    rest_rate: FloatArray
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def norm_rms(self) -> float:
+        """Root mean square of the norm error [m/s²]."""
+        return float(np.sqrt(np.mean(self.norm_error**2)))
+
+    @property
+    def angle_rms_deg(self) -> float:
+        """Root mean square of the gravity prediction [deg]; NaN without moves."""
+        return float(np.sqrt(np.mean(self.angle_deg**2))) if len(self.angle_deg) else float("nan")
+
+    @property
+    def is_passed(self) -> bool:
+        """No finding says that the calibration does not hold here."""
+        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)

@@ -1,0 +1,10 @@
+"""REPORT: numbers become words, tables and figures; laid out once, written as text or as a page."""
+
+from trihedron.report.calibration import calibration_report
+from trihedron.report.check import check_report
+from trihedron.report.document import Document
+from trihedron.report.segments import segments_report
+from trihedron.report.text import to_text
+from trihedron.report.verification import verification_report
+
+__all__ = ["Document", "calibration_report", "check_report", "segments_report", "to_text", "verification_report"]

@@ -1,0 +1,55 @@
+"""What S and b mean for each sensor axis: sensitivity, zero reading, and how the axes stand to one another.
+
+All three are the same in every frame: they belong to the sensor, not to the choice of Mz.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records import SensorCalibration
+from trihedron.sensor_model import other_form, other_form_jacobian
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """What the numbers of one sensor say about its axes.
+
+    ``sensitivity`` (3,) in raw unit per SI unit, ``zero`` (3,) raw reading at true zero, ``skew_rad`` (3,) by which the
+    angles between axes 1-2, 1-3, 2-3 exceed a right angle; each with its standard error.
+    """
+
+    sensitivity: FloatArray
+    sigma_sensitivity: FloatArray
+    zero: FloatArray
+    sigma_zero: FloatArray
+    skew_rad: FloatArray
+    sigma_skew_rad: FloatArray
+
+
+def axes_of(sensor: SensorCalibration) -> Axes:
+    """From the rows r of ``S⁻¹``: sensitivity ``|r_i|``, zero ``-S⁻¹ b``, skew ``-asin(r_i·r_j / |r_i||r_j|)``."""
+    inverse, zero = other_form(sensor.S, sensor.b)
+    jacobian = other_form_jacobian(sensor.S, sensor.b)
+    covariance = jacobian @ sensor.covariance @ jacobian.T
+    sensitivity = np.linalg.norm(inverse, axis=1)
+    unit = inverse / sensitivity[:, None]
+    wrt = np.zeros((6, 12))
+    for i in range(3):
+        wrt[i, 3 * i : 3 * i + 3] = unit[i]
+    skew = np.zeros(3)
+    for k, (i, j) in enumerate(combinations(range(3), 2)):
+        cosine = float(unit[i] @ unit[j])
+        skew[k] = -np.arcsin(np.clip(cosine, -1.0, 1.0))
+        slope = -1.0 / np.sqrt(max(1.0 - cosine**2, 1e-12))
+        wrt[3 + k, 3 * i : 3 * i + 3] = slope * (unit[j] - cosine * unit[i]) / sensitivity[i]
+        wrt[3 + k, 3 * j : 3 * j + 3] = slope * (unit[i] - cosine * unit[j]) / sensitivity[j]
+    sigma = np.sqrt(np.maximum(np.diag(wrt @ covariance @ wrt.T), 0.0))
+    sigma_zero = np.sqrt(np.maximum(np.diag(covariance)[9:], 0.0))
+    return Axes(sensitivity, sigma[:3], zero, sigma_zero, skew, sigma[3:])

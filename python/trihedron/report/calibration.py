@@ -1,0 +1,307 @@
+"""The calibration as a laboratory report: result, findings, what the numbers mean, residuals, certainty."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
+from trihedron.report.axes import Axes, axes_of
+from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.numbers import (
+    duration,
+    engineering_exponent,
+    how_many,
+    one_of,
+    plain_number,
+    power_of_ten,
+    unit_in_print,
+    with_sigma,
+)
+from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
+
+SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
+
+
+def calibration_report(
+    calibration: Calibration, segments: Segments | None = None, recording: Recording | None = None
+) -> Document:
+    """Lay out a calibration; with the segments and the recording it was made from also its tables and figures."""
+    sections = [
+        Section("Result", _result(calibration, segments, recording)),
+        Section("Findings", (findings_block(calibration.findings),)),
+        Section("Axes", _meaning(calibration)),
+        Section("Certainty", tuple(_certainty(calibration))),
+    ]
+    residuals = tuple(_residuals(calibration, segments))
+    if residuals:
+        sections.append(Section("Residuals", residuals))
+    if segments is not None and recording is not None:
+        sections.append(Section("Figures", tuple(_figures(calibration, segments, recording))))
+    return Document(
+        title="Calibration",
+        subtitle=calibration.recording_source or "no recording named",
+        verdict=verdict(calibration),
+        is_trustworthy=calibration.is_trustworthy,
+        sections=tuple(sections),
+    )
+
+
+def verdict(calibration: Calibration) -> str:
+    """One sentence: may this be used?"""
+    return verdict_of(
+        calibration.findings,
+        "Good: nothing was noticed that speaks against it.",
+        "Usable",
+        "NOT TO BE TRUSTED",
+    )
+
+
+def _result(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> tuple[Block, ...]:
+    facts = []
+    if recording is not None:
+        facts.append(("recording", f"{duration(recording.duration_s)} at {plain_number(recording.rate_hz, 4)} Hz"))
+    if segments is not None:
+        facts.append(("motion", f"{how_many(segments.n_holds, 'still pose')}, {how_many(len(segments.moves), 'move')}"))
+    facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
+    facts.append(("frame", calibration.frame))
+    blocks: list[Block] = [Facts(tuple(facts))]
+    for name, sensor in _sensors(calibration):
+        blocks += [parameter_table(name, sensor), Facts(tuple(_fit_in_words(name, sensor)))]
+    return tuple(blocks)
+
+
+def _sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
+    pairs = (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope))
+    return [(name, sensor) for name, sensor in pairs if sensor is not None]
+
+
+def parameter_table(name: str, sensor: SensorCalibration) -> Table:
+    """S and b with their standard errors, in powers of ten that leave digits to read."""
+    true, raw = SYMBOLS[name]
+    unit = unit_in_print(sensor.si_unit)
+    exponent = engineering_exponent(float(np.abs(sensor.S).max()))
+    scale = 10.0**-exponent
+    times = f" × {power_of_ten(exponent)}" if exponent else ""
+    head = ("", *(f"{raw}′{j}{times}" for j in (1, 2, 3)), f"b [{unit}]")
+    rows = tuple(
+        (
+            f"{true}{i + 1} =",
+            *(with_sigma(scale * sensor.S[i, j], scale * sensor.sigma_S[i, j]) for j in range(3)),
+            with_sigma(sensor.b[i], sensor.sigma_b[i]),
+        )
+        for i in range(3)
+    )
+    per = "" if sensor.raw_unit == sensor.si_unit else f" per {one_of(sensor.raw_unit)}"
+    caption = (
+        f"{name.capitalize()}   {true} = S {raw}′ + b   {raw}′ in {unit_in_print(sensor.raw_unit)}, S in {unit}{per}"
+    )
+    return Table(head, rows, caption)
+
+
+def _fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]:
+    rows = [("method", sensor.method)]
+    quality = sensor.quality
+    if quality is None:
+        return rows
+    if name == "accelerometer":
+        rows.append(("residual", _norm_words(quality)))
+    else:
+        rows.append(("residual", _angle_words(quality)))
+    return rows
+
+
+def _norm_words(quality: FitQuality) -> str:
+    def words(value: float) -> str:
+        return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
+
+    parts = []
+    if quality.dof > 0:
+        parts.append(f"{words(quality.rms_dof)} per pose in sample (rms per degree of freedom, {quality.dof})")
+    else:
+        parts.append("none: as many parameters as poses, so the fit cannot be judged")
+    if quality.held_out_rms is not None:
+        parts.append(f"{words(quality.held_out_rms)} held out")
+    parts.append(f"noise alone {words(quality.floor)}")
+    return "; ".join(parts)
+
+
+def _angle_words(quality: FitQuality) -> str:
+    parts = []
+    for label, angles in (("in sample", quality.angle_deg), ("held out", quality.held_out_angle_deg)):
+        if angles is None:
+            continue
+        finite = angles[np.isfinite(angles)]
+        if quality.weights is not None and len(quality.weights) == len(angles):
+            finite = angles[np.isfinite(angles) & (quality.weights > 0)]
+        if len(finite):
+            rms, worst = float(np.sqrt(np.mean(finite**2))), float(finite.max())
+            parts.append(f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}")
+    return "gravity after a move predicted to " + "; ".join(parts) if parts else "no move to judge by"
+
+
+def _meaning(calibration: Calibration) -> tuple[Block, ...]:
+    return tuple(_axes_block(name, sensor) for name, sensor in _sensors(calibration))
+
+
+def _axes_block(name: str, sensor: SensorCalibration) -> Block:
+    try:
+        return _axes_table(name, sensor, axes_of(sensor))
+    except ValueError:
+        return Paragraph(f"The {name}'s S is singular: its axes have no meaning of their own.")
+
+
+def _axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
+    raw, si = unit_in_print(sensor.raw_unit), unit_in_print(sensor.si_unit)
+    unit = "" if raw == si else f" [{raw} per {si}]"
+    rows = [
+        (
+            f"axis {i + 1}",
+            with_sigma(axes.sensitivity[i], axes.sigma_sensitivity[i]),
+            plain_number(1e6 * axes.sigma_sensitivity[i] / axes.sensitivity[i], 2) + " ppm",
+            with_sigma(axes.zero[i], axes.sigma_zero[i]),
+        )
+        for i in range(3)
+    ]
+    skew = [
+        f"{pair} {with_sigma(mrad_from_radians(axes.skew_rad[k]), mrad_from_radians(axes.sigma_skew_rad[k]))} mrad"
+        for k, pair in enumerate(("1-2", "1-3", "2-3"))
+    ]
+    return Table(
+        ("", f"sensitivity{unit}", "σ/value", f"zero reading [{raw}]"),
+        tuple(rows),
+        f"{name.capitalize()}: angles between axes exceed 90° by {', '.join(skew)}",
+    )
+
+
+def _certainty(calibration: Calibration) -> list[Block]:
+    blocks: list[Block] = []
+    for name, sensor in _sensors(calibration):
+        seen = sensor.observability
+        if seen is None:
+            continue
+        rows = [
+            (
+                name,
+                f"{seen.rank} of {seen.n_parameters} parameters determined, condition {plain_number(seen.condition)}",
+            )
+        ]
+        if seen.weakest:
+            rows.append(("weakest", seen.weakest))
+        # One pose is enough where nothing is wrong; findings name all that are missing.
+        if seen.advice:
+            rows.append(("gains most from", seen.advice[0]))
+        strong = sorted(seen.correlated, key=lambda pair: -abs(pair[2]))[:5]
+        if strong:
+            rows.append(("correlated", ", ".join(f"{a} and {b} ({plain_number(r, 2)})" for a, b, r in strong)))
+        if sensor.quality is not None and sensor.quality.dof > 0:
+            per_dof = sensor.quality.chi2 / sensor.quality.dof
+            rows.append(("χ² per dof", f"{plain_number(per_dof)} over {sensor.quality.dof} degrees of freedom"))
+        blocks.append(Facts(tuple(rows)))
+    return blocks
+
+
+def _residuals(calibration: Calibration, segments: Segments | None) -> list[Block]:
+    blocks: list[Block] = []
+    quality = calibration.accelerometer.quality
+    if quality is not None:
+        blocks.append(_pose_table(calibration.accelerometer, quality, segments))
+    gyroscope = calibration.gyroscope
+    if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
+        blocks.append(_move_table(gyroscope.quality, segments))
+    return blocks
+
+
+def _pose_table(sensor: SensorCalibration, quality: FitQuality, segments: Segments | None) -> Table:
+    is_known = segments is not None and segments.n_holds == len(quality.residual)
+    rows = []
+    for k, (residual, sigma) in enumerate(zip(quality.residual, quality.sigma, strict=True)):
+        row = [str(k)]
+        if is_known and segments is not None:
+            row += [plain_number(segments.time_mid_s[k], 4), plain_number(segments.duration_s[k], 2)]
+            mean = segments.accelerometer_mean
+            row.append("" if mean is None else direction(sensor.S @ mean[k] + sensor.b))
+        row.append(with_sigma(mm_s2_from_m_s2(float(residual)), mm_s2_from_m_s2(float(sigma))))
+        row.append(_held_out_cell(quality, k))
+        rows.append(tuple(row))
+    head = ("pose", *(("mid [s]", "hold [s]", "up, in Mz") if is_known else ()), "residual [mm/s²]", "held out [mm/s²]")
+    return Table(head, tuple(rows), "Accelerometer: |f| − |g| of every still pose ± what noise alone allows")
+
+
+def _held_out_cell(quality: FitQuality, k: int) -> str:
+    if quality.held_out is None or not np.isfinite(quality.held_out[k]):
+        return "–"
+    sigma = float("nan") if quality.held_out_sigma is None else float(quality.held_out_sigma[k])
+    return with_sigma(mm_s2_from_m_s2(float(quality.held_out[k])), mm_s2_from_m_s2(sigma))
+
+
+def direction(force: np.ndarray[tuple[int], np.dtype[np.float64]]) -> str:
+    """A unit vector with two decimals."""
+    unit = force / np.linalg.norm(force)
+    return " ".join(f"{c:+.2f}".replace("-", "−") for c in unit)
+
+
+def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
+    assert quality.angle_deg is not None
+    moves = segments.moves if segments is not None and len(segments.moves) == len(quality.angle_deg) else None
+    rows = []
+    for k, angle in enumerate(quality.angle_deg):
+        row = [str(k)]
+        if moves is not None:
+            row.append(f"{moves[k].hold_before} → {moves[k].hold_after}")
+        held = quality.held_out_angle_deg
+        noise = degrees_from_radians(float(np.linalg.norm(quality.sigma[k])) / 9.8)
+        is_out = quality.weights is not None and len(quality.weights) > k and quality.weights[k] == 0.0
+        row += [
+            plain_number(float(angle), 2),
+            "–" if held is None else plain_number(float(held[k]), 2),
+            plain_number(noise, 2),
+            "left out" if is_out else "",
+        ]
+        rows.append(tuple(row))
+    head = ("move", *(("poses",) if moves is not None else ()), "in sample [°]", "held out [°]", "noise alone [°]", "")
+    return Table(head, tuple(rows), "Gyroscope: angle between predicted and measured gravity after every move")
+
+
+def _figures(calibration: Calibration, segments: Segments, recording: Recording) -> list[Block]:
+    # Drawing is imported when something is drawn: text and JSON need none of it.
+    from trihedron.report import figures
+
+    blocks: list[Block] = [
+        Picture(
+            "signals",
+            "The recording; shaded where the sensor stood still.",
+            partial(figures.draw_signals, recording, segments),
+        ),
+    ]
+    quality = calibration.accelerometer.quality
+    if quality is not None:
+        blocks.append(
+            Picture(
+                "residuals",
+                "Norm of gravity minus its true value in every still pose, with the standard "
+                "error that noise alone gives; open circles: predicted by a fit that did not see that pose.",
+                partial(figures.draw_residuals, quality),
+            )
+        )
+        if segments.accelerometer_mean is not None:
+            blocks.append(
+                Picture(
+                    "poses",
+                    "Directions of 'up' in the sensor's trihedron, upper and lower hemisphere. Empty "
+                    "regions are poses that were not recorded.",
+                    partial(figures.draw_poses, calibration.accelerometer, segments.accelerometer_mean),
+                )
+            )
+    gyroscope = calibration.gyroscope
+    if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
+        blocks.append(
+            Picture(
+                "moves",
+                "Angle between predicted and measured gravity after every move, in sample and held out.",
+                partial(figures.draw_moves, gyroscope.quality),
+            )
+        )
+    return blocks

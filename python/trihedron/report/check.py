@@ -1,0 +1,67 @@
+"""A log before its calibration: is it fit, and how sure would the answer be?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
+from trihedron.report.axes import axes_of
+from trihedron.report.document import Block, Document, Facts, Section, Table
+from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.numbers import plain_number, unit_in_print
+from trihedron.report.segments import recording_facts, signals_picture
+from trihedron.units import mrad_from_radians
+
+
+def check_report(
+    recording: Recording, segments: Segments, calibration: Calibration | None, findings: tuple[Finding, ...]
+) -> Document:
+    """Lay out the audit; ``calibration`` gives the error bars to expect."""
+    blocks: list[Block] = []
+    if calibration is not None:
+        blocks.append(_expected(calibration))
+        blocks += _advice(calibration)
+    return Document(
+        title="Check of a log",
+        subtitle=recording.source,
+        verdict=verdict_of(findings, "Fit for calibration.", "Fit for calibration", "NOT FIT for calibration"),
+        is_trustworthy=not any(finding.severity.value == "serious" for finding in findings),
+        sections=(
+            Section("Recording", (Facts(recording_facts(recording, segments)),)),
+            *((Section("Error bars to expect", tuple(blocks)),) if blocks else ()),
+            Section("Findings", (findings_block(findings),)),
+            Section("Figures", (signals_picture(recording, segments),)),
+        ),
+    )
+
+
+def _expected(calibration: Calibration) -> Table:
+    rows = []
+    for name, sensor in (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)):
+        if sensor is None:
+            rows.append((name, "–", "–", "–"))
+            continue
+        rows.append((name, *_expected_cells(sensor)))
+    return Table(("standard error (largest of the axes)", "scale", "zero", "angles between axes"), tuple(rows))
+
+
+def _expected_cells(sensor: SensorCalibration) -> tuple[str, str, str]:
+    try:
+        axes = axes_of(sensor)
+    except ValueError:
+        return ("not determined", "not determined", "not determined")
+    scale = 100.0 * float(np.max(axes.sigma_sensitivity / axes.sensitivity))
+    skew = mrad_from_radians(float(np.max(axes.sigma_skew_rad)))
+    return (
+        f"{plain_number(scale, 2)} %",
+        f"{plain_number(float(np.max(sensor.sigma_b)), 2)} {unit_in_print(sensor.si_unit)}",
+        f"{plain_number(skew, 2)} mrad",
+    )
+
+
+def _advice(calibration: Calibration) -> list[Block]:
+    rows = []
+    for name, sensor in (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)):
+        if sensor is not None and sensor.observability is not None and sensor.observability.advice:
+            rows.append((f"{name} gains most from", sensor.observability.advice[0]))
+    return [Facts(tuple(rows))] if rows else []

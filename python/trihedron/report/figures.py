@@ -1,0 +1,210 @@
+"""Figures: the only place that draws. Every function returns a PNG file."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from trihedron.records import FitQuality, Recording, Segments, SensorCalibration, Verification
+from trihedron.report.numbers import unit_in_print
+from trihedron.units import mm_s2_from_m_s2
+
+FloatArray = npt.NDArray[np.float64]
+
+# Distinct for colour-blind readers and in grey (Okabe and Ito).
+AXIS_COLOURS = ("#0072B2", "#E69F00", "#009E73")
+ACCENT = "#D55E00"
+INK = "#222222"
+SHADE = "#DDE5EC"
+DPI = 110
+MOST_POINTS = 4000
+
+
+def draw_signals(recording: Recording, segments: Segments) -> bytes:
+    """Both sensors over time, holds shaded."""
+    sensors = [
+        (recording.accelerometer, f"accelerometer\n[{unit_in_print(recording.accelerometer_unit.value)}]"),
+        (recording.gyroscope, f"gyroscope\n[{unit_in_print(recording.gyroscope_unit.value)}]"),
+    ]
+    present = [(readings, label) for readings, label in sensors if readings is not None]
+    figure, axes = _panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
+    for axis, (readings, label) in zip(axes, present, strict=True):
+        _shade_holds(axis, recording, segments)
+        for k in range(3):
+            time, values = _envelope(recording.time_s, readings[:, k])
+            axis.plot(time, values, color=AXIS_COLOURS[k], linewidth=0.7, label=f"axis {k + 1}")
+        axis.set_ylabel(label)
+        axis.margins(x=0.0)
+    axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
+    _mark_disturbances(axes, recording, segments)
+    axes[-1].set_xlabel("time [s]")
+    return _png(figure)
+
+
+def draw_residuals(quality: FitQuality) -> bytes:
+    """Residual of every pose with its standard error, and the held-out prediction."""
+    figure, (axis,) = _panels(1, 1, (9.5, 3.2))
+    pose = np.arange(len(quality.residual))
+    axis.axhline(0.0, color=INK, linewidth=0.8)
+    if quality.held_out is not None:
+        axis.errorbar(
+            pose + 0.18,
+            mm_s2(quality.held_out),
+            None if quality.held_out_sigma is None else mm_s2(quality.held_out_sigma),
+            fmt="o",
+            markersize=5,
+            markerfacecolor="white",
+            color=ACCENT,
+            elinewidth=1.0,
+            label="held out",
+        )
+    axis.errorbar(
+        pose - 0.18,
+        mm_s2(quality.residual),
+        mm_s2(quality.sigma),
+        fmt="o",
+        markersize=4.5,
+        color=AXIS_COLOURS[0],
+        elinewidth=1.0,
+        label="in sample",
+    )
+    axis.set_xlabel("still pose")
+    axis.set_ylabel("|f| − |g|  [mm/s²]")
+    axis.set_xlim(-0.8, len(pose) - 0.2)
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
+    return _png(figure)
+
+
+def mm_s2(values: FloatArray) -> FloatArray:
+    """Accelerations in mm/s²."""
+    return values * mm_s2_from_m_s2(1.0)
+
+
+def draw_poses(sensor: SensorCalibration, means: FloatArray) -> bytes:
+    """Directions of "up" on two hemispheres, by Lambert's equal-area projection."""
+    force = means @ sensor.S.T + sensor.b
+    up = force / np.linalg.norm(force, axis=1)[:, None]
+    figure, axes = _panels(1, 2, (7.6, 4.1))
+    for axis, sign, title in ((axes[0], 1.0, "axis 3 above the horizon"), (axes[1], -1.0, "axis 3 below the horizon")):
+        _hemisphere(axis, title)
+        for k, direction in enumerate(up):
+            # A pose with level axis 3 lies on the rim of both.
+            if sign * direction[2] < -1e-2:
+                continue
+            x, y = _equal_area(direction * np.array([1.0, 1.0, sign]))
+            axis.plot(x, y, "o", markersize=8, color=AXIS_COLOURS[0], alpha=0.85)
+            axis.annotate(str(k), (x, y), ha="center", va="center", fontsize=5.5, color="white")
+    return _png(figure)
+
+
+def draw_moves(quality: FitQuality) -> bytes:
+    """Angle between predicted and measured gravity after every move."""
+    assert quality.angle_deg is not None
+    figure, (axis,) = _panels(1, 1, (9.5, 3.0))
+    move = np.arange(len(quality.angle_deg))
+    axis.bar(move - 0.2, quality.angle_deg, 0.38, color=AXIS_COLOURS[0], label="in sample")
+    if quality.held_out_angle_deg is not None:
+        axis.bar(move + 0.2, quality.held_out_angle_deg, 0.38, color=ACCENT, label="held out")
+    axis.set_xlabel("move")
+    axis.set_ylabel("gravity missed by [°]")
+    axis.set_xlim(-0.8, len(move) - 0.2)
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
+    return _png(figure)
+
+
+def _panels(rows: int, columns: int, size: tuple[float, float], *, share_x: bool = False) -> tuple[Figure, list[Axes]]:
+    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(rows, columns, sharex=share_x, squeeze=False)
+    axes: list[Axes] = list(grid.ravel())
+    for axis in axes:
+        axis.spines[["top", "right"]].set_visible(False)
+        axis.tick_params(labelsize=8.5, color=INK)
+    return figure, axes
+
+
+def _png(figure: Figure) -> bytes:
+    buffer = io.BytesIO()
+    # Without a date or version the same data give the same bytes.
+    figure.savefig(buffer, format="png", metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def _shade_holds(axis: Axes, recording: Recording, segments: Segments) -> None:
+    for hold in segments.holds:
+        axis.axvspan(recording.time_s[hold.start], recording.time_s[hold.stop - 1], color=SHADE, linewidth=0, zorder=0)
+
+
+def _mark_disturbances(axes: Sequence[Axes], recording: Recording, segments: Segments) -> None:
+    for hold in segments.holds:
+        for first, last in hold.disturbed:
+            for axis in axes:
+                start, stop = recording.time_s[first], recording.time_s[min(last, recording.n_samples) - 1]
+                axis.axvspan(start, stop, color=ACCENT, alpha=0.35, linewidth=0, zorder=0)
+
+
+def _envelope(time_s: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest value of each block: a long log drawn whole, with no peak lost."""
+    n = len(values)
+    if n <= MOST_POINTS:
+        return time_s, values
+    block = -(-n // (MOST_POINTS // 2))
+    whole = n // block * block
+    parts = values[:whole].reshape(-1, block)
+    low_high = np.column_stack([np.nanmin(parts, axis=1), np.nanmax(parts, axis=1)]).ravel()
+    return np.repeat(time_s[:whole:block], 2), low_high
+
+
+def _equal_area(direction: FloatArray) -> tuple[float, float]:
+    """Lambert's azimuthal projection of a unit vector about +axis 3, scaled so that the equator has radius one."""
+    factor = 1.0 / np.sqrt(1.0 + max(float(direction[2]), 0.0))
+    return float(direction[0] * factor), float(direction[1] * factor)
+
+
+def _hemisphere(axis: Axes, title: str) -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)
+    for elevation_deg in (0.0, 30.0, 60.0):
+        z = np.sin(np.radians(elevation_deg))
+        radius = np.sqrt(1.0 - z)
+        axis.plot(radius * np.cos(angle), radius * np.sin(angle), color="#AAB4BD", linewidth=0.6, zorder=0)
+    for label, x, y in (("+1", 1.15, 0.0), ("−1", -1.15, 0.0), ("+2", 0.0, 1.15), ("−2", 0.0, -1.15)):
+        axis.annotate(label, (x, y), ha="center", va="center", fontsize=9, color=INK)
+        axis.plot([0.0, np.clip(x, -1.0, 1.0)], [0.0, np.clip(y, -1.0, 1.0)], color="#D5DBE0", linewidth=0.6, zorder=0)
+    axis.set_aspect("equal")
+    axis.set_axis_off()
+    axis.set_xlim(-1.22, 1.22)
+    axis.set_ylim(-1.22, 1.22)
+    axis.set_title(title, fontsize=10)
+
+
+def draw_verification(verification: Verification) -> bytes:
+    """Norm error per pose with its standard error, and angle per move with the expected one."""
+    has_moves = len(verification.angle_deg) > 0
+    figure, axes = _panels(2 if has_moves else 1, 1, (9.5, 5.2 if has_moves else 3.0))
+    pose = np.arange(len(verification.norm_error))
+    axes[0].axhline(0.0, color=INK, linewidth=0.8)
+    axes[0].errorbar(
+        pose,
+        mm_s2(verification.norm_error),
+        mm_s2(verification.norm_sigma),
+        fmt="o",
+        markersize=4.5,
+        color=AXIS_COLOURS[0],
+        elinewidth=1.0,
+    )
+    axes[0].set_xlabel("still pose")
+    axes[0].set_ylabel("|f| − |g|  [mm/s²]")
+    if has_moves:
+        move = np.arange(len(verification.angle_deg))
+        axes[1].bar(move, verification.angle_deg, 0.7, color=AXIS_COLOURS[0], label="missed by")
+        axes[1].plot(move, verification.angle_sigma_deg, "_", markersize=14, color=ACCENT, label="to be expected (rms)")
+        axes[1].set_xlabel("move")
+        axes[1].set_ylabel("gravity missed by [°]")
+        axes[1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
+    return _png(figure)

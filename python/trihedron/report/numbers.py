@@ -1,0 +1,91 @@
+"""Numbers become words here: as many digits as the uncertainty allows, and a unit."""
+
+from __future__ import annotations
+
+import math
+
+MINUS = "−"
+
+
+def plain_number(value: float, digits: int = 3) -> str:
+    """``digits`` significant digits, without an exponent where that stays readable."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0.0:
+        return "0"
+    # Rounding may carry: 9.996 is 10.0 with three digits.
+    exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if -5 <= exponent < max(digits, 6):
+        text = f"{value:.{max(digits - 1 - exponent, 0)}f}"
+    else:
+        text = f"{value:.{digits - 1}e}"
+        mantissa, power = text.split("e")
+        text = f"{mantissa}e{int(power)}"
+    return text.replace("-", MINUS)
+
+
+def decimals_of(sigma: float) -> int:
+    """Decimal places that show two significant digits of an uncertainty."""
+    if not math.isfinite(sigma) or sigma <= 0.0:
+        return 0
+    exponent = math.floor(math.log10(float(f"{sigma:.1e}")))
+    return max(1 - exponent, 0)
+
+
+def with_sigma(value: float, sigma: float) -> str:
+    """``value ± σ``: σ with two significant digits, the value with the same decimal places; fixed values bare."""
+    if not math.isfinite(value):
+        return "–"
+    if sigma == 0.0:
+        return plain_number(value, 7) if value else "0"
+    if not math.isfinite(sigma):
+        return f"{plain_number(value)} ± ?"
+    places = decimals_of(sigma)
+    if sigma >= 100.0:
+        # Digits before the point beyond the second of σ mean nothing.
+        step = 10.0 ** (math.floor(math.log10(sigma)) - 1)
+        value, sigma = round(value / step) * step, round(sigma / step) * step
+    return f"{value:.{places}f} ± {sigma:.{places}f}".replace("-", MINUS)
+
+
+def engineering_exponent(size: float) -> int:
+    """Power of ten, a multiple of three, that brings a number of this size near one."""
+    if not math.isfinite(size) or size <= 0.0:
+        return 0
+    return 3 * math.floor((math.log10(size) + 0.3) / 3.0)
+
+
+def power_of_ten(exponent: int) -> str:
+    """``10⁻³``; nothing for one."""
+    if exponent == 0:
+        return ""
+    return "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def unit_in_print(unit: str) -> str:
+    """``m/s^2`` as people print it."""
+    return unit.replace("^2", "²")
+
+
+def how_many(n: int, noun: str) -> str:
+    """``1 pose``, ``24 poses``."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
+def listed(words: list[str]) -> str:
+    """``a, b and c``."""
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + f" and {words[-1]}"
+
+
+def duration(seconds: float) -> str:
+    """Seconds, minutes or hours, whichever reads best."""
+    if seconds < 600.0:
+        return f"{plain_number(seconds, 3)} s"
+    if seconds < 6.0 * 3600.0:
+        return f"{plain_number(seconds / 60.0, 3)} min"
+    return f"{plain_number(seconds / 3600.0, 3)} h"
+
+
+def one_of(unit: str) -> str:
+    """A unit after 'per': one count, not several."""
+    return "count" if unit == "counts" else unit_in_print(unit)

@@ -1,0 +1,98 @@
+"""What was found in a recording: still poses, moves, noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.records import Recording, Segments
+from trihedron.report.document import Document, Facts, Picture, Section, Table
+from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
+
+
+def segments_report(recording: Recording, segments: Segments) -> Document:
+    """Lay out the segments of one recording."""
+    findings = (*recording.findings, *segments.findings)
+    return Document(
+        title="Still poses and moves",
+        subtitle=recording.source,
+        verdict=verdict_of(
+            findings,
+            f"{how_many(segments.n_holds, 'still pose')}, {how_many(len(segments.moves), 'move')}.",
+            f"{how_many(segments.n_holds, 'still pose')}, {how_many(len(segments.moves), 'move')}",
+            "NOT FIT",
+        ),
+        is_trustworthy=not any(finding.severity.value == "serious" for finding in findings),
+        sections=(
+            Section("Recording", (Facts(recording_facts(recording, segments)),)),
+            Section("Findings", (findings_block(findings),)),
+            Section("Still poses", (hold_table(recording, segments),)),
+            Section("Figures", (signals_picture(recording, segments),)),
+        ),
+    )
+
+
+def recording_facts(recording: Recording, segments: Segments) -> tuple[tuple[str, str], ...]:
+    """Length, rate, sensors with unit and noise, what was found."""
+    facts = [("length", f"{duration(recording.duration_s)}, {recording.n_samples} samples")]
+    facts.append(("rate", f"{plain_number(recording.rate_hz, 5)} Hz"))
+    for name, readings, unit, sigma in (
+        ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value, segments.accelerometer_sigma),
+        ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value, segments.gyroscope_sigma),
+    ):
+        if readings is None:
+            facts.append((name, "not in the log"))
+            continue
+        words = f"in {unit_in_print(unit)}"
+        if sigma is not None and np.all(np.isfinite(sigma)):
+            words += (
+                f"; noise of one sample {', '.join(plain_number(float(s), 2) for s in sigma)} {unit_in_print(unit)}"
+            )
+        facts.append((name, words))
+    still_s = float(np.sum(segments.duration_s)) if segments.n_holds else 0.0
+    poses, moves = how_many(segments.n_holds, "still pose"), how_many(len(segments.moves), "move")
+    facts.append(("found", f"{poses} ({duration(still_s)} in all), {moves}"))
+    return tuple(facts)
+
+
+def hold_table(recording: Recording, segments: Segments) -> Table:
+    """Every still pose with its means."""
+    head = ["pose", "from [s]", "to [s]"]
+    columns: list[tuple[list[str], str]] = []
+    for label, mean, sigma, unit in (
+        ("a′", segments.accelerometer_mean, segments.accelerometer_sigma_mean, recording.accelerometer_unit.value),
+        ("w′", segments.gyroscope_mean, segments.gyroscope_sigma_mean, recording.gyroscope_unit.value),
+    ):
+        if mean is None:
+            continue
+        for axis in range(3):
+            cells = [
+                with_sigma(float(mean[k, axis]), float("nan") if sigma is None else float(sigma[k, axis]))
+                for k in range(segments.n_holds)
+            ]
+            columns.append((cells, f"{label}{axis + 1} [{unit_in_print(unit)}]"))
+    head += [title for _, title in columns]
+    rows = tuple(
+        (
+            str(k),
+            f"{recording.time_s[hold.start]:.2f}",
+            f"{recording.time_s[hold.stop - 1]:.2f}",
+            *(cells[k] for cells, _ in columns),
+        )
+        for k, hold in enumerate(segments.holds)
+    )
+    return Table(tuple(head), rows, "Mean readings ± their standard error; disturbed stretches left out")
+
+
+def signals_picture(recording: Recording, segments: Segments) -> Picture:
+    """The signals with the holds shaded."""
+
+    def draw() -> bytes:
+        # Drawing is imported when something is drawn: text and JSON need none of it.
+        from trihedron.report import figures
+
+        return figures.draw_signals(recording, segments)
+
+    return Picture(
+        "signals", "The recording; shaded where the sensor stood still, red where a still pose was bumped.", draw
+    )

@@ -1,0 +1,116 @@
+"""A calibration judged on another recording, as a report."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.records import Recording, Segments, Verification
+from trihedron.report.document import Block, Document, Facts, Picture, Section, Table
+from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.numbers import plain_number, with_sigma
+from trihedron.report.segments import signals_picture
+from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2
+
+
+def verification_report(
+    verification: Verification, segments: Segments | None = None, recording: Recording | None = None
+) -> Document:
+    """Lay out a verification."""
+    sections = [
+        Section("Result", (Facts(_facts(verification)),)),
+        Section("Findings", (findings_block(verification.findings),)),
+        Section("Poses and moves", tuple(_tables(verification, segments))),
+    ]
+    if segments is not None and recording is not None:
+        sections.append(Section("Figures", (_errors_picture(verification), signals_picture(recording, segments))))
+    return Document(
+        title="Verification",
+        subtitle=verification.source,
+        verdict=verdict_of(
+            verification.findings,
+            "The calibration holds here: errors are what noise and its own error bars allow.",
+            "The calibration was tested",
+            "NOT PASSED",
+        ),
+        is_trustworthy=verification.is_passed,
+        sections=tuple(sections),
+    )
+
+
+def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
+    v = verification
+    worst = int(np.argmax(np.abs(v.norm_error)))
+    expected = float(np.sqrt(np.mean(v.norm_sigma**2)))
+    facts = [
+        ("gravity", f"{v.gravity_m_s2:.5f} m/s², {v.gravity_source}"),
+        (
+            "norm error",
+            f"{_acceleration(v.norm_rms)} rms over {len(v.norm_error)} still poses, worst "
+            f"{_acceleration(float(v.norm_error[worst]))} in pose {worst}",
+        ),
+        ("to be expected", f"{_acceleration(expected)} rms from noise and the calibration's own error bars"),
+    ]
+    if len(v.angle_deg):
+        worst = int(np.argmax(v.angle_deg))
+        expected = float(np.sqrt(np.mean(v.angle_sigma_deg**2)))
+        facts += [
+            (
+                "gravity predicted",
+                f"to {plain_number(v.angle_rms_deg)}° rms over {len(v.angle_deg)} moves, worst "
+                f"{plain_number(float(v.angle_deg[worst]))}° in move {worst}",
+            ),
+            ("to be expected", f"{plain_number(expected)}° rms"),
+        ]
+    if len(v.rest_rate):
+        shift = [plain_number(degrees_from_radians(float(r)), 2) for r in np.mean(v.rest_rate, axis=0)]
+        facts.append(
+            ("gyro's zero", f"moved by {', '.join(shift)} °/s since the calibration (taken from each still pose)")
+        )
+    return tuple(facts)
+
+
+def _acceleration(value: float) -> str:
+    return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
+
+
+def _tables(verification: Verification, segments: Segments | None) -> list[Block]:
+    v = verification
+    rows = tuple(
+        (
+            str(k),
+            "" if segments is None else plain_number(float(segments.time_mid_s[k]), 4),
+            with_sigma(mm_s2_from_m_s2(float(v.norm_error[k])), mm_s2_from_m_s2(float(v.norm_sigma[k]))),
+            plain_number(float(v.norm_error[k] / v.norm_sigma[k]), 2),
+        )
+        for k in range(len(v.norm_error))
+    )
+    blocks: list[Block] = [
+        Table(
+            ("pose", "mid [s]", "|f| − |g| [mm/s²]", "in σ"),
+            rows,
+            "Norm of gravity ± noise and the calibration's error",
+        )
+    ]
+    if len(v.angle_deg):
+        rows = tuple(
+            (
+                str(k),
+                plain_number(float(v.angle_deg[k]), 2),
+                plain_number(float(v.angle_noise_deg[k]), 2),
+                plain_number(float(v.angle_sigma_deg[k]), 2),
+            )
+            for k in range(len(v.angle_deg))
+        )
+        head = ("move", "missed by [°]", "noise alone [°]", "with calibration's error [°]")
+        blocks.append(Table(head, rows, "Gravity carried through every move by the gyro"))
+    return blocks
+
+
+def _errors_picture(verification: Verification) -> Picture:
+    def draw() -> bytes:
+        # Drawing is imported when something is drawn: text and JSON need none of it.
+        from trihedron.report import figures
+
+        return figures.draw_verification(verification)
+
+    return Picture("errors", "Error in every still pose and after every move, with what was to be expected.", draw)
