@@ -50,7 +50,7 @@ def calibrate_joint(
         As :func:`trihedron.estimate.gyroscope.calibrate_moves`.
     """
     options = options or MoveOptions()
-    measured = measure_moves(recording, segments, accelerometer, options.rate_degree)
+    measured = measure_moves(recording, segments, accelerometer, options.rate_degree, options.is_attitude_removed)
     basis, frame = free_directions(accelerometer.S)
     first = starts(recording, measured, accelerometer, options.nominal())
     aligned = align_screened(measured, accelerometer, basis, gravity_m_s2, first, options)

@@ -68,6 +68,7 @@ class FindingCode(str, Enum):
     TURN_NOT_A_MULTIPLE = "turn-not-a-multiple"
     TURN_UNCHECKED = "turn-unchecked"
     GYRO_BIAS_DRIFT = "gyro-bias-drift"
+    GYRO_G_SENSITIVITY = "gyro-g-sensitivity"
     NOT_CONVERGED = "not-converged"
     GYROSCOPE_LEFT_OUT = "gyroscope-left-out"
     # verify, check

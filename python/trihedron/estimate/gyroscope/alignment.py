@@ -32,13 +32,16 @@ class MoveOptions:
 
     ``rate_degree`` of the rate polynomial over a sample (0 constant, 1 linear, 3 coning-corrected); ``is_robust``
     screens moves whose residual is far beyond the others'; ``is_offset_free`` adds a constant rate inside the moves
-    that the holds do not show (3 parameters); ``n_folds`` for held-out prediction, 0 for none; ``nominal_scale`` (3, 3)
-    or a number, rad/s per raw unit, where the moves cannot tell it.
+    that the holds do not show (3 parameters); ``is_attitude_removed``
+    subtracts a zero reading that follows specific force (``None``: where the holds show one); ``n_folds`` for
+    held-out prediction, 0 for none; ``nominal_scale`` (3, 3) or a number, rad/s per raw unit, where the moves cannot
+    tell it.
     """
 
     rate_degree: RateDegree = 3
     is_robust: bool = True
     is_offset_free: bool = False
+    is_attitude_removed: bool | None = None
     n_folds: int = 5
     nominal_scale: FloatArray | float | None = None
 

@@ -13,7 +13,7 @@ from trihedron.estimate.gyroscope.measurements import MoveMeasurements, audit_mo
 from trihedron.estimate.gyroscope.observability import describe, observability_findings
 from trihedron.estimate.gyroscope.verification import Prediction
 from trihedron.records.finding import Finding, FindingCode, Severity
-from trihedron.units import degrees_from_radians
+from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -50,6 +50,7 @@ def findings_of(aligned: Aligned, measured: MoveMeasurements, held: Prediction |
             )
         )
     found += _held_out_findings(held, aligned)
+    found += _attitude_findings(measured, S)
     found += _drift_findings(measured, S)
     return tuple(found)
 
@@ -137,6 +138,29 @@ def _held_out_findings(held: Prediction | None, aligned: Aligned) -> list[Findin
             "too few moves for the number of parameters, or an effect that differs from move to move",
             "Record more moves, about all axes, both ways.",
             MappingProxyType({"chi2_per_dof": chi2 / dof}),
+        )
+    ]
+
+
+def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> list[Finding]:
+    attitude = measured.attitude
+    if attitude is None:
+        return []
+    per_g = np.abs(S @ attitude.A) * STANDARD_GRAVITY_M_S2
+    rate, force = (int(k) for k in np.unravel_index(int(np.argmax(per_g)), (3, 3)))
+    per_move = np.median(measured.durations_s) * np.abs(attitude.A).max(axis=1) * STANDARD_GRAVITY_M_S2
+    is_material = bool(np.any(per_move > measured.noise_density * np.sqrt(np.median(measured.durations_s))))
+    return [
+        Finding(
+            FindingCode.GYRO_G_SENSITIVITY,
+            Severity.WARNING if is_material else Severity.NOTE,
+            "the gyro's zero reading follows gravity, by up to "
+            f"{degrees_from_radians(float(per_g[rate, force])):.2g} deg/s per g (axis {rate + 1} for force along axis "
+            f"{force + 1}), {100.0 * attitude.scatter_left:.0f} % of its scatter between holds is left without it. "
+            "The moves were fitted without it, but S and b alone cannot correct it.",
+            "g-sensitivity of the gyro",
+            "Run trihedron diagnose for the extended model.",
+            MappingProxyType({"largest_rad_s_per_m_s2": float(np.max(np.abs(S @ attitude.A)))}),
         )
     ]
 

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import chi2 as chi2_distribution
 
 from trihedron._core import Moves
+from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.recording import Recording
@@ -30,7 +32,9 @@ class MoveMeasurements:
     variances of these means; ``links`` (m, 2) the holds each move joins, ``edges`` (m, 2) its samples;
     ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_zero_walk`` (3,) the variance by which the
     true zero reading changes from hold to hold; ``is_clipped`` (m,) marks moves in which the gyro met its limit.
-    ``zero_weights`` (n, 3) make the session's zero reading ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,).
+    ``attitude`` is the dependence of the zero reading on specific force where it was removed: ``rate`` (samples, 3) are
+    the raw gyro readings without it, and so are the zeros. ``zero_weights`` (n, 3) make the session's zero reading
+    ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,).
     """
 
     moves: Moves
@@ -51,6 +55,8 @@ class MoveMeasurements:
     is_clipped: BoolArray
     is_gapped: BoolArray
     zero_excess: FloatArray
+    attitude: AttitudeDependence | None
+    rate: FloatArray
 
     @property
     def n_moves(self) -> int:
@@ -107,9 +113,16 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
 
 
 def measure_moves(
-    recording: Recording, segments: Segments, accelerometer: SensorCalibration, rate_degree: int
+    recording: Recording,
+    segments: Segments,
+    accelerometer: SensorCalibration,
+    rate_degree: int,
+    is_attitude_removed: bool | None = None,
 ) -> MoveMeasurements:
     """Collect hold means, moves and noise.
+
+    With ``is_attitude_removed`` (``None``: where the holds show it beyond chance) a zero reading that follows specific
+    force is subtracted sample by sample: interpolating it between two attitudes would be wrong in the middle of a move.
 
     Raises
     ------
@@ -117,7 +130,7 @@ def measure_moves(
         When a sensor is missing or there is no move between two holds.
     """
     gyroscope = _required(recording.gyroscope, "gyroscope")
-    _required(recording.accelerometer, "accelerometer")
+    raw_force = _required(recording.accelerometer, "accelerometer")
     if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
         raise ValueError("method 2 needs the hold means of both sensors: segment a recording that has both")
     moves = [move for move in segments.moves if move.stop - move.start >= 2]
@@ -131,21 +144,25 @@ def measure_moves(
     edges = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
     links = np.array([[move.hold_before, move.hold_after] for move in moves], dtype=np.int64)
     anchors = segments.time_mid_s[links]
-    prepared = Moves(recording.time_s, gyroscope, edges, np.ascontiguousarray(anchors), links, rate_degree)
-
+    reading = np.ascontiguousarray(segments.accelerometer_mean, dtype=np.float64)
     zero = np.ascontiguousarray(segments.gyroscope_mean, dtype=np.float64)
     var_zero = _mean_variance(segments.gyroscope_sigma_mean, segments.gyroscope_sigma, gyroscope)
-    reading = np.ascontiguousarray(segments.accelerometer_mean, dtype=np.float64)
-    var_reading = _mean_variance(
-        segments.accelerometer_sigma_mean,
-        segments.accelerometer_sigma,
-        _required(recording.accelerometer, "accelerometer"),
-    )
+    force = reading @ accelerometer.S.T + accelerometer.b
+    attitude = attitude_dependence(zero, var_zero, force) if is_attitude_removed is not False else None
+    if attitude is not None and (attitude.is_present or is_attitude_removed):
+        rate = gyroscope - (raw_force @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
+        zero = np.ascontiguousarray(zero - force @ attitude.A.T)
+    else:
+        attitude, rate = None, gyroscope
+    prepared = Moves(recording.time_s, rate, edges, np.ascontiguousarray(anchors), links, rate_degree)
+
+    var_reading = _mean_variance(segments.accelerometer_sigma_mean, segments.accelerometer_sigma, raw_force)
     var_reading = var_reading + _unexplained_reading_variance(accelerometer)
-    change = zero[links[:, 1]] - zero[links[:, 0]]
-    expected = var_zero[links[:, 1]] + var_zero[links[:, 0]]
-    walk = np.maximum(np.mean(change**2 - expected, axis=0), 0.0)
+    walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_zero[links[:, 1]] + var_zero[links[:, 0]])
     weights, mean, var_mean, excess, _ = pool_zeros(zero, var_zero)
+    zero, var_zero = shrink(zero, var_zero, mean)
+    if attitude is not None:
+        var_mean = np.maximum(var_mean, attitude.var_zero)
     steps = np.diff(recording.time_s)
     nominal = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 1.0 / recording.rate_hz
     jitter = float(np.median(np.abs(steps - nominal))) * 1.4826 / np.sqrt(2.0)
@@ -168,6 +185,8 @@ def measure_moves(
         is_clipped=clipped_moves(gyroscope, edges),
         is_gapped=np.array([np.max(steps[a : b - 1], initial=0.0) > 5.0 * nominal for a, b in edges]),
         zero_excess=excess,
+        attitude=attitude,
+        rate=rate,
     )
 
 
@@ -274,3 +293,34 @@ def pool_zeros(
     mean = (weight * zero).sum(axis=0)
     variance = (weight**2 * (floor + spread)).sum(axis=0)
     return np.ascontiguousarray(weight), mean, variance, chi2, spread
+
+
+def excess_variance(values: FloatArray, noise: FloatArray) -> FloatArray:
+    """Variance (3,) beyond ``noise`` (n, 3) in ``values`` (n, 3) about zero, from the median: deaf to single bad holds.
+
+    Solves ``median(x²/(v + τ²)) = median of χ²(1)`` for τ² of each column; zero where noise alone explains the median.
+    """
+    target = float(chi2_distribution.median(1))
+    out = np.zeros(values.shape[1])
+    for axis, (x2, v) in enumerate(zip((values**2).T, noise.T, strict=True)):
+        low, high = 0.0, float(np.max(x2)) / target
+        if np.median(x2 / np.maximum(v, 1e-300)) <= target:
+            continue
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if np.median(x2 / (v + middle)) > target else (low, middle)
+        out[axis] = high
+    return out
+
+
+def shrink(zero: FloatArray, var_zero: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Zero readings of the holds drawn to the session's by their noise: ``(z/v + z̄/τ²)/(1/v + 1/τ²)`` and its variance.
+
+    With a zero that changes (τ² ≫ v) each hold keeps its own; with a steady one a short hold borrows from the others.
+    """
+    n = len(zero)
+    tau2 = excess_variance((zero - mean) * np.sqrt(n / max(n - 1, 1)), var_zero)
+    gain = tau2 / np.maximum(tau2 + var_zero, 1e-300)
+    pooled = 1.0 / np.sum(1.0 / np.maximum(var_zero + tau2, 1e-300), axis=0)
+    variance = gain * var_zero + (1.0 - gain) ** 2 * pooled
+    return np.ascontiguousarray(mean + gain * (zero - mean)), np.ascontiguousarray(variance)

@@ -55,7 +55,7 @@ def calibrate_moves(
         When a sensor or every move is missing, or nothing tells the scale to start from.
     """
     options = options or MoveOptions()
-    measured = measure_moves(recording, segments, accelerometer, options.rate_degree)
+    measured = measure_moves(recording, segments, accelerometer, options.rate_degree, options.is_attitude_removed)
     first = starts(recording, measured, accelerometer, options.nominal())
     aligned = align_screened(measured, accelerometer, GIVEN_ACCELEROMETER, gravity_m_s2, first, options)
     held = held_out(aligned, measured, accelerometer, GIVEN_ACCELEROMETER, gravity_m_s2, options)

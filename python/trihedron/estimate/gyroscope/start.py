@@ -22,7 +22,7 @@ def integral_start(
     accelerometer. Accelerations of the hand disturb it, but they average out over a move; scale, sign, axis order and
     handedness come out right without any nominal figure.
     """
-    if recording.gyroscope is None or recording.accelerometer is None:
+    if recording.accelerometer is None:
         return None
     rows, sides = [], []
     force = accelerometer.S @ measured.reading.T + accelerometer.b[:, None]
@@ -30,7 +30,7 @@ def integral_start(
         measured.edges, measured.links, measured.is_clipped, strict=True
     ):
         time = recording.time_s[start:stop]
-        rate = recording.gyroscope[start:stop] - 0.5 * (measured.zero[before] + measured.zero[after])
+        rate = measured.rate[start:stop] - 0.5 * (measured.zero[before] + measured.zero[after])
         inside = recording.accelerometer[start:stop] @ accelerometer.S.T + accelerometer.b
         keep = np.all(np.isfinite(rate) & np.isfinite(inside), axis=1)
         if clipped or np.count_nonzero(keep) < 2:
