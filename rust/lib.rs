@@ -3,6 +3,7 @@
 //! No module here reads files, prints, or knows Python; `python` (feature `python`) is the only seam.
 //! Vocabulary: `S`, `b` are the direct form `f = S a' + b` (raw to SI), `Mz` is the instrument trihedron.
 
+pub mod allan;
 pub mod banded;
 pub mod ellipsoid;
 pub mod error;

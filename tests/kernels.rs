@@ -18,3 +18,5 @@ mod kalman;
 
 #[path = "kernels/simulate.rs"]
 mod simulate;
+#[path = "kernels/allan.rs"]
+mod allan;

@@ -1,7 +1,7 @@
 """Signatures of the compiled core. A test compares this stub with the runtime."""
 
 from collections.abc import Sequence
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 import numpy.typing as npt
@@ -46,6 +46,27 @@ def fit_norm_held_out(
     readings: FloatArray, noise: FloatArray, settings: NormSettings, fit: NormFit, folds: Sequence[int]
 ) -> FloatArray: ...
 def fit_ellipsoid(readings: FloatArray, gravity_m_s2: float, symmetric: bool) -> tuple[FloatArray, FloatArray]: ...
+
+# allan
+@final
+class AllanKind:
+    Overlapping: ClassVar[AllanKind]
+    NonOverlapping: ClassVar[AllanKind]
+    Modified: ClassVar[AllanKind]
+    Hadamard: ClassVar[AllanKind]
+    Total: ClassVar[AllanKind]
+    def __int__(self) -> int: ...
+    def __eq__(self, other: object, /) -> bool: ...
+
+def allan_variance(
+    x: FloatArray, clusters: Sequence[int], kind: AllanKind
+) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]: ...
+@final
+class AllanStream:
+    def __new__(cls, channels: int, clusters: Sequence[int], budget: int) -> AllanStream: ...
+    def extend(self, x: FloatArray) -> None: ...
+    def finish(self) -> tuple[list[int], FloatArray, npt.NDArray[np.int64], int, int, list[float]]: ...
+    def means(self, channel: int, readings: int) -> tuple[FloatArray, int]: ...
 
 # rotation
 def rotation_from_vector(vectors: FloatArray) -> FloatArray: ...

@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use crate::error::Result as KernelResult;
 
 mod accelerometer;
+mod allan;
 mod gyro_alignment;
 mod kalman;
 mod kalman_norm;
@@ -31,6 +32,7 @@ pub(crate) fn run<T: Send>(
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    allan::register(module)?;
     gyro_alignment::register(module)?;
     poisson::register(module)?;
     kalman::register(module)?;

@@ -1,0 +1,6 @@
+"""NOISE: Allan curves at memory speed; which noise terms a static log holds, how large, with what certainty."""
+
+from trihedron.estimate.noise.allan import allan_deviation, default_clusters, stream_allan_deviation
+from trihedron.estimate.noise.degrees import degrees_of_freedom
+
+__all__ = ["allan_deviation", "default_clusters", "degrees_of_freedom", "stream_allan_deviation"]

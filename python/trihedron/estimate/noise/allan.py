@@ -1,0 +1,250 @@
+"""Allan deviation of arrays and of logs that arrive in chunks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.estimate.noise.degrees import FLICKER, QUANTISATION, WALK, WHITE, degrees_of_freedom
+from trihedron.estimate.noise.quantiles import chi_square_quantile
+from trihedron.records.noise import AllanCurve, AllanKind, FloatArray
+
+_KINDS = {
+    "overlapping": _core.AllanKind.Overlapping,
+    "non-overlapping": _core.AllanKind.NonOverlapping,
+    "modified": _core.AllanKind.Modified,
+    "hadamard": _core.AllanKind.Hadamard,
+    "total": _core.AllanKind.Total,
+}
+_LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
+
+STREAM_BUDGET_BYTES = 384 << 20
+"""Memory for running sums of a streamed log, all channels together."""
+
+
+def default_clusters(n: int, kind: AllanKind = "overlapping", per_octave: int = 4) -> list[int]:
+    """Cluster sizes from 1 reading to the longest that still has terms, ``per_octave`` to the octave."""
+    longest = max(1, n // _LONGEST[kind])
+    steps = np.arange(int(per_octave * math.log2(longest)) + 1)
+    return [int(m) for m in np.unique(np.round(2.0 ** (steps / per_octave)).astype(np.int64))]
+
+
+def allan_deviation(
+    x: npt.ArrayLike,
+    rate_hz: float,
+    clusters: Sequence[int] | npt.NDArray[np.int64] | None = None,
+    kind: AllanKind = "overlapping",
+    *,
+    confidence: float = 0.95,
+    names: Sequence[str] = (),
+    units: Sequence[str] = (),
+) -> AllanCurve:
+    """Allan deviation of rate (not phase) readings, every channel, with chi-square intervals (docs/noise.md, eq. 1-6).
+
+    Parameters
+    ----------
+    x : (n,) or (n, channels)
+        Equally spaced readings in any unit, float64, float32, int16 or int32 (not copied when C-contiguous). NaN marks
+        a missing reading; clusters are then means of the readings they have, weighted by their number.
+    rate_hz : float
+        Samples per second.
+    clusters : (k,) of int, optional
+        Readings per cluster; by default four to the octave up to the longest with a term.
+    kind
+        ``overlapping`` uses every start; see :data:`~trihedron.records.noise.AllanKind`.
+
+    Raises
+    ------
+    ValueError
+        When the log is too short, a cluster size has no term, or the kind does not allow missing readings.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> curve = allan_deviation(np.random.default_rng(1).normal(size=10000), rate_hz=100.0, clusters=[1, 100])
+    >>> [round(float(d), 2) for d in curve.deviation[:, 0]]
+    [1.0, 0.1]
+    """
+    readings = as_readings(x)
+    n = len(readings)
+    check_question(rate_hz, kind, confidence)
+    if n < _LONGEST[kind]:
+        raise ValueError(f"an Allan deviation needs at least {_LONGEST[kind]} readings, got {n}")
+    sizes = default_clusters(n, kind) if clusters is None else checked_clusters(clusters)
+    variance, terms, weight = _core.allan_variance(readings, sizes, _KINDS[kind])
+    return curve_with_intervals(
+        kind, rate_hz, n, np.array(sizes), variance.T, terms.T, weight.T, confidence, tuple(names), tuple(units)
+    )
+
+
+def stream_allan_deviation(
+    chunks: Iterable[npt.ArrayLike],
+    rate_hz: float,
+    clusters: Sequence[int] | npt.NDArray[np.int64] | None = None,
+    *,
+    n_samples: int | None = None,
+    confidence: float = 0.95,
+    names: Sequence[str] = (),
+    units: Sequence[str] = (),
+    budget_bytes: int = STREAM_BUDGET_BYTES,
+) -> AllanCurve:
+    """Overlapping Allan deviation of a log that does not fit into memory, in one pass over its chunks.
+
+    ``chunks`` yields arrays (k,) or (k, channels) in order, for instance slices of a memory-mapped array. Clusters
+    up to 65536 readings use every start; longer ones use every ``stride``-th start once the running sums exceed
+    ``budget_bytes`` (at least 64 starts to a cluster) and are rounded up to a multiple of ``stride``.
+
+    Raises
+    ------
+    ValueError
+        When a chunk has missing readings or another number of channels, or the log is too short.
+    """
+    check_question(rate_hz, "overlapping", confidence)
+    sizes = default_clusters(n_samples or 1 << 44) if clusters is None else checked_clusters(clusters)
+    stream: _core.AllanStream | None = None
+    for chunk in chunks:
+        readings = as_readings(chunk)
+        if stream is None:
+            channels = readings.shape[1]
+            stream = _core.AllanStream(channels, sizes, max(budget_bytes // (8 * channels), 1 << 18))
+        stream.extend(readings)
+    if stream is None:
+        raise ValueError("the log holds no chunk of readings")
+    found, variance, terms, stride, n, _ = stream.finish()
+    return curve_with_intervals(
+        "overlapping",
+        rate_hz,
+        n,
+        np.array(found),
+        variance.T,
+        terms.T,
+        terms.T.astype(np.float64),
+        confidence,
+        tuple(names),
+        tuple(units),
+        stride,
+    )
+
+
+def as_readings(x: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Readings as a C-contiguous array (n, channels) of a type the kernel reads, copied only where needed."""
+    array = np.asarray(x)
+    if array.ndim == 1:
+        array = array[:, np.newaxis]
+    if array.ndim != 2 or array.shape[1] == 0:
+        raise ValueError(f"readings must have shape (n,) or (n, channels), got {np.shape(x)}")
+    if array.dtype not in (np.float64, np.float32, np.int16, np.int32):
+        if array.dtype.kind not in "iufb":
+            raise ValueError(f"readings must be real numbers, got the type {array.dtype}")
+        array = array.astype(np.float64)
+    # The kernel reads all four types; float64 stands for any of them in the signatures.
+    return np.ascontiguousarray(array)
+
+
+def check_question(rate_hz: float, kind: str, confidence: float) -> None:
+    """Refuse what cannot be answered.
+
+    Raises
+    ------
+    ValueError
+        Naming the argument.
+    """
+    if not (math.isfinite(rate_hz) and rate_hz > 0):
+        raise ValueError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
+    if kind not in _KINDS:
+        raise ValueError(f"kind must be one of {', '.join(_KINDS)}; got {kind!r}")
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence must lie between 0 and 1, got {confidence}")
+
+
+def checked_clusters(clusters: Sequence[int] | npt.NDArray[np.int64]) -> list[int]:
+    """Cluster sizes as integers.
+
+    Raises
+    ------
+    ValueError
+        When one is not a whole number of at least 1.
+    """
+    sizes = np.atleast_1d(np.asarray(clusters))
+    if sizes.ndim != 1 or sizes.size == 0:
+        raise ValueError("clusters must be a list of cluster sizes in readings")
+    whole = np.asarray(sizes, dtype=np.float64)
+    if not np.all(np.isfinite(whole)) or np.any(whole != np.round(whole)) or np.any(whole < 1):
+        raise ValueError("clusters are counted in readings: whole numbers of at least 1 (averaging time times rate)")
+    return [int(m) for m in whole]
+
+
+def curve_with_intervals(
+    kind: AllanKind,
+    rate_hz: float,
+    n: int,
+    clusters: npt.NDArray[np.int64],
+    variance: FloatArray,
+    terms: npt.NDArray[np.int64],
+    weight: FloatArray,
+    confidence: float,
+    names: tuple[str, ...],
+    units: tuple[str, ...],
+    stride: int = 1,
+) -> AllanCurve:
+    """The curve with its degrees of freedom and chi-square intervals, the noise type read off the local slope."""
+    channels = variance.shape[1]
+    edf = np.column_stack([_edf_along(n, clusters, variance[:, c], weight[:, c], kind) for c in range(channels)])
+    tail = (1.0 - confidence) / 2.0
+    high, low = chi_square_quantile(1.0 - tail, edf), chi_square_quantile(tail, edf)
+    return AllanCurve(
+        kind=kind,
+        rate_hz=float(rate_hz),
+        n_samples=n,
+        clusters=np.asarray(clusters, dtype=np.int64),
+        deviation=np.sqrt(variance),
+        n_terms=np.asarray(terms, dtype=np.int64),
+        weight=weight,
+        edf=edf,
+        lower=np.sqrt(variance * edf / high),
+        upper=np.sqrt(variance * edf / low),
+        confidence=confidence,
+        names=names or tuple(f"channel {c + 1}" for c in range(channels)),
+        units=units or ("",) * channels,
+        stride=stride,
+    )
+
+
+def _edf_along(
+    n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, weight: FloatArray, kind: AllanKind
+) -> FloatArray:
+    slopes = local_slopes(n, clusters, variance)
+    out = np.empty(len(clusters))
+    # Slope of the variance: -2 quantisation, -1 white, 0 flicker, 1 walk; between two types 1/edf is interpolated.
+    types = (QUANTISATION, WHITE, FLICKER, WALK)
+    for i, m in enumerate(clusters):
+        place = min(max(slopes[i] + 2.0, 0.0), 3.0)
+        below = min(int(place), 2)
+        share = place - below
+        first, second = (degrees_of_freedom(n, int(m), types[below + step], kind) for step in (0, 1))
+        edf = 1.0 / ((1.0 - share) / first + share / second)
+        full = max(n - (3 if kind in ("hadamard", "modified") else 2) * int(m) + 1, 1)
+        if kind == "non-overlapping":
+            full = max(n // int(m) - 1, 1)
+        # Missing readings take degrees of freedom with them, in proportion.
+        out[i] = max(1.0, edf * min(1.0, weight[i] / full)) if kind not in ("total", "modified") else edf
+    return out
+
+
+def local_slopes(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray) -> FloatArray:
+    """(k,) slopes of log variance against log cluster size, over wider stretches where the curve is less certain."""
+    x = np.log2(np.asarray(clusters, dtype=np.float64))
+    y = np.log2(np.where(variance > 0, variance, np.nan))
+    out = np.full(len(x), -1.0)
+    for i in range(len(x)):
+        # One octave either side while there are hundreds of clusters, towards three octaves back at the end.
+        back = 1.0 + 2.0 / (1.0 + n / (50.0 * 2.0 ** x[i]))
+        near = (x >= x[i] - back) & (x <= x[i] + 1.0) & np.isfinite(y)
+        if np.count_nonzero(near) >= 2 and np.ptp(x[near]) > 0:
+            w = np.sqrt(n / 2.0 ** x[near])
+            out[i] = np.polyfit(x[near] - x[i], y[near], 1, w=w)[0]
+    return out

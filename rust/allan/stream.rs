@@ -1,0 +1,238 @@
+//! Logs that do not fit into memory: one pass, chunk by chunk, in bounded memory.
+//!
+//! Clusters up to [`FINE`] readings are evaluated at every reading from a window of the running sum that moves with the
+//! chunks. For longer ones the running sum is kept at every `stride`-th reading (a power of two, doubled whenever the
+//! kept values exceed the budget), and terms are taken at every `stride`-th start: at least [`FINE_PER_STRIDE`] starts
+//! to a cluster, which holds all the information of every start to within 0.1 % of its variance. As long as
+//! the budget suffices (`stride` = 1) the result is that of the whole array.
+
+use super::Curve;
+use super::prefix::{compensated_sum, two_sum};
+use super::tiles::{self, Difference};
+use crate::error::{Error, Result};
+
+/// Longest cluster that is evaluated at every reading whatever the length of the log.
+pub const FINE: usize = 65536;
+/// Fewest starts per cluster among the longer ones.
+pub const FINE_PER_STRIDE: usize = 64;
+
+/// Overlapping Allan variance of one channel that arrives in chunks.
+#[derive(Debug, Clone)]
+pub struct Stream {
+    clusters: Vec<usize>,
+    n_fine: usize,
+    centre: f64,
+    window: Vec<f64>,
+    window_start: usize,
+    fine: Vec<(f64, f64)>,
+    kept: Vec<f64>,
+    stride: usize,
+    budget: usize,
+    total: (f64, f64),
+    n: usize,
+}
+
+/// What a stream amounts to.
+#[derive(Debug, Clone)]
+pub struct StreamedCurve {
+    /// Cluster sizes as evaluated: those above [`FINE`] are multiples of `stride`; sizes without a term are left out.
+    pub clusters: Vec<usize>,
+    /// The curve at these.
+    pub curve: Curve,
+    /// Distance of the starts of the longer clusters.
+    pub stride: usize,
+    /// Number of readings.
+    pub n: usize,
+    /// Mean of all readings.
+    pub mean: f64,
+}
+
+impl Stream {
+    /// A stream for these cluster sizes (any order; doubles are dropped) that keeps at most `budget` running sums.
+    ///
+    /// # Errors
+    /// `BadInput` for an empty list, a zero cluster or a budget below `4 · FINE`.
+    pub fn new(clusters: &[usize], budget: usize) -> Result<Self> {
+        if clusters.is_empty() || clusters.contains(&0) {
+            return Err(Error::bad_input(
+                "cluster sizes must be at least 1, and there must be one",
+            ));
+        }
+        if budget < 4 * FINE {
+            return Err(Error::bad_input(format!(
+                "the stream needs room for {} running sums",
+                4 * FINE
+            )));
+        }
+        let mut clusters = clusters.to_vec();
+        clusters.sort_unstable();
+        clusters.dedup();
+        let n_fine = clusters.partition_point(|&m| m <= FINE);
+        Ok(Self {
+            n_fine,
+            fine: vec![(0.0, 0.0); n_fine],
+            clusters,
+            centre: f64::NAN,
+            window: vec![0.0],
+            window_start: 0,
+            kept: vec![0.0],
+            stride: 1,
+            budget,
+            total: (0.0, 0.0),
+            n: 0,
+        })
+    }
+
+    /// Number of readings so far.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.n
+    }
+
+    /// No reading has arrived yet.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.n == 0
+    }
+
+    /// Take the next `n` readings.
+    ///
+    /// # Errors
+    /// `BadInput` naming the first reading that is not finite.
+    pub fn extend<F: Fn(usize) -> f64>(&mut self, n: usize, get: F) -> Result<()> {
+        if n == 0 {
+            return Ok(());
+        }
+        if let Some(bad) = (0..n).find(|&i| !get(i).is_finite()) {
+            return Err(Error::bad_input(format!(
+                "reading {} is missing or infinite: exclude it, or load the log whole, where gaps are weighted",
+                self.n + bad
+            )));
+        }
+        if self.n == 0 {
+            // Close to the mean is enough: a constant drops out of every difference.
+            self.centre = get(0) + compensated_sum((0..n).map(|i| get(i) - get(0))) / n as f64;
+        }
+        // Pieces bound the window whatever chunk the caller likes.
+        let piece = 4 * FINE;
+        for first in (0..n).step_by(piece) {
+            self.piece(first..(first + piece).min(n), &get);
+        }
+        Ok(())
+    }
+
+    fn piece<F: Fn(usize) -> f64>(&mut self, range: std::ops::Range<usize>, get: &F) {
+        for i in range {
+            let (s, e) = two_sum(self.total.0, get(i) - self.centre);
+            self.total = (s, self.total.1 + e);
+            let sum = self.total.0 + self.total.1;
+            self.window.push(sum);
+            self.n += 1;
+            if self.n.is_multiple_of(self.stride) {
+                self.kept.push(sum);
+            }
+        }
+        if self.kept.len() > self.budget {
+            self.thin();
+        }
+        self.settle();
+    }
+
+    /// Keep every second running sum.
+    fn thin(&mut self) {
+        let mut place = 0;
+        self.kept.retain(|_| {
+            place += 1;
+            place % 2 == 1
+        });
+        self.stride *= 2;
+    }
+
+    /// Add the terms of the fine clusters that became complete: every start for which the window holds all clusters.
+    fn settle(&mut self) {
+        let Some(&longest) = self.clusters[..self.n_fine].last() else {
+            self.window.clear();
+            return;
+        };
+        let starts = self.window.len().saturating_sub(2 * longest);
+        if starts == 0 {
+            return;
+        }
+        for (sum, &m) in self.fine.iter_mut().zip(&self.clusters) {
+            let energy =
+                tiles::energies(&self.window[..starts + 2 * m], &[m], Difference::Second)[0];
+            let (s, e) = two_sum(sum.0, energy);
+            *sum = (s, sum.1 + e);
+        }
+        self.window.drain(..starts);
+        self.window_start += starts;
+    }
+
+    /// The curve of everything so far.
+    ///
+    /// # Errors
+    /// `NotDetermined` when the log is too short for every cluster.
+    pub fn finish(&self) -> Result<StreamedCurve> {
+        let n = self.n;
+        let mut out = StreamedCurve {
+            clusters: Vec::new(),
+            curve: Curve {
+                variance: Vec::new(),
+                terms: Vec::new(),
+                weight: Vec::new(),
+            },
+            stride: self.stride,
+            n,
+            mean: self.centre + (self.total.0 + self.total.1) / n as f64,
+        };
+        for (c, &m) in self.clusters.iter().enumerate() {
+            let (m, energy, terms) = if c < self.n_fine {
+                let rest = tiles::energies(&self.window, &[m], Difference::Second)[0];
+                (
+                    m,
+                    self.fine[c].0 + (self.fine[c].1 + rest),
+                    (n + 1).saturating_sub(2 * m),
+                )
+            } else {
+                let lag = m.div_ceil(self.stride);
+                let energy = tiles::energies(&self.kept, &[lag], Difference::Second)[0];
+                (
+                    lag * self.stride,
+                    energy,
+                    self.kept.len().saturating_sub(2 * lag),
+                )
+            };
+            if terms == 0 || out.clusters.last() == Some(&m) {
+                continue;
+            }
+            out.clusters.push(m);
+            out.curve
+                .variance
+                .push(energy / (2.0 * (m as f64).powi(2) * terms as f64));
+            out.curve.terms.push(terms);
+            out.curve.weight.push(terms as f64);
+        }
+        if out.clusters.is_empty() {
+            return Err(Error::not_determined(format!(
+                "{n} readings are too few for the cluster sizes asked for"
+            )));
+        }
+        Ok(out)
+    }
+
+    /// Means of `lag · stride` readings, one after the other, and that number of readings.
+    ///
+    /// `lag` is the least that gives means of at least `readings` readings.
+    #[must_use]
+    pub fn means(&self, readings: usize) -> (Vec<f64>, usize) {
+        let lag = readings.div_ceil(self.stride).max(1);
+        let size = lag * self.stride;
+        let ends = self.kept.iter().step_by(lag);
+        let means = ends
+            .clone()
+            .zip(ends.skip(1))
+            .map(|(a, b)| self.centre + (b - a) / size as f64)
+            .collect();
+        (means, size)
+    }
+}

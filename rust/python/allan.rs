@@ -1,0 +1,221 @@
+//! Allan variances across the seam.
+
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::allan::{self, Curve, Kind, Stream};
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<AllanKind>()?;
+    module.add_class::<AllanStream>()?;
+    module.add_function(wrap_pyfunction!(allan_variance, module)?)?;
+    Ok(())
+}
+
+/// Which variance of the family.
+#[pyclass(eq, frozen, from_py_object, module = "trihedron._core")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum AllanKind {
+    Overlapping,
+    NonOverlapping,
+    Modified,
+    Hadamard,
+    Total,
+}
+
+impl From<AllanKind> for Kind {
+    fn from(kind: AllanKind) -> Self {
+        match kind {
+            AllanKind::Overlapping => Self::Overlapping,
+            AllanKind::NonOverlapping => Self::NonOverlapping,
+            AllanKind::Modified => Self::Modified,
+            AllanKind::Hadamard => Self::Hadamard,
+            AllanKind::Total => Self::Total,
+        }
+    }
+}
+
+/// Readings `(n, channels)` in the type they were logged in: counts need not be copied to be read.
+#[derive(FromPyObject)]
+enum Readings<'py> {
+    F64(PyReadonlyArray2<'py, f64>),
+    F32(PyReadonlyArray2<'py, f32>),
+    I16(PyReadonlyArray2<'py, i16>),
+    I32(PyReadonlyArray2<'py, i32>),
+}
+
+/// A view that may cross threads: where the readings lie and how far apart, in elements.
+struct View<'a, T> {
+    data: &'a [T],
+    n: usize,
+    channels: usize,
+}
+
+impl<T: Copy + Into<f64>> View<'_, T> {
+    fn channel(&self, c: usize) -> impl Fn(usize) -> f64 + Sync + '_
+    where
+        T: Sync,
+    {
+        move |i| self.data[i * self.channels + c].into()
+    }
+}
+
+fn view<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<View<'a, T>> {
+    let data = array
+        .as_slice()
+        .map_err(|_| PyValueError::new_err("readings must be C-contiguous, one row per sample"))?;
+    Ok(View {
+        data,
+        n: array.shape()[0],
+        channels: array.shape()[1],
+    })
+}
+
+// The readings are borrowed, not owned: a copy would be the largest piece of memory in the whole computation.
+macro_rules! with_view {
+    ($readings:expr, $view:ident => $body:expr) => {
+        match $readings {
+            Readings::F64(array) => {
+                let $view = view(array)?;
+                $body
+            }
+            Readings::F32(array) => {
+                let $view = view(array)?;
+                $body
+            }
+            Readings::I16(array) => {
+                let $view = view(array)?;
+                $body
+            }
+            Readings::I32(array) => {
+                let $view = view(array)?;
+                $body
+            }
+        }
+    };
+}
+
+fn readings<'py>(x: &Bound<'py, PyAny>) -> PyResult<Readings<'py>> {
+    x.extract().map_err(|_| {
+        PyTypeError::new_err(
+            "readings must be an array (n, channels) of float64, float32, int16 or int32",
+        )
+    })
+}
+
+type Curves<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<i64>>,
+    Bound<'py, PyArray2<f64>>,
+);
+
+fn curves<'py>(py: Python<'py>, found: &[Curve]) -> PyResult<Curves<'py>> {
+    let size = [found.len(), found.first().map_or(0, |c| c.variance.len())];
+    let flat =
+        |pick: fn(&Curve) -> &Vec<f64>| found.iter().flat_map(pick).copied().collect::<Vec<f64>>();
+    let terms: Vec<i64> = found
+        .iter()
+        .flat_map(|c| &c.terms)
+        .map(|&t| i64::try_from(t).unwrap_or(i64::MAX))
+        .collect();
+    Ok((
+        flat(|c| &c.variance).to_pyarray(py).reshape(size)?,
+        terms.to_pyarray(py).reshape(size)?,
+        flat(|c| &c.weight).to_pyarray(py).reshape(size)?,
+    ))
+}
+
+#[pyfunction]
+fn allan_variance<'py>(
+    py: Python<'py>,
+    x: &Bound<'py, PyAny>,
+    clusters: Vec<usize>,
+    kind: AllanKind,
+) -> PyResult<Curves<'py>> {
+    let x = readings(x)?;
+    let found = with_view!(&x, v => super::run(py, || {
+        (0..v.channels)
+            .map(|c| allan::variances(v.n, v.channel(c), &clusters, kind.into()))
+            .collect::<crate::Result<Vec<Curve>>>()
+    }))?;
+    curves(py, &found)
+}
+
+/// Overlapping Allan variance of a log that arrives in chunks `(n, channels)`.
+#[pyclass(module = "trihedron._core")]
+pub(crate) struct AllanStream {
+    channels: Vec<Stream>,
+}
+
+#[pymethods]
+impl AllanStream {
+    #[new]
+    fn new(py: Python<'_>, channels: usize, clusters: Vec<usize>, budget: usize) -> PyResult<Self> {
+        let stream = super::run(py, || Stream::new(&clusters, budget))?;
+        Ok(Self {
+            channels: vec![stream; channels],
+        })
+    }
+
+    fn extend(&mut self, py: Python<'_>, x: &Bound<'_, PyAny>) -> PyResult<()> {
+        let x = readings(x)?;
+        let channels = &mut self.channels;
+        with_view!(&x, v => {
+            if v.channels != channels.len() {
+                return Err(PyValueError::new_err(format!(
+                    "the stream has {} channels, this chunk {}", channels.len(), v.channels
+                )));
+            }
+            super::run(py, || {
+                channels.iter_mut().enumerate().try_for_each(|(c, stream)| stream.extend(v.n, v.channel(c)))
+            })
+        })
+    }
+
+    /// `(clusters, variance, terms, stride, n, mean)`.
+    #[allow(clippy::type_complexity)]
+    fn finish<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(
+        Vec<usize>,
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray2<i64>>,
+        usize,
+        usize,
+        Vec<f64>,
+    )> {
+        let found = super::run(py, || {
+            self.channels
+                .iter()
+                .map(Stream::finish)
+                .collect::<crate::Result<Vec<_>>>()
+        })?;
+        let first = found
+            .first()
+            .ok_or_else(|| PyValueError::new_err("the stream has no channel"))?;
+        let (clusters, stride, n) = (first.clusters.clone(), first.stride, first.n);
+        let means = found.iter().map(|f| f.mean).collect();
+        let found: Vec<Curve> = found.into_iter().map(|f| f.curve).collect();
+        let (variance, terms, _) = curves(py, &found)?;
+        Ok((clusters, variance, terms, stride, n, means))
+    }
+
+    /// Means `(k,)` of at least `readings` readings of one channel, and how many they hold.
+    fn means<'py>(
+        &self,
+        py: Python<'py>,
+        channel: usize,
+        readings: usize,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, usize)> {
+        let stream = self
+            .channels
+            .get(channel)
+            .ok_or_else(|| PyValueError::new_err(format!("there is no channel {channel}")))?;
+        let (means, size) = stream.means(readings);
+        Ok((means.to_pyarray(py), size))
+    }
+}

@@ -1,0 +1,212 @@
+"""Allan curves: published values, slow twins, an independent tool, precision, gaps, streams."""
+
+import allantools
+import numpy as np
+import pytest
+
+from trihedron.estimate.noise import allan_deviation, default_clusters, degrees_of_freedom, stream_allan_deviation
+from twins_noise import overlapping_variance, running_sum_in_long_double, weighted_hadamard, weighted_variance
+
+NINE = [892.0, 809.0, 823.0, 798.0, 671.0, 644.0, 883.0, 903.0, 677.0]
+
+
+def thousand_points():
+    """The 1000-point set of NIST SP 1065: a published congruential generator, no data."""
+    values, n = [], 1234567890
+    for _ in range(1000):
+        values.append(n / 2147483647)
+        n = 16807 * n % 2147483647
+    return np.array(values)
+
+
+# NIST SP 1065 (2008), tables 30 and 31, as printed: seven digits.
+@pytest.mark.parametrize(
+    ("kind", "m", "value"),
+    [
+        ("overlapping", 1, 91.22945),
+        ("non-overlapping", 2, 115.8082),
+        ("overlapping", 2, 85.95287),
+        ("modified", 2, 74.78849),
+        ("total", 1, 91.22945),
+        ("total", 2, 93.90379),
+        ("hadamard", 1, 70.80607),
+        ("hadamard", 2, 85.61487),
+    ],
+)
+def test_the_nine_nbs_frequencies_give_the_printed_values(kind, m, value):
+    assert allan_deviation(NINE, 1.0, [m], kind).deviation[0, 0] == pytest.approx(value, abs=6e-5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        ("non-overlapping", (2.922319e-01, 9.965736e-02, 3.897804e-02)),
+        ("overlapping", (2.922319e-01, 9.159953e-02, 3.241343e-02)),
+        ("modified", (2.922319e-01, 6.172376e-02, 2.170921e-02)),
+        ("hadamard", (2.943883e-01, 9.581083e-02, 3.237638e-02)),
+        ("total", (2.922319e-01, 9.134743e-02, 3.406530e-02)),
+    ],
+)
+def test_the_thousand_point_set_gives_the_printed_values(kind, values):
+    curve = allan_deviation(thousand_points(), 1.0, [1, 10, 100], kind)
+    assert curve.deviation[:, 0] == pytest.approx(values, abs=6e-9 * 100)
+
+
+@pytest.mark.parametrize(
+    ("kind", "oracle"),
+    [
+        ("overlapping", allantools.oadev),
+        ("non-overlapping", allantools.adev),
+        ("modified", allantools.mdev),
+        ("hadamard", allantools.ohdev),
+        ("total", allantools.totdev),
+    ],
+)
+def test_every_kind_agrees_with_allantools(kind, oracle):
+    rng = np.random.default_rng(11)
+    x = rng.normal(size=20000) + 0.01 * np.cumsum(rng.normal(size=20000))
+    clusters = [1, 2, 3, 7, 10, 33, 100, 511, 1000, 3000, 6000]
+    curve = allan_deviation(x, 50.0, clusters, kind)
+    taus, deviation, _, _ = oracle(x, rate=50.0, data_type="freq", taus=curve.tau_s)
+    assert len(taus) == len(clusters)
+    # The oracle keeps the mean in its running sum: 1e-10 leaves room for its rounding, ours is far below.
+    assert curve.deviation[:, 0] == pytest.approx(deviation, rel=1e-10)
+
+
+def test_overlapping_means_every_start():
+    x = np.random.default_rng(3).normal(size=300).cumsum()
+    curve = allan_deviation(x, 1.0, [1, 2, 7, 50, 149, 150])
+    assert curve.n_terms[:, 0].tolist() == [299, 297, 287, 201, 3, 1]
+    for m, deviation in zip(curve.clusters, curve.deviation[:, 0], strict=True):
+        assert deviation**2 == pytest.approx(overlapping_variance(x, m), rel=1e-12)
+
+
+def test_a_bias_of_ten_thousand_times_the_noise_costs_no_digits():
+    rng = np.random.default_rng(4)
+    x = 1e4 + rng.normal(size=1_000_000)
+    clusters = [1, 10, 1000, 30000, 400000]
+    curve = allan_deviation(x, 100.0, clusters)
+    assert curve.variance[:, 0] == pytest.approx(running_sum_in_long_double(x, clusters), rel=1e-9)
+
+
+def test_counts_are_read_in_their_own_type():
+    counts = np.random.default_rng(5).integers(-3000, 3000, size=(5000, 3))
+    wide = allan_deviation(counts.astype(np.float64), 100.0)
+    for kind in (np.int16, np.int32, np.int64, np.float32):
+        assert np.allclose(allan_deviation(counts.astype(kind), 100.0).deviation, wide.deviation, rtol=1e-13)
+
+
+def test_missing_readings_are_weighted_as_defined():
+    rng = np.random.default_rng(6)
+    x = rng.normal(size=400).cumsum()
+    x[rng.random(400) < 0.1] = np.nan
+    x[200:260] = np.nan
+    for m in (1, 5, 40, 120):
+        curve = allan_deviation(x, 1.0, [m])
+        assert curve.variance[0, 0] == pytest.approx(weighted_variance(x, m), rel=1e-11)
+        hadamard = allan_deviation(x, 1.0, [m], "hadamard")
+        assert hadamard.variance[0, 0] == pytest.approx(weighted_hadamard(x, m), rel=1e-11)
+
+
+def test_a_gap_biases_neither_white_noise_nor_a_random_walk():
+    rng = np.random.default_rng(7)
+    white, walk = [], []
+    clusters = [1, 10, 100, 1000]
+    for _ in range(60):
+        x = rng.normal(size=20000)
+        w = 1e-2 * np.cumsum(rng.normal(size=20000))
+        for series in (x, w):
+            series[5000:6500] = np.nan
+        white.append(allan_deviation(x, 1.0, clusters).variance[:, 0] * clusters)
+        exact = 1e-4 * (2 * np.square(clusters) + 1) / (6.0 * np.array(clusters))
+        walk.append(allan_deviation(w, 1.0, clusters).variance[:, 0] / exact)
+    for runs in (np.array(white), np.array(walk)):
+        error = runs.std(axis=0, ddof=1) / np.sqrt(len(runs))
+        # 4 standard errors of the mean of 60 runs, and 1 % for the windows that straddle the gap's ends.
+        assert np.all(np.abs(runs.mean(axis=0) - 1.0) < 4 * error + 0.01)
+
+
+def test_chunks_give_what_the_whole_array_gives():
+    x = 100.0 + np.random.default_rng(8).normal(size=(400_000, 2)).cumsum(axis=0)
+    whole = allan_deviation(x, 100.0)
+    chunks = (x[i : i + 33_333] for i in range(0, len(x), 33_333))
+    streamed = stream_allan_deviation(chunks, 100.0, n_samples=len(x))
+    assert streamed.stride == 1
+    assert streamed.clusters.tolist() == whole.clusters.tolist()
+    assert streamed.deviation == pytest.approx(whole.deviation, rel=1e-11)
+
+
+def test_a_stream_beyond_its_memory_thins_only_the_long_clusters():
+    x = np.random.default_rng(9).normal(size=1_500_000)
+    clusters = [1, 100, 65536, 100_000, 300_000]
+    streamed = stream_allan_deviation([x], 100.0, clusters, budget_bytes=8 << 18)
+    whole = allan_deviation(x, 100.0, streamed.clusters)
+    assert streamed.stride == 8
+    assert streamed.deviation[:3] == pytest.approx(whole.deviation[:3], rel=1e-11)
+    # Every eighth start of 1e5: the information is the same, the sum is not.
+    assert streamed.deviation == pytest.approx(whole.deviation, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("increment", "expected"),
+    [
+        ("walk", lambda m: (2 * m**2 + 1) / (6 * m)),
+        ("white", lambda m: 1 / m),
+        ("differenced", lambda m: 3 / m**2),
+    ],
+)
+def test_exact_discrete_expectations_hold(increment, expected):
+    rng = np.random.default_rng(10)
+    clusters = np.array([1, 2, 3, 8, 25])
+    runs = []
+    for _ in range(400):
+        q = rng.normal(size=601)
+        x = {"walk": np.cumsum(q), "white": q, "differenced": np.diff(q)}[increment]
+        runs.append(allan_deviation(x, 1.0, clusters).variance[:, 0])
+    error = np.std(runs, axis=0, ddof=1) / np.sqrt(len(runs))
+    # Five comparisons at 4 standard errors of 400 runs: a correct formula fails once in 3000 seeds.
+    assert np.all(np.abs(np.mean(runs, axis=0) - expected(clusters)) < 4 * error)
+
+
+@pytest.mark.parametrize("kind", ["overlapping", "non-overlapping", "modified", "hadamard"])
+@pytest.mark.parametrize("alpha", [2, 0, -1, -2])
+def test_degrees_of_freedom_agree_with_an_independent_implementation(kind, alpha):
+    for m in (1, 4, 64, 1024):
+        oracle = allantools.edf_greenhall(
+            alpha=alpha,
+            d=3 if kind == "hadamard" else 2,
+            m=m,
+            N=10001,
+            overlapping=kind != "non-overlapping",
+            modified=kind == "modified",
+            verbose=False,
+        )
+        # The oracle's closed approximations for long sums are good to 2 %; ours are the sums themselves.
+        assert degrees_of_freedom(10000, m, alpha, kind) == pytest.approx(oracle, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("question", "words"),
+    [
+        (lambda: allan_deviation([1.0], 1.0), "at least 2 readings"),
+        (lambda: allan_deviation(NINE, 0.0), "rate_hz"),
+        (lambda: allan_deviation(NINE, 1.0, [0]), "whole numbers"),
+        (lambda: allan_deviation(NINE, 1.0, [1.5]), "whole numbers"),
+        (lambda: allan_deviation(NINE, 1.0, [5]), "longer log"),
+        (lambda: allan_deviation(NINE, 1.0, kind="oadev"), "kind must be one of"),
+        (lambda: allan_deviation([np.nan] * 9, 1.0), "no finite reading"),
+        (lambda: allan_deviation([*NINE, np.nan], 1.0, kind="modified"), "not defined where readings are missing"),
+        (lambda: allan_deviation(np.zeros((3, 3, 3)), 1.0), "shape"),
+        (lambda: stream_allan_deviation([], 1.0), "no chunk"),
+        (lambda: stream_allan_deviation([[1.0, np.inf, 2.0]], 1.0), "reading 1"),
+    ],
+)
+def test_a_malformed_question_is_refused_in_words(question, words):
+    with pytest.raises(ValueError, match=words):
+        question()
+
+
+def test_default_clusters_reach_the_longest_with_a_term():
+    assert default_clusters(1000)[0] == 1
+    assert default_clusters(1000)[-1] <= 500
+    assert allan_deviation(np.arange(1000.0), 1.0).n_terms[-1, 0] >= 1
