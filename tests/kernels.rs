@@ -16,7 +16,7 @@ mod stillness;
 #[path = "kernels/kalman.rs"]
 mod kalman;
 
-#[path = "kernels/simulate.rs"]
-mod simulate;
 #[path = "kernels/allan.rs"]
 mod allan;
+#[path = "kernels/simulate.rs"]
+mod simulate;

@@ -61,6 +61,7 @@ class AllanKind:
 def allan_variance(
     x: FloatArray, clusters: Sequence[int], kind: AllanKind
 ) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]: ...
+
 @final
 class AllanStream:
     def __new__(cls, channels: int, clusters: Sequence[int], budget: int) -> AllanStream: ...

@@ -17,7 +17,7 @@ pub struct Prefix {
 }
 
 /// `a + b` as a rounded sum and what the rounding lost (Knuth's two-sum).
-#[inline(always)]
+#[inline]
 #[must_use]
 pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;

@@ -5,6 +5,12 @@
 //! that all threads work on neighbouring memory; each tile leaves one number per lag and these are added in order, with
 //! compensation: the result does not depend on the number of threads.
 
+// The loops are compiled once per instruction set: they take on the features of the function they are inlined into.
+#![expect(
+    clippy::inline_always,
+    reason = "a loop that is not inlined keeps the features of the baseline"
+)]
+
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -29,8 +29,8 @@ class AllanCurve:
     """Allan deviations of one or more channels against averaging time.
 
     ``clusters`` (k,) readings per cluster, ``tau_s`` (k,) the same in seconds; ``deviation`` (k, channels) in the unit
-    of the readings, NaN where missing readings leave no term; ``lower``, ``upper`` (k, channels) a chi-square interval of
-    ``confidence`` from ``edf`` (k, channels) equivalent degrees of freedom; ``n_terms`` (k, channels) terms summed,
+    of the readings, NaN where missing readings leave no term; ``lower``, ``upper`` (k, channels) a chi-square interval
+    of ``confidence`` from ``edf`` (k, channels) equivalent degrees of freedom; ``n_terms`` (k, channels) terms summed,
     ``weight`` (k, channels) the sum of their weights (equal to ``n_terms`` without missing readings). ``stride`` is the
     distance of the starts of clusters too long for the memory: 1 unless the log was streamed.
     """
