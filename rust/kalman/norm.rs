@@ -81,6 +81,10 @@ const SETTLED: f64 = 1e-3;
 /// A run over all poses that moves every parameter by less than this part of its standard error is the last.
 const CONVERGED: f64 = 1e-6;
 
+/// The point of linearisation moves by at most this part of gravity or of a sensitivity at a time: a few poses in one
+/// plane leave directions to which the length of gravity is stationary, and a full step there leads nowhere.
+const LONGEST_STEP: f64 = 0.2;
+
 /// Recursive estimate of a triad from the length of gravity alone.
 #[derive(Debug, Clone)]
 pub struct NormFilter {
@@ -277,7 +281,7 @@ impl NormFilter {
             let seen = self.update_at(&mut filter, pose, &theta);
             first.get_or_insert(seen);
             let moved = self.moved(&filter, &theta);
-            theta.copy_from_slice(&filter.x[self.n_noise..]);
+            self.approach(&mut theta, &filter.x[self.n_noise..]);
             self.filter = filter;
             if moved < SETTLED {
                 break;
@@ -302,14 +306,51 @@ impl NormFilter {
             .fold(0.0, f64::max)
     }
 
+    /// Move a point of linearisation towards an estimate, not further than [`LONGEST_STEP`].
+    fn approach(&self, theta: &mut [f64], estimate: &[f64]) {
+        let (s, _) = self.frame.unpack(theta);
+        let change: Vec<f64> = estimate
+            .iter()
+            .zip(&*theta)
+            .map(|(to, from)| to - from)
+            .collect();
+        let (ds, db) = self.frame.unpack(&change);
+        let relative = s
+            .try_inverse()
+            .map_or(f64::INFINITY, |inverse| (ds * inverse).amax());
+        let length = relative.max(db.amax() / self.gravity);
+        let part = if length > LONGEST_STEP {
+            LONGEST_STEP / length
+        } else {
+            1.0
+        };
+        for (value, step) in theta.iter_mut().zip(change) {
+            *value += part * step;
+        }
+    }
+
+    /// Take many poses without estimating anything: [`Self::relinearise`] then starts from the prior's mean, with all of
+    /// them together.
+    ///
+    /// # Errors
+    /// As [`Self::add`].
+    pub fn load(&mut self, poses: &[NormPose]) -> Result<()> {
+        for pose in poses {
+            self.check(pose)?;
+            self.timeline.pass(pose.start, pose.hold);
+            self.poses.push(*pose);
+        }
+        Ok(())
+    }
+
     /// Run over all poses again, linearised at the latest constants, until they stay. Returns the number of runs, or
     /// `None` when `most` were not enough.
     ///
     /// # Errors
     /// Never for poses that were taken once.
     pub fn relinearise(&mut self, most: usize) -> Result<Option<usize>> {
+        let mut theta = self.filter.x[self.n_noise..].to_vec();
         for run in 1..=most {
-            let theta = self.filter.x[self.n_noise..].to_vec();
             self.filter = Self::start(&self.shapings, self.n_noise, &self.prior);
             self.timeline = Timeline::default();
             let poses = std::mem::take(&mut self.poses);
@@ -325,6 +366,8 @@ impl NormFilter {
             if self.moved(&self.filter, &theta) < CONVERGED {
                 return Ok(Some(run));
             }
+            let estimate = self.filter.x[self.n_noise..].to_vec();
+            self.approach(&mut theta, &estimate);
         }
         Ok(None)
     }

@@ -1,10 +1,14 @@
 //! The norm-invariant Kalman filter across the seam.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+    ToPyArray,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::kalman::{AxisKalmanModel, matrix};
+use super::rotation::rows3;
 use crate::kalman::norm::{Frame, N_PARAMETERS, NormFilter, NormPose, NormPrior};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -85,6 +89,31 @@ impl NormKalman {
             filter.add(&pose(reading, start_s, hold_s, extra_variance))
         })?;
         Ok((seen.value, seen.variance))
+    }
+
+    /// Take many poses without estimating anything yet.
+    fn load(
+        &mut self,
+        py: Python<'_>,
+        readings: PyReadonlyArray2<'_, f64>,
+        start_s: PyReadonlyArray1<'_, f64>,
+        hold_s: PyReadonlyArray1<'_, f64>,
+        extra_variance: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<()> {
+        let rows = rows3("readings", &readings)?;
+        let extra = rows3("extra_variance", &extra_variance)?;
+        if [start_s.len(), hold_s.len(), extra.len()] != [rows.len(); 3] {
+            return Err(PyValueError::new_err(format!(
+                "start_s, hold_s and extra_variance must have {} rows like the readings",
+                rows.len()
+            )));
+        }
+        let (t, hold) = (start_s.as_array(), hold_s.as_array());
+        let poses: Vec<NormPose> = (0..rows.len())
+            .map(|i| pose(rows[i].into(), t[i], hold[i], extra[i].into()))
+            .collect();
+        let filter = &mut self.inner;
+        super::run(py, || filter.load(&poses))
     }
 
     /// Run over all poses again at the latest constants until they stay; the number of runs, or None.

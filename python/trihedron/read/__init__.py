@@ -5,7 +5,8 @@ stated as a finding. A file that cannot become a recording raises :class:`ReadEr
 """
 
 from trihedron.read.errors import ReadError
+from trihedron.read.pose_table import read_pose_table
 from trihedron.read.recording import read_recording
 from trihedron.read.table import Progress
 
-__all__ = ["Progress", "ReadError", "read_recording"]
+__all__ = ["Progress", "ReadError", "read_pose_table", "read_recording"]

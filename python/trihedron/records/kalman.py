@@ -105,7 +105,7 @@ class PoseTable:
             raise ValueError(f"pitch and roll must have one entry per pose each, got {pitch.shape} and {roll.shape}")
         if not (np.isfinite(gravity_m_s2) and gravity_m_s2 > 0):
             raise ValueError(f"gravity must be positive, got {gravity_m_s2} m/s²")
-        theta, phi = np.broadcast_arrays(np.radians(pitch), np.radians(roll))
+        theta, phi = np.broadcast_arrays(radians_from_degrees(1.0) * pitch, radians_from_degrees(1.0) * roll)
         f = np.column_stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)])
         return cls(gravity_m_s2 * f, sigma_m_s2=gravity_m_s2 * radians_from_degrees(sigma_angle_deg), source=source)
 

@@ -5,6 +5,12 @@ from trihedron.estimate.kalman.guide import Goal
 from trihedron.estimate.kalman.live import LiveCalibration
 from trihedron.estimate.kalman.norm_invariant import LiveNormCalibration, NormStart, calibrate_without_references
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
+from trihedron.estimate.kalman.session import (
+    calibrate_session,
+    calibrate_session_without_references,
+    noise_from_holds,
+    pose_readings,
+)
 from trihedron.estimate.kalman.shaping import ShapingOptions
 
 __all__ = [
@@ -14,8 +20,12 @@ __all__ = [
     "NormStart",
     "Prior",
     "ShapingOptions",
+    "calibrate_session",
+    "calibrate_session_without_references",
     "calibrate_with_references",
     "calibrate_without_references",
     "check_innovations",
+    "noise_from_holds",
     "normalised_error_squared",
+    "pose_readings",
 ]

@@ -153,6 +153,10 @@ class LiveNormCalibration:
             self.relinearise(3)
         return self.estimate(nis=np.full(3, innovation**2 / variance), look_ahead=look_ahead)
 
+    def load(self, readings: FloatArray, start_s: FloatArray, hold_s: FloatArray, extra_variance: FloatArray) -> None:
+        """Take many poses at once, (n, 3), (n,), (n,), (n, 3); :meth:`relinearise` then estimates from all of them."""
+        self._filter.load(readings - self._zero, start_s, hold_s, np.ascontiguousarray(extra_variance))
+
     def relinearise(self, most: int = MOST_RUNS) -> bool:
         """Repeat the run over all poses until the constants stay; whether they did within ``most`` runs."""
         runs = self._filter.relinearise(most)
@@ -282,33 +286,25 @@ def calibrate_without_references(
         raise ValueError("hold_s must be finite and positive: every pose needs a positive length")
     extra = np.asarray(extra_variance, dtype=np.float64)
     extra = np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (n, 3)))
-    live = LiveNormCalibration(
-        noise,
-        gravity_m_s2=gravity_m_s2,
-        start=start or NormStart.from_range(a, gravity_m_s2),
-        frame=frame,
-        options=options,
-        session_s=float(begin[-1] + hold[-1] - begin[0]),
-        hold_s=float(np.median(hold)),
-    )
-    parameters, sigmas = np.empty((n, 12)), np.empty((n, 12))
-    for i in range(n):
-        # Every pose counts at first; later ones change the point of linearisation by less than its error.
-        again = i < 40 or i % 10 == 0
-        live.add(
-            a[i],
-            start_s=float(begin[i]),
-            hold_s=float(hold[i]),
-            extra_variance=extra[i],
-            relinearise=again,
-            look_ahead=0,
+
+    def fresh() -> LiveNormCalibration:
+        return LiveNormCalibration(
+            noise,
+            gravity_m_s2=gravity_m_s2,
+            start=start or NormStart.from_range(a, gravity_m_s2),
+            frame=frame,
+            options=options,
+            session_s=float(begin[-1] + hold[-1] - begin[0]),
+            hold_s=float(np.median(hold)),
         )
-        S, b, covariance = live.calibration()
-        parameters[i] = np.concatenate([S.ravel(), b])
-        sigmas[i] = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+    parameters, sigmas = _track(fresh(), a, begin, hold, extra)
+    # The answer does not depend on how the first few poses went: all together, from the start.
+    live = fresh()
+    live.load(a, begin, hold, extra)
     converged = live.relinearise()
     S, b, covariance = live.calibration()
-    parameters[-1], sigmas[-1] = np.concatenate([S.ravel(), b]), np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    parameters[-1], sigmas[-1] = _flat(S, b, covariance)
     innovation, innovation_sigma = live.innovations()
     seen = check_innovations(innovation, innovation_sigma)
     findings: list[Finding] = []
@@ -342,6 +338,24 @@ def calibrate_without_references(
         consistency=seen,
         findings=tuple(findings),
     )
+
+
+def _flat(S: FloatArray, b: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return np.concatenate([S.ravel(), b]), np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+
+def _track(
+    live: LiveNormCalibration, a: FloatArray, begin: FloatArray, hold: FloatArray, extra: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """S row by row and b with standard errors (n, 12), as they stand after every pose."""
+    parameters, sigmas = np.empty((len(a), 12)), np.empty((len(a), 12))
+    for i in range(len(a)):
+        # Every pose counts at first; later ones change the point of linearisation by less than its error.
+        again = i < 40 or i % 10 == 0
+        when = {"start_s": float(begin[i]), "hold_s": float(hold[i])}
+        live.add(a[i], **when, extra_variance=extra[i], relinearise=again, look_ahead=0)
+        parameters[i], sigmas[i] = _flat(*live.calibration())
+    return parameters, sigmas
 
 
 def _observability(live: LiveNormCalibration) -> tuple[Observability, list[Finding]]:

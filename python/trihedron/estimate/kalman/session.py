@@ -1,0 +1,214 @@
+"""From a recording and its still poses to what the filters take: mean readings, times, noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.estimate.kalman.norm_invariant import NormFrame, NormStart, calibrate_without_references
+from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
+from trihedron.estimate.kalman.shaping import ShapingOptions
+from trihedron.records import (
+    AxisNoise,
+    Finding,
+    FindingCode,
+    KalmanCalibration,
+    NormKalmanCalibration,
+    PoseTable,
+    Recording,
+    Segments,
+    Severity,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+MOST_SAMPLES_FOR_RESOLUTION = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class PoseReadings:
+    """Mean raw readings (n, 3) of the still poses, their starts and lengths (n,) [s], and standard errors (n, 3)."""
+
+    mean: FloatArray
+    start_s: FloatArray
+    hold_s: FloatArray
+    sigma_mean: FloatArray
+
+
+def pose_readings(recording: Recording, segments: Segments, table: PoseTable | None = None) -> PoseReadings:
+    """Means of the still poses, matched with a pose table.
+
+    A table with start and stop times is averaged over its own times; one with hold numbers picks still poses of the
+    log; one with neither must have as many rows as the log has still poses.
+
+    Raises
+    ------
+    ValueError
+        When there is no accelerometer, the log has no still pose, or table and log do not match.
+    """
+    a = recording.accelerometer
+    if a is None:
+        raise ValueError(f"{recording.source}: there is no accelerometer to calibrate in this log")
+    if table is not None and table.start_s is not None and table.stop_s is not None:
+        return _timed_means(recording, segments, a, table.start_s, table.stop_s)
+    mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma_mean
+    if mean is None or sigma is None or segments.n_holds == 0:
+        raise ValueError(f"{recording.source}: no still pose was found, so there is nothing to calibrate from")
+    step = 1.0 / recording.rate_hz
+    start = np.array([recording.time_s[hold.start] for hold in segments.holds])
+    length = np.array([recording.time_s[hold.stop - 1] + step for hold in segments.holds]) - start
+    chosen = np.arange(segments.n_holds)
+    if table is not None and table.hold is not None:
+        chosen = np.asarray(table.hold, dtype=np.intp)
+        if np.any(chosen >= segments.n_holds):
+            worst = int(np.max(chosen)) + 1
+            raise ValueError(
+                f"{table.source}: pose {worst} is asked for, but {recording.source} has {segments.n_holds} still poses"
+            )
+        if np.any(np.diff(chosen) <= 0):
+            raise ValueError(f"{table.source}: give the poses in the order in which they were held, each once")
+    elif table is not None and len(table) != segments.n_holds:
+        raise ValueError(
+            f"{table.source} lists {len(table)} poses, but {recording.source} has {segments.n_holds} still poses: add "
+            "a column 'hold' with the number of the still pose (`trihedron segment` lists them), or 'start' and 'stop'"
+        )
+    return PoseReadings(mean[chosen], start[chosen], length[chosen], sigma[chosen])
+
+
+def _timed_means(
+    recording: Recording, segments: Segments, a: FloatArray, start_s: FloatArray, stop_s: FloatArray
+) -> PoseReadings:
+    n = len(start_s)
+    mean, sigma = np.empty((n, 3)), np.empty((n, 3))
+    noise = segments.accelerometer_sigma
+    for i, (start, stop) in enumerate(zip(start_s, stop_s, strict=True)):
+        first, last = np.searchsorted(recording.time_s, [start, stop])
+        rows = a[first:last]
+        rows = rows[np.isfinite(rows).all(axis=1)]
+        if len(rows) < 2:
+            raise ValueError(f"pose {i + 1}: the log has {len(rows)} readings from {start:g} s to {stop:g} s")
+        mean[i] = rows.mean(axis=0)
+        scatter = rows.std(axis=0, ddof=1) if noise is None else noise
+        sigma[i] = scatter / np.sqrt(len(rows))
+    return PoseReadings(mean, np.array(start_s), np.array(stop_s) - np.array(start_s), sigma)
+
+
+def noise_from_holds(recording: Recording, segments: Segments) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
+    """White noise as scattered inside the holds, and the converter's step where it is coarse: nothing slow.
+
+    Raises
+    ------
+    ValueError
+        When there is no accelerometer.
+    """
+    a = recording.accelerometer
+    if a is None:
+        raise ValueError(f"{recording.source}: there is no accelerometer to calibrate in this log")
+    sigma = segments.accelerometer_sigma
+    sigma = np.zeros(3) if sigma is None else sigma
+    noises = []
+    for axis in range(3):
+        white = float(sigma[axis]) / np.sqrt(recording.rate_hz)
+        step = _resolution(a[:MOST_SAMPLES_FOR_RESOLUTION, axis])
+        # A step below the noise is dithered away and already in the scatter.
+        resolution = step if step > float(sigma[axis]) else 0.0
+        noises.append(AxisNoise(white=white, resolution=resolution, sample_sigma=float(sigma[axis])))
+    return noises[0], noises[1], noises[2]
+
+
+def _resolution(readings: FloatArray) -> float:
+    """Smallest difference between two different readings; 0 where all are alike."""
+    steps = np.diff(np.unique(readings[np.isfinite(readings)]))
+    # Steps of a billionth of the largest reading are how decimals are stored, not what a converter does.
+    real = steps[steps > 1e-9 * max(float(np.nanmax(np.abs(readings))), 1e-300)]
+    return float(real.min()) if len(real) else 0.0
+
+
+def _noise(
+    recording: Recording, segments: Segments, noise: AxisNoise | Sequence[AxisNoise] | None, poses: PoseReadings
+) -> tuple[AxisNoise | Sequence[AxisNoise], FloatArray, tuple[Finding, ...]]:
+    if noise is not None:
+        return noise, np.zeros_like(poses.mean), ()
+    assumed = noise_from_holds(recording, segments)
+    white = np.array([one.white for one in assumed])
+    # What the segmentation saw beyond white noise inside a hold comes on top of each mean.
+    extra = np.maximum(poses.sigma_mean**2 - white**2 / poses.hold_s[:, None], 0.0)
+    finding = Finding(
+        FindingCode.NOISE_ASSUMED,
+        Severity.NOTE,
+        "Noise was taken from the scatter inside the still poses; slow noise from pose to pose is not known.",
+        "No noise description was given.",
+        "Identify the noise from an hour of rest and give it, or heed what the innovations say.",
+    )
+    return assumed, extra, (finding,)
+
+
+def calibrate_session(
+    recording: Recording,
+    segments: Segments,
+    table: PoseTable,
+    *,
+    noise: AxisNoise | Sequence[AxisNoise] | None = None,
+    prior: Prior | None = None,
+    options: ShapingOptions | None = None,
+) -> KalmanCalibration:
+    """Calibrate the accelerometer of a recording in the known attitudes of a pose table, all methods side by side.
+
+    ``noise`` None takes what the holds show (white noise and resolution) and says so in a finding.
+
+    Raises
+    ------
+    ValueError
+        When table and log do not match, or the poses do not determine the constants.
+    """
+    poses = pose_readings(recording, segments, table)
+    used, extra, findings = _noise(recording, segments, noise, poses)
+    result = calibrate_with_references(
+        poses.mean,
+        replace(table, hold=None, start_s=None, stop_s=None),
+        used,
+        start_s=poses.start_s,
+        hold_s=poses.hold_s,
+        extra_variance=extra,
+        prior=prior,
+        options=options,
+        raw_unit=recording.accelerometer_unit.value,
+    )
+    return replace(result, findings=(*findings, *result.findings))
+
+
+def calibrate_session_without_references(
+    recording: Recording,
+    segments: Segments,
+    *,
+    gravity_m_s2: float,
+    noise: AxisNoise | Sequence[AxisNoise] | None = None,
+    start: NormStart | None = None,
+    frame: NormFrame = "lower",
+    options: ShapingOptions | None = None,
+) -> NormKalmanCalibration:
+    """Calibrate the accelerometer of a recording from the length of gravity in its still poses.
+
+    Raises
+    ------
+    ValueError
+        When there are fewer than nine still poses.
+    """
+    poses = pose_readings(recording, segments)
+    used, extra, findings = _noise(recording, segments, noise, poses)
+    result = calibrate_without_references(
+        poses.mean,
+        used,
+        start_s=poses.start_s,
+        hold_s=poses.hold_s,
+        gravity_m_s2=gravity_m_s2,
+        start=start,
+        frame=frame,
+        extra_variance=extra,
+        options=options,
+        raw_unit=recording.accelerometer_unit.value,
+    )
+    return replace(result, findings=(*findings, *result.findings))

@@ -1,0 +1,196 @@
+"""From a log and a pose table to the filters: matching, noise from the holds, recordings."""
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.estimate.accelerometer import calibrate_norm
+from trihedron.estimate.kalman import (
+    calibrate_session,
+    calibrate_session_without_references,
+    calibrate_without_references,
+    noise_from_holds,
+    normalised_error_squared,
+    pose_readings,
+)
+from trihedron.read import ReadError, read_pose_table
+from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise, FindingCode, PoseTable
+from trihedron.segment import segment_recording
+from trihedron.simulate import Accelerometer, Adc, NoiseTerms, Scenario, dividing_head, hand_session, simulate
+from trihedron.units import AccelerationUnit
+
+GRAVITY = 9.80665
+S_TRUE = np.array([[0.98, 0.01, -0.02], [0.005, 1.03, 0.008], [-0.01, 0.012, 0.99]])
+B_TRUE = np.array([0.2, -0.3, 0.1])
+
+
+def head_session(seed, *, adc=0.0, noise=0.005, walk=0.0):
+    accelerometer = Accelerometer(
+        S=tuple(map(tuple, S_TRUE)),
+        b=tuple(B_TRUE),
+        noise=NoiseTerms(N=(noise,) * 3, K=(walk,) * 3),
+        adc=Adc(lsb=adc),
+    )
+    recording = simulate(Scenario(motion=dividing_head(), accelerometer=accelerometer), seed=seed)[0]
+    return recording, segment_recording(recording)
+
+
+@pytest.fixture(scope="module")
+def head():
+    return head_session(1)
+
+
+@pytest.fixture(scope="module")
+def table():
+    return PoseTable.from_angles(*DIVIDING_HEAD_ANGLES_DEG.T, gravity_m_s2=GRAVITY)
+
+
+def test_a_simulated_dividing_head_gives_the_instrument_back(head, table):
+    result = calibrate_session(*head, table)
+    error = np.concatenate([(result.accelerometer.S - S_TRUE).ravel(), result.accelerometer.b - B_TRUE])
+    # 12 degrees of freedom: mean 12, standard deviation 4.9; 40 is beyond the 99.99 % limit of 39.1.
+    assert normalised_error_squared(error, result.accelerometer.covariance) < 40.0
+    assert np.max(result.accelerometer.sigma_S) < 1e-3
+    assert {f.code for f in result.findings} == {FindingCode.NOISE_ASSUMED}
+
+
+def test_the_same_session_without_its_angles_agrees_up_to_the_frame(head, table):
+    known = calibrate_session(*head, table).accelerometer
+    unknown = calibrate_session_without_references(*head, gravity_m_s2=GRAVITY).accelerometer
+    # SᵀS is free of the frame. Its entries are about twice those of S; both fits see the same noise.
+    difference = unknown.S.T @ unknown.S - known.S.T @ known.S
+    assert np.max(np.abs(difference)) < 6 * 2 * np.max(unknown.sigma_S)
+
+
+def test_times_in_the_table_stand_for_the_segmentation(head, table):
+    recording, segments = head
+    start = np.array([recording.time_s[h.start] for h in segments.holds])
+    stop = np.array([recording.time_s[h.stop - 1] for h in segments.holds]) + 1.0 / recording.rate_hz
+    timed = PoseTable(table.specific_force, start_s=start, stop_s=stop)
+    np.testing.assert_allclose(
+        pose_readings(recording, segments, timed).mean, pose_readings(recording, segments, table).mean, rtol=1e-12
+    )
+
+
+def test_hold_numbers_pick_still_poses_and_a_mismatch_is_said(head, table):
+    recording, segments = head
+    few = PoseTable(table.specific_force[::9], hold=np.arange(0, 324, 9))
+    assert len(pose_readings(recording, segments, few).mean) == 36
+    with pytest.raises(ValueError, match=r"lists 36 poses, but .* has 324 still poses"):
+        pose_readings(recording, segments, PoseTable(table.specific_force[::9]))
+    with pytest.raises(ValueError, match="pose 500 is asked for"):
+        pose_readings(recording, segments, PoseTable(table.specific_force[:1], hold=np.array([499])))
+    with pytest.raises(ValueError, match="each once"):
+        pose_readings(recording, segments, PoseTable(table.specific_force[:2], hold=np.array([3, 3])))
+    with pytest.raises(ValueError, match="0 readings"):
+        pose_readings(
+            recording, segments, PoseTable(table.specific_force[:1], start_s=np.array([1e6]), stop_s=np.array([2e6]))
+        )
+
+
+def test_slow_noise_shows_only_when_it_is_not_modelled(table):
+    recording, segments = head_session(2, walk=0.001)
+    assumed = {f.code for f in calibrate_session(recording, segments, table).findings}
+    right = AxisNoise(white=0.005, walk=0.001)
+    modelled = calibrate_session(recording, segments, table, noise=right)
+    assert FindingCode.INNOVATIONS_COLOURED in assumed
+    assert FindingCode.INNOVATIONS_COLOURED not in {f.code for f in modelled.findings}
+
+
+def test_a_coarse_converter_is_charged_with_its_step():
+    recording, segments = head_session(3, adc=0.37, noise=0.001)
+    noise = noise_from_holds(recording, segments)
+    # Readings are multiples of the step to rounding of the decimal.
+    assert noise[0].resolution == pytest.approx(0.37, rel=1e-9)
+    fine, _ = head_session(3, adc=0.001)
+    assert noise_from_holds(fine, segment_recording(fine))[0].resolution == 0.0
+
+
+def test_the_filter_agrees_with_the_batch_fit_on_a_hand_session_in_counts():
+    accelerometer = Accelerometer(
+        S=((0.0024, 0.0, 0.0), (1e-5, 0.0025, 0.0), (2e-5, -1e-5, 0.0024)),
+        b=(-78.0, -82.0, -77.0),
+        unit=AccelerationUnit.COUNTS,
+        noise=NoiseTerms(N=(0.005,) * 3),
+        adc=Adc(lsb=1.0),
+    )
+    recording = simulate(Scenario(motion=hand_session(), accelerometer=accelerometer), seed=4)[0]
+    segments = segment_recording(recording)
+    assert_agrees_with_batch_fit(*poses_of(recording, segments), GRAVITY)
+
+
+def poses_of(recording, segments):
+    poses = pose_readings(recording, segments)
+    return poses.mean, poses.sigma_mean, poses.start_s, poses.hold_s
+
+
+def assert_agrees_with_batch_fit(means, sigma, start, hold, gravity):
+    """The batch fit knows one standard error per mean; the filter gets it as variance on top of next to nothing."""
+    batch, _ = calibrate_norm(means, sigma, gravity)
+    tiny = [AxisNoise(white=1e-3 * np.median(sigma[:, i]) * np.sqrt(np.median(hold))) for i in range(3)]
+    run = {"start_s": start, "hold_s": hold, "gravity_m_s2": gravity}
+    got = calibrate_without_references(means, tiny, extra_variance=sigma**2, **run).accelerometer
+    scale = np.concatenate([batch.sigma_S.ravel(), batch.sigma_b])
+    difference = np.concatenate([(got.S - batch.S).ravel(), got.b - batch.b])
+    free = scale > 0
+    # Both minimise the same sum; the filter also corrects the lengthening of a noisy vector, tr(Σ)/2g ~ 1e-3 σ.
+    assert np.max(np.abs(difference[free] / scale[free])) < 0.01
+
+
+def test_the_filter_agrees_with_the_batch_fit_on_xsens_mti(real_data):
+    folder = real_data / "xsens_mti"
+    recording = trihedron.read(accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")
+    assert_agrees_with_batch_fit(*poses_of(recording, segment_recording(recording)), 9.81744)
+
+
+def test_the_filter_agrees_with_the_batch_fit_on_ctu(real_data):
+    means = np.loadtxt(real_data / "ctu" / "measured_accelerations.csv", delimiter=",", skiprows=1)
+    # The residuals of the 24 published means are about 4 mm/s²; no noise is published.
+    sigma = np.full(means.shape, 4e-4)
+    assert_agrees_with_batch_fit(means, sigma, 10.0 * np.arange(24), np.full(24, 5.0), 9.81)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("pitch,roll\n0,0\n90,0\n0,90\n", [[0, 0, 1], [-1, 0, 0], [0, 1, 0]]),
+        ("roll_deg;pitch_deg\n0;0\n0;90\n90;0\n", [[0, 0, 1], [-1, 0, 0], [0, 1, 0]]),
+        ("pitch [deg]\n0\n90\n180\n", [[0, 0, 1], [-1, 0, 0], [0, 0, -1]]),
+        ("pitch_rad,roll_rad\n0,0\n1.5707963267948966,0\n0,1.5707963267948966\n", [[0, 0, 1], [-1, 0, 0], [0, 1, 0]]),
+        ("fx,fy,fz\n0,0,2\n-9.8,0,0\n0,1,0\n", [[0, 0, 1], [-1, 0, 0], [0, 1, 0]]),
+    ],
+)
+def test_a_pose_table_is_read_by_its_header(tmp_path, text, expected):
+    path = tmp_path / "poses.csv"
+    path.write_text(text)
+    table = read_pose_table(path, gravity_m_s2=GRAVITY)
+    np.testing.assert_allclose(table.specific_force / GRAVITY, expected, atol=1e-12)
+
+
+def test_a_pose_table_may_say_which_pose_and_when(tmp_path):
+    path = tmp_path / "poses.csv"
+    path.write_text("hold,start_s,stop_s,pitch,roll\n1,0.0,2.0,0,0\n4,3.0,5.5,90,0\n")
+    table = read_pose_table(path, gravity_m_s2=GRAVITY, sigma_angle_deg=0.1)
+    np.testing.assert_array_equal(table.hold, [0, 3])
+    np.testing.assert_array_equal(table.stop_s, [2.0, 5.5])
+    assert table.sigma_m_s2 == pytest.approx(GRAVITY * np.radians(0.1))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1,2\n3,4\n5,6\n", "no header"),
+        ("a,b\n3,4\n5,6\n", "neither angles .* nor a direction"),
+        ("pitch,theta\n3,4\n5,6\n", "both mean pitch"),
+        ("fx,fy,fz\n0,0,1\n0,0,0\n", "line 3: the direction has no length"),
+        ("hold,pitch\n0,0\n1,10\n", "count still poses from 1"),
+        ("start,pitch\n0,0\n1,10\n", "both start and stop"),
+        ("start,stop,pitch\n0,1,0\n3,2,10\n", "stops before it starts"),
+        ("pitch,roll\n0,0\n10,nan\n", "roll is missing"),
+    ],
+)
+def test_a_pose_table_that_cannot_be_used_is_refused_in_plain_words(tmp_path, text, message):
+    path = tmp_path / "poses.csv"
+    path.write_text(text)
+    with pytest.raises(ReadError, match=message):
+        read_pose_table(path, gravity_m_s2=GRAVITY)
