@@ -9,6 +9,8 @@ import numpy.typing as npt
 from trihedron.records.calibration import FloatArray
 
 # accelerometer
+ANCHOR: float
+
 @final
 class NormSettings:
     def __new__(
@@ -32,6 +34,7 @@ class NormFit:
     chi2: float
     robust_chi2: float
     rank: int
+    is_anchored: bool
     is_converged: bool
     stopped_because: str
     n_iterations: int

@@ -69,7 +69,7 @@ fn one_fold(
     let Ok(other) = fit(rest, settings, Some(full.model)) else {
         return Vec::new();
     };
-    if other.certainty.rank < N_PARAMETERS {
+    if other.is_anchored || other.certainty.rank < N_PARAMETERS {
         return Vec::new();
     }
     let dof = values.len().saturating_sub(N_PARAMETERS);

@@ -92,6 +92,8 @@ pub struct Fit {
     pub robust_chi2: f64,
     /// Rank, singular values of the Jacobian in the solver's parameters.
     pub certainty: Certainty,
+    /// The poses leave parameters so free that each was held near its start, to [`ANCHOR`] of |g|.
+    pub is_anchored: bool,
     /// Why the solver stopped.
     pub stop: Stop,
     /// Linearisations over all renewals of σ.
@@ -145,12 +147,20 @@ impl Readings<'_> {
 /// Above this many readings rows are not kept: the normal equations are summed in one parallel pass.
 const ROWS_KEPT: usize = 20_000;
 
+/// Standard error, in |g|, above which a scale, an angle or a zero counts as left free by the poses: errors no longer
+/// propagate linearly, and no triad is made that badly.
+pub const UNKNOWN: f64 = 0.02;
+
+/// How far, in |g|, parameters left free may be from the sphere's: scales within 10 %, axes within 6°.
+pub const ANCHOR: f64 = 0.1;
+
 /// Times that σ is renewed at most; it depends on the answer only through directions and settles in two.
 const RENEWALS: usize = 8;
 
 /// Fits from an ellipsoid start, or from `start`.
 ///
-/// With fewer than nine independent poses the undetermined directions stay at the start and `certainty.rank` tells.
+/// Poses that leave a parameter unknown to 2 % of |g| (six faces leave three altogether) would let it run away into any
+/// accident of the readings: all are then held near a sphere through the readings, and `is_anchored` tells.
 ///
 /// # Errors
 /// When readings are malformed or all the same, or the fit collapses to `S = 0`.
@@ -163,9 +173,15 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
         )));
     }
     let standard = Standardisation::of(readings.values)?;
-    let begin = match start {
+    let nominal = match start {
         Some(model) => in_frame(&model, settings.frame)?,
-        None => starting_model(readings.values, settings)?,
+        None => sphere_model(readings.values, settings)?,
+    };
+    let is_anchored = problem::is_weak(readings, settings, &nominal);
+    let begin = if is_anchored || start.is_some() {
+        nominal
+    } else {
+        starting_model(readings.values, settings)?
     };
     let options = Options {
         loss: settings.loss,
@@ -177,14 +193,16 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
     let first = pack(&begin, &standard);
     let mut theta = first.clone();
     let volume = (begin.s * standard.size).determinant().abs();
-    let mut anchor = None;
+    let anchor = is_anchored.then(|| first.clone());
     let mut iterations = 0;
+    let mut widening = 1.0;
     for renewal in 0.. {
-        let frozen = Frozen::at(
+        let mut frozen = Frozen::at(
             readings,
             settings,
             &unpack(&theta, settings.frame, &standard),
         );
+        frozen.widening = widening;
         let problem = PoseProblem {
             readings,
             settings,
@@ -204,14 +222,14 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
             )?
         };
         iterations += solution.iterations;
-        if solution.certainty.rank < N_PARAMETERS && anchor.is_none() {
-            // Steps along the determined directions alone would still drag the others along: hold them at the start.
-            anchor = Some(first.clone());
-            theta = first.clone();
-            continue;
-        }
         let change = (&solution.parameters - &theta).norm() / theta.norm();
         theta = solution.parameters.clone();
+        if is_anchored {
+            // Scatter beyond the noise must not buy itself an angle of ten degrees where nothing else contradicts it.
+            let spare = readings.values.len().saturating_sub(N_PARAMETERS).max(1);
+            let scatter = problem.chi2(&theta) / spare as f64;
+            widening *= scatter.max(widening.powi(-2)).sqrt();
+        }
         // σ moves with the parameters at first order only through S: 1e-7 in S is 1e-7 in σ, far below its own error.
         if change < 1e-7 || renewal >= RENEWALS {
             return finish(&problem, &solution, iterations);
@@ -246,12 +264,8 @@ fn finish(
         ),
     };
     // Noise in a reading enters residual and derivative alike and draws S towards zero, by (σ/g)² of itself.
-    let theta = if certainty.rank == N_PARAMETERS {
-        &solution.parameters
-            + &certainty.covariance * problem.noise_in_gradient(&solution.parameters)
-    } else {
-        solution.parameters.clone()
-    };
+    let theta = &solution.parameters
+        + &solution.certainty.covariance * problem.noise_in_gradient(&solution.parameters);
     let model = unpack(&theta, settings.frame, &problem.standard);
     let shrink = (model.s * problem.standard.size).determinant().abs() / problem.volume;
     if shrink < 2.0 * problem::SMALLEST_VOLUME
@@ -278,9 +292,24 @@ fn finish(
         sigmas: problem.frozen.sigma.clone(),
         weights,
         certainty,
+        is_anchored: problem.anchor.is_some(),
         stop: solution.stop,
         iterations,
     })
+}
+
+/// The sphere through the readings: equal scales, square axes.
+fn sphere_model(values: &[Vector3<f64>], settings: &Settings) -> Result<Model> {
+    let standard = Standardisation::of(values)?;
+    let u: Vec<_> = values.iter().map(|a| standard.apply(a)).collect();
+    let (centre, radius) = ellipsoid::fit_sphere(&u).ok_or_else(|| {
+        Error::not_determined(format!(
+            "the still poses give no starting point: {}",
+            ellipsoid::missing_directions(&u)
+        ))
+    })?;
+    let s = Matrix3::identity() * (settings.gravity / radius);
+    Ok(standard.undo(&Model { s, b: -s * centre }))
 }
 
 /// The ellipsoid, or the sphere where the poses do not determine one; whichever explains the readings better.
@@ -298,10 +327,11 @@ fn starting_model(values: &[Vector3<f64>], settings: &Settings) -> Result<Model>
     {
         candidates.extend(quadric.model(g, settings.frame));
     }
-    if let Some((centre, radius)) = ellipsoid::fit_sphere(&u) {
-        let s = Matrix3::identity() * (g / radius);
-        candidates.push(Model { s, b: -s * centre });
-    }
+    let sphere = sphere_model(values, settings)?;
+    candidates.push(Model {
+        s: sphere.s * standard.size,
+        b: sphere.b + sphere.s * standard.centre,
+    });
     candidates
         .into_iter()
         .map(|model| {
@@ -311,7 +341,6 @@ fn starting_model(values: &[Vector3<f64>], settings: &Settings) -> Result<Model>
                 .sum();
             (misfit, model)
         })
-        // Readings all on one tiny cap give spheres far too large or small; a triad's axes differ by less than that.
         .filter(|(misfit, model)| misfit.is_finite() && model.s.determinant().abs() > 0.0)
         .min_by(|(a, _), (b, _)| a.total_cmp(b))
         .map(|(_, model)| standard.undo(&model))

@@ -3,7 +3,9 @@
 use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
-use super::{Frame, Model, N_PARAMETERS, Objective, Readings, Settings, unpack_standardised};
+use super::{
+    ANCHOR, Frame, Model, N_PARAMETERS, Objective, Readings, Settings, UNKNOWN, unpack_standardised,
+};
 use crate::ellipsoid::Standardisation;
 use crate::error::Result;
 use crate::gauss_newton::{Linear, Problem};
@@ -15,18 +17,28 @@ pub(super) const SMALLEST_VOLUME: f64 = 1e-2;
 pub(super) struct Frozen {
     /// Standard error of the residual, m/s².
     pub sigma: Vec<f64>,
+    /// Factor on every sigma in the fit: above one where an anchored fit finds more scatter than the noise explains.
+    pub widening: f64,
     /// Expected excess of the norm from noise across gravity, `(tr SΣSᵀ - σ²)/2|g|`, m/s².
     pub excess: Vec<f64>,
 }
 
 impl Frozen {
+    fn charged(&self, i: usize) -> f64 {
+        self.sigma[i] * self.widening
+    }
+
     pub(super) fn at(readings: Readings<'_>, settings: &Settings, model: &Model) -> Self {
         let (sigma, excess) = (0..readings.values.len())
             .into_par_iter()
             .with_min_len(4096)
             .map(|i| predicted(readings, settings, model, i))
             .unzip();
-        Self { sigma, excess }
+        Self {
+            sigma,
+            widening: 1.0,
+            excess,
+        }
     }
 }
 
@@ -58,7 +70,7 @@ pub(super) struct PoseProblem<'a> {
     pub frozen: &'a Frozen,
     /// `|det S|` of the start, in standardised readings.
     pub volume: f64,
-    /// Where the parameters are held with a standard error of |g| each (100 % of scale), when the poses leave some free.
+    /// Where the parameters are held, to `ANCHOR` of |g| each, when the poses leave some free.
     pub anchor: Option<DVector<f64>>,
 }
 
@@ -69,10 +81,8 @@ impl PoseProblem<'_> {
         let f = model.correct(&u);
         let residual = self.misfit(&f, i);
         let slope = residual_gradient(&f, &u, self.settings);
-        (
-            residual / self.frozen.sigma[i],
-            slope / self.frozen.sigma[i],
-        )
+        let sigma = self.frozen.charged(i);
+        (residual / sigma, slope / sigma)
     }
 
     fn misfit(&self, f: &Vector3<f64>, i: usize) -> f64 {
@@ -101,13 +111,21 @@ impl PoseProblem<'_> {
             jacobian.row_mut(i).tr_copy_from(&slope);
         }
         if let Some(anchor) = &self.anchor {
-            let g = self.settings.gravity;
-            residuals.rows_mut(n, extra).copy_from(&((x - anchor) / g));
+            let width = ANCHOR * self.settings.gravity;
+            residuals
+                .rows_mut(n, extra)
+                .copy_from(&((x - anchor) / width));
             jacobian
                 .view_mut((n, 0), (extra, N_PARAMETERS))
-                .fill_diagonal(1.0 / g);
+                .fill_diagonal(1.0 / width);
         }
         (residuals, jacobian)
+    }
+
+    /// Of the readings, with the sigmas charged.
+    pub(super) fn chi2(&self, x: &DVector<f64>) -> f64 {
+        let n = self.readings.values.len();
+        self.residuals(x).rows(0, n).norm_squared()
     }
 
     /// Rows of the readings alone.
@@ -126,10 +144,10 @@ impl PoseProblem<'_> {
         }
         for i in 0..n {
             let f = model.correct(&self.standard.apply(&self.readings.values[i]));
-            residuals[i] = self.misfit(&f, i) / self.frozen.sigma[i];
+            residuals[i] = self.misfit(&f, i) / self.frozen.charged(i);
         }
         if let Some(anchor) = &self.anchor {
-            let held = (x - anchor) / self.settings.gravity;
+            let held = (x - anchor) / (ANCHOR * self.settings.gravity);
             residuals.rows_mut(n, extra).copy_from(&held);
         }
         residuals
@@ -170,7 +188,7 @@ impl PoseProblem<'_> {
             }
         }
         mean.fixed_rows_mut::<3>(6).copy_from(&across);
-        mean / self.frozen.sigma[i].powi(2)
+        mean / self.frozen.charged(i).powi(2)
     }
 
     /// Norm residuals in m/s² of a model in raw units.
@@ -181,6 +199,36 @@ impl PoseProblem<'_> {
             .map(|i| self.misfit(&model.correct(&self.readings.values[i]), i))
             .collect()
     }
+}
+
+/// Whether the directions of gravity in these readings leave some scale, angle or zero unknown.
+///
+/// In the truth's own coordinates `δf = M f + z`, a pose sees `uᵀδf = |g| Σ M_jk u_j u_k + zᵀu`: the information on the
+/// nine numbers depends on directions and noise alone.
+pub(super) fn is_weak(readings: Readings<'_>, settings: &Settings, model: &Model) -> bool {
+    let n = readings.values.len();
+    let parts: Vec<SMatrix<f64, N_PARAMETERS, N_PARAMETERS>> = (0..n.div_ceil(SHARE))
+        .into_par_iter()
+        .map(|k| {
+            let mut part = SMatrix::<f64, N_PARAMETERS, N_PARAMETERS>::zeros();
+            for i in k * SHARE..((k + 1) * SHARE).min(n) {
+                let f = model.correct(&readings.values[i]);
+                let u = f / f.norm();
+                let mut row = SVector::<f64, N_PARAMETERS>::zeros();
+                for (entry, &(j, k)) in Frame::ENTRIES.iter().enumerate() {
+                    row[entry] = u[j] * u[k];
+                }
+                row.fixed_rows_mut::<3>(6).copy_from(&u);
+                let sigma = predicted(readings, settings, model, i).0 / settings.gravity;
+                part.ger(sigma.powi(-2), &row, &row, 1.0);
+            }
+            part
+        })
+        .collect();
+    let information: SMatrix<f64, N_PARAMETERS, N_PARAMETERS> = parts.iter().sum();
+    information
+        .cholesky()
+        .is_none_or(|factor| factor.inverse().diagonal().max() > UNKNOWN * UNKNOWN)
 }
 
 /// Gradient of the residual in m/s² with respect to the solver's parameters, `S11 S21 S22 S31 S32 S33` and `b`, at a
@@ -286,7 +334,7 @@ impl Problem for SampleProblem<'_, '_> {
             let mut sums = Sums::zero();
             for i in range {
                 let f = model.correct(&self.0.standard.apply(&self.0.readings.values[i]));
-                let residual = self.0.misfit(&f, i) / self.0.frozen.sigma[i];
+                let residual = self.0.misfit(&f, i) / self.0.frozen.charged(i);
                 sums.cost += 0.5 * self.0.settings.loss.rho(residual * residual).0;
             }
             sums

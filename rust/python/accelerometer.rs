@@ -14,6 +14,7 @@ use crate::gauss_newton::Loss;
 use crate::norm_invariant::{self, Fit, Frame, Model, Objective, Readings, Settings};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("ANCHOR", norm_invariant::ANCHOR)?;
     module.add_class::<NormSettings>()?;
     module.add_class::<NormFit>()?;
     module.add_function(wrap_pyfunction!(fit_norm, module)?)?;
@@ -130,6 +131,11 @@ impl NormFit {
     #[getter]
     fn rank(&self) -> usize {
         self.0.certainty.rank
+    }
+
+    #[getter]
+    fn is_anchored(&self) -> bool {
+        self.0.is_anchored
     }
 
     #[getter]

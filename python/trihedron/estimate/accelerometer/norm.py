@@ -74,8 +74,8 @@ def calibrate_norm(
     Returns
     -------
     (SensorCalibration, findings)
-        When the poses do not determine nine parameters, the unseen ones stay at the ellipsoid or sphere start, their
-        variance is that of complete ignorance (100 % of scale, |g| of zero), and a SERIOUS finding names poses to add.
+        When the poses do not determine nine parameters, these are held to 10 % of the sphere through the readings, the
+        covariance of what was not seen is that wide, and a SERIOUS finding names the poses to add.
 
     Raises
     ------
@@ -219,8 +219,8 @@ def _assemble(
     scale = verdict.covariance_scale(chi2, dof)
     design = PoseDesign.of(up, sigma / g)
     relative_sigma = float(np.median(sigma)) / g
-    if design.rank < 9:
-        covariance = _covariance_of_ignorance(design, S, fit.b, g, frame)
+    if fit.is_anchored:
+        covariance = _anchored_covariance(design.information / scale, S, fit.b, g, frame)
     else:
         turn = np.concatenate([np.tile(signs, 3), np.ones(3)])
         covariance = fit.covariance * np.outer(turn, turn) * scale
@@ -249,7 +249,9 @@ def _assemble(
     )
     findings = [
         *verdict.convergence_findings(fit.is_converged, fit.stopped_because),
-        *verdict.observability_findings(design, relative_sigma, observability.advice),
+        *verdict.observability_findings(
+            design, relative_sigma, observability.advice, is_anchored=fit.is_anchored, anchor=_core.ANCHOR
+        ),
         *verdict.model_findings(S, unit, signs_are_known=signs_are_known),
         *verdict.residual_findings(chi2, dof, rms_dof, floor),
         *verdict.held_out_findings(unseen, apart[:, 1], apart[:, 2], dof),
@@ -281,9 +283,9 @@ def norm_residual(f: FloatArray, S: FloatArray, noise: FloatArray, g: float) -> 
     return norm - g - (total - along) / (2.0 * g), sigma
 
 
-def _covariance_of_ignorance(design: PoseDesign, S: FloatArray, b: FloatArray, g: float, frame: Frame) -> FloatArray:
-    """(12, 12) with the unseen directions as wide as a prior of 100 % in scale and |g| in zero (eq. 17)."""
-    physical = np.linalg.inv(design.information + np.eye(9))
+def _anchored_covariance(information: FloatArray, S: FloatArray, b: FloatArray, g: float, frame: Frame) -> FloatArray:
+    """(12, 12) of a fit held to ``ANCHOR`` of |g|: what was not seen is as wide as that (eq. 17)."""
+    physical = np.linalg.inv(information + np.eye(9) / _core.ANCHOR**2)
     to_lower = reframing(S, b, "lower")
     L, low = to_lower.rotation @ S, to_lower.rotation @ b
     # δf = M f + z with f = L a' + b: δL = M L, δb = M b + z.

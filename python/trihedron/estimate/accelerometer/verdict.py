@@ -19,9 +19,6 @@ WEAK_PREDICTION = 3.0
 """A set of n well spread poses predicts any new one to √(9/n) of a pose's noise; at three times the noise of a pose the
 set hardly constrains some direction."""
 
-BLIND_PREDICTION = 0.05
-"""Predicted error, in |g|, above which the linear propagation of errors no longer holds: the parameter is unknown."""
-
 
 def covariance_scale(chi2: float, dof: int) -> float:
     """χ²/dof where it exceeds the 99 % quantile of noise alone, else 1: errors never shrink below the noise."""
@@ -49,7 +46,9 @@ def residual_findings(chi2: float, dof: int, rms_dof: float, floor: float) -> li
     ]
 
 
-def observability_findings(design: PoseDesign, relative_sigma: float, advice: tuple[str, ...]) -> list[Finding]:
+def observability_findings(
+    design: PoseDesign, relative_sigma: float, advice: tuple[str, ...], *, is_anchored: bool, anchor: float
+) -> list[Finding]:
     """Nothing, a warning, or a refusal, with the poses to add."""
     add = "Add still poses with " + "; ".join(f"({i + 1}) {words}" for i, words in enumerate(advice)) + "."
     numbers = {"rank": float(design.rank), "n_parameters": 9.0}
@@ -59,7 +58,7 @@ def observability_findings(design: PoseDesign, relative_sigma: float, advice: tu
                 FindingCode.NOT_OBSERVABLE,
                 Severity.SERIOUS,
                 f"The still poses determine {design.rank} of the 9 parameters of the accelerometer; unseen is the "
-                f"{_unseen(design)}.",
+                f"{_unseen(design)}, held within {100 * anchor:.0f} % of a perfect triad.",
                 "Too few different orientations: six faces alone are six equations for nine parameters.",
                 add,
                 MappingProxyType(numbers),
@@ -67,13 +66,14 @@ def observability_findings(design: PoseDesign, relative_sigma: float, advice: tu
         ]
     worst = design.worst_prediction()
     numbers["worst_prediction_g"] = worst
-    if worst > BLIND_PREDICTION:
+    if is_anchored:
         return [
             Finding(
                 FindingCode.NOT_OBSERVABLE,
                 Severity.SERIOUS,
-                f"The still poses determine the accelerometer so weakly that some pose would be wrong by "
-                f"{100 * worst:.2g} % of gravity; worst is {design.weakest()}.",
+                f"The still poses determine the accelerometer so weakly that some pose could be wrong by "
+                f"{100 * min(worst, 1.0):.2g} % of gravity; worst is {design.weakest()}. All parameters were held "
+                f"within {100 * anchor:.0f} % of a perfect triad.",
                 "The orientations are too much alike.",
                 add,
                 MappingProxyType(numbers),
