@@ -101,7 +101,7 @@ def _with_stdout_as_default(words: list[str]) -> list[str]:
 
 
 def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
-    message = str(getattr(error, "format_message", lambda: error)()).strip()
+    message = str(getattr(error, "format_message", lambda: error)()).strip().removeprefix("Invalid value: ")
     names = {command.__name__ for command in COMMANDS}
     command = next((word for word in words if word in names), None)
     where = f"trihedron {command} --help" if command else "trihedron --help"

@@ -2,7 +2,41 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
 
-def apply() -> None:
-    """Apply a calibration to a log: readings in SI, CSV or Parquet."""
-    raise ValueError("not built yet")
+import typer
+
+from trihedron.cli.options import Force, Json, LogSource, with_options
+from trihedron.cli.output import check_outputs, leave, say, write_json
+
+
+@with_options(source=LogSource)
+def apply(
+    calibration: Annotated[Path, typer.Argument(metavar="CALIBRATION", help="Calibration file (JSON).")],
+    source: LogSource,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="FILE", help="Where to write: .csv, .parquet, or '-' for CSV on stdout."
+        ),
+    ] = Path("-"),
+    json: Json = None,
+    force: Force = False,
+) -> None:
+    """Apply a calibration to a log: time [s], specific force [m/s^2], angular rate [rad/s]."""
+    check_outputs(output, json, force=force)
+    from trihedron.calibration_file import read_calibration
+
+    known = read_calibration(calibration)
+    recording = source.read()
+    from trihedron import pipeline
+    from trihedron.recording_file import write_recording
+    from trihedron.report.machine import recording_record
+
+    done = pipeline.apply(known, recording)
+    write_recording(done, output, overwrite=force)
+    if str(output) != "-":
+        say(f"{done.n_samples} samples: {output}")
+    write_json(recording_record(done), json, force=force)
+    leave(done.findings)

@@ -2,7 +2,141 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated, Any, Optional
 
-def calibrate() -> None:
+import typer
+
+from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
+from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+
+FIRST_SCREEN = 2
+
+
+@with_options(source=LogSource, place=GravitySource)
+def calibrate(
+    source: LogSource,
+    place: GravitySource,
+    method: Annotated[
+        str,
+        typer.Option(
+            help="joint: any poses, both sensors in one fit. separate: one after the other. faces: six faces."
+        ),
+    ] = "joint",
+    frame: Annotated[
+        Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+        typer.Option(help="Instrument trihedron: lower, symmetric, or case (with --method faces)."),
+    ] = None,
+    faces: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            metavar="LIST", help="With --method faces: axis up in each pose, '1,-1,2,-2,3,-3'; 0 leaves one out."
+        ),
+    ] = None,
+    turns: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            metavar="LIST", help="With --method faces: angle of each turn in degrees, '90,-90,360'; 0 leaves one out."
+        ),
+    ] = None,
+    axis_signs: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(metavar="+++", help="Sign with which each raw axis follows its documented direction, e.g. '-++'."),
+    ] = None,
+    loss: Annotated[str, typer.Option(help="How far outlying poses count: linear, huber, soft_l1, cauchy.")] = "linear",
+    gyro_nominal: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option(metavar="X", help="Nominal rad/s per gyro unit, where counts and few moves cannot tell it."),
+    ] = None,
+    output: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON)."),
+    ] = None,
+    json: Json = None,
+    report: Report = None,
+    full: Annotated[bool, typer.Option("--full", help="Print the whole report, with every pose and move.")] = False,
+    force: Force = False,
+) -> None:
     """Calibrate both sensors from a log of still poses and moves."""
-    raise ValueError("not built yet")
+    check_outputs(output, json, force=force, report=report)
+    choices = _choices(method, frame, faces, turns, axis_signs, loss)
+    recording = source.read()
+    from trihedron import pipeline
+    from trihedron.calibration_file import write_calibration
+    from trihedron.report import calibration_report
+    from trihedron.report.machine import calibration_record
+
+    with progress("calibrating") as tell:
+        result = pipeline.calibrate(
+            recording,
+            gravity_m_s2=place.gravity,
+            latitude_deg=place.latitude,
+            height_m=place.height,
+            gyroscope_nominal=gyro_nominal,
+            progress=tell,
+            **choices,
+        )
+    document = calibration_report(result.calibration, result.segments, recording)
+    machine = calibration_record(result.calibration, result.segments, recording)
+    show(document, json, sections=None if full else FIRST_SCREEN)
+    if output is not None:
+        write_calibration(result.calibration, output, overwrite=force)
+        say(f"calibration: {output}")
+    write_json(machine, json, force=force)
+    write_report(document, machine, report, force=force)
+    if not full and report is None:
+        say("Every pose and move: --full, or --report FILE.html with figures.")
+    leave(result.findings)
+
+
+def _choices(
+    method: str, frame: str | None, faces: str | None, turns: str | None, axis_signs: str | None, loss: str
+) -> dict[str, Any]:
+    return {
+        "method": one_of("--method", method, ("joint", "separate", "faces")),
+        "frame": None if frame is None else one_of("--frame", frame, ("lower", "symmetric", "case")),
+        "faces": None if faces is None else [int(value) for value in numbers("--faces", faces)],
+        "turns_deg": None if turns is None else numbers("--turns", turns),
+        "axis_signs": None if axis_signs is None else signs("--axis-signs", axis_signs),
+        "loss": one_of("--loss", loss, ("linear", "huber", "soft_l1", "cauchy")),
+    }
+
+
+def one_of(option: str, value: str, allowed: tuple[str, ...]) -> str:
+    """A word of a list.
+
+    Raises
+    ------
+    typer.BadParameter
+        Naming the words there are.
+    """
+    if value not in allowed:
+        raise typer.BadParameter(f"{option} is one of {', '.join(allowed)}, not {value!r}")
+    return value
+
+
+def numbers(option: str, text: str) -> list[float]:
+    """Numbers with commas between.
+
+    Raises
+    ------
+    typer.BadParameter
+        When they are not.
+    """
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"{option} is numbers with commas between, not {text!r}") from None
+
+
+def signs(option: str, text: str) -> list[int]:
+    """Three signs.
+
+    Raises
+    ------
+    typer.BadParameter
+        When they are not three of + and -.
+    """
+    if len(text) != 3 or set(text) - {"+", "-"}:
+        raise typer.BadParameter(f"{option} is three signs such as '-++', not {text!r}")
+    return [1 if sign == "+" else -1 for sign in text]

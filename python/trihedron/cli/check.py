@@ -2,7 +2,24 @@
 
 from __future__ import annotations
 
+from trihedron.cli.options import Force, Json, LogSource, Report, progress, with_options
+from trihedron.cli.output import check_outputs, leave, show, write_json, write_report
 
-def check() -> None:
-    """Say whether a log is fit for calibration, before anything is computed from it."""
-    raise ValueError("not built yet")
+
+@with_options(source=LogSource)
+def check(source: LogSource, report: Report = None, json: Json = None, force: Force = False) -> None:
+    """Is a log fit for calibration? Its faults, its poses, and the error bars to expect."""
+    check_outputs(json, force=force, report=report)
+    recording = source.read()
+    from trihedron import pipeline
+    from trihedron.report import check_report
+    from trihedron.report.machine import check_record
+
+    with progress("checking") as tell:
+        result = pipeline.check(recording, progress=tell)
+    document = check_report(recording, result.segments, result.calibration, result.findings)
+    machine = check_record(recording, result.segments, result.calibration, result.findings)
+    show(document, json, sections=None)
+    write_json(machine, json, force=force)
+    write_report(document, machine, report, force=force)
+    leave(result.findings)

@@ -2,7 +2,34 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
 
-def export() -> None:
-    """Write a calibration for other programs: C, Python, Kalibr, imu_tk."""
-    raise ValueError("not built yet")
+import typer
+
+from trihedron.cli.options import Force
+from trihedron.cli.output import check_outputs, leave, say
+
+
+def export(
+    calibration: Annotated[Path, typer.Argument(metavar="CALIBRATION", help="Calibration file (JSON).")],
+    to: Annotated[str, typer.Option("--to", metavar="TARGET", help="c, python, kalibr, imu_tk, basalt, xio or pyins.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FILE", help="Where to write; '-' is stdout.")
+    ] = Path("-"),
+    force: Force = False,
+) -> None:
+    """Write a calibration in another program's convention, with its equation stated."""
+    check_outputs(output, force=force)
+    from trihedron.calibration_file import read_calibration
+    from trihedron.export import export_calibration
+    from trihedron.output_file import write_whole
+
+    known = read_calibration(calibration)
+    text = export_calibration(known, to)
+    if str(output) == "-":
+        typer.echo(text, nl=False)
+    else:
+        write_whole(output, text, overwrite=force)
+        say(f"{to}: {output}")
+    leave(known.findings)

@@ -2,7 +2,23 @@
 
 from __future__ import annotations
 
+from trihedron.cli.options import Force, Json, LogSource, Report, progress, with_options
+from trihedron.cli.output import check_outputs, leave, show, write_json, write_report
 
-def segment() -> None:
+
+@with_options(source=LogSource)
+def segment(source: LogSource, report: Report = None, json: Json = None, force: Force = False) -> None:
     """Find the still poses and the moves between them."""
-    raise ValueError("not built yet")
+    check_outputs(json, force=force, report=report)
+    recording = source.read()
+    from trihedron import pipeline
+    from trihedron.report import segments_report
+    from trihedron.report.machine import segments_record
+
+    with progress("segmenting") as tell:
+        segments = pipeline.segment(recording, progress=tell)
+    document, machine = segments_report(recording, segments), segments_record(recording, segments)
+    show(document, json, sections=None)
+    write_json(machine, json, force=force)
+    write_report(document, machine, report, force=force)
+    leave((*recording.findings, *segments.findings))

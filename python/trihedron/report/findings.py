@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from trihedron.records import Finding, Severity
 from trihedron.report.document import FindingList, Paragraph
@@ -13,7 +14,7 @@ _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
 
 def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
     """Gravest first; within a severity in the order of the stages."""
-    ordered = tuple(sorted(findings, key=lambda finding: _ORDER[finding.severity]))
+    ordered = tuple(sorted((_sentence(finding) for finding in findings), key=lambda f: _ORDER[f.severity]))
     return FindingList(ordered) if ordered else Paragraph("None.")
 
 
@@ -26,3 +27,8 @@ def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) ->
         more = f" ({how_many(len(serious) - 1, 'more serious finding')})" if len(serious) > 1 else ""
         return f"{bad}: {serious[0].seen}{more}"
     return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
+
+
+def _sentence(finding: Finding) -> Finding:
+    """What was seen, with a capital letter."""
+    return replace(finding, seen=finding.seen[:1].upper() + finding.seen[1:])

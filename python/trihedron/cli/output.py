@@ -1,0 +1,88 @@
+"""Where results go: text to stdout, JSON and reports to files (or '-'), and the exit status."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from trihedron.output_file import OutputError, check_free, write_whole
+
+if TYPE_CHECKING:
+    from trihedron.records import Finding
+    from trihedron.report import Document
+
+NOT_TO_BE_TRUSTED = 2
+REPORT_KINDS = (".html", ".txt", ".json")
+
+
+def check_outputs(*paths: Path | None, force: bool, report: Path | None = None) -> None:
+    """Refuse outputs that would be refused later, before minutes of work.
+
+    Raises
+    ------
+    OutputError
+        As :func:`trihedron.output_file.check_free`, or when a report has an ending that names no format.
+    """
+    if report is not None and report.suffix.lower() not in REPORT_KINDS:
+        raise OutputError(f"{report}: the ending tells the format of a report; give .html, .txt or .json.")
+    check_free([*paths, report], overwrite=force)
+
+
+def write_report(document: Document, machine: dict[str, Any], report: Path | None, *, force: bool) -> None:
+    """The report in the format that its name asks for."""
+    if report is None:
+        return
+    kind = report.suffix.lower()
+    if kind == ".html":
+        from trihedron.report.page import to_html
+
+        content = to_html(document)
+    elif kind == ".txt":
+        from trihedron.report import to_text
+
+        content = to_text(document)
+    else:
+        content = json_text(machine)
+    write_whole(report, content, overwrite=force)
+    say(f"report: {report}")
+
+
+def write_json(machine: dict[str, Any], target: Path | None, *, force: bool) -> None:
+    """The result for machines, to a file or ('-') to stdout."""
+    if target is None:
+        return
+    if str(target) == "-":
+        typer.echo(json_text(machine), nl=False)
+        return
+    write_whole(target, json_text(machine), overwrite=force)
+    say(f"JSON: {target}")
+
+
+def json_text(machine: dict[str, Any]) -> str:
+    """Strict JSON: what is not a finite number is ``null``."""
+    from trihedron.calibration_file import plain
+
+    return json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:
+    """The report on stdout, unless stdout carries JSON."""
+    if json_target is None or str(json_target) != "-":
+        from trihedron.report import to_text
+
+        typer.echo(to_text(document, sections=sections), nl=False)
+
+
+def say(sentence: str) -> None:
+    """To stderr: what was done, not what was found."""
+    typer.echo(sentence, err=True)
+
+
+def leave(findings: Iterable[Finding]) -> None:
+    """End with status 2 when a serious finding says that the answer is not to be trusted."""
+    if any(finding.severity.value == "serious" for finding in findings):
+        raise typer.Exit(NOT_TO_BE_TRUSTED)

@@ -1,0 +1,103 @@
+"""Results for machines: everything that the report says, as plain JSON types with units in the names."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from trihedron.calibration_file import calibration_document
+from trihedron.records import Calibration, Finding, Recording, Segments, Verification
+
+
+def recording_record(recording: Recording) -> dict[str, Any]:
+    """A recording without its samples."""
+    return {
+        "source": recording.source,
+        "sha256": recording.sha256,
+        "n_samples": recording.n_samples,
+        "duration_s": recording.duration_s,
+        "rate_hz": recording.rate_hz,
+        "accelerometer_unit": None if recording.accelerometer is None else recording.accelerometer_unit.value,
+        "gyroscope_unit": None if recording.gyroscope is None else recording.gyroscope_unit.value,
+        "findings": [finding.to_dict() for finding in recording.findings],
+    }
+
+
+def segments_record(recording: Recording, segments: Segments) -> dict[str, Any]:
+    """Holds with their means, moves, noise."""
+    holds = [
+        {
+            "start": hold.start,
+            "stop": hold.stop,
+            "start_s": float(recording.time_s[hold.start]),
+            "stop_s": float(recording.time_s[hold.stop - 1]),
+            "disturbed": [list(part) for part in hold.disturbed],
+            "n_averaged": int(segments.n_averaged[k]),
+            "accelerometer_mean": _row(segments.accelerometer_mean, k),
+            "accelerometer_sigma_mean": _row(segments.accelerometer_sigma_mean, k),
+            "gyroscope_mean": _row(segments.gyroscope_mean, k),
+            "gyroscope_sigma_mean": _row(segments.gyroscope_sigma_mean, k),
+        }
+        for k, hold in enumerate(segments.holds)
+    ]
+    moves = [
+        {"start": move.start, "stop": move.stop, "hold_before": move.hold_before, "hold_after": move.hold_after}
+        for move in segments.moves
+    ]
+    return {
+        "recording": recording_record(recording),
+        "accelerometer_sigma": _row(segments.accelerometer_sigma),
+        "gyroscope_sigma": _row(segments.gyroscope_sigma),
+        "holds": holds,
+        "moves": moves,
+        "findings": [finding.to_dict() for finding in segments.findings],
+    }
+
+
+def calibration_record(calibration: Calibration, segments: Segments, recording: Recording) -> dict[str, Any]:
+    """The calibration file's content, with the segments that it was made from."""
+    document = calibration_document(calibration)
+    return {**document, "segments": segments_record(recording, segments)}
+
+
+def verification_record(verification: Verification) -> dict[str, Any]:
+    """Errors of every pose and move, in SI and degrees."""
+    v = verification
+    return {
+        "recording": {"source": v.source, "sha256": v.sha256},
+        "is_passed": v.is_passed,
+        "gravity_m_s2": v.gravity_m_s2,
+        "gravity_source": v.gravity_source,
+        "norm_rms_m_s2": v.norm_rms,
+        "norm_error_m_s2": v.norm_error,
+        "norm_noise_m_s2": v.norm_noise,
+        "norm_sigma_m_s2": v.norm_sigma,
+        "angle_rms_deg": v.angle_rms_deg,
+        "angle_deg": v.angle_deg,
+        "angle_noise_deg": v.angle_noise_deg,
+        "angle_sigma_deg": v.angle_sigma_deg,
+        "rest_rate_rad_s": v.rest_rate,
+        "findings": [finding.to_dict() for finding in v.findings],
+    }
+
+
+def check_record(
+    recording: Recording, segments: Segments, calibration: Calibration | None, findings: tuple[Finding, ...]
+) -> dict[str, Any]:
+    """The audit, and the error bars to expect."""
+    expected: dict[str, Any] = {}
+    if calibration is not None:
+        for name, sensor in (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)):
+            if sensor is not None:
+                expected[name] = {"sigma_S": sensor.sigma_S, "sigma_b": sensor.sigma_b, "si_unit": sensor.si_unit}
+    return {
+        **segments_record(recording, segments),
+        "is_fit": not any(finding.severity.value == "serious" for finding in findings),
+        "expected": expected,
+        "findings": [finding.to_dict() for finding in findings],
+    }
+
+
+def _row(array: Any, k: int | None = None) -> Any:
+    if array is None:
+        return None
+    return array if k is None else array[k]
