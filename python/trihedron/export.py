@@ -34,16 +34,17 @@ def export_calibration(calibration: Calibration, target: str) -> str:
 
 
 def lower_orthogonal(A: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """``A = L Q`` with L lower triangular, positive diagonal, and Q orthogonal (a rotation where det A > 0)."""
+    """``A = L Q`` with L lower triangular and Q a rotation; the signs of A's diagonal stay with L."""
     q, r = np.linalg.qr(A.T)
-    signs = np.sign(np.diag(r))
+    signs = np.sign(np.diag(r)) * np.sign(np.diag(A))
     return (r * signs[:, None]).T, (q * signs).T
 
 
 def upper_frame(calibration: Calibration) -> tuple[FloatArray, list[tuple[SensorCalibration, FloatArray, FloatArray]]]:
     """Both sensors turned by R so that the accelerometer's S is upper triangular: R and (sensor, R S, R b)."""
     q, r = np.linalg.qr(calibration.accelerometer.S)
-    rotation = (q * np.sign(np.diag(r))).T
+    # The signs of the diagonal stay with S: a left-handed triad is not mended by a reflection of Mz.
+    rotation = (q * (np.sign(np.diag(r)) * np.sign(np.diag(calibration.accelerometer.S)))).T
     turned = [(sensor, rotation @ sensor.S, rotation @ sensor.b) for sensor in _sensors(calibration)]
     # Rounding below the diagonal is removed: the target does not expect it.
     turned[0] = (turned[0][0], np.triu(turned[0][1]), turned[0][2])
@@ -66,7 +67,7 @@ def _heading(calibration: Calibration, comment: str, equation: str) -> list[str]
     return [f"{comment} {row}".replace("\n", " ") for row in rows]
 
 
-def _row(values: FloatArray) -> str:
+def _row(values: npt.NDArray[np.floating]) -> str:
     return ", ".join(repr(float(v)) for v in values)
 
 
