@@ -13,7 +13,7 @@ import numpy.typing as npt
 from trihedron.read.table import FloatArray
 
 WINDOW_S = 0.5
-MAX_WINDOWS = 4000
+MAX_WINDOWS = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,16 +58,21 @@ def look(sensors: dict[str, FloatArray], rate_hz: float) -> Windows | None:
     enough = np.ones(len(start), dtype=bool)
     for array in sensors.values():
         # Half of a window may be missing; fewer readings tell nothing about its noise.
-        pairs = np.isfinite(np.diff(array[index], axis=1)).all(axis=2)
-        enough &= pairs.sum(axis=1) >= max(1, length // 2 if length > 2 else 1)
+        block = array[index]
+        if not np.isfinite(block).all():
+            pairs = np.isfinite(np.diff(block, axis=1)).all(axis=2)
+            enough &= pairs.sum(axis=1) >= max(1, length // 2 if length > 2 else 1)
     if not enough.any():
         return None
     start, index = start[enough], index[enough]
     for name, array in sensors.items():
         block = array[index]
-        mean[name] = np.nanmean(block, axis=1)
-        noise[name] = np.nanstd(np.diff(block, axis=1), axis=1) / np.sqrt(2.0)
-        spread[name] = np.linalg.norm(np.nanstd(block, axis=1), axis=1)
+        is_whole = bool(np.isfinite(block).all())
+        # The versions that pass over NaN take four times as long.
+        mean_of, deviation_of = (np.mean, np.std) if is_whole else (np.nanmean, np.nanstd)
+        mean[name] = mean_of(block, axis=1)
+        noise[name] = deviation_of(np.diff(block, axis=1), axis=1) / np.sqrt(2.0)
+        spread[name] = np.linalg.norm(deviation_of(block, axis=1), axis=1)
     quiet = np.ones(len(start), dtype=bool)
     for value in spread.values():
         # The quietest tenth shows the sensor's own noise; three times that still is no hand motion.

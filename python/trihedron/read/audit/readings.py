@@ -36,7 +36,10 @@ def audit_readings(sensor: str, readings: FloatArray, windows: Windows | None, p
 def _non_finite(sensor: str, readings: FloatArray, place: Place) -> list[Finding]:
     count, first = 0, -1
     for start in range(0, len(readings), CHUNK):
-        bad = ~np.isfinite(readings[start : start + CHUNK]).all(axis=1)
+        finite = np.isfinite(readings[start : start + CHUNK])
+        if finite.all():
+            continue
+        bad = ~finite.all(axis=1)
         here = int(np.count_nonzero(bad))
         if here and first < 0:
             first = start + int(np.argmax(bad))

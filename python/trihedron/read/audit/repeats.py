@@ -28,7 +28,7 @@ class Repeats:
             stop = min(start + CHUNK, n)
             same = np.empty((stop - start, 4), dtype=bool)
             np.equal(readings[start:stop], readings[start - 1 : stop - 1], out=same[:, :3])
-            np.logical_and.reduce(same[:, :3], axis=1, out=same[:, 3])
+            same[:, 3] = same[:, 0] & same[:, 1] & same[:, 2]
             self.count += same.sum(axis=0)
             rates.append(_window_rates(same))
             for k in range(4):
