@@ -64,9 +64,15 @@ impl<T: Copy + Into<f64>> View<'_, T> {
 }
 
 fn view<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<View<'a, T>> {
-    let data = array
-        .as_slice()
-        .map_err(|_| PyValueError::new_err("readings must be C-contiguous, one row per sample"))?;
+    let data = match array.as_slice() {
+        // `as_slice` also succeeds on a Fortran-ordered array, whose memory runs down the columns.
+        Ok(data) if array.is_c_contiguous() => data,
+        _ => {
+            return Err(PyValueError::new_err(
+                "readings must be C-contiguous, one row per sample",
+            ));
+        }
+    };
     Ok(View {
         data,
         n: array.shape()[0],

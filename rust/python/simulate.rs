@@ -55,7 +55,10 @@ fn channels(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Sampl
             array.shape()[1]
         )));
     }
-    if let Ok(flat) = array.as_slice() {
+    // `as_slice` also succeeds on a Fortran-ordered array, whose memory runs down the columns.
+    if array.is_c_contiguous()
+        && let Ok(flat) = array.as_slice()
+    {
         return Ok(flat.chunks_exact(3).map(|r| [r[0], r[1], r[2]]).collect());
     }
     let view = array.as_array();

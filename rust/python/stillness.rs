@@ -31,10 +31,11 @@ fn block_statistics<'py>(
             readings.shape()[1]
         )));
     }
-    let owned: Vec<f64> = readings.as_slice().map_or_else(
-        |_| readings.as_array().iter().copied().collect(),
-        <[f64]>::to_vec,
-    );
+    // `as_slice` also succeeds on a Fortran-ordered array, whose memory runs down the columns.
+    let owned: Vec<f64> = match readings.as_slice() {
+        Ok(flat) if readings.is_c_contiguous() => flat.to_vec(),
+        _ => readings.as_array().iter().copied().collect(),
+    };
     let blocks = super::run(py, || stillness::block_statistics(&owned, length))?;
     let shape = [blocks.count.len(), 3];
     Ok((

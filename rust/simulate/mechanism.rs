@@ -197,7 +197,8 @@ pub fn play(signal: &mut [Sample], width: &Sample, offset: &Sample) -> Result<()
         // The state before the recording: no play used up.
         let mut y = signal.first().map_or(0.0, |row| row[k]);
         for row in signal.iter_mut() {
-            y = y.clamp(row[k] - w, row[k] + w);
+            // Not `clamp`, which panics where the signal is NaN.
+            y = y.max(row[k] - w).min(row[k] + w);
             row[k] += offset[k] * (y - row[k]) / w;
         }
     }

@@ -68,11 +68,9 @@ impl Converter {
     /// # Errors
     /// A negative step or dead band, or a range that is empty.
     pub fn convert(&self, signal: &mut [Sample]) -> Result<()> {
-        if self.lsb < 0.0
-            || self.dead_band < 0.0
-            || self.low >= self.high
-            || self.missing_every == 1
-        {
+        // Written so that a NaN fails each of them: clamping to a NaN would be a panic.
+        let is_sound = self.lsb >= 0.0 && self.dead_band >= 0.0 && self.low < self.high;
+        if !is_sound || self.missing_every == 1 {
             return Err(Error::bad_input(format!(
                 "the converter is malformed: step {}, range {} to {}, dead band {}, one code missing in {}",
                 self.lsb, self.low, self.high, self.dead_band, self.missing_every

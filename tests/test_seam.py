@@ -1,0 +1,254 @@
+"""The seam: whatever arrives, a kernel answers or refuses in words; how an array lies in memory changes nothing."""
+
+import ast
+import inspect
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trihedron import _core
+
+STUB = ast.parse((Path(_core.__file__).parent / "_core.pyi").read_text())
+REFUSALS = (ValueError, TypeError, OverflowError)
+N_TRIALS = 40
+
+
+def callables() -> dict[str, ast.arguments]:
+    """Every function, constructor and method of the compiled core with its declared parameters."""
+    found: dict[str, ast.arguments] = {}
+    for node in STUB.body:
+        if isinstance(node, ast.FunctionDef):
+            found[node.name] = node.args
+        elif isinstance(node, ast.ClassDef):
+            for item in node.body:
+                if isinstance(item, ast.FunctionDef) and not item.decorator_list:
+                    found[f"{node.name}.{item.name}"] = item.args
+    return found
+
+
+CALLABLES = callables()
+
+
+def some_number(rng: np.random.Generator) -> float:
+    if rng.random() < 0.7:
+        return float(rng.uniform(0.01, 10.0))
+    return float(rng.choice([0.0, -1.0, np.nan, np.inf, 1e300, 1e-300]))
+
+
+def some_array(rng: np.random.Generator, name: str, n: int) -> np.ndarray:
+    """Mostly an array of the shape its name suggests, sometimes of any other shape, order, kind or content."""
+    triads = {"readings", "gyroscope", "vectors", "reading", "noise", "zero", "starts", "force", "rate", "signal"}
+    if rng.random() < 0.2:
+        shape = tuple(rng.integers(0, 5, rng.integers(0, 4)))
+    elif name in triads:
+        shape = (n, 3)
+    elif name.endswith("rotations"):
+        shape = (n, 3, 3)
+    elif name in {"moves", "edges", "holds"}:
+        shape = (n, 2)
+    elif "scale" in name or name in {"S", "accelerometer_basis"}:
+        shape = (3, 3)
+    elif name.startswith("prior") or "bias" in name or "density" in name:
+        shape = (3,) if rng.random() < 0.5 else (4,)
+    else:
+        shape = (n,)
+    values = rng.standard_normal(shape)
+    if name.endswith("_s") and values.ndim:
+        values = np.sort(np.abs(values), axis=0)
+    spoil = rng.random()
+    if values.size and spoil < 0.15:
+        values.flat[int(rng.integers(values.size))] = rng.choice([np.nan, np.inf, -np.inf, 1e300])
+    elif spoil < 0.2:
+        values = values * 0
+    form = rng.random()
+    if form < 0.15:
+        values = np.asfortranarray(values)
+    elif form < 0.3 and values.ndim:
+        values = np.repeat(values, 2, axis=0)[::2]
+    elif form < 0.4:
+        values.setflags(write=False)
+    elif form < 0.45:
+        with np.errstate(over="ignore"):
+            values = values.astype(np.float32)
+    elif form < 0.5:
+        values = values.astype(object)
+    elif form < 0.55 and values.ndim:
+        values = values[::-1]
+    return values
+
+
+def some_value(rng: np.random.Generator, name: str, annotation: str, n: int) -> object:
+    if "None" in annotation and rng.random() < 0.3:
+        return None
+    if annotation.startswith("FloatArray"):
+        return some_array(rng, name, n)
+    if "int64" in annotation or "uint" in annotation:
+        array = some_array(rng, name, n)
+        whole = np.nan_to_num(np.asarray(array, dtype=np.float64), posinf=9, neginf=-9)
+        return np.sort(np.clip(np.abs(whole * 3), 0, 20).astype(np.int64), axis=-1 if whole.ndim else None)
+    if "bool_" in annotation:
+        return rng.random(n) < 0.5
+    if annotation.startswith("Sequence[Sequence[int]]"):
+        return [[int(v) for v in rng.integers(0, 9, rng.integers(0, 4))] for _ in range(n)]
+    if annotation.startswith("Sequence[Sequence[float]]"):
+        return [[some_number(rng) for _ in range(int(rng.choice([3, 3, 3, 2, 0])))] for _ in range(n)]
+    if annotation.startswith("Sequence[int]"):
+        return [int(v) for v in rng.integers(0, 4, n)]
+    if annotation.startswith("Sequence[float]"):
+        return [some_number(rng) for _ in range(int(rng.choice([3, 3, 3, n, 0])))]
+    if annotation.startswith("tuple[FloatArray, FloatArray]"):
+        return (some_array(rng, "S", n), some_array(rng, "bias", n))
+    if annotation.startswith("bool"):
+        return bool(rng.random() < 0.5)
+    if annotation.startswith("int"):
+        return int(rng.choice([0, 1, 2, 3, 5, 17, -1]))
+    if annotation.startswith("float"):
+        return some_number(rng)
+    if annotation.startswith("str"):
+        return "x"
+    return some_instance(rng, annotation.split(" ")[0].strip("'\""), n)
+
+
+def arguments(rng: np.random.Generator, declared: ast.arguments, n: int) -> tuple[list[object], dict[str, object]]:
+    positional = [
+        some_value(rng, a.arg, ast.unparse(a.annotation), n)
+        for a in declared.args
+        if a.arg not in {"cls", "self"} and a.annotation is not None
+    ]
+    named = {a.arg: some_value(rng, a.arg, ast.unparse(a.annotation), n) for a in declared.kwonlyargs if a.annotation}
+    return positional, named
+
+
+def some_instance(rng: np.random.Generator, name: str, n: int) -> object:
+    """An object of a class of the core, from random arguments that its constructor accepts, or a plain stand-in."""
+    if name == "NormFit":
+        readings = rng.standard_normal((20, 3))
+        readings *= 9.8 / np.linalg.norm(readings, axis=1, keepdims=True)
+        return _core.fit_norm(readings, np.tile(np.eye(3), (20, 1, 1)), _core.NormSettings(9.8))
+    if name == "AllanKind":
+        kinds = ("Overlapping", "NonOverlapping", "Modified", "Hadamard", "Total")
+        return getattr(_core.AllanKind, kinds[int(rng.integers(len(kinds)))])
+    declared = CALLABLES.get(f"{name}.__new__")
+    if declared is None:
+        return object()
+    for _ in range(20):
+        positional, named = arguments(rng, declared, n)
+        try:
+            return getattr(_core, name)(*positional, **named)
+        except REFUSALS:
+            continue
+    return object()
+
+
+@pytest.mark.parametrize("name", CALLABLES)
+def test_any_arguments_are_answered_or_refused_in_words(name):
+    owner, _, method = name.rpartition(".")
+    # Making an object costs more than calling it, and the constructors are tried on their own.
+    for trial in range(N_TRIALS if not owner or method == "__new__" else N_TRIALS // 5):
+        # Seeded by name and trial, so that a new function does not change what the others are given.
+        rng = np.random.default_rng([trial, *name.encode()])
+        n = int(rng.choice([0, 1, 2, 3, 4, 8, 30]))
+        positional, named = arguments(rng, CALLABLES[name], n)
+        if not owner:
+            target = getattr(_core, name)
+        elif method == "__new__":
+            target = getattr(_core, owner)
+        else:
+            target = getattr(some_instance(rng, owner, n), method, None)
+            if target is None:  # no instance could be made from these arguments
+                continue
+        try:
+            target(*positional, **named)
+        except REFUSALS as refusal:
+            sentence = str(refusal)
+            assert sentence
+
+
+def contiguous_calls() -> dict[str, tuple]:
+    """A good call of the functions that take whole recordings or many vectors."""
+    rng = np.random.default_rng(7)
+    vectors = rng.standard_normal((50, 3))
+    unit = rng.standard_normal((60, 3))
+    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    readings = 9.8 * unit @ np.array([[1.02, 0, 0], [0.01, 0.97, 0], [-0.02, 0.03, 1.0]]).T + [0.1, -0.2, 0.3]
+    calls = {
+        "rotation_from_vector": (vectors,),
+        "vector_from_rotation": (_core.rotation_from_vector(vectors),),
+        "block_statistics": (rng.standard_normal((400, 3)), 8),
+        "fit_ellipsoid": (readings, 9.8, False),
+        "integrate_raw_rate": (
+            np.arange(200) / 100.0,
+            rng.standard_normal((200, 3)),
+            np.array([[10, 60], [80, 150]], dtype=np.int64),
+            1,
+        ),
+    }
+    calls["simulate_first_order"] = (rng.standard_normal((100, 3)), 0.01, [0.1, 0.2, 0.3])
+    return {name: call for name, call in calls.items() if hasattr(_core, name)}
+
+
+def rearranged(array: np.ndarray) -> list[np.ndarray]:
+    """The same numbers lying otherwise in memory."""
+    frozen = array.copy()
+    frozen.setflags(write=False)
+    wide = np.zeros((*array.shape[:-1], 2 * array.shape[-1]), dtype=array.dtype)
+    wide[..., ::2] = array
+    return [np.asfortranarray(array), np.repeat(array, 3, axis=0)[::3], wide[..., ::2], array[::-1][::-1], frozen]
+
+
+def flat(result: object) -> list[np.ndarray]:
+    if isinstance(result, (tuple, list)):
+        return [leaf for item in result for leaf in flat(item)]
+    return [np.asarray(result)]
+
+
+@pytest.mark.parametrize("name", contiguous_calls())
+def test_how_an_array_lies_in_memory_changes_nothing(name):
+    call = contiguous_calls()[name]
+    expected = flat(getattr(_core, name)(*call))
+    for i, argument in enumerate(call):
+        if not isinstance(argument, np.ndarray):
+            continue
+        for other in rearranged(argument):
+            got = flat(getattr(_core, name)(*call[:i], other, *call[i + 1 :]))
+            for a, b in zip(got, expected, strict=True):
+                np.testing.assert_array_equal(a, b)
+
+
+def test_the_allan_kernels_refuse_an_array_they_would_have_to_copy():
+    # Long logs are not copied behind the caller's back; in the wrong order they would be read down the columns.
+    x = np.asfortranarray(np.random.default_rng(1).standard_normal((100, 3)))
+    with pytest.raises(ValueError, match="C-contiguous"):
+        _core.allan_variance(x, [1, 2], _core.AllanKind.Overlapping)
+
+
+@pytest.mark.parametrize("name", contiguous_calls())
+def test_arguments_are_not_written_to(name):
+    call = contiguous_calls()[name]
+    before = [np.array(argument) for argument in call]
+    getattr(_core, name)(*call)
+    for a, b in zip(call, before, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("name", contiguous_calls())
+def test_another_number_of_columns_is_refused_with_the_shape(name):
+    call = contiguous_calls()[name]
+    i = max(
+        range(len(call)),
+        key=lambda k: (
+            getattr(call[k], "ndim", 0) * (call[k].dtype == np.float64 if isinstance(call[k], np.ndarray) else 0)
+        ),
+    )
+    with pytest.raises(ValueError, match=r"shape|columns|\(n, 3"):
+        getattr(_core, name)(*call[:i], call[i][..., :2], *call[i + 1 :])
+
+
+def test_every_function_of_the_core_is_in_the_stub():
+    public = {
+        n for n, value in vars(_core).items() if not n.startswith("_") and (callable(value) or inspect.isclass(value))
+    }
+    assert public == {name.split(".")[0] for name in CALLABLES} | {
+        n.name for n in STUB.body if isinstance(n, ast.ClassDef)
+    }
