@@ -79,6 +79,8 @@ struct Step {
     h: f64,
     /// Where the middle of the step lies between the anchors: 0 before, 1 after.
     fraction: f64,
+    /// Variance of the reading over this step beyond the rate noise, raw unit².
+    var_extra: Vector3<f64>,
 }
 
 /// A move prepared for repeated integration: the moments of its raw readings.
@@ -151,14 +153,23 @@ const UNEVEN_STEPS: f64 = 3.0;
 
 /// Reduces the samples of a move to moments; non-finite rows and repeated stamps are bridged.
 ///
+/// `var_extra`, as long as `raw` where given, is the variance of single readings beyond the rate noise: readings that
+/// were reconstructed where the gyro met its limit.
+///
 /// # Errors
 /// When the range leaves the record, the anchors coincide or time runs backward.
 pub fn prepare(
     time_s: &[f64],
     raw: &[Vector3<f64>],
+    var_extra: Option<&[Vector3<f64>]>,
     range: &MoveRange,
     model: RateModel,
 ) -> Result<PreparedMove> {
+    if var_extra.is_some_and(|var| var.len() != raw.len()) {
+        return Err(Error::bad_input(
+            "the extra variance must have one row per reading",
+        ));
+    }
     if range.start >= range.stop || range.stop > time_s.len() || time_s.len() != raw.len() {
         return Err(Error::bad_input(format!(
             "a move covers samples {}..{} of {}: it must hold at least one sample and stay inside the record",
@@ -219,6 +230,7 @@ pub fn prepare(
             change: raw[q] - raw[p],
             h,
             fraction: (0.5 * (time_s[p] + time_s[q]) - range.anchor_before_s) / span_s,
+            var_extra: var_extra.map_or_else(Vector3::zeros, |var| var[p]),
         });
     }
     Ok(PreparedMove { steps, span_s })
@@ -269,7 +281,7 @@ impl PreparedMove {
         let mut cov_noise = Matrix3::zeros();
         let mut duration_s = 0.0;
         let bias_slope = (bias_after - bias_before) / self.span_s;
-        let scaled_density: Matrix3<f64> = scale * Matrix3::from_diagonal(&noise.density);
+        let density2 = noise.density.component_mul(&noise.density);
         let var_time = noise.sigma_time_s * noise.sigma_time_s;
         for step in &self.steps {
             let h = step.h;
@@ -294,8 +306,9 @@ impl PreparedMove {
             let by_slope = wrt_phi1 * (h * h / (12.0 * self.span_s));
             wrt_bias_before += wrt_phi0 * (h * (1.0 - step.fraction)) - by_slope;
             wrt_bias_after += wrt_phi0 * (h * step.fraction) + by_slope;
-            let of_noise: Matrix3<f64> = to_start * scaled_density;
-            cov_noise += of_noise * of_noise.transpose() * h;
+            let of_raw: Matrix3<f64> = to_start * scale;
+            let var = density2 * h + step.var_extra * (h * h);
+            cov_noise += of_raw * Matrix3::from_diagonal(&var) * of_raw.transpose();
             let is_gap = h > 1.5 * noise.nominal_step_s;
             if var_time > 0.0 || is_gap {
                 let jump = to_start * (scale * step.change);
@@ -324,12 +337,13 @@ impl PreparedMove {
 pub fn prepare_all(
     time_s: &[f64],
     raw: &[Vector3<f64>],
+    var_extra: Option<&[Vector3<f64>]>,
     ranges: &[MoveRange],
     model: RateModel,
 ) -> Result<Vec<PreparedMove>> {
     ranges
         .par_iter()
-        .map(|range| prepare(time_s, raw, range, model))
+        .map(|range| prepare(time_s, raw, var_extra, range, model))
         .collect()
 }
 

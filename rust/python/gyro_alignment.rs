@@ -92,6 +92,8 @@ fn same_length(n: usize, pieces: &[(&str, usize)]) -> PyResult<()> {
 #[pymethods]
 impl Moves {
     #[new]
+    #[pyo3(signature = (time_s, gyroscope, edges, anchors_s, holds, rate_degree, var_extra=None))]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python<'_>,
         time_s: PyReadonlyArray1<'_, f64>,
@@ -100,14 +102,19 @@ impl Moves {
         anchors_s: PyReadonlyArray2<'_, f64>,
         holds: PyReadonlyArray2<'_, i64>,
         rate_degree: u8,
+        var_extra: Option<PyReadonlyArray2<'_, f64>>,
     ) -> PyResult<Self> {
         let time_s = samples(&time_s);
         let raw = rows3("gyroscope", &gyroscope)?;
+        let var_extra = var_extra
+            .map(|array| rows3("var_extra", &array))
+            .transpose()?;
         let ranges = ranges(&edges, &anchors_s)?;
         let links = links(&holds)?;
         same_length(ranges.len(), &[("holds", links.len())])?;
         let moves = super::run(py, || {
-            prepare_all(&time_s, &raw, &ranges, RateModel::of_degree(rate_degree)?)
+            let model = RateModel::of_degree(rate_degree)?;
+            prepare_all(&time_s, &raw, var_extra.as_deref(), &ranges, model)
         })?;
         Ok(Self { links, moves })
     }

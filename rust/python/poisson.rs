@@ -129,7 +129,7 @@ fn integrate_moves<'py>(
     };
     let turns = super::run(py, || {
         let model = RateModel::of_degree(rate_degree)?;
-        let prepared = poisson::prepare_all(&time_s, &raw, &ranges, model)?;
+        let prepared = poisson::prepare_all(&time_s, &raw, None, &ranges, model)?;
         Ok(poisson::integrate_all(
             &prepared, &scale, &before, &after, &noise,
         ))
@@ -170,7 +170,13 @@ fn integrate_raw_rate<'py>(
         numpy::PyArray::from_vec(py, [0.0, 1.0].repeat(shape[0])).reshape([shape[0], 2])?;
     let ranges = ranges(&moves, &anchors_s.readonly())?;
     let prepared = super::run(py, || {
-        poisson::prepare_all(&time_s, &raw, &ranges, RateModel::of_degree(rate_degree)?)
+        poisson::prepare_all(
+            &time_s,
+            &raw,
+            None,
+            &ranges,
+            RateModel::of_degree(rate_degree)?,
+        )
     })?;
     let angles: Vec<f64> = prepared
         .iter()

@@ -92,7 +92,7 @@ def align(
         gravity_m_s2,
         starts,
         options,
-        ~measured.is_clipped if used is None else used,
+        ~measured.is_lost if used is None else used,
         None,
     )
 
@@ -110,7 +110,7 @@ def align_screened(
     A move is an outlier when its squared Mahalanobis distance, in units of the typical one when that is above the
     noise, has a chance below ``FALSE_ALARM`` among all moves.
     """
-    used = ~measured.is_clipped
+    used = ~measured.is_lost
     if not np.any(used):
         raise ValueError("the gyro met its limit in every move: turn more slowly or set a wider range")
     outliers: tuple[int, ...] = ()

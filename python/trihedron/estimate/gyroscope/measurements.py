@@ -10,6 +10,7 @@ from scipy.stats import chi2 as chi2_distribution
 
 from trihedron._core import Moves
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
+from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, bridge_clipping, clipped_time
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.recording import Recording
@@ -31,10 +32,10 @@ class MoveMeasurements:
     ``reading``, ``zero`` (n, 3) are the hold means of accelerometer and gyro, ``var_reading``, ``var_zero`` (n, 3) the
     variances of these means; ``links`` (m, 2) the holds each move joins, ``edges`` (m, 2) its samples;
     ``noise_density`` (3,) the angle random walk in raw unit · √s; ``var_zero_walk`` (3,) the variance by which the
-    true zero reading changes from hold to hold; ``is_clipped`` (m,) marks moves in which the gyro met its limit.
-    ``attitude`` is the dependence of the zero reading on specific force where it was removed: ``rate`` (samples, 3) are
-    the raw gyro readings without it, and so are the zeros. ``zero_weights`` (n, 3) make the session's zero reading
-    ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,).
+    true zero reading changes from hold to hold; ``clipped_s`` (m,) is the time in each move that the gyro spent at
+    its limit. ``attitude`` is the dependence of the zero reading on specific force where it was removed: ``rate``
+    (samples, 3) are the raw gyro readings without it, and so are the zeros. ``zero_weights`` (n, 3) make the
+    session's zero reading ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,).
     """
 
     moves: Moves
@@ -52,11 +53,16 @@ class MoveMeasurements:
     noise_density: FloatArray
     sigma_time_s: float
     nominal_step_s: float
-    is_clipped: BoolArray
+    clipped_s: FloatArray
     is_gapped: BoolArray
     zero_excess: FloatArray
     attitude: AttitudeDependence | None
     rate: FloatArray
+
+    @property
+    def is_lost(self) -> BoolArray:
+        """Moves (m,) in which the gyro was at its limit too long to be bridged."""
+        return self.clipped_s > LONGEST_BRIDGE_S
 
     @property
     def n_moves(self) -> int:
@@ -154,7 +160,18 @@ def measure_moves(
         zero = np.ascontiguousarray(zero - force @ attitude.A.T)
     else:
         attitude, rate = None, gyroscope
-    prepared = Moves(recording.time_s, rate, edges, np.ascontiguousarray(anchors), links, rate_degree)
+    clipped = bridge_clipping(recording.time_s, gyroscope)
+    if clipped is not None:
+        rate = np.where(clipped.is_clipped, rate + clipped.readings - gyroscope, rate)
+    prepared = Moves(
+        recording.time_s,
+        rate,
+        edges,
+        np.ascontiguousarray(anchors),
+        links,
+        rate_degree,
+        None if clipped is None else clipped.variance,
+    )
 
     var_reading = _mean_variance(segments.accelerometer_sigma_mean, segments.accelerometer_sigma, raw_force)
     var_reading = var_reading + _unexplained_reading_variance(accelerometer)
@@ -182,7 +199,7 @@ def measure_moves(
         noise_density=rate_noise_density(recording, segments),
         sigma_time_s=jitter,
         nominal_step_s=nominal,
-        is_clipped=clipped_moves(gyroscope, edges),
+        clipped_s=clipped_time(clipped, edges, nominal),
         is_gapped=np.array([np.max(steps[a : b - 1], initial=0.0) > 5.0 * nominal for a, b in edges]),
         zero_excess=excess,
         attitude=attitude,
@@ -190,35 +207,20 @@ def measure_moves(
     )
 
 
-def clipped_moves(gyroscope: FloatArray, edges: IntArray) -> BoolArray:
-    """Moves in which a raw axis stays at the extreme value of the whole record for two samples or more, (m,).
-
-    A gyro that is not clipped reaches its extreme once, not repeatedly.
-    """
-    finite = np.where(np.isfinite(gyroscope), gyroscope, 0.0)
-    at_limit = np.zeros(len(gyroscope), dtype=bool)
-    for axis in range(3):
-        column = finite[:, axis]
-        for limit in (column.max(), column.min()):
-            at = column == limit
-            repeated = at[1:] & at[:-1]
-            # At rest a coarse converter repeats its extreme too: a limit is far from where the gyro rests.
-            if np.any(repeated) and abs(limit - np.median(column)) > 0.3 * np.ptp(column):
-                at_limit |= at
-    return np.array([int(np.count_nonzero(at_limit[a:b])) >= 2 for a, b in edges], dtype=bool)
-
-
 def audit_moves(measured: MoveMeasurements) -> list[Finding]:
     """Findings on clipped moves, gaps inside moves, and a zero reading that changes from hold to hold."""
     findings = []
-    if np.any(measured.is_clipped):
-        which = [int(i) for i in np.flatnonzero(measured.is_clipped)]
+    if np.any(measured.clipped_s > 0.0):
+        which = [int(i) for i in np.flatnonzero(measured.clipped_s > 0.0)]
+        lost = int(np.count_nonzero(measured.is_lost))
         findings.append(
             Finding(
                 FindingCode.CLIPPING,
                 Severity.WARNING,
-                f"the gyro met its limit in {len(which)} of {measured.n_moves} moves ({_list(which)}); "
-                "they are left out of the fit.",
+                f"the gyro met its limit in {len(which)} of {measured.n_moves} moves ({_list(which)}), for "
+                f"{1000.0 * float(measured.clipped_s.max()):.0f} ms at most; {len(which) - lost} of them are "
+                f"bridged and "
+                f"weigh less, {lost} left out.",
                 "the sensor was turned faster than its range",
                 "Turn more slowly, or set a wider range.",
             )

@@ -26,9 +26,7 @@ def integral_start(
         return None
     rows, sides = [], []
     force = accelerometer.S @ measured.reading.T + accelerometer.b[:, None]
-    for (start, stop), (before, after), clipped in zip(
-        measured.edges, measured.links, measured.is_clipped, strict=True
-    ):
+    for (start, stop), (before, after), clipped in zip(measured.edges, measured.links, measured.is_lost, strict=True):
         time = recording.time_s[start:stop]
         rate = measured.rate[start:stop] - 0.5 * (measured.zero[before] + measured.zero[after])
         inside = recording.accelerometer[start:stop] @ accelerometer.S.T + accelerometer.b
