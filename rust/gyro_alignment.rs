@@ -9,7 +9,9 @@
 //! `Tⱼ` spans the plane across `f_j`: the length of `f` belongs to the accelerometer, so a move carries rank-two
 //! information. `z` is the zero reading of the gyro, interpolated between the means of the two holds. The residuals are
 //! weighed by their full covariance (5.8), in which neighbouring moves are correlated through the hold they share. With
-//! free accelerometer parameters the rows `|f_h| − |g|` of every hold join in, and the fit is the joint one.
+//! free accelerometer parameters the rows `|f_h| − |g|` of every hold join in, and the fit is the joint one. A given
+//! accelerometer with standard errors is held to them by rows of its own, which is to weigh its errors as noise that all
+//! moves share.
 
 mod covariance;
 mod stages;
@@ -54,6 +56,8 @@ pub struct Model {
     pub gyroscope_scale: Matrix3<f64>,
     /// A rate in the moves that the holds do not show, rad/s (zero unless asked for).
     pub rate_offset: Vector3<f64>,
+    /// How far each free accelerometer direction was followed from the start.
+    pub followed: DVector<f64>,
 }
 
 /// Everything measured.
@@ -75,6 +79,9 @@ pub struct Alignment {
     pub var_zero_walk: Vector3<f64>,
     /// Directions in `(S_f row by row, b_f)` that are free: `(12, k)`; no columns when the accelerometer is given.
     pub accelerometer_basis: DMatrix<f64>,
+    /// Whether these directions are standard errors of a given accelerometer (each then has a row of its own that holds
+    /// it to zero) instead of free parameters, for which the norms of the holds speak.
+    pub is_accelerometer_given: bool,
     /// Whether the rate offset is free.
     pub is_offset_free: bool,
 }
@@ -188,7 +195,9 @@ impl Alignment {
         let k = self.n_accelerometer();
         let mut model = base.clone();
         if k > 0 {
-            let change = &self.accelerometer_basis * x.rows(0, k);
+            let followed = x.rows(0, k);
+            let change = &self.accelerometer_basis * followed;
+            model.followed += followed;
             for i in 0..3 {
                 for j in 0..3 {
                     model.accelerometer_scale[(i, j)] += change[3 * i + j];
@@ -268,6 +277,8 @@ impl Alignment {
 /// Rows of the stacked residual: which hold or move they belong to.
 #[derive(Debug, Clone, Copy)]
 enum Rows {
+    /// A given accelerometer direction, in its standard errors: one row.
+    Given(usize),
     /// `|f| − |g|` of a hold: one row.
     Norm(usize),
     /// A move, with the plane it is seen in: two rows.
@@ -277,7 +288,7 @@ enum Rows {
 impl Rows {
     fn len(&self) -> usize {
         match self {
-            Self::Norm(_) => 1,
+            Self::Given(_) | Self::Norm(_) => 1,
             Self::Move(..) => 2,
         }
     }

@@ -274,6 +274,7 @@ class Moves:
         sigma_time_s: float,
         nominal_step_s: float,
         var_zero_walk: FloatArray,
+        is_accelerometer_given: bool,
         is_offset_free: bool,
         loss_scale: float | None,
     ) -> AlignmentFit: ...

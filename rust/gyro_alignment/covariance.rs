@@ -31,8 +31,11 @@ impl Layout {
             }
         }
         let mut rows = Vec::new();
+        if problem.is_accelerometer_given {
+            rows.extend((0..problem.n_accelerometer()).map(Rows::Given));
+        }
         for (hold, moves) in moves_from.iter().enumerate() {
-            if problem.n_accelerometer() > 0 {
+            if problem.n_accelerometer() > 0 && !problem.is_accelerometer_given {
                 rows.push(Rows::Norm(hold));
             }
             for &index in moves {
@@ -55,6 +58,10 @@ impl Layout {
         let mut jacobian = DMatrix::zeros(self.n, problem.n_parameters());
         for (row, &offset) in self.rows.iter().zip(&self.offsets) {
             match row {
+                Rows::Given(direction) => {
+                    residual[offset] = at.model.followed[*direction];
+                    jacobian[(offset, *direction)] = 1.0;
+                }
                 Rows::Norm(hold) => {
                     let force = at.forces[*hold];
                     residual[offset] = force.norm() - problem.gravity;
@@ -84,6 +91,7 @@ impl Layout {
         let mut out = DMatrix::zeros(self.n, 12);
         for (row, &offset) in self.rows.iter().zip(&self.offsets) {
             match row {
+                Rows::Given(_) => {}
                 Rows::Norm(hold) => out.rows_mut(offset, 1).copy_from(
                     &(at.forces[*hold].normalize().transpose()
                         * force_wrt_accelerometer(&problem.holds[*hold].reading)),
@@ -133,8 +141,13 @@ impl Layout {
         let finest = (FINEST_RELATIVE * problem.gravity).powi(2);
         let mut mahalanobis = vec![0.0; problem.links.len()];
         for (row, &offset) in self.rows.iter().zip(&self.offsets) {
+            let floor = if matches!(row, Rows::Given(_)) {
+                1.0
+            } else {
+                finest
+            };
             for i in 0..row.len() {
-                c.add(offset + i, offset + i, finest);
+                c.add(offset + i, offset + i, floor);
             }
             if let Rows::Move(index, plane) = row {
                 let own = plane * own_covariance(problem, at, *index) * plane.transpose();
@@ -197,6 +210,7 @@ impl Layout {
         let scale = at.model.accelerometer_scale;
         for (block, row) in self.rows.iter().enumerate() {
             match row {
+                Rows::Given(_) => {}
                 Rows::Norm(hold) => readings[*hold].touched.push((
                     block,
                     dynamic(&(at.forces[*hold].normalize().transpose() * scale)),

@@ -137,7 +137,7 @@ impl Moves {
 
     #[pyo3(signature = (*, reading, var_reading, zero, var_zero, zero_weights, used, starts, accelerometer_scale,
         accelerometer_bias, accelerometer_basis, gravity_m_s2, noise_density, sigma_time_s, nominal_step_s,
-        var_zero_walk, is_offset_free, loss_scale))]
+        var_zero_walk, is_accelerometer_given, is_offset_free, loss_scale))]
     #[allow(clippy::too_many_arguments)]
     fn align(
         &self,
@@ -157,6 +157,7 @@ impl Moves {
         sigma_time_s: f64,
         nominal_step_s: f64,
         var_zero_walk: PyReadonlyArray1<'_, f64>,
+        is_accelerometer_given: bool,
         is_offset_free: bool,
         loss_scale: Option<f64>,
     ) -> PyResult<AlignmentFit> {
@@ -204,6 +205,7 @@ impl Moves {
             accelerometer_basis: DMatrix::from_fn(basis.nrows(), basis.ncols(), |i, j| {
                 basis[[i, j]]
             }),
+            is_accelerometer_given,
             is_offset_free,
         };
         let base = Model {
@@ -211,6 +213,7 @@ impl Moves {
             accelerometer_bias: vector3("accelerometer_bias", &accelerometer_bias)?,
             gyroscope_scale: Matrix3::identity(),
             rate_offset: Vector3::zeros(),
+            followed: nalgebra::DVector::zeros(basis.ncols()),
         };
         let starts: Vec<Model> = starts
             .as_array()

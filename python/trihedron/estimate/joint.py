@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.estimate.gyroscope.alignment import Aligned, MoveOptions, align_screened
+from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align_screened
 from trihedron.estimate.gyroscope.findings import findings_of
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.moves import gyroscope_of
@@ -53,8 +53,9 @@ def calibrate_joint(
     measured = measure_moves(recording, segments, accelerometer, options.rate_degree, options.is_attitude_removed)
     basis, frame = free_directions(accelerometer.S)
     first = starts(recording, measured, accelerometer, options.nominal())
-    aligned = align_screened(measured, accelerometer, basis, gravity_m_s2, first, options)
-    held = held_out(aligned, measured, accelerometer, basis, gravity_m_s2, options)
+    part = AccelerometerPart(accelerometer, basis, is_given=False)
+    aligned = align_screened(measured, part, gravity_m_s2, first, options)
+    held = held_out(aligned, measured, part, gravity_m_s2, options)
     return Calibration(
         accelerometer=SensorCalibration(
             S=np.asarray(aligned.fit.accelerometer_scale),

@@ -58,6 +58,30 @@ class MoveOptions:
 
 
 @dataclass(frozen=True, eq=False)
+class AccelerometerPart:
+    """The accelerometer's share in the fit: the ``model``, and ``basis`` (12, k) of directions in its parameters.
+
+    Given (``is_given``): the directions are its standard errors, which all moves share. Otherwise they are free.
+    """
+
+    model: SensorCalibration
+    basis: FloatArray
+    is_given: bool
+
+
+def given_accelerometer(model: SensorCalibration) -> AccelerometerPart:
+    """A finished accelerometer with its covariance ``L Lᵀ``."""
+    size = np.sqrt(np.maximum(np.diag(model.covariance), 1e-300))
+    if not np.any(np.diag(model.covariance) > 0.0):
+        return AccelerometerPart(model, np.zeros((12, 0)), True)
+    # Scaled first: counts and m/s² spread the variances over many decades.
+    values, vectors = np.linalg.eigh(model.covariance / np.outer(size, size))
+    keep = values > 1e-10 * float(values.max())
+    basis: FloatArray = size[:, None] * vectors[:, keep] * np.sqrt(values[keep])
+    return AccelerometerPart(model, np.ascontiguousarray(basis), True)
+
+
+@dataclass(frozen=True, eq=False)
 class Aligned:
     """A finished alignment.
 
@@ -73,12 +97,12 @@ class Aligned:
     used: BoolArray
     outliers: tuple[int, ...]
     inflation: float
+    n_gyroscope: int
 
 
 def align(
     measured: MoveMeasurements,
-    accelerometer: SensorCalibration,
-    basis: FloatArray,
+    accelerometer: AccelerometerPart,
     gravity_m_s2: float,
     starts: FloatArray,
     options: MoveOptions,
@@ -88,7 +112,6 @@ def align(
     return _core_align(
         measured,
         accelerometer,
-        basis,
         gravity_m_s2,
         starts,
         options,
@@ -99,8 +122,7 @@ def align(
 
 def align_screened(
     measured: MoveMeasurements,
-    accelerometer: SensorCalibration,
-    basis: FloatArray,
+    accelerometer: AccelerometerPart,
     gravity_m_s2: float,
     starts: FloatArray,
     options: MoveOptions,
@@ -116,7 +138,7 @@ def align_screened(
     outliers: tuple[int, ...] = ()
     n_parameters = 9 + (3 if options.is_offset_free else 0)
     if options.is_robust and 2 * int(np.count_nonzero(used)) > n_parameters + 2:
-        screen = _core_align(measured, accelerometer, basis, gravity_m_s2, starts, options, used, CAUCHY_SCALE)
+        screen = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, CAUCHY_SCALE)
         distance = np.asarray(screen.mahalanobis)
         # The median of χ²(2) is 1.386; residuals of p fitted parameters are smaller by 1 − p/n.
         shrink = max(1.0 - screen.rank / (2.0 * np.count_nonzero(used)), 0.1)
@@ -128,17 +150,16 @@ def align_screened(
             outliers = tuple(int(i) for i in np.flatnonzero(far))
             used = used & ~far
         starts = np.concatenate([np.asarray(screen.gyroscope_scale)[None], starts])
-    fit = _core_align(measured, accelerometer, basis, gravity_m_s2, starts, options, used, None)
+    fit = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, None)
     inflation = 1.0
     if fit.dof > 0 and chi2_distribution.sf(fit.chi2, fit.dof) < FALSE_ALARM:
         inflation = fit.chi2 / fit.dof
-    return assemble(fit, measured, accelerometer, basis, used, outliers, inflation)
+    return assemble(fit, measured, accelerometer, used, outliers, inflation)
 
 
 def _core_align(
     measured: MoveMeasurements,
-    accelerometer: SensorCalibration,
-    basis: FloatArray,
+    accelerometer: AccelerometerPart,
     gravity_m_s2: float,
     starts: FloatArray,
     options: MoveOptions,
@@ -153,9 +174,10 @@ def _core_align(
         zero_weights=measured.zero_weights,
         used=used,
         starts=starts,
-        accelerometer_scale=accelerometer.S,
-        accelerometer_bias=accelerometer.b,
-        accelerometer_basis=basis,
+        accelerometer_scale=accelerometer.model.S,
+        accelerometer_bias=accelerometer.model.b,
+        accelerometer_basis=accelerometer.basis,
+        is_accelerometer_given=accelerometer.is_given,
         gravity_m_s2=gravity_m_s2,
         noise_density=measured.noise_density,
         sigma_time_s=measured.sigma_time_s,
@@ -169,8 +191,7 @@ def _core_align(
 def assemble(
     fit: AlignmentFit,
     measured: MoveMeasurements,
-    accelerometer: SensorCalibration,
-    basis: FloatArray,
+    accelerometer: AccelerometerPart,
     used: BoolArray,
     outliers: tuple[int, ...],
     inflation: float,
@@ -180,15 +201,15 @@ def assemble(
     ``b_ω = −S_ω z̄ + offset``, so ``δb = −δS_ω z̄ − S_ω δz̄ + δoffset``.
     """
     S = np.asarray(fit.gyroscope_scale)
-    k = basis.shape[1]
+    k = accelerometer.basis.shape[1]
     p = fit.covariance.shape[0]
     inner = inflation * (np.asarray(fit.covariance) + _unseen(fit, S, k))
-    cov_accelerometer = accelerometer.covariance if k == 0 else np.zeros((12, 12))
+    cov_accelerometer = accelerometer.model.covariance if accelerometer.is_given else np.zeros((12, 12))
     response = np.asarray(fit.wrt_accelerometer)
     # y = (fit parameters, z̄, given accelerometer).
     n = p + 3 + 12
     joint = np.zeros((n, n))
-    joint[:p, :p] = inner + response @ cov_accelerometer @ response.T
+    joint[:p, :p] = inner
     joint[:p, p : p + 3] = fit.cov_with_zero
     joint[p : p + 3, :p] = np.asarray(fit.cov_with_zero).T
     joint[p : p + 3, p : p + 3] = np.diag(measured.var_zero_mean)
@@ -196,10 +217,10 @@ def assemble(
     joint[p + 3 :, :p] = joint[:p, p + 3 :].T
     joint[p + 3 :, p + 3 :] = cov_accelerometer
     to_all = np.zeros((24, n))
-    if k == 0:
+    if accelerometer.is_given:
         to_all[:12, p + 3 :] = np.eye(12)
     else:
-        to_all[:12, :k] = basis
+        to_all[:12, :k] = accelerometer.basis
     to_all[12:21, k : k + 9] = np.eye(9)
     for i in range(3):
         to_all[21 + i, k + 3 * i : k + 3 * i + 3] = -measured.zero_mean
@@ -215,6 +236,7 @@ def assemble(
         used=used,
         outliers=outliers,
         inflation=inflation,
+        n_gyroscope=p - k,
     )
 
 

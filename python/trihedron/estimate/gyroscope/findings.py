@@ -25,7 +25,7 @@ def findings_of(aligned: Aligned, measured: MoveMeasurements, held: Prediction |
     covariance = aligned.covariance[12:21, 12:21]
     found = audit_moves(measured)
     found += handedness(S, np.asarray(fit.accelerometer_scale))
-    found += observability_findings(describe(fit, covariance, S), covariance, S)
+    found += observability_findings(describe(fit, covariance, S, aligned.n_gyroscope), covariance, S)
     if not fit.is_converged:
         found.append(
             Finding(

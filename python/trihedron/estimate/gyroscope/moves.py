@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.estimate.gyroscope.alignment import Aligned, MoveOptions, align_screened
+from trihedron.estimate.gyroscope.alignment import Aligned, MoveOptions, align_screened, given_accelerometer
 from trihedron.estimate.gyroscope.findings import findings_of
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.observability import describe
@@ -17,9 +17,6 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 
 FloatArray = npt.NDArray[np.float64]
-
-GIVEN_ACCELEROMETER = np.zeros((12, 0))
-"""Basis without columns: the accelerometer is not fitted."""
 
 
 def calibrate_moves(
@@ -57,8 +54,9 @@ def calibrate_moves(
     options = options or MoveOptions()
     measured = measure_moves(recording, segments, accelerometer, options.rate_degree, options.is_attitude_removed)
     first = starts(recording, measured, accelerometer, options.nominal())
-    aligned = align_screened(measured, accelerometer, GIVEN_ACCELEROMETER, gravity_m_s2, first, options)
-    held = held_out(aligned, measured, accelerometer, GIVEN_ACCELEROMETER, gravity_m_s2, options)
+    part = given_accelerometer(accelerometer)
+    aligned = align_screened(measured, part, gravity_m_s2, first, options)
+    held = held_out(aligned, measured, part, gravity_m_s2, options)
     return gyroscope_of(aligned, measured, recording, gravity_m_s2, held, "moves"), findings_of(aligned, measured, held)
 
 
@@ -80,5 +78,5 @@ def gyroscope_of(
         si_unit="rad/s",
         method=method,
         quality=quality_of(aligned, measured, gravity_m_s2, held),
-        observability=describe(aligned.fit, aligned.covariance[12:21, 12:21], S),
+        observability=describe(aligned.fit, aligned.covariance[12:21, 12:21], S, aligned.n_gyroscope),
     )

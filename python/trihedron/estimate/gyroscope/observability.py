@@ -15,7 +15,7 @@ WEAK = 0.03
 """Relative standard error of a direction in ``S_ω`` above which it is called weak: data sheets promise this much."""
 
 
-def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray) -> Observability:
+def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_gyroscope: int) -> Observability:
     """Turn the SVD of the whitened Jacobian and the covariance (9, 9) of ``S_ω`` into words.
 
     A move shows ``δS_ω ∫w' dt`` across the vertical only, so the element ``S_ij`` needs a turn about body axis ``j``
@@ -43,9 +43,12 @@ def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray) -> Observ
         if abs(correlation[i, j]) > 0.9
     )
     singular = np.asarray(fit.singular_values)
-    n = len(singular)
-    condition = float(singular[0] / singular[-1]) if fit.rank == n and singular[-1] > 0 else float("inf")
-    return Observability(fit.rank, n, condition, singular, weakest, advice, pairs)
+    condition = float(singular[0] / singular[-1]) if fit.rank == len(singular) else float("inf")
+    # Directions that the moves leave open, as far as they concern the gyro; its nine parameters are counted.
+    k = len(singular) - n_gyroscope
+    unseen = np.asarray(fit.directions)[k:, fit.rank :]
+    n_unseen = int(np.count_nonzero(np.linalg.norm(unseen, axis=0) > 0.5))
+    return Observability(n_gyroscope - n_unseen, n_gyroscope, condition, singular, weakest, advice, pairs)
 
 
 def _advice(fit: AlignmentFit, covariance: FloatArray, size: float) -> list[str]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.estimate.gyroscope.alignment import Aligned, MoveOptions, align, assemble
+from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align, assemble
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.records.calibration import FitQuality, SensorCalibration
+from trihedron.records.calibration import FitQuality
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -66,8 +66,7 @@ def predict(aligned: Aligned, measured: MoveMeasurements, is_held_out: bool) -> 
 def held_out(
     aligned: Aligned,
     measured: MoveMeasurements,
-    accelerometer: SensorCalibration,
-    basis: FloatArray,
+    accelerometer: AccelerometerPart,
     gravity_m_s2: float,
     options: MoveOptions,
 ) -> Prediction | None:
@@ -83,10 +82,10 @@ def held_out(
         out = indices[fold::n_folds]
         used = aligned.used.copy()
         used[out] = False
-        fit = align(measured, accelerometer, basis, gravity_m_s2, start, options, used)
+        fit = align(measured, accelerometer, gravity_m_s2, start, options, used)
         if fit.rank < aligned.fit.rank:
             return None
-        without = assemble(fit, measured, accelerometer, basis, used, (), aligned.inflation)
+        without = assemble(fit, measured, accelerometer, used, (), aligned.inflation)
         parts.append((out, predict(without, measured, is_held_out=True)))
     m = measured.n_moves
     merged: dict[str, FloatArray] = {name: np.full((m, 3), np.nan) for name in ("residual", "sigma")}
