@@ -111,6 +111,8 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     pooled = np.vstack([channels.variance[a:b] for run in runs for a, b in run.quiet_ranges()])
     noise = np.maximum(np.nanmean(pooled, axis=0) - channels.quantisation_variance, 0.0)
     q2 = np.where(channels.quantum > 0.0, channels.quantum**2, 1.0)
+    # Readings that only toggle between two neighbours (variance up to q²/4) do not show how large the noise is.
+    noise = np.where(noise < q2 / 4.0, 0.0, noise)
     first = q2 / (2.0 * np.pi**2) * np.exp(-4.0 * np.pi**2 * noise / q2)
-    out: FloatArray = np.where(channels.quantum > 0.0, np.minimum(first, q2 / 12.0), 0.0)
+    out: FloatArray = np.where(channels.quantum > 0.0, np.where(noise > 0.0, first, q2 / 12.0), 0.0)
     return out

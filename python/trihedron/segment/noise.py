@@ -55,6 +55,13 @@ def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = F
             taus.append(size * channels.step_s)
             counts.append(float(len(squares)))
             variances.append(pooled)
+        # A stretch's own halves reach further than the last power of two in it: the mean of the whole is extrapolated.
+        own = [(a, b) for a, b in ranges if size < (b - a) // 2 < 2 * size]
+        if len(own) > 1:
+            squares = np.vstack([two_sample_differences(channels.mean[a:b], (b - a) // 2)[:1] for a, b in own])
+            taus.append(float(np.mean([(b - a) // 2 for a, b in own])) * channels.step_s)
+            counts.append(float(len(own)))
+            variances.append(np.median(squares, axis=0) / stats.chi2.median(1) if is_robust else squares.mean(axis=0))
         size *= 2
     rounding = channels.quantisation_variance / channels.length
     if not taus:
@@ -67,9 +74,29 @@ def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = F
         seen = np.array([v[channel] for v in variances]) + 1e-6 * rounding[channel]
         if not np.any(seen > 0.0):
             continue
-        model = np.maximum(seen, 0.1 * seen.max() * tau[0] / tau)
-        for _ in range(4):
-            weight = np.sqrt(n) / model
-            terms[channel], _ = optimize.nnls(design * weight[:, None], seen * weight)
-            model = np.maximum(design @ terms[channel], 1e-3 * seen.max() * tau[0] / tau)
+        fits = [_fit(design, seen, n, chosen) for chosen in TERMS]
+        criterion = np.array([fit[0] for fit in fits])
+        weight = np.exp(-0.5 * (criterion - criterion.min()))
+        terms[channel] = np.average([fit[1] for fit in fits], axis=0, weights=weight)
     return MeanNoise(terms[:, 0], terms[:, 1], terms[:, 2])
+
+
+TERMS = ([0], [0, 1], [0, 2], [0, 1, 2])
+"""White alone; with flicker; with walk; with both. The law is their average by Akaike's weights: a term must earn
+its place, or it would inflate every error, and none is struck out for good by too short a log."""
+
+
+def _fit(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int]) -> tuple[float, FloatArray]:
+    """Akaike's criterion and the non-negative terms of one choice.
+
+    A variance with n degrees of freedom has the deviance n (s/v - 1 - ln(s/v)); a term costs 2.
+    """
+    terms = np.zeros(3)
+    least = 1e-3 * seen.max() * design[:, 0] / design[0, 0]
+    model = np.maximum(seen, 100.0 * least)
+    for _ in range(5):
+        weight = np.sqrt(n) / model
+        terms[chosen], _ = optimize.nnls(design[:, chosen] * weight[:, None], seen * weight)
+        model = np.maximum(design @ terms, least)
+    ratio = np.maximum(seen, 1e-3 * least) / model
+    return float((n * (ratio - 1.0 - np.log(ratio))).sum()) + 2.0 * len(chosen), terms

@@ -15,12 +15,14 @@ from trihedron.segment.means import average_holds
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.runs import (
     Run,
+    close_gaps,
     find_unsteady,
     join_quiet,
     loose_blocks,
     ranges_of,
     trim_edges,
     turning_blocks,
+    widen,
 )
 from trihedron.units import AccelerationUnit
 
@@ -55,8 +57,9 @@ def segment_recording(recording: Recording, *, progress: Progress | None = None)
     if activity.is_wandering(channels):
         return _nothing_found(recording, channels)
     report(0.4, "still stretches")
-    turning = turning_blocks(channels, activity.is_quiet)
-    quiet = activity.is_quiet & ~turning
+    quiet = widen(close_gaps(activity.is_quiet, channels.is_valid), channels.is_valid)
+    turning = turning_blocks(channels, quiet, _gravity_reading(recording, channels))
+    quiet &= ~turning
     loose = loose_blocks(activity, channels.is_valid) & ~turning
     runs = _find_runs(recording, channels, quiet, loose)
     report(0.7, "means and their errors")

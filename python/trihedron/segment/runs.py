@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from trihedron.segment.channels import BoolArray, Channels, FloatArray, rolling_mean
+from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, rolling_mean
 from trihedron.segment.floor import Activity
 from trihedron.segment.noise import MeanNoise, Range
 
@@ -15,6 +15,12 @@ MIN_HOLD_S = 1.0
 """A hand that hesitates stops for a few tenths of a second; a person who holds, holds a second."""
 BUMP_S = 2.0
 """A push and the ringing after it last less than this; what lasts longer is a move even if the pose comes back."""
+RETURN = 0.3
+"""A push and its return cancel: what is left of the turn is less than this part of the way turned to and fro."""
+CLEAN_EDGE = 2e-3
+"""Chance that a clean stretch at an end is trimmed, where it costs some tenths of a second."""
+CREEP_PART = 0.02
+"""A creeping support turns slower than this part of the speed of the log's own moves."""
 SAME_POSE = 1e-3
 """Chance that two stretches of one pose are called two poses."""
 SWAY_RAD = 0.02
@@ -70,11 +76,28 @@ def loose_blocks(activity: Activity, is_valid: BoolArray) -> BoolArray:
     return loose | below
 
 
-def turning_blocks(channels: Channels, quiet: BoolArray) -> BoolArray:
+def close_gaps(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
+    """Quiet blocks with gaps shorter than a window closed: a true disturbance lifts every window it lies in."""
+    out = quiet.copy()
+    for first, last in ranges_of(~quiet):
+        if first > 0 and last < len(quiet) and last - first < WINDOW_BLOCKS and is_valid[first:last].all():
+            out[first:last] = True
+    return out
+
+
+def widen(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
+    """The whole of the quiet windows: a quiet block is the centre of one, which reaches further on either side."""
+    kernel = np.ones(2 * (WINDOW_BLOCKS // 2) + 1)
+    out: BoolArray = (np.convolve(quiet.astype(np.float64), kernel, mode="same") > 0.5) & is_valid
+    return out
+
+
+def turning_blocks(channels: Channels, quiet: BoolArray, gravity: float | None) -> BoolArray:
     """Quiet blocks in which the gyro reads far from its common zero: a slow steady turn, gravity says nothing of.
 
-    The zero is the median over the quiet windows of one second, its scatter that of the windows or of the holds,
-    whichever is larger: a zero that depends on the pose or drifts is no turn.
+    The zero is where the windows of one second are densest, for turns may take most of the time; its scatter is theirs,
+    or that of the holds' nearest windows where that is larger: a zero that depends on the pose is no turn. Where the
+    accelerometer sees the tilt too, and it stays within ``SWAY_RAD``, the hold creeps and remains a hold.
     """
     out = np.zeros(len(quiet), dtype=bool)
     gyro = np.flatnonzero(channels.is_gyroscope)
@@ -82,42 +105,93 @@ def turning_blocks(channels: Channels, quiet: BoolArray) -> BoolArray:
         return out
     centre = np.median(channels.mean[quiet][:, gyro], axis=0)
     reading = np.where(channels.is_valid[:, None], channels.mean[:, gyro] - centre, 0.0)
-    second = rolling_mean(reading, channels.blocks(1.0))
-    holds = [np.median(reading[a:b], axis=0) for a, b in ranges_of(quiet) if b - a >= channels.blocks(MIN_HOLD_S)]
-    zero = np.median(second[quiet], axis=0)
-    scatter = _scatter(second[quiet])
-    if len(holds) > 1:
-        scatter = np.maximum(scatter, _scatter(np.array(holds)))
+    second = np.zeros_like(reading)
+    ranges = ranges_of(quiet)
+    for a, b in ranges:
+        # Inside the quiet stretch only: the move next to it has its own say.
+        second[a:b] = rolling_mean(reading[a:b], channels.blocks(1.0))
+    zero, scatter = _densest(second[quiet])
+    nearest = [np.abs(second[a:b] - zero).min(axis=0) for a, b in ranges if b - a >= channels.blocks(MIN_HOLD_S)]
+    if len(nearest) > 1:
+        scatter = np.maximum(scatter, 1.4826 * np.median(nearest, axis=0))
     scatter = np.maximum(scatter, channels.quantum[gyro] / np.sqrt(12.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.nan_to_num(np.abs(second - zero) / scatter, nan=0.0)
-    turning: BoolArray = quiet & (distance > TURN_SIGMAS).any(axis=1)
-    return turning
-
-
-def _scatter(values: FloatArray) -> FloatArray:
-    out: FloatArray = 1.4826 * np.median(np.abs(values - np.median(values, axis=0)), axis=0)
+    top = _speed_of_moves(channels, quiet)
+    out[:] = quiet & (distance > TURN_SIGMAS).any(axis=1)
+    for a, b in ranges:
+        flagged = a + np.flatnonzero(out[a:b])
+        if not len(flagged):
+            continue
+        is_slow = bool((np.abs(second[flagged] - zero).max(axis=0) < CREEP_PART * top).all())
+        if gravity is not None and is_slow and _tilts_a_little(channels, flagged[0], flagged[-1] + 1, gravity):
+            out[a:b] = False
+        for first, last in ranges_of(out[a:b]):
+            # A turn of any length fills a whole second of windows; at the ends of the stretch it may run on outside.
+            if last - first < WINDOW_BLOCKS and first > 0 and last < b - a:
+                out[a + first : a + last] = False
     return out
+
+
+def _speed_of_moves(channels: Channels, quiet: BoolArray) -> float:
+    """Gyro reading of the log's faster moves about its zero, raw unit; infinite in a log without moves."""
+    moving = ~quiet & channels.is_valid
+    gyro = channels.is_gyroscope
+    if not moving.any() or not quiet.any() or not gyro.any():
+        return float("inf")
+    zero = np.median(channels.mean[quiet][:, gyro], axis=0)
+    return float(np.quantile(np.abs(channels.mean[moving][:, gyro] - zero), 0.9, axis=0).max())
+
+
+def _tilts_a_little(channels: Channels, first: int, last: int, gravity: float) -> bool:
+    """The accelerometer too sees a drift over the stretch, of no more than a hand's sway."""
+    attitude = channels.mean[first:last, ~channels.is_gyroscope]
+    half = len(attitude) // 2
+    if half < 1 or not attitude.shape[1]:
+        return False
+    drift = attitude[-half:].mean(axis=0) - attitude[:half].mean(axis=0)
+    steps = np.diff(attitude, axis=0)
+    variance = (steps**2).mean(axis=0) / half
+    live = variance > 0.0
+    statistic = float((drift[live] ** 2 / variance[live]).sum())
+    # The halves' means are half of the whole drift apart.
+    is_small = 2.0 * float(np.linalg.norm(drift)) / gravity < SWAY_RAD
+    return is_small and statistic > float(stats.chi2.isf(SAME_POSE, max(int(live.sum()), 1)))
+
+
+def _densest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Middle of the shortest interval that holds a quarter of the values of each axis, and the deviation it implies."""
+    ordered = np.sort(values, axis=0)
+    n = len(ordered)
+    quarter = max(n // 4, 1)
+    width = ordered[quarter:] - ordered[: n - quarter] if n > quarter else np.zeros((1, values.shape[1]))
+    at = width.argmin(axis=0)
+    axes = np.arange(values.shape[1])
+    middle: FloatArray = ordered[at + quarter // 2, axes]
+    deviation: FloatArray = width[at, axes] / (2.0 * float(stats.norm.ppf(0.5 + 0.25 / 2.0)))
+    return middle, deviation
 
 
 def join_quiet(channels: Channels, quiet: BoolArray, loose: BoolArray, noise: MeanNoise) -> list[Run]:
     """Holds from quiet stretches: neighbours in one pose, with only a bump between, are one hold."""
     runs: list[Run] = []
     shortest = channels.blocks(MIN_HOLD_S)
-    # Half a hold must show the pose before a neighbour is compared with it.
+    creeping = CREEP_PART * _speed_of_moves(channels, quiet)
     for first, last in ranges_of(quiet):
         piece = Run(first, last)
         if runs:
             before = runs[-1]
             gap = (first - before.last) * channels.step_s
-            if (gap <= BUMP_S or loose[before.last : first].all()) and _is_same_pose(channels, before, piece, noise):
+            if (gap <= BUMP_S or loose[before.last : first].all()) and _is_same_pose(
+                channels, before, piece, noise, creeping
+            ):
                 runs[-1] = Run(before.first, last, (*before.bumps, (before.last, first)))
                 continue
         runs.append(piece)
     return [run for run in runs if sum(b - a for a, b in run.quiet_ranges()) >= shortest]
 
 
-def _is_same_pose(channels: Channels, before: Run, after: Run, noise: MeanNoise) -> bool:
+def _is_same_pose(channels: Channels, before: Run, after: Run, noise: MeanNoise, creeping: float) -> bool:
     difference = np.zeros(channels.mean.shape[1])
     variance = np.zeros_like(difference)
     for sign, run in ((-1.0, before), (1.0, after)):
@@ -127,7 +201,27 @@ def _is_same_pose(channels: Channels, before: Run, after: Run, noise: MeanNoise)
     variance += 2.0 * channels.quantisation_variance
     live = variance > 0.0
     statistic = float(np.sum(difference[live] ** 2 / variance[live]))
-    return statistic < float(stats.chi2.isf(SAME_POSE, int(live.sum())))
+    if statistic > float(stats.chi2.isf(SAME_POSE, int(live.sum()))):
+        return False
+    return _comes_back(channels, before, after, noise, creeping)
+
+
+def _comes_back(channels: Channels, before: Run, after: Run, noise: MeanNoise, creeping: float) -> bool:
+    """The gyro's integral between two stretches is nothing: a push and its return, not a turn about the vertical."""
+    gyro = np.flatnonzero(channels.is_gyroscope)
+    between = slice(before.last, after.first)
+    is_valid = channels.is_valid[between]
+    if not len(gyro) or not is_valid.any():
+        return True
+    zero = 0.5 * (run_mean(channels, before)[0] + run_mean(channels, after)[0])[gyro]
+    rate = channels.mean[between][is_valid][:, gyro] - zero
+    net = rate.mean(axis=0)
+    variance = noise.variance(len(rate) * channels.step_s)[gyro]
+    live = variance > 0.0
+    statistic = float(np.sum(net[live] ** 2 / variance[live]))
+    is_nothing = statistic < float(stats.chi2.isf(SAME_POSE, max(int(live.sum()), 1)))
+    travelled = float(np.linalg.norm(rate, axis=1).mean())
+    return is_nothing or float(np.linalg.norm(net)) < max(RETURN * travelled, creeping)
 
 
 def run_mean(channels: Channels, run: Run) -> tuple[FloatArray, int]:
@@ -141,8 +235,8 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
 
     ``gravity`` is the accelerometer's reading of |g| in raw units; without it an angle has no scale, and none is found.
     """
-    accelerometer = ~channels.is_gyroscope
-    if gravity is None or not accelerometer.any():
+    accelerometer = np.flatnonzero(~channels.is_gyroscope)
+    if gravity is None or not len(accelerometer):
         return []
     free = loose.copy()
     for run in steady:
@@ -153,14 +247,30 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
         while b < len(free) and free[b]:
             b += 1
         free[a:b] = False
-    found = []
+    attitude = channels.mean[:, accelerometer] / gravity
+    shortest, bump = channels.blocks(MIN_HOLD_S), channels.blocks(BUMP_S)
+    found: list[Run] = []
     for first, last in ranges_of(free):
-        if last - first < channels.blocks(MIN_HOLD_S):
+        run = Run(first, last, (), True)
+        if last - first < shortest or _sway(attitude, [run]) > SWAY_RAD:
             continue
-        sway = np.linalg.norm(channels.mean[first:last][:, accelerometer].std(axis=0)) / gravity
-        if sway < SWAY_RAD:
-            found.append(Run(first, last, (), True))
+        if any(
+            max(first - near.last, near.first - last) < bump and _sway(attitude, [near, run]) < SWAY_RAD
+            for near in steady
+        ):
+            # The same pose before it settled, or after it was touched.
+            continue
+        if found and first - found[-1].last < bump and _sway(attitude, [found[-1], run]) < SWAY_RAD:
+            before = found.pop()
+            run = Run(before.first, last, (*before.bumps, (before.last, first)), True)
+        found.append(run)
     return found
+
+
+def _sway(attitude: FloatArray, runs: list[Run]) -> float:
+    """Scatter of the attitude over runs together [rad]."""
+    blocks = np.vstack([attitude[a:b] for run in runs for a, b in run.quiet_ranges()])
+    return float(np.linalg.norm(blocks.std(axis=0)))
 
 
 def trim_edges(channels: Channels, run: Run, noise: MeanNoise) -> Run:
@@ -181,8 +291,12 @@ def trim_edges(channels: Channels, run: Run, noise: MeanNoise) -> Run:
     level = mean[core].mean(axis=0)
     off = np.where(good[:, None], mean - level, 0.0)
     core_variance = noise.variance(core.sum() * channels.step_s)
-    start = _clean_from(off, core_variance, channels, noise, n // 3)
-    stop = n - _clean_from(off[::-1], core_variance, channels, noise, n // 3)
+    most = n // 3
+    start, tail = (_clean_from(side, core_variance, channels, noise, most) for side in (off, off[::-1]))
+    if start + tail > n // 2:
+        # Hardly a middle is left: the hold creeps throughout, which is said instead of trimmed.
+        start = tail = 0
+    stop = n - tail
     bumps = tuple((a, b) for a, b in run.bumps if b > run.first + start and a < run.first + stop)
     bumps = tuple((max(a, run.first + start), min(b, run.first + stop)) for a, b in bumps)
     return replace(run, first=run.first + start, last=run.first + stop, bumps=bumps, trimmed=(start, n - stop))
@@ -192,7 +306,7 @@ def _clean_from(off: FloatArray, core_variance: FloatArray, channels: Channels, 
     total = np.vstack([np.zeros(off.shape[1]), np.cumsum(off, axis=0)])
     sizes = [2**k for k in range(16) if 2**k <= most]
     live = np.flatnonzero(noise.variance(1.0) > 0.0)
-    limit = float(stats.chi2.isf(SAME_POSE, len(live)))
+    limit = float(stats.chi2.isf(CLEAN_EDGE, len(live)))
     dirty = np.zeros(most + 1, dtype=bool)
     for size in sizes:
         variance = noise.variance(size * channels.step_s) + core_variance + channels.quantisation_variance
@@ -200,4 +314,6 @@ def _clean_from(off: FloatArray, core_variance: FloatArray, channels: Channels, 
         statistic = (mean[:, live] ** 2 / variance[live]).sum(axis=1)
         dirty[: len(statistic)] |= statistic > limit
     clean = np.flatnonzero(~dirty)
-    return int(clean[0]) if len(clean) else most
+    # A soft beginning goes on below what can be seen: as much again is given away; and one block, which may be the
+    # one the motion begins in.
+    return min(2 * int(clean[0]) + 1, most) if len(clean) else most
