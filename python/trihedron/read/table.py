@@ -84,17 +84,18 @@ def available_memory_bytes() -> int | None:
     return None
 
 
-def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None = None) -> None:
+def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None = None, n_held: int = 0) -> None:
     """Refuse a log that would not fit, before it takes the machine down.
 
     Raises
     ------
     ReadError
-        When ``n_rows * n_columns * 24`` bytes exceed what the machine has left.
+        When ``n_rows * n_columns * 24`` bytes, less 8 for every cell of the ``n_held`` rows already read, exceed what
+        the machine has left.
     """
     left = available_memory_bytes() if available is None else available
     needed = n_rows * n_columns * BYTES_PER_CELL_AT_PEAK
-    if left is not None and needed > left:
+    if left is not None and needed - 8 * n_held * n_columns > left:
         raise ReadError(
             f"{path}: about {n_rows:.3g} rows of {n_columns} columns need {needed / 1e9:.1f} GB of memory and this "
             f"machine has {left / 1e9:.1f} GB left; cut the log into parts and read them one by one."

@@ -259,7 +259,7 @@ class TextReader:
         rows_per_byte = self.n_rows / max(self.n_bytes + len(data), 1)
         expected = int(self.size * rows_per_byte) if self.compression is None else self.n_rows
         if expected > 1_000_000:
-            check_memory(self.path, expected, layout.n_fields)
+            check_memory(self.path, expected, layout.n_fields, n_held=self.n_rows)
 
     def _polars(
         self, data: bytes, schema: Mapping[str, type[pl.DataType]], layout: Layout, quoted: bool
