@@ -19,6 +19,7 @@ from trihedron.cli.check import check
 from trihedron.cli.demo import demo
 from trihedron.cli.export import export
 from trihedron.cli.segment import segment
+from trihedron.cli.simulate import simulate
 from trihedron.cli.verify import verify
 
 # In the order in which they are used.
@@ -30,6 +31,7 @@ COMMANDS = (
     verify,
     apply,
     export,
+    simulate,
 )
 
 COULD_NOT_RUN = 1

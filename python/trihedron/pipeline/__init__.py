@@ -6,6 +6,7 @@ from trihedron.pipeline.checking import check
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import read, segment
 from trihedron.pipeline.results import CalibrationResult, CheckResult, VerificationResult
+from trihedron.pipeline.simulating import simulate, twin
 from trihedron.pipeline.verifying import verify
 
 __all__ = [
@@ -19,5 +20,7 @@ __all__ = [
     "read",
     "segment",
     "settle_gravity",
+    "simulate",
+    "twin",
     "verify",
 ]

@@ -7,7 +7,7 @@ from trihedron.simulate.library import list_scenarios, scenario_by_name
 from trihedron.simulate.motion import Disturb, Hold, Motion, MoveTo, Oscillate, Replay, Turn, Vibrate
 from trihedron.simulate.noise import NoiseTerms, make_noise
 from trihedron.simulate.profiles import PROFILES, Profile, profile_by_name
-from trihedron.simulate.readout import Adc, Drift, Electronics, Filter, Interference, Thermal
+from trihedron.simulate.readout import Adc, Drift, Electronics, Filter, Interference, Smoother, Thermal
 from trihedron.simulate.run import simulate
 from trihedron.simulate.scenario import Clock, Environment, Loss, Scenario, Supply, Temperature
 from trihedron.simulate.scenario_file import read_scenario
@@ -20,6 +20,7 @@ from trihedron.simulate.sessions import (
     six_faces,
     table_turns,
 )
+from trihedron.simulate.twin import twin_scenario
 
 __all__ = [
     "EFFECT_IDS",
@@ -46,6 +47,7 @@ __all__ = [
     "Replay",
     "Scenario",
     "SenseMode",
+    "Smoother",
     "Supply",
     "Temperature",
     "Thermal",
@@ -65,5 +67,6 @@ __all__ = [
     "simulate",
     "six_faces",
     "table_turns",
+    "twin_scenario",
     "with_effect",
 ]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.simulate.noise import NoiseTerms
-from trihedron.simulate.readout import IDENTITY, NO_MATRIX, NONE, Adc, Electronics, Matrix, Triple, sense_axes
+from trihedron.simulate.readout import IDENTITY, NO_MATRIX, NONE, Adc, Electronics, Matrix, Smoother, Triple, sense_axes
 from trihedron.units import AccelerationUnit
 
 FloatArray = npt.NDArray[np.float64]
@@ -70,6 +70,7 @@ class Accelerometer:
 
     ``places_m`` (row per channel) are the places of the three proof masses from the body's reference point [m].
     ``rectification`` [1/(m/s²)]: offset per mean square of the acceleration faster than ``rectification_corner_hz``.
+    ``noise_filter``: the part's own digital low-pass, which colours the noise.
     """
 
     S: Matrix = IDENTITY
@@ -82,6 +83,7 @@ class Accelerometer:
     rectification_corner_hz: float = 5.0
     electronics: Electronics = field(default_factory=Electronics)
     noise: NoiseTerms = field(default_factory=NoiseTerms)
+    noise_filter: Smoother = field(default_factory=Smoother)
     adc: Adc = field(default_factory=Adc)
 
     @property

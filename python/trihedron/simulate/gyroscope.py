@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.simulate.noise import NoiseTerms
-from trihedron.simulate.readout import IDENTITY, NO_MATRIX, NONE, Adc, Electronics, Matrix, Triple, sense_axes
+from trihedron.simulate.readout import IDENTITY, NO_MATRIX, NONE, Adc, Electronics, Matrix, Smoother, Triple, sense_axes
 from trihedron.units import RateUnit
 
 FloatArray = npt.NDArray[np.float64]
@@ -39,6 +39,7 @@ class Gyroscope:
 
     ``g_sensitivity`` (row per channel) [(rad/s)/(m/s²)]: rate seen per specific force; ``rectification``
     [(rad/s)/(m/s²)²]: rate seen per mean square of the acceleration faster than ``rectification_corner_hz``.
+    ``noise_filter``: the part's own digital low-pass, which colours the noise.
     """
 
     S: Matrix = IDENTITY
@@ -50,6 +51,7 @@ class Gyroscope:
     rectification_corner_hz: float = 5.0
     electronics: Electronics = field(default_factory=Electronics)
     noise: NoiseTerms = field(default_factory=NoiseTerms)
+    noise_filter: Smoother = field(default_factory=Smoother)
     adc: Adc = field(default_factory=Adc)
 
     @property

@@ -250,7 +250,7 @@ def up_in_body(q: Quaternion) -> FloatArray:
 
 def attitude_with_up(up: npt.ArrayLike) -> Quaternion:
     """Any attitude whose body direction ``up`` points to the zenith."""
-    return quaternion_product(LEVEL, quaternion_from_vector(_shortest_turn(_unit(up), np.array([0.0, 0.0, 1.0]))))
+    return quaternion_product(LEVEL, quaternion_from_vector(shortest_turn(_unit(up), np.array([0.0, 0.0, 1.0]))))
 
 
 def _unit(v: npt.ArrayLike) -> FloatArray:
@@ -261,7 +261,7 @@ def _unit(v: npt.ArrayLike) -> FloatArray:
     return out / norm
 
 
-def _shortest_turn(a: FloatArray, b: FloatArray) -> FloatArray:
+def shortest_turn(a: FloatArray, b: FloatArray) -> FloatArray:
     """Rotation vector that turns unit vector a into unit vector b."""
     cross = np.cross(a, b)
     sine, cosine = float(np.linalg.norm(cross)), float(a @ b)
@@ -335,7 +335,7 @@ class _Planner:
             self.add("hold", step.name, step.duration_s, creep if step.creep_deg else None, ramp=0.05)
         elif isinstance(step, MoveTo):
             # Body vector v turns so that the new zenith is `up`: R' = R exp(v), exp(v) up = old zenith in the body.
-            turn = quaternion_from_vector(_shortest_turn(_unit(step.up), up_in_body(self.attitude_above_table())))
+            turn = quaternion_from_vector(shortest_turn(_unit(step.up), up_in_body(self.attitude_above_table())))
             heading = quaternion_from_vector(radians_from_degrees(step.heading_deg) * _unit(step.up))
             rotation = vector_from_quaternion(quaternion_product(turn, heading))
             k = self.add("move", step.name, step.duration_s, rotation, step.ramp, step.travel_m, step.arm_m)

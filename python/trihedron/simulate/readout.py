@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import lfilter, lfilter_zi
 
 from trihedron import _core
 
@@ -98,6 +99,39 @@ class Filter:
         if self.order % 2:
             signal = _core.simulate_first_order(signal, dt, [0.5 / (math.pi * self.cutoff_hz)] * 3)
         return signal
+
+
+@dataclass(frozen=True)
+class Smoother:
+    """Digital low-pass of the part as its noise meets it, at the output rate.
+
+    Butterworth poles of ``corner_hz`` (0: none) and ``order`` 1 to 6, carried over by ``z = exp(s dt)``; gain one at
+    rest.
+    """
+
+    corner_hz: float = 0.0
+    order: int = 1
+
+    def __post_init__(self) -> None:
+        if not (self.corner_hz >= 0.0 and 1 <= self.order <= 6):
+            raise ValueError(f"a smoother needs corner_hz >= 0 and order 1..6, got {self.corner_hz} Hz, {self.order}")
+
+    def feedback(self, dt: float) -> FloatArray:
+        """(order + 1,) denominator in powers of 1/z."""
+        n = self.order
+        angles = np.pi * (2.0 * np.arange(n) + n + 1.0) / (2.0 * n)
+        poles = np.exp(2.0 * np.pi * self.corner_hz * dt * np.exp(1j * angles))
+        out: FloatArray = np.real(np.poly(poles))
+        return out
+
+    def apply(self, signal: FloatArray, dt: float) -> FloatArray:
+        """(n, 3) → (n, 3), settled on the first sample."""
+        if self.corner_hz == 0.0:
+            return signal
+        a = self.feedback(dt)
+        gain = [float(a.sum())]
+        settled = lfilter_zi(gain, a)[:, None] * signal[:1]
+        return np.ascontiguousarray(lfilter(gain, a, signal, axis=0, zi=settled)[0])
 
 
 @dataclass(frozen=True)

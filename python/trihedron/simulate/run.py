@@ -41,7 +41,7 @@ def simulate(scenario: Scenario, seed: int = 0) -> tuple[Recording, Truth]:
     plan = plan_motion(scenario.motion, stream(seed, "motion"))
     clock, place = scenario.clock, scenario.environment
     accel, gyro = scenario.accelerometer, scenario.gyroscope
-    n = int(np.floor(plan.duration_s * clock.true_rate_hz + 1e-9))
+    n = len(clock.instants_s) or int(np.floor(plan.duration_s * clock.true_rate_hz + 1e-9))
     if n < 1:
         raise ValueError(f"the motion lasts {plan.duration_s:g} s, less than one sample at {clock.rate_hz:g} Hz")
     true_s = _sample_instants(clock, n, seed)
@@ -123,7 +123,7 @@ def _read(
         signal = sensor.sense((force, rate, change), time_s, dt, _die(sensor, place, time_s, dt))
     noise = sensor.noise
     if any(any(getattr(noise, term)) for term in "QNBKR"):
-        signal += make_noise(noise, len(time_s), dt, seed, name)
+        signal += sensor.noise_filter.apply(make_noise(noise, len(time_s), dt, seed, name), dt)
     _, gain = sense_axes(sensor.S, name)
     offset = -np.linalg.solve(np.asarray(sensor.S), np.asarray(sensor.b))
     raw = signal  # in place: ten million samples are 240 MB
@@ -151,7 +151,7 @@ def _die(sensor: Sensor, place: Environment, time_s: FloatArray, dt: float) -> F
 
 
 def _sample_instants(clock: Clock, n: int, seed: int) -> FloatArray:
-    grid = np.arange(n) / clock.true_rate_hz
+    grid = np.array(clock.instants_s) if clock.instants_s else np.arange(n) / clock.true_rate_hz
     if clock.jitter_s == 0.0:
         return grid
     # Neighbours must not overtake each other: the tail beyond 0.45 steps is folded to it.
@@ -177,7 +177,9 @@ def _stamps(clock: Clock, true_s: FloatArray, kept: npt.NDArray[np.bool_], seed:
     n = int(np.count_nonzero(kept))
     index = np.arange(n) if clock.restamped else np.flatnonzero(kept)
     stamps: FloatArray = index / clock.rate_hz
-    if clock.stamps_show_jitter and not clock.restamped:
+    if clock.instants_s and not clock.restamped:
+        stamps = np.array(clock.instants_s)[kept]
+    elif clock.stamps_show_jitter and not clock.restamped:
         stamps = true_s[kept] * (1.0 + clock.rate_error)
     if clock.stamp_jitter_s > 0.0:
         noise = clock.stamp_jitter_s * stream(seed, "clock/stamps").standard_normal(len(true_s))[kept]

@@ -127,7 +127,8 @@ class Clock:
     rms of the true instants about the grid; ``stamps_show_jitter`` writes it into the stamps. ``stamp_jitter_s``: rms
     error of the stamps alone. ``gyroscope_offset_s``: the gyro samples that much later under the same stamp. Samples
     are lost as listed in ``losses`` and at random with ``loss_probability``; ``restamped`` then counts on as if
-    nothing were missing. ``oversample`` fine steps per sample where a sensor has dynamics (0: 8).
+    nothing were missing. ``instants_s`` gives every true instant, from 0, instead of a grid: stamps and gaps of a
+    real log. ``oversample`` fine steps per sample where a sensor has dynamics (0: 8).
     """
 
     rate_hz: float = 100.0
@@ -140,12 +141,15 @@ class Clock:
     loss_probability: float = 0.0
     restamped: bool = False
     oversample: int = 0
+    instants_s: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0.0 < self.rate_hz < 1e6:
             raise ValueError(f"rate_hz must be a positive number, got {self.rate_hz}")
         if not (0.0 <= self.loss_probability < 1.0 and self.jitter_s >= 0.0 and self.stamp_jitter_s >= 0.0):
             raise ValueError("loss_probability must be in [0, 1); jitter_s and stamp_jitter_s must not be negative")
+        if np.any(np.diff(self.instants_s) < 0.0):
+            raise ValueError("instants_s must not run backward")
         if not -0.5 < self.rate_error < 0.5:
             raise ValueError(f"rate_error is a fraction, got {self.rate_error}")
 

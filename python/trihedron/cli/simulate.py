@@ -1,0 +1,74 @@
+"""``trihedron simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from trihedron.cli.options import Force
+
+
+def simulate(
+    scenario: Annotated[
+        Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+        typer.Argument(metavar="[SCENARIO]", help="A .toml file, or the name of a ready-made scenario (--list)."),
+    ] = None,
+    output: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--output", "-o", metavar="LOG", help="Log to write: .csv, .npz or .parquet."),
+    ] = None,
+    truth: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--truth", metavar="FILE", help="Truth to write: .npz, or .json without the samples."),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Which accident of noise.")] = 0,
+    like: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--like", metavar="LOG", help="Twin: repeat this recording, with --calibration."),
+    ] = None,
+    calibration: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--calibration", metavar="FILE", help="Calibration of the recording to repeat."),
+    ] = None,
+    list_them: Annotated[bool, typer.Option("--list", help="List the ready-made scenarios.")] = False,
+    force: Force = False,
+) -> None:
+    """Simulate an instrument: a scenario, or the twin of a recording; the truth is kept apart from the log."""
+    from trihedron.simulate import list_scenarios
+
+    if list_them:
+        for name, sentence in list_scenarios().items():
+            typer.echo(f"{name:24s}{sentence}")
+        return
+    if (scenario is None) == (like is None):
+        raise typer.BadParameter("give either a SCENARIO (a .toml file or a name) or --like LOG")
+    if (like is None) != (calibration is None):
+        raise typer.BadParameter("--like and --calibration go together")
+    if output is None:
+        raise typer.BadParameter("say where the log goes with -o LOG")
+    from trihedron.log_file import LOG_SUFFIXES, write_recording
+    from trihedron.output_file import OutputError, check_free
+    from trihedron.pipeline import read, twin
+    from trihedron.pipeline import simulate as run
+    from trihedron.truth_file import write_truth
+
+    if output.suffix.lower() not in LOG_SUFFIXES:
+        raise OutputError(f"{output}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
+    if truth is not None and truth.suffix.lower() not in (".npz", ".json"):
+        raise OutputError(f"{truth}: truth is written as .npz (everything) or .json (no samples).")
+    check_free([output, truth], overwrite=force)
+    if like is not None and calibration is not None:
+        from trihedron.calibration_file import read_calibration
+
+        recording, known = twin(read(like), read_calibration(calibration), seed)
+    else:
+        recording, known = run(str(scenario), seed)
+    write_recording(recording, output, overwrite=force)
+    if truth is not None:
+        write_truth(known, truth, overwrite=force)
+    typer.echo(f"{output}: {recording.n_samples} samples, {recording.duration_s:.1f} s at {recording.rate_hz:.4g} Hz")
+    typer.echo(f"{len(known.holds)} holds, {len(known.moves)} moves, |g| {known.gravity_m_s2:.6g} m/s²")
+    for name, parameters in known.effects.items():
+        typer.echo(f"effect {name}: " + ", ".join(f"{key} {value}" for key, value in parameters.items()))

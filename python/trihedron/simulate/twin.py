@@ -1,0 +1,214 @@
+"""The twin: a real recording repeated as a simulation, from its poses, moves, instants, noise and converter.
+
+Poses are the directions of gravity that the calibrated holds show; moves are replayed from the calibrated rates and
+accelerations, turned by a slow level rotation so that each ends in the pose that follows. What the calibration does not
+explain is therefore what differs between the recording and its twin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import solveh_banded
+
+from trihedron import _core
+from trihedron.records import Calibration, Recording, Segments
+from trihedron.sensor_model import correct
+from trihedron.simulate.accelerometer import Accelerometer
+from trihedron.simulate.gyroscope import Gyroscope
+from trihedron.simulate.motion import Hold, Motion, Quaternion, Replay, Step, attitude_with_up, shortest_turn
+from trihedron.simulate.readout import Adc, Matrix, Triple, sense_axes
+from trihedron.simulate.scenario import Clock, Environment, Scenario
+from trihedron.simulate.twin_noise import noise_of_holds
+
+FloatArray = npt.NDArray[np.float64]
+
+# Knots of a replayed move: wider ones would blunt the jolt of setting the case down. The price is that the recording's
+# noise inside moves is replayed as motion and the simulation's own comes on top.
+_KNOT_S = 0.01
+
+
+def twin_scenario(recording: Recording, segments: Segments, calibration: Calibration) -> Scenario:
+    """A scenario whose simulation repeats a recording.
+
+    Raises
+    ------
+    ValueError
+        When the recording lacks a sensor, was never still, or the calibration has no gyro.
+    """
+    if recording.accelerometer is None or recording.gyroscope is None or calibration.gyroscope is None:
+        raise ValueError("a twin needs both sensors in the recording and in the calibration")
+    if not segments.holds:
+        raise ValueError("a twin needs at least one still pose; the recording has none")
+    accel, gyro = calibration.accelerometer, calibration.gyroscope
+    time_s = recording.time_s
+    readings = (_filled(recording.accelerometer), _filled(recording.gyroscope))
+    motion = _motion(time_s, readings, segments, calibration)
+    holds = [(hold.start, hold.stop) for hold in segments.holds]
+    dt = 1.0 / recording.rate_hz
+    parts: list[dict[str, object]] = []
+    for sensor, raw, name in ((accel, readings[0], "accelerometer"), (gyro, readings[1], "gyroscope")):
+        step = converter_step(raw)
+        S, b = _matrix(sensor.S), _triple(sensor.b)
+        _, gain = sense_axes(S, name)
+        noise, low_pass = noise_of_holds(raw / gain, holds, dt, step / gain)
+        parts.append(
+            {
+                "S": S,
+                "b": b,
+                "noise": noise,
+                "noise_filter": low_pass,
+                "adc": Adc(step, float(raw.min()), float(raw.max())),
+            }
+        )
+    return Scenario(
+        motion=motion,
+        name=f"twin of {recording.source}",
+        accelerometer=replace(Accelerometer(unit=recording.accelerometer_unit), **parts[0]),  # type: ignore[arg-type]
+        gyroscope=replace(Gyroscope(unit=recording.gyroscope_unit), **parts[1]),  # type: ignore[arg-type]
+        clock=Clock(recording.rate_hz, instants_s=tuple(float(t) for t in time_s)),
+        environment=Environment(gravity_m_s2=calibration.gravity_m_s2),
+    )
+
+
+def converter_step(raw: FloatArray) -> float:
+    """Spacing of the codes in (n, 3) readings; 0 where they are not evenly spaced."""
+    values = np.unique(np.round(raw[np.isfinite(raw)], 12))
+    gaps = np.diff(values)
+    gaps = gaps[gaps > 1e-9 * max(float(np.ptp(values)), 1e-300)] if len(values) > 1 else gaps
+    if len(gaps) < 8:
+        return 0.0
+    # Text rounds: the step is the mean of the smallest gaps, and the others must be its multiples.
+    step = float(np.mean(gaps[gaps < 1.5 * gaps.min()]))
+    multiples = gaps / step
+    even = np.abs(multiples - np.round(multiples)) < 0.1
+    near = multiples < 20.0
+    return step if even[near].mean() > 0.95 and len(values) < 0.5 * raw.size else 0.0
+
+
+def _motion(
+    time_s: FloatArray, readings: tuple[FloatArray, FloatArray], segments: Segments, calibration: Calibration
+) -> Motion:
+    gyro = calibration.gyroscope
+    assert gyro is not None  # twin_scenario has looked
+    force = correct(readings[0], calibration.accelerometer.S, calibration.accelerometer.b)
+    rate = correct(readings[1], gyro.S, gyro.b)
+    holds = segments.holds
+    ups = [_unit(force[hold.samples()].mean(axis=0)) for hold in holds]
+    still = [rate[hold.samples()].mean(axis=0) for hold in holds]
+    g = calibration.gravity_m_s2
+    begin = [float(time_s[hold.start]) for hold in holds]
+    end = [float(time_s[hold.stop - 1]) for hold in holds]
+    start = attitude = attitude_with_up(ups[0])
+    step_s = float(np.median(np.diff(time_s)))
+    steps: list[Step] = []
+    for i in range(len(holds)):
+        first = float(time_s[0]) if i == 0 else begin[i]
+        steps.append(Hold(max(end[i] - first, step_s), name=f"pose {i + 1}"))
+        is_last = i + 1 == len(holds)
+        stop_s = float(time_s[-1]) + step_s if is_last else begin[i + 1]
+        if stop_s - end[i] < 2.0 * step_s:
+            continue
+        bias = still[i] if is_last else 0.5 * (still[i] + still[i + 1])
+        knots = _knots(time_s, end[i], stop_s)
+        w = _averaged(time_s, rate - bias, knots)
+        f = _averaged(time_s, force, knots)
+        if not is_last:
+            w = _ending_in(w, attitude, stop_s - end[i], ups[i + 1])
+        path = _attitudes(w, attitude, stop_s - end[i])
+        acceleration = np.einsum("nij,nj->ni", _matrices(path), f) - [0.0, 0.0, g]
+        acceleration[0] = 0.0
+        if not is_last:
+            acceleration[-1] = 0.0
+        steps.append(Replay(w, acceleration, stop_s - end[i], name=f"move {i + 1}"))
+        q = path[-1]
+        attitude = (float(q[0]), float(q[1]), float(q[2]), float(q[3]))
+    return Motion(tuple(steps), start=start)
+
+
+def _knots(time_s: FloatArray, start_s: float, stop_s: float) -> FloatArray:
+    spacing = max(_KNOT_S, float(np.median(np.diff(time_s))))
+    return np.linspace(start_s, stop_s, max(3, round((stop_s - start_s) / spacing) + 1))
+
+
+def _averaged(time_s: FloatArray, values: FloatArray, knots: FloatArray) -> FloatArray:
+    """(m, 3) values at the knots: least squares of straight lines between them, so that no knot holds one sample."""
+    a, b = np.searchsorted(time_s, [knots[0] - 1e-9, knots[-1] + 1e-9])
+    t, y = time_s[a:b], values[a:b]
+    place = np.clip((t - knots[0]) / (knots[1] - knots[0]), 0.0, len(knots) - 1.0)
+    k = np.minimum(place.astype(np.intp), len(knots) - 2)
+    x = place - k
+    m = len(knots)
+    diagonal, off, right = np.zeros(m), np.zeros(m), np.zeros((m, 3))
+    np.add.at(diagonal, k, (1.0 - x) ** 2)
+    np.add.at(diagonal, k + 1, x**2)
+    np.add.at(off, k, x * (1.0 - x))
+    np.add.at(right, k, (1.0 - x)[:, None] * y)
+    np.add.at(right, k + 1, x[:, None] * y)
+    # A weak pull towards evenness decides knots in a gap of the log.
+    diagonal += 1e-3
+    nearest = np.column_stack([np.interp(knots, t, y[:, j]) for j in range(3)])
+    right += 1e-3 * nearest
+    out: FloatArray = solveh_banded(np.vstack([np.concatenate([[0.0], off[:-1]]), diagonal]), right)
+    return out
+
+
+def _attitudes(rate: FloatArray, start: Quaternion, duration_s: float) -> FloatArray:
+    """(m, 4) attitude at every knot of a replay."""
+    row = np.array([[0.0, duration_s, *start, 1.0, 0.0, 0.0, 0.0, 0.5, *[0.0] * 6, 0.5]])
+    knots = np.column_stack([np.zeros(len(rate)), rate, np.zeros_like(rate)])
+    empty = np.zeros((0, 6))
+    t = np.linspace(0.0, duration_s, len(rate))
+    q, *_ = _core.simulate_motion(row, empty, empty, knots, t, 0.0, (0.0, 0.0, 0.0))
+    return q
+
+
+def _ending_in(rate: FloatArray, start: Quaternion, duration_s: float, up: FloatArray) -> FloatArray:
+    """The rate with a constant level rotation added, so that the move ends with ``up`` at the zenith.
+
+    If R(t) belongs to ω then exp(c t) R(t) belongs to ω + R(t)ᵀ c, exactly; c is level and small.
+    """
+    for _ in range(3):
+        R = _matrices(_attitudes(rate, start, duration_s))
+        c = shortest_turn(_unit(R[-1] @ up), np.array([0.0, 0.0, 1.0])) / duration_s
+        rate = rate + R.transpose(0, 2, 1) @ c
+    return rate
+
+
+def _matrices(q: FloatArray) -> FloatArray:
+    """(m, 3, 3) body to level."""
+    w, x, y, z = q.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    out: FloatArray = np.moveaxis(np.array(rows), 2, 0)
+    return out
+
+
+def _filled(raw: FloatArray) -> FloatArray:
+    """Lost rows by straight lines: only the motion under them is guessed."""
+    if np.isfinite(raw).all():
+        return raw
+    out = raw.copy()
+    index = np.arange(len(raw))
+    for k in range(3):
+        good = np.isfinite(raw[:, k])
+        out[:, k] = np.interp(index, index[good], raw[good, k])
+    return out
+
+
+def _unit(v: FloatArray) -> FloatArray:
+    out: FloatArray = v / np.linalg.norm(v)
+    return out
+
+
+def _triple(v: FloatArray) -> Triple:
+    return (float(v[0]), float(v[1]), float(v[2]))
+
+
+def _matrix(S: FloatArray) -> Matrix:
+    return (_triple(S[0]), _triple(S[1]), _triple(S[2]))

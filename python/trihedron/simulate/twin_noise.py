@@ -1,0 +1,107 @@
+"""Noise of a recording's holds for its twin: N, B and the low-pass that coloured them.
+
+A non-negative fit to the pooled Allan variance of the holds, for each of a list of filters; the best is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import nnls
+
+from trihedron.simulate.noise import NoiseTerms, Triple
+from trihedron.simulate.readout import Smoother
+
+FloatArray = npt.NDArray[np.float64]
+
+
+# Corners in parts of the sampling rate, and orders, that are tried.
+_CORNERS = (0.03, 0.045, 0.06, 0.08, 0.1, 0.12, 0.15, 0.19, 0.24, 0.3, 0.37, 0.45)
+_ORDERS = (1, 2, 3, 4, 6)
+
+
+def noise_of_holds(
+    signal: FloatArray, holds: Sequence[tuple[int, int]], dt: float, step: FloatArray | float = 0.0
+) -> tuple[NoiseTerms, Smoother]:
+    """Terms per axis of (n, 3) readings inside the holds ``[start, stop)``, and the low-pass all axes share.
+
+    ``step`` of the converter is taken off. What is longer than a third of a hold cannot be told and is left out.
+    """
+    steps = np.broadcast_to(np.asarray(step, dtype=np.float64), (3,))
+    measured = [_pooled(signal[:, k], holds, float(steps[k])) for k in range(3)]
+    filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
+    fits = [[_fit(axis, dt, low_pass) for axis in measured] for low_pass in filters]
+    best = int(np.argmin([sum(misfit for _, misfit in fit) for fit in fits]))
+    columns = [terms for terms, _ in fits[best]]
+
+    def triple(j: int) -> Triple:
+        return (columns[0][j], columns[1][j], columns[2][j])
+
+    return NoiseTerms(N=triple(0), B=triple(1)), filters[best]
+
+
+def _pooled(x: FloatArray, holds: Sequence[tuple[int, int]], step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Cluster sizes, Allan variances over all holds, and their degrees of freedom."""
+    longest = max(stop - start for start, stop in holds)
+    clusters, variances, freedom = [], [], []
+    m = 1
+    while 3 * m <= longest:
+        total, count, independent = 0.0, 0, 0.0
+        for start, stop in holds:
+            n = stop - start
+            if n < 3 * m:
+                continue
+            sums = np.concatenate([[0.0], np.cumsum(x[start:stop] - x[start:stop].mean())])
+            means = (sums[m:] - sums[:-m]) / m
+            differences = means[m:] - means[:-m]
+            total += float(differences @ differences)
+            count += len(differences)
+            independent += n / m - 1.0
+        if independent < 4.0 and m > 1:
+            break
+        clusters.append(m)
+        variances.append(0.5 * total / count)
+        freedom.append(independent)
+        m *= 2
+    size = np.array(clusters, dtype=np.float64)
+    measured = np.maximum(np.array(variances) - step**2 / 12.0 / size, 0.0)
+    return size, measured, np.array(freedom)
+
+
+def _fit(
+    pooled: tuple[FloatArray, FloatArray, FloatArray], dt: float, low_pass: Smoother
+) -> tuple[tuple[float, ...], float]:
+    """(N, B) and how badly they fit behind a low-pass: minus twice the logarithm of the likelihood."""
+    size, measured, freedom = pooled
+    if not np.any(measured > 0.0):
+        return (0.0, 0.0), 0.0
+    passed = _passed_white(size, dt, low_pass)
+    tau = size * dt
+    # The filter colours what is fast; flicker is slow enough to pass it whole. A walk is not offered: holds of seconds
+    # would let it grow over the minutes between them without a trace of evidence.
+    flat = np.full(len(tau), 2.0 * np.log(2.0) / np.pi)
+    design = np.column_stack([passed / dt, flat])
+    # Relative errors of a variance with so many degrees of freedom; at least 3 %, which the shapes do not keep. They
+    # are relative to the model: a variance that came out small by accident must not weigh the most.
+    relative = np.hypot(np.sqrt(2.0 / freedom), 0.03)
+    model = np.maximum(measured, 0.1 * measured.max() / size)
+    for _ in range(5):
+        scaled = design / (model * relative)[:, None]
+        norms = np.linalg.norm(scaled, axis=0)
+        solution, misfit = nnls(scaled / norms, measured / (model * relative))
+        model = np.maximum(design @ (solution / norms), 1e-6 * measured.max() / size)
+    white, flicker = (float(v) for v in np.sqrt(solution / norms))
+    return (white, flicker), float(misfit) ** 2 + 2.0 * float(np.sum(np.log(model)))
+
+
+def _passed_white(size: FloatArray, dt: float, low_pass: Smoother) -> FloatArray:
+    """Allan variance of unit white noise behind the low-pass, by its power transfer."""
+    w = np.pi * (np.arange(1 << 13) + 0.5) / (1 << 13)
+    power = np.ones(len(w))
+    if low_pass.corner_hz > 0.0:
+        a = low_pass.feedback(dt)
+        power = np.abs(a.sum() / np.polyval(a[::-1], np.exp(-1j * w))) ** 2
+    half = 0.5 * w
+    return np.array([2.0 / m**2 * np.mean(np.sin(half * m) ** 4 / np.sin(half) ** 2 * power) for m in size])

@@ -1,0 +1,84 @@
+"""The truth behind a simulated log, in a file of its own: .npz with a JSON header, or the header alone as .json."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from trihedron.output_file import OutputError, write_whole
+from trihedron.records.truth import TrueSegment, Truth
+
+_ARRAYS = (
+    "accelerometer_time_s",
+    "gyroscope_time_s",
+    "specific_force_m_s2",
+    "angular_rate_rad_s",
+    "attitude",
+    "temperature_degc",
+    "supply_v",
+    "kept",
+)
+_MATRICES = ("accelerometer_S", "accelerometer_b", "gyroscope_S", "gyroscope_b")
+
+
+def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Write the truth; ``.npz`` holds everything, ``.json`` all but the arrays per sample.
+
+    Raises
+    ------
+    OutputError
+        When the ending is neither, or the file exists and may not be replaced.
+    """
+    target = Path(path)
+    header: dict[str, Any] = {
+        "scenario": truth.scenario,
+        "seed": truth.seed,
+        "gravity_m_s2": truth.gravity_m_s2,
+        **{name: getattr(truth, name).tolist() for name in _MATRICES},
+        "effects": {name: dict(values) for name, values in truth.effects.items()},
+        "noise": {name: dict(values) for name, values in truth.noise.items()},
+        "segments": [asdict(segment) for segment in truth.segments],
+    }
+    text = json.dumps(header, indent=1)
+    if target.suffix.lower() == ".json":
+        write_whole(target, text + "\n", overwrite=overwrite)
+    elif target.suffix.lower() == ".npz":
+        arrays = {name: getattr(truth, name) for name in _ARRAYS if getattr(truth, name) is not None}
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, allow_pickle=False, header=np.array(text), **arrays)
+        write_whole(target, buffer.getvalue(), overwrite=overwrite)
+    else:
+        raise OutputError(f"{target}: truth is written as .npz (everything) or .json (no arrays); give it that ending.")
+
+
+def read_truth(path: str | os.PathLike[str]) -> Truth:
+    """Read back what :func:`write_truth` wrote as ``.npz``.
+
+    Raises
+    ------
+    ValueError
+        When the file is not such a one.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            header = json.loads(str(archive["header"]))
+            arrays = {name: archive[name] for name in _ARRAYS if name in archive.files}
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"{path}: this is not a truth file written as .npz ({error})") from None
+    segments = tuple(TrueSegment(**{**entry, "axis": tuple(entry["axis"])}) for entry in header.pop("segments"))
+    effects = {name: MappingProxyType(values) for name, values in header.pop("effects").items()}
+    noise = {
+        name: MappingProxyType({term: tuple(values) for term, values in terms.items()})
+        for name, terms in header.pop("noise").items()
+    }
+    values: dict[str, Any] = {name: np.array(header.pop(name)) for name in _MATRICES}
+    values |= header
+    values |= arrays
+    return Truth(segments=segments, effects=MappingProxyType(effects), noise=MappingProxyType(noise), **values)

@@ -1,0 +1,181 @@
+"""Scenario files, logs and truth files: what is asked is what is made, and a wrong question gets one sentence."""
+
+import numpy as np
+import pytest
+
+from trihedron.cli import main
+from trihedron.log_file import write_recording
+from trihedron.output_file import OutputError
+from trihedron.pipeline import read
+from trihedron.simulate import (
+    Hold,
+    Scenario,
+    Turn,
+    profile_by_name,
+    read_scenario,
+    scenario_by_name,
+    simulate,
+    with_effect,
+)
+from trihedron.truth_file import read_truth, write_truth
+
+EXAMPLE = """
+name = "bench"
+profile = "adis"
+unit = 7
+start_up = [0, 0, 1]
+table_tilt_deg = [0.1, -0.2]
+
+[clock]
+rate_hz = 200
+losses = [{ time_s = 1.0, n = 3 }]
+
+[environment]
+gravity_m_s2 = 0
+latitude_deg = 59.9
+earth_rate = true
+[environment.temperature]
+warm_up_k = 5
+logged = true
+
+[accelerometer]
+noise = { N = 1e-3, K = [1e-5, 0, 0] }
+mass = { moves = true, resonance_hz = 120 }
+
+[[step]]
+kind = "hold"
+duration_s = 2
+[[step]]
+kind = "turn"
+axis = [0, 0, 1]
+angle_deg = 90
+duration_s = 1.5
+
+[[effect]]
+id = "gyro-g-sensitivity"
+matrix = [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]
+"""
+
+
+def written(tmp_path, text):
+    path = tmp_path / "bench.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_scenario_file_says_the_same_as_python(tmp_path):
+    scenario = Scenario.from_toml(written(tmp_path, EXAMPLE))
+    assert scenario.name == "bench"
+    assert scenario.motion.steps == (Hold(2.0), Turn((0.0, 0.0, 1.0), 90.0, 1.5))
+    assert scenario.motion.table_tilt_deg == (0.1, -0.2)
+    accel, gyro = profile_by_name("adis").unit(7)
+    assert scenario.accelerometer.S == accel.S
+    assert scenario.accelerometer.noise.N == (1e-3, 1e-3, 1e-3)
+    # What the file does not mention stays as in the profile.
+    assert scenario.accelerometer.noise.B == accel.noise.B
+    assert scenario.accelerometer.mass.resonance_hz == (120.0, 120.0, 120.0)
+    assert scenario.gyroscope.b == gyro.b
+    assert scenario.clock.losses[0].n == 3
+    recording, truth = simulate(scenario, seed=1)
+    assert recording.rate_hz == pytest.approx(200.0)
+    assert recording.temperature_degc is not None
+    assert set(truth.effects) >= {"gyro-g-sensitivity", "earth-rate", "dropped-samples", "table-tilt"}
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("profile = [", "not a TOML file"),
+        ('profile = "mpux"', "no profile is called 'mpux'"),
+        ('sesion = "hand"', "no key 'sesion'"),
+        ("[clock]\nrate = 5", "clock has no key 'rate'"),
+        ("[clock]\nrate_hz = 'fast'", "clock.rate_hz must be float"),
+        ("[clock]\nrate_hz = -5", "rate_hz must be a positive number"),
+        ("[accelerometer]\nb = [1, 2]", "accelerometer.b must hold 3 values"),
+        ("[accelerometer]\nunit = 'stone'", "accelerometer.unit is one of"),
+        ("[[step]]\nkind = 'jump'", "is of kind 'jump'"),
+        ("[[step]]\nkind = 'hold'", "missing 1 required positional argument"),
+        ("session = { kind = 'tango' }", "no session is of kind 'tango'"),
+        ("session = { kind = 'hand', n = 3 }", "unexpected keyword argument 'n'"),
+        ("[[effect]]\nid = 'gremlin'", "no effect is called 'gremlin'"),
+        ("[accelerometer.noise]\nN = -1", "noise term N"),
+    ],
+)
+def test_a_wrong_scenario_file_is_refused_with_its_name_and_the_place(tmp_path, text, sentence):
+    with pytest.raises(ValueError, match=r"bench\.toml") as caught:
+        read_scenario(written(tmp_path, text))
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)[:60]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
+def test_a_log_reads_back_as_it_was_simulated(tmp_path, suffix):
+    scenario = with_effect(scenario_by_name("hand-session"), "accel-thermal-bias", per_k=0.01)
+    for scene in (scenario, scenario_by_name("hand-session-tactical")):
+        recording, _ = simulate(scene, seed=2)
+        path = tmp_path / f"{scene.name}{suffix}"
+        write_recording(recording, path)
+        again = read(path)
+        assert np.array_equal(again.accelerometer, recording.accelerometer)
+        assert np.array_equal(again.gyroscope, recording.gyroscope)
+        assert (again.accelerometer_unit, again.gyroscope_unit) == (
+            recording.accelerometer_unit,
+            recording.gyroscope_unit,
+        )
+        # Stamps are written to the nanosecond.
+        assert np.abs(again.time_s - recording.time_s).max() < 1e-9
+        if recording.temperature_degc is not None:
+            assert np.abs(again.temperature_degc - recording.temperature_degc).max() < 1e-9
+
+
+def test_a_log_never_overwrites_and_knows_its_endings(tmp_path):
+    recording, truth = simulate(scenario_by_name("six-faces"))
+    path = tmp_path / "log.csv"
+    write_recording(recording, path)
+    with pytest.raises(OutputError, match="was left alone"):
+        write_recording(recording, path)
+    write_recording(recording, path, overwrite=True)
+    with pytest.raises(OutputError, match=r"\.csv, \.npz, \.parquet"):
+        write_recording(recording, tmp_path / "log.xlsx")
+    with pytest.raises(OutputError, match="truth is written as"):
+        write_truth(truth, tmp_path / "truth.csv")
+
+
+def test_truth_reads_back_as_it_was(tmp_path):
+    _, truth = simulate(scenario_by_name("imperfect"), seed=3)
+    write_truth(truth, tmp_path / "truth.npz")
+    again = read_truth(tmp_path / "truth.npz")
+    assert again.segments == truth.segments
+    assert set(again.effects) == set(truth.effects)
+    assert again.noise == truth.noise
+    for name in ("specific_force_m_s2", "angular_rate_rad_s", "attitude", "accelerometer_S", "temperature_degc"):
+        assert np.array_equal(getattr(again, name), getattr(truth, name))
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    with pytest.raises(ValueError, match="not a truth file"):
+        read_truth(tmp_path / "other.npz")
+
+
+def test_the_command_writes_log_and_truth_and_refuses_in_one_sentence(tmp_path, capsys):
+    log, truth = tmp_path / "a.csv", tmp_path / "a.npz"
+    assert main(["simulate", "table-turns", "-o", str(log), "--truth", str(truth), "--seed", "4"]) == 0
+    assert "21 holds" in capsys.readouterr().out
+    recording, _ = simulate(scenario_by_name("table-turns"), seed=4)
+    assert np.array_equal(read(log).gyroscope, recording.gyroscope)
+    assert read_truth(truth).seed == 4
+    assert main(["simulate", "--list"]) == 0
+    assert "manual-example" in capsys.readouterr().out
+    for words, sentence in (
+        (["table-turns", "-o", str(log)], "--force"),
+        (["table-turns"], "-o LOG"),
+        (["tango", "-o", str(tmp_path / "b.csv")], "no scenario is called 'tango'"),
+        (["table-turns", "-o", str(tmp_path / "b.doc")], ".csv, .npz, .parquet"),
+        ([], "either a SCENARIO"),
+        (["--like", str(log), "-o", str(tmp_path / "b.csv")], "--like and --calibration go together"),
+        (["none.toml", "-o", str(tmp_path / "b.csv")], "none.toml"),
+    ):
+        assert main(["simulate", *words]) == 1
+        told = capsys.readouterr().err
+        assert sentence in told
+        assert "Traceback" not in told
+    assert main(["simulate", str(written(tmp_path, EXAMPLE)), "-o", str(tmp_path / "c.parquet")]) == 0
+    assert not (tmp_path / "b.csv").exists()

@@ -1,0 +1,117 @@
+"""A twin repeats its original: pose means, moves, stamps, noise spectrum, converter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trihedron.pipeline import calibrate, read, segment
+from trihedron.records import Segments
+from trihedron.sensor_model import correct
+from trihedron.simulate import scenario_by_name, simulate, twin_scenario
+from trihedron.simulate.twin import converter_step
+
+WINDOW = 128
+# Octaves of the spectrum of 128 samples, without the lowest lines, which the removal of the mean touches.
+OCTAVES = ((2, 4), (4, 8), (8, 16), (16, 32), (32, 65))
+
+
+def spectrum(readings, holds):
+    """(65, 3) periodogram averaged over all windows inside the holds."""
+    taper = np.hanning(WINDOW)[:, None]
+    total, count = np.zeros((WINDOW // 2 + 1, 3)), 0
+    for hold in holds:
+        for k in range(hold.start, hold.stop - WINDOW, WINDOW // 2):
+            block = readings[k : k + WINDOW]
+            total += np.abs(np.fft.rfft((block - block.mean(axis=0)) * taper, axis=0)) ** 2
+            count += 1
+    assert count > 20
+    return total / count
+
+
+def means(readings, holds):
+    return np.array([readings[hold.samples()].mean(axis=0) for hold in holds])
+
+
+def compare(recording, gravity):
+    segments = segment(recording)
+    calibration = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+    copy, truth = simulate(twin_scenario(recording, segments, calibration), seed=1)
+    return segments, calibration, copy, truth
+
+
+# Spectra within these factors, octave by octave: a twin has three numbers per axis for its noise.
+@pytest.mark.parametrize(
+    ("which", "gravity", "accel_factor", "gyro_factor"),
+    [("xsens_mti", 9.81744, 1.6, 1.4), ("mpu9150", 9.81, 2.0, 3.0)],
+)
+def test_the_twin_of_a_real_recording_looks_like_it(real_data, which, gravity, accel_factor, gyro_factor):
+    if which == "xsens_mti":
+        folder = real_data / which
+        recording = read(accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")
+    else:
+        recording = read(real_data / which / "imu0.log", rate_hz=100)
+    segments, calibration, copy, truth = compare(recording, gravity)
+    holds = segments.holds
+    assert np.array_equal(copy.time_s, recording.time_s - recording.time_s[0])
+    assert len(truth.holds) == len(holds)
+
+    accel, gyro = calibration.accelerometer, calibration.gyroscope
+    # Pose means: what the calibration leaves unexplained, plus the slow noise of both.
+    apart = (means(recording.accelerometer, holds) - means(copy.accelerometer, holds)) @ accel.S.T
+    unexplained = np.linalg.norm(means(correct(recording.accelerometer, accel.S, accel.b), holds), axis=1) - gravity
+    slow = 0.02
+    assert np.sqrt(np.mean(apart**2)) < 2.0 * np.sqrt(np.mean(unexplained**2)) + slow
+
+    # Moves: the same gravity before and after, the same rates on the way.
+    moving = np.concatenate([np.arange(move.start + 1, move.stop - 1) for move in segments.moves])
+    difference = ((recording.gyroscope - copy.gyroscope) @ gyro.S.T)[moving]
+    assert np.sqrt(np.mean(difference**2)) < 0.02 * np.sqrt(np.mean(truth.angular_rate_rad_s[moving] ** 2))
+    shaken = ((recording.accelerometer - copy.accelerometer) @ accel.S.T)[moving]
+    assert np.sqrt(np.mean(shaken**2)) < 0.02 * gravity
+
+    for name, factor in (("accelerometer", accel_factor), ("gyroscope", gyro_factor)):
+        original, twin_of_it = getattr(recording, name), getattr(copy, name)
+        ratio = spectrum(twin_of_it, holds) / spectrum(original, holds)
+        for low, high in OCTAVES:
+            octave = np.exp(np.mean(np.log(ratio[low:high]), axis=0))
+            assert np.all(octave < factor), (name, low, octave)
+            assert np.all(octave > 1.0 / factor), (name, low, octave)
+        assert converter_step(twin_of_it) == pytest.approx(converter_step(original), rel=1e-3)
+
+
+def test_the_twin_of_a_simulation_has_its_noise_and_poses():
+    recording, truth = simulate(scenario_by_name("hand-session"), seed=8)
+    segments, calibration, copy, again = compare(recording, truth.gravity_m_s2)
+    scenario = twin_scenario(recording, segments, calibration)
+    # White noise from some 10⁴ samples: 1 %, and what the flicker beside it takes or leaves.
+    assert np.allclose(scenario.accelerometer.noise.N, truth.noise["accelerometer"]["N"], rtol=0.1)
+    assert np.allclose(scenario.gyroscope.noise.N, truth.noise["gyroscope"]["N"], rtol=0.1)
+    assert (scenario.accelerometer.adc.lsb, scenario.gyroscope.adc.lsb) == (1.0, 1.0)
+    for hold in segments.holds:
+        middle = (hold.start + hold.stop) // 2
+        pair = again.specific_force_m_s2[middle], truth.specific_force_m_s2[middle]
+        # A pose mean is known to N/√t = 2e-3 m/s² per axis, and b and S with it.
+        assert np.linalg.norm(pair[0] - pair[1]) < 0.02
+    assert copy.n_samples == recording.n_samples
+
+
+def test_a_twin_says_what_it_lacks():
+    recording, truth = simulate(scenario_by_name("six-faces"))
+    segments = segment(recording)
+    calibration = calibrate(simulate(scenario_by_name("hand-session"))[0], gravity_m_s2=truth.gravity_m_s2).calibration
+    with pytest.raises(ValueError, match="needs both sensors"):
+        twin_scenario(replace(recording, gyroscope=None), segments, calibration)
+    none = np.zeros((0, 3))
+    empty = Segments((), (), None, None, none, none, none, none, np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+    with pytest.raises(ValueError, match="at least one still pose"):
+        twin_scenario(recording, empty, calibration)
+
+
+def test_converter_steps_are_found_in_counts_decimals_and_denied_to_floats():
+    rng = np.random.default_rng(0)
+    x = rng.normal(size=(3000, 3))
+    assert converter_step(np.round(x * 50)) == 1.0
+    assert converter_step(np.round(np.round(x / 0.0048) * 0.0048, 5)) == pytest.approx(0.0048, rel=0.01)
+    assert converter_step(x) == 0.0
+    assert converter_step(np.zeros((10, 3))) == 0.0
