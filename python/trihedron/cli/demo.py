@@ -2,7 +2,38 @@
 
 from __future__ import annotations
 
+from itertools import count
+from pathlib import Path
+from typing import Annotated, Optional
 
-def demo() -> None:
+import typer
+
+from trihedron.cli.options import Force
+from trihedron.cli.output import leave, say
+
+FOLDER = "trihedron-demo"
+
+
+def demo(
+    folder: Annotated[
+        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+        typer.Argument(metavar="[FOLDER]", help=f"Where to write; {FOLDER} when not said, or the next free name."),
+    ] = None,
+    force: Force = False,
+) -> None:
     """A complete session, simulated: calibrate, verify, report, and compare with the truth."""
-    raise ValueError("not built yet")
+    target = _free_folder() if folder is None and not force else folder or Path(FOLDER)
+    if folder is not None and folder.exists() and not force:
+        raise ValueError(f"{folder}: this exists and was left alone; choose another name or add --force.")
+    from trihedron.pipeline.demonstrating import demonstrate
+    from trihedron.report import to_text
+
+    done = demonstrate(target, overwrite=force, say=say)
+    typer.echo(to_text(done.document), nl=False)
+    leave((*done.result.findings, *done.verification.findings))
+
+
+def _free_folder() -> Path:
+    """The first of ``trihedron-demo``, ``trihedron-demo-2`` ... that does not exist."""
+    names = (Path(FOLDER if k == 1 else f"{FOLDER}-{k}") for k in count(1))
+    return next(path for path in names if not path.exists())

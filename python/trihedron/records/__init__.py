@@ -11,6 +11,7 @@ from trihedron.records.calibration import (
     Observability,
     SensorCalibration,
 )
+from trihedron.records.comparison import Comparison
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.kalman import (
     CONSTANT_NAMES,
@@ -36,6 +37,7 @@ __all__ = [
     "AxisKalmanResult",
     "AxisNoise",
     "Calibration",
+    "Comparison",
     "Consistency",
     "ConstantsTrack",
     "Finding",

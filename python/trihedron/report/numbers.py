@@ -49,10 +49,10 @@ def with_sigma(value: float, sigma: float) -> str:
 
 
 def engineering_exponent(size: float) -> int:
-    """Power of ten, a multiple of three, that brings a number of this size near one."""
+    """Power of ten, a multiple of three, that brings a number of this size between 0.2 and 200."""
     if not math.isfinite(size) or size <= 0.0:
         return 0
-    return 3 * math.floor((math.log10(size) + 0.3) / 3.0)
+    return 3 * math.floor((math.log10(size) + 0.7) / 3.0)
 
 
 def power_of_ten(exponent: int) -> str:

@@ -1,0 +1,152 @@
+"""The demonstration told as a story: what was done, what came out, and how far it is from the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from trihedron.records import Calibration, Comparison, Finding, Recording, Segments, Severity, Verification
+from trihedron.report.calibration import parameter_table
+from trihedron.report.document import Block, Document, Facts, Paragraph, Section, Table
+from trihedron.report.findings import findings_block
+from trihedron.report.numbers import duration, engineering_exponent, plain_number, power_of_ten, with_sigma
+from trihedron.units import mg_from_m_s2, mm_s2_from_m_s2
+
+
+def demonstration_report(
+    calibration: Calibration,
+    segments: Segments,
+    recording: Recording,
+    verification: Verification,
+    comparison: Comparison,
+    uncalibrated_rms_m_s2: float,
+    latitude_deg: float,
+    files: tuple[tuple[Path, str], ...],
+) -> Document:
+    """The whole story."""
+    return Document(
+        title="A complete session, on a simulated sensor",
+        subtitle="Everything below was computed from the CSV log; only section 4 knows the truth.",
+        verdict=_verdict(comparison, verification, uncalibrated_rms_m_s2),
+        is_trustworthy=calibration.is_trustworthy,
+        sections=(
+            Section("1  The session", (Paragraph(_session(segments, recording)),)),
+            Section("2  Calibrate", _calibrated(calibration, latitude_deg)),
+            Section("3  Verify on another session", _verified(verification, uncalibrated_rms_m_s2)),
+            Section("4  Compare with the truth", (_truth_table(comparison), Paragraph(_coverage(comparison)))),
+            Section("5  Files", (Facts(tuple((str(path), what) for path, what in files)),)),
+            Section("Your own sensor", (_next_steps(),)),
+        ),
+    )
+
+
+def _acceleration(value: float) -> str:
+    return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
+
+
+def _verdict(comparison: Comparison, verification: Verification, before: float) -> str:
+    within = int(np.sum(np.abs(comparison.z) < 2.0))
+    return (
+        f"Gravity at rest, in a session that the calibration has not seen: {_acceleration(before)} rms wrong before, "
+        f"{_acceleration(verification.norm_rms)} after. {within} of {len(comparison.names)} parameters lie "
+        f"within 2σ of "
+        "the truth."
+    )
+
+
+def _session(segments: Segments, recording: Recording) -> str:
+    still = float(np.sum(segments.duration_s))
+    return (
+        "A person picks up a 16-bit MEMS IMU, sets it down in one pose after another by hand, faces and edges "
+        "of its case "
+        f"and some tilts between, and never looks at an angle. After {duration(recording.duration_s)} the log holds "
+        f"{recording.n_samples} rows of raw counts at {plain_number(recording.rate_hz, 4)} Hz; the sensor's own "
+        f"noise tells "
+        f"{segments.n_holds} still poses ({duration(still)} in all) from {len(segments.moves)} moves. Nothing was set."
+    )
+
+
+def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, ...]:
+    said = (
+        f"Only gravity had to be said: latitude {latitude_deg:g}° gives {calibration.gravity_m_s2:.5f} m/s². In "
+        f"every still "
+        "pose the calibrated accelerometer must read that much, whatever the pose; through every move the "
+        "calibrated gyro "
+        "must carry gravity from one pose into the next. One fit of both gives:"
+    )
+    blocks: list[Block] = [Paragraph(said), parameter_table("accelerometer", calibration.accelerometer)]
+    if calibration.gyroscope is not None:
+        blocks.append(parameter_table("gyroscope", calibration.gyroscope))
+    return (*blocks, *_warnings(calibration.findings))
+
+
+def _verified(verification: Verification, before: float) -> tuple[Block, ...]:
+    expected = float(np.sqrt(np.mean(verification.norm_sigma**2)))
+    rows = [
+        ("before", f"{_acceleration(before)} rms norm error with the data sheet's scale"),
+        ("after", f"{_acceleration(verification.norm_rms)} rms over {len(verification.norm_error)} still poses"),
+        ("to be expected", f"{_acceleration(expected)} rms from noise and the calibration's error bars"),
+    ]
+    if len(verification.angle_deg):
+        expected = float(np.sqrt(np.mean(verification.angle_sigma_deg**2)))
+        rows += [
+            (
+                "gravity carried",
+                f"to {plain_number(verification.angle_rms_deg)}° rms through {len(verification.angle_deg)} moves",
+            ),
+            ("to be expected", f"{plain_number(expected)}° rms"),
+        ]
+    return (Facts(tuple(rows)), *_warnings(verification.findings))
+
+
+def _warnings(findings: tuple[Finding, ...]) -> tuple[Block, ...]:
+    """Findings that matter to the story; the notes are in the reports."""
+    grave = tuple(finding for finding in findings if finding.severity is not Severity.NOTE)
+    return (findings_block(grave),) if grave else ()
+
+
+def _truth_table(comparison: Comparison) -> Table:
+    rows = []
+    for k, name in enumerate(comparison.names):
+        sensor, parameter = name.split(".")
+        # S of one sensor shares a power of ten, so that its rows compare at a glance.
+        peers = [
+            abs(comparison.truth[i])
+            for i, other in enumerate(comparison.names)
+            if other.startswith(f"{sensor}.{parameter[0]}")
+        ]
+        exponent = engineering_exponent(float(max(peers)))
+        scale = 10.0**-exponent
+        times = f" × {power_of_ten(exponent)}" if exponent else ""
+        sigma = scale * comparison.sigma[k]
+        rows.append(
+            (
+                f"{sensor} {parameter}",
+                with_sigma(scale * comparison.truth[k], sigma).split(" ±")[0] + times,
+                with_sigma(scale * comparison.estimate[k], sigma) + times,
+                f"{comparison.z[k]:+.1f}".replace("-", "−"),
+            )
+        )
+    return Table(("", "truth", "estimate ± σ", "error in σ"), tuple(rows))
+
+
+def _coverage(comparison: Comparison) -> str:
+    z = np.abs(comparison.z)
+    n = len(z)
+    return (
+        f"Within 1σ: {int(np.sum(z < 1.0))} of {n} (honest error bars: about {round(0.683 * n)}); within 2σ: "
+        f"{int(np.sum(z < 2.0))} of {n} (about {round(0.954 * n)}). With all correlations χ² is "
+        f"{plain_number(comparison.chi2)} for {n} parameters. One session proves little: the same count over 200 "
+        "sessions is benches/coverage.py. (The zeros of a real sensor wander; truth is their mean in this session.)"
+    )
+
+
+def _next_steps() -> Facts:
+    return Facts(
+        (
+            ("is it fit?", "trihedron check LOG"),
+            ("calibrate", "trihedron calibrate LOG --latitude DEG -o calibration.json --report report.html"),
+            ("use it", "trihedron apply calibration.json LOG -o corrected.csv"),
+        )
+    )
