@@ -136,7 +136,7 @@ def _statement(
     )
     return Finding(
         FindingCode.CLOCKS_MERGED,
-        Severity.WARNING if base == "gyroscope" else Severity.NOTE,
+        Severity.WARNING if base == "gyroscope" or variance < 0.9 else Severity.NOTE,
         seen,
         "Each sensor was logged with its own time stamps.",
         f"For the {other}'s noise (Allan variance) read its file alone, where nothing is interpolated."

@@ -18,8 +18,8 @@ from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, a
 NEAR_GRAVITY = 0.2
 """An uncalibrated accelerometer at rest may be this far off: scale a few per cent, zero offset a tenth of g."""
 _ADVICE = {
-    "accelerometer": "Say it with --accelerometer-unit m/s^2, g, mg or counts if this is wrong.",
-    "gyroscope": "Say it with --gyroscope-unit rad/s, mrad/s, deg/s or counts if this is wrong.",
+    "accelerometer": "Say it with --accel-unit m/s^2, g, mg or counts if this is wrong.",
+    "gyroscope": "Say it with --gyro-unit rad/s, mrad/s, deg/s or counts if this is wrong.",
 }
 
 
