@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
+from scipy import special, stats
 
 from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, rolling_mean
 from trihedron.segment.floor import Activity
@@ -156,7 +156,7 @@ def _tilts_a_little(channels: Channels, first: int, last: int, gravity: float) -
     statistic = float((drift[live] ** 2 / variance[live]).sum())
     # The halves' means are half of the whole drift apart.
     is_small = 2.0 * float(np.linalg.norm(drift)) / gravity < SWAY_RAD
-    return is_small and statistic > float(stats.chi2.isf(SAME_POSE, max(int(live.sum()), 1)))
+    return is_small and statistic > float(special.chdtri(max(int(live.sum()), 1), SAME_POSE))
 
 
 def _densest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -201,7 +201,7 @@ def _is_same_pose(channels: Channels, before: Run, after: Run, noise: MeanNoise,
     variance += 2.0 * channels.quantisation_variance
     live = variance > 0.0
     statistic = float(np.sum(difference[live] ** 2 / variance[live]))
-    if statistic > float(stats.chi2.isf(SAME_POSE, int(live.sum()))):
+    if statistic > float(special.chdtri(int(live.sum()), SAME_POSE)):
         return False
     return _comes_back(channels, before, after, noise, creeping)
 
@@ -219,7 +219,7 @@ def _comes_back(channels: Channels, before: Run, after: Run, noise: MeanNoise, c
     variance = noise.variance(len(rate) * channels.step_s)[gyro]
     live = variance > 0.0
     statistic = float(np.sum(net[live] ** 2 / variance[live]))
-    is_nothing = statistic < float(stats.chi2.isf(SAME_POSE, max(int(live.sum()), 1)))
+    is_nothing = statistic < float(special.chdtri(max(int(live.sum()), 1), SAME_POSE))
     travelled = float(np.linalg.norm(rate, axis=1).mean())
     return is_nothing or float(np.linalg.norm(net)) < max(RETURN * travelled, creeping)
 
@@ -306,7 +306,7 @@ def _clean_from(off: FloatArray, core_variance: FloatArray, channels: Channels, 
     total = np.vstack([np.zeros(off.shape[1]), np.cumsum(off, axis=0)])
     sizes = [2**k for k in range(16) if 2**k <= most]
     live = np.flatnonzero(noise.variance(1.0) > 0.0)
-    limit = float(stats.chi2.isf(CLEAN_EDGE, len(live)))
+    limit = float(special.chdtri(len(live), CLEAN_EDGE))
     dirty = np.zeros(most + 1, dtype=bool)
     for size in sizes:
         variance = noise.variance(size * channels.step_s) + core_variance + channels.quantisation_variance
