@@ -1,0 +1,296 @@
+//! Alignment of gyros to gravity: recovery, agreement with closed forms, the banded factor.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use trihedron::banded::Banded;
+use trihedron::gyro_alignment::{Alignment, Link, Model, Settings, StillPose, fit, tangent_plane};
+use trihedron::poisson::{MoveRange, RateModel, RateNoise, prepare_all};
+use trihedron::rotation::exp;
+
+fn scale() -> Matrix3<f64> {
+    Matrix3::new(1.03, 0.01, -0.02, 0.015, 0.97, 0.01, -0.01, 0.02, 1.01)
+}
+
+/// Noise-free moves: smooth turns by rotation vectors, then a rest.
+fn session(turns: &[Vector3<f64>], start: Vector3<f64>) -> Alignment {
+    let inverse = scale().try_inverse().expect("a regular matrix");
+    let (steps, h) = (200, 0.01);
+    let (mut time, mut raw, mut ranges) = (Vec::new(), Vec::new(), Vec::new());
+    let mut force = start;
+    let pose = |force: Vector3<f64>| StillPose {
+        reading: force,
+        var_reading: Vector3::repeat(1e-6),
+        zero: Vector3::zeros(),
+        var_zero: Vector3::repeat(1e-10),
+    };
+    let mut holds = vec![pose(force)];
+    for turn in turns {
+        let first = raw.len();
+        for k in 0..=steps {
+            let u = f64::from(k) / f64::from(steps);
+            // Rate of a raised-cosine turn about a fixed axis.
+            let rate = turn * ((1.0 - (std::f64::consts::TAU * u).cos()) / (f64::from(steps) * h));
+            time.push(raw.len() as f64 * h);
+            raw.push(inverse * rate);
+        }
+        ranges.push(MoveRange {
+            start: first,
+            stop: raw.len(),
+            anchor_before_s: first as f64 * h - 1.0,
+            anchor_after_s: raw.len() as f64 * h + 1.0,
+        });
+        force = exp(&-turn) * force;
+        holds.push(pose(force));
+    }
+    let links = (0..turns.len())
+        .map(|i| Link {
+            before: i,
+            after: i + 1,
+        })
+        .collect();
+    Alignment {
+        holds,
+        links,
+        moves: prepare_all(&time, &raw, None, &ranges, RateModel::Coning).expect("valid moves"),
+        used: vec![true; turns.len()],
+        gravity: 9.8,
+        noise: RateNoise {
+            density: Vector3::repeat(1e-4),
+            sigma_time_s: 0.0,
+            nominal_step_s: h,
+        },
+        var_zero_walk: Vector3::zeros(),
+        accelerometer_basis: DMatrix::zeros(12, 0),
+        is_accelerometer_given: true,
+        is_offset_free: false,
+    }
+}
+
+fn start(scale: Matrix3<f64>) -> Model {
+    Model {
+        accelerometer_scale: Matrix3::identity(),
+        accelerometer_bias: Vector3::zeros(),
+        gyroscope_scale: scale,
+        rate_offset: Vector3::zeros(),
+        followed: DVector::zeros(0),
+    }
+}
+
+fn many_turns() -> Vec<Vector3<f64>> {
+    (0..12)
+        .map(|k| {
+            let k = f64::from(k);
+            Vector3::new(
+                (1.3 * k).sin(),
+                (2.1 * k + 1.0).cos(),
+                (0.7 * k + 2.0).sin(),
+            ) * 1.6
+        })
+        .collect()
+}
+
+#[test]
+fn noise_free_moves_return_the_scale_to_rounding() {
+    let problem = session(&many_turns(), Vector3::new(1.0, 2.0, 9.5).normalize() * 9.8);
+    let weights = vec![Vector3::zeros(); 13];
+    for from in [Matrix3::identity(), Matrix3::identity() * 0.8] {
+        let found = fit(&problem, &[start(from)], &weights, &Settings::default()).expect("a fit");
+        assert!(found.is_converged, "{}", found.stopped_because);
+        // A raised cosine of 200 samples is integrated to 1e-12; the solver stops at steps of 1e-10.
+        assert!((found.model.gyroscope_scale - scale()).norm() < 1e-9);
+        assert_eq!(found.certainty.rank, 9);
+    }
+}
+
+#[test]
+fn three_horizontal_turns_without_stops_show_six_numbers_and_with_stops_all_nine() {
+    let up = Vector3::z() * 9.8;
+    let turn = |axis: usize, angle: f64| {
+        let mut v = Vector3::zeros();
+        v[axis] = angle;
+        v
+    };
+    // Axis x and y are level in the first pose; x again brings z down to level for the third.
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let whole = [turn(0, quarter), turn(2, 2.0), turn(1, 1.0)];
+    let stops: Vec<_> = [
+        turn(0, 0.7),
+        turn(0, quarter - 0.7),
+        turn(2, 0.9),
+        turn(2, 1.1),
+        turn(1, 0.5),
+        turn(1, 0.9),
+    ]
+    .to_vec();
+    let rank = |turns: &[Vector3<f64>]| {
+        let problem = session(turns, up);
+        let weights = vec![Vector3::zeros(); turns.len() + 1];
+        fit(&problem, &[start(scale())], &weights, &Settings::default())
+            .expect("a fit")
+            .certainty
+            .rank
+    };
+    assert_eq!(rank(&whole), 6);
+    assert_eq!(rank(&stops), 9);
+}
+
+#[test]
+fn a_turn_about_the_vertical_shows_nothing_along_it() {
+    let problem = session(
+        &[Vector3::z() * 1.5, Vector3::z() * -2.0],
+        Vector3::z() * 9.8,
+    );
+    let found = fit(
+        &problem,
+        &[start(scale())],
+        &[Vector3::zeros(); 3],
+        &Settings::default(),
+    )
+    .expect("a fit");
+    for jacobian in &found.jacobians {
+        // Column of S33: gravity stays where it was whatever the scale of the vertical axis.
+        assert!(jacobian.column(8).norm() < 1e-9);
+    }
+}
+
+#[test]
+fn jacobians_of_the_residual_match_differences() {
+    let mut problem = session(
+        &many_turns()[..4],
+        Vector3::new(3.0, -4.0, 8.0).normalize() * 9.8,
+    );
+    problem.holds[1].zero = Vector3::new(0.02, -0.01, 0.03);
+    problem.used = vec![true; 4];
+    let weights = vec![Vector3::zeros(); 5];
+    let at = |s: Matrix3<f64>| {
+        let mut frozen = problem.clone();
+        frozen.used = vec![true, false, false, false];
+        // One round with one move and a rank-2 problem leaves other directions where they were: read the prediction only.
+        let settings = Settings {
+            max_rounds: 1,
+            ..Settings::default()
+        };
+        fit(&frozen, &[start(s)], &weights, &settings).expect("a fit")
+    };
+    let base = at(scale());
+    let s0 = base.model.gyroscope_scale;
+    let problem_at = |s: Matrix3<f64>| {
+        // Residual at exactly s, through the public prediction of unused moves: B f_i − f_j.
+        let moved = problem.clone();
+        let zero = |h: usize| -s * moved.holds[h].zero;
+        moved
+            .moves
+            .iter()
+            .zip(&moved.links)
+            .map(|(one, link)| {
+                let turn = one.integrate(&s, &zero(link.before), &zero(link.after), &moved.noise);
+                turn.rotation * moved.holds[link.before].reading - moved.holds[link.after].reading
+            })
+            .collect::<Vec<_>>()
+    };
+    let step = 1e-6;
+    for i in 0..3 {
+        for j in 0..3 {
+            let mut d = Matrix3::zeros();
+            d[(i, j)] = step;
+            let (plus, minus) = (problem_at(s0 + d), problem_at(s0 - d));
+            for index in 0..4 {
+                let numeric = (plus[index] - minus[index]) / (2.0 * step);
+                let analytic: Vector3<f64> = base.jacobians[index]
+                    .column(3 * i + j)
+                    .fixed_rows::<3>(0)
+                    .into();
+                // Differences of 9.8 with step 1e-6: rounding 2e-9, truncation far below.
+                assert!(
+                    (numeric - analytic).norm() < 1e-7,
+                    "S{i}{j} of move {index}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn an_outlier_loses_its_weight() {
+    let mut problem = session(&many_turns(), Vector3::z() * 9.8);
+    problem.holds[5].reading += Vector3::new(0.5, -0.4, 0.3);
+    let settings = Settings {
+        loss: trihedron::gauss_newton::Loss::Cauchy { scale: 3.0 },
+        ..Settings::default()
+    };
+    let found = fit(
+        &problem,
+        &[start(Matrix3::identity())],
+        &[Vector3::zeros(); 13],
+        &settings,
+    )
+    .expect("a fit");
+    assert!(
+        found.weights[4] < 0.1 && found.weights[5] < 0.1,
+        "{:?}",
+        found.weights
+    );
+    assert!(found.weights[9] > 0.9, "{:?}", found.weights);
+}
+
+#[test]
+fn malformed_problems_are_refused() {
+    let good = session(&many_turns(), Vector3::z() * 9.8);
+    let weights = vec![Vector3::zeros(); 13];
+    let refused = |problem: &Alignment| {
+        fit(problem, &[start(scale())], &weights, &Settings::default()).is_err()
+    };
+    let mut wrong = good.clone();
+    wrong.links[0].after = 99;
+    assert!(refused(&wrong));
+    wrong = good.clone();
+    wrong.used = vec![false; 12];
+    assert!(refused(&wrong));
+    wrong = good.clone();
+    wrong.used.pop();
+    assert!(refused(&wrong));
+    assert!(fit(&good, &[], &weights, &Settings::default()).is_err());
+}
+
+#[test]
+fn the_tangent_plane_is_across_the_direction() {
+    for v in [
+        Vector3::x(),
+        Vector3::new(1.0, 1.0, 1.0),
+        Vector3::new(-1e-9, 0.0, 9.8),
+    ] {
+        let t = tangent_plane(&v);
+        assert!((t.transpose() * v).norm() < 1e-14 * v.norm());
+        assert!((t.transpose() * t - nalgebra::Matrix2::identity()).norm() < 1e-14);
+    }
+}
+
+#[test]
+fn the_banded_factor_whitens_as_the_dense_one() {
+    let (n, width) = (14, 3);
+    let root = DMatrix::from_fn(n, n, |i, j| {
+        if i >= j && i - j <= width {
+            (1.0 + (i * 7 + j * 3) as f64).sin() + if i == j { 3.0 } else { 0.0 }
+        } else {
+            0.0
+        }
+    });
+    let dense = &root * root.transpose();
+    let mut banded = Banded::zeros(n, width);
+    for i in 0..n {
+        for j in i.saturating_sub(width)..=i {
+            banded.add(i, j, dense[(i, j)]);
+        }
+    }
+    let mut seen = DMatrix::from_fn(n, 2, |i, j| (i + 5 * j) as f64);
+    let expected = dense
+        .clone()
+        .cholesky()
+        .expect("positive")
+        .l()
+        .solve_lower_triangular(&seen)
+        .expect("regular");
+    banded.cholesky().expect("positive").whiten(&mut seen);
+    // A well-conditioned factor of 14 rows: some ulp.
+    assert!((seen - expected).norm() < 1e-12);
+    assert!(Banded::zeros(3, 1).cholesky().is_err());
+}
