@@ -1,11 +1,15 @@
 """Method 2 for gyros: recovery, honesty, observability."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from trihedron.estimate.gyroscope import MoveOptions, calibrate_moves
-from trihedron.records import SensorCalibration
-from trihedron.simulate import Accelerometer, Gyroscope, Motion, NoiseTerms, Scenario, hand_session, simulate
+from trihedron.records import FindingCode, SensorCalibration
+from trihedron.segment import segment_recording
+from trihedron.simulate import Accelerometer, Gyroscope, Motion, MoveTo, NoiseTerms, Scenario, hand_session, simulate
+from trihedron.simulate import Hold as SimulatedHold
 from true_segments import segments_from_truth
 
 SCALE = ((1.02, 0.01, -0.015), (0.005, 0.98, 0.02), (-0.01, 0.008, 1.01))
@@ -69,3 +73,224 @@ def test_error_bars_of_the_scale_and_zero_cover_the_truth_at_their_stated_rate()
     for level, expected in ((1.0, 0.683), (1.96, 0.95)):
         margin = 3.0 * np.sqrt(expected * (1.0 - expected) / 150.0)
         assert abs(np.mean(np.abs(scores) < level) - expected) < margin
+
+
+def test_error_bars_contain_those_of_the_accelerometer():
+    motion = hand_session(14, hold_s=2.0, first_hold_s=3.0)
+    recording, truth = simulate(scenario(motion), seed=3)
+    segments = segments_from_truth(recording, truth)
+    covariance = np.zeros((12, 12))
+    covariance[np.diag_indices(12)] = np.array([3e-3] * 9 + [2e-2] * 3) ** 2
+    loose = given_accelerometer(truth, covariance)
+    tight = given_accelerometer(truth)
+    options = MoveOptions(n_folds=0)
+    with_doubt, _ = calibrate_moves(recording, segments, loose, truth.gravity_m_s2, options)
+    without, _ = calibrate_moves(recording, segments, tight, truth.gravity_m_s2, options)
+    # Misalignments of 3 mrad turn the predicted gravity by as much: the gyro's own part is ten times smaller.
+    assert with_doubt.sigma_S.min() > 2.0 * without.sigma_S.max()
+
+
+def test_a_wrong_accelerometer_inside_its_error_bars_leaves_the_gyro_inside_its_own():
+    rng = np.random.default_rng(7)
+    recording, truth = simulate(scenario(hand_session(14, hold_s=2.0, first_hold_s=3.0)), seed=4)
+    segments = segments_from_truth(recording, truth)
+    sigma = np.array([1e-3] * 9 + [5e-3] * 3)
+    distance = []
+    for _ in range(12):
+        error = rng.normal(size=12) * sigma
+        given = SensorCalibration(
+            truth.accelerometer_S + error[:9].reshape(3, 3),
+            truth.accelerometer_b + error[9:],
+            np.diag(sigma**2),
+            "m/s^2",
+            "m/s^2",
+            "given",
+        )
+        found, _ = calibrate_moves(recording, segments, given, truth.gravity_m_s2, MoveOptions(n_folds=0))
+        e = np.concatenate([(found.S - truth.gyroscope_S).ravel(), found.b - truth.gyroscope_b])
+        distance.append(e @ np.linalg.solve(found.covariance, e))
+    # Twelve draws of χ²(12): their sum has mean 144 and standard deviation 17; four of them.
+    assert 75.0 < sum(distance) < 213.0
+
+
+@pytest.mark.parametrize("sign", [(1, 1, -1), (-1, -1, -1)])
+def test_a_left_handed_gyro_is_recovered_and_reported(sign):
+    S = np.array(SCALE) @ np.diag(sign)
+    recording, truth = simulate(scenario(hand_session(14, hold_s=2.0), S=tuple(map(tuple, S))), seed=2)
+    segments = segments_from_truth(recording, truth)
+    found, findings = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
+    assert np.linalg.det(found.S) < 0.0
+    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
+    assert FindingCode.LEFT_HANDED in codes(findings)
+
+
+def test_exchanged_axes_are_found_without_any_nominal_scale():
+    S = np.array(SCALE)[:, [1, 2, 0]]
+    recording, truth = simulate(scenario(hand_session(14, hold_s=2.0), S=tuple(map(tuple, S))), seed=2)
+    segments = segments_from_truth(recording, truth)
+    found, findings = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
+    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
+    assert FindingCode.LEFT_HANDED in codes(findings)  # which says that axes differ in name
+
+
+def test_the_manuals_unit_in_counts_is_recovered_and_both_triads_are_left_handed():
+    S_f = np.array([[-0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
+    S_w = np.radians([[-0.0290, 0.0002, 0.0002], [0.0021, 0.0251, -0.0022], [0.0004, -0.0005, 0.0285]]) * 10.0
+    b_w = np.radians([-457.68, -400.59, -447.47])
+    recording, truth = simulate(
+        Scenario(
+            motion=hand_session(18, hold_s=3.0, first_hold_s=5.0),
+            accelerometer=Accelerometer(
+                S=tuple(map(tuple, S_f)),
+                b=(19.5696, -22.4746, -20.3088),
+                unit="counts",
+                noise=NoiseTerms(N=(2e-3,) * 3),
+            ),
+            gyroscope=Gyroscope(S=tuple(map(tuple, S_w)), b=tuple(b_w), unit="counts", noise=NoiseTerms(N=(5e-4,) * 3)),
+        ),
+        seed=5,
+    )
+    segments = segments_from_truth(recording, truth)
+    assert np.linalg.det(truth.accelerometer_S) < 0.0
+    found, findings = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
+    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
+    assert FindingCode.LEFT_HANDED in codes(findings)
+
+
+def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():
+    up = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.2), (0.0, 0.3, -1.0), (0.0, -1.0, 0.1), (0.0, 0.1, 1.0), (0.0, 1.0, 0.5))
+    steps = [SimulatedHold(4.0)]
+    for direction in up[1:]:
+        steps += [MoveTo(direction, 2.0, wobble_deg=0.0), SimulatedHold(3.0)]
+    recording, truth = simulate(scenario(Motion(tuple(steps))), seed=1)
+    segments = segments_from_truth(recording, truth)
+    found, findings = calibrate_moves(
+        recording, segments, given_accelerometer(truth), truth.gravity_m_s2, MoveOptions(nominal_scale=1.0)
+    )
+    finding = next(f for f in findings if f.code is FindingCode.NOT_OBSERVABLE)
+    assert "axis 2" in finding.action
+    assert "axis 3" in finding.action
+    # What was turned about is known; what was not has error bars as large as the scale itself.
+    assert found.sigma_S[0, 0] < 0.01
+    assert found.sigma_S[:, 1:].max() > 0.3
+
+
+def test_a_disturbed_hold_costs_its_two_moves_and_is_named(quiet):
+    recording, truth, segments = quiet
+    mean = segments.accelerometer_mean.copy()
+    mean[7] += [0.4, -0.3, 0.2]
+    found, findings = calibrate_moves(
+        recording, replace(segments, accelerometer_mean=mean), given_accelerometer(truth), truth.gravity_m_s2
+    )
+    named = {int(f.numbers["move"]) for f in findings if f.code is FindingCode.OUTLIER_MOVE}
+    assert named == {6, 7}
+    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
+    assert list(np.flatnonzero(found.quality.weights == 0.0)) == [6, 7]
+
+
+def test_a_clipped_move_is_bridged_and_weighs_less(quiet):
+    recording, truth, segments = quiet
+    speed = np.abs(recording.gyroscope[:, 0])
+    limit = np.sort(speed)[-12]
+    clipped = replace(recording, gyroscope=np.clip(recording.gyroscope, [-limit, -9, -9], [limit, 9, 9]))
+    found, findings = calibrate_moves(clipped, segments, given_accelerometer(truth), truth.gravity_m_s2)
+    assert FindingCode.CLIPPING in codes(findings)
+    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
+    hard = np.clip(recording.gyroscope, -0.3 * limit, 0.3 * limit)
+    with pytest.raises(ValueError, match="limit in every move"):
+        calibrate_moves(replace(recording, gyroscope=hard), segments, given_accelerometer(truth), truth.gravity_m_s2)
+
+
+def test_a_zero_that_follows_gravity_is_found_and_taken_out(quiet):
+    recording, truth, segments = quiet
+    A = np.array([[0.0, 3e-4, 0.0], [4e-4, 0.0, 0.0], [0.0, 0.0, -2e-4]])
+    tilted = replace(recording, gyroscope=recording.gyroscope + truth.specific_force_m_s2 @ A.T)
+    means = segments.gyroscope_mean + segments.accelerometer_mean @ A.T
+    segments = replace(segments, gyroscope_mean=means)
+    found, findings = calibrate_moves(tilted, segments, given_accelerometer(truth), truth.gravity_m_s2)
+    assert FindingCode.GYRO_G_SENSITIVITY in codes(findings)
+    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)).max() < 4.0
+    options = MoveOptions(is_attitude_removed=False)
+    left_in, _ = calibrate_moves(tilted, segments, given_accelerometer(truth), truth.gravity_m_s2, options)
+    assert left_in.quality.held_out_rms > 1.5 * found.quality.held_out_rms
+
+
+def test_a_zero_that_drifts_is_followed_and_reported(quiet):
+    recording, truth, segments = quiet
+    drift = 0.01 * recording.time_s / recording.time_s[-1]
+    drifting = replace(recording, gyroscope=recording.gyroscope + drift[:, None])
+    means = np.array([drifting.gyroscope[h.start : h.stop].mean(axis=0) for h in segments.holds])
+    found, findings = calibrate_moves(
+        drifting, replace(segments, gyroscope_mean=means), given_accelerometer(truth), truth.gravity_m_s2
+    )
+    assert FindingCode.GYRO_BIAS_DRIFT in codes(findings)
+    assert np.abs(z_scores(found, truth.gyroscope_S, truth.gyroscope_b)[:9]).max() < 4.0
+
+
+def test_held_out_moves_are_predicted_as_well_as_the_error_bars_say(quiet):
+    recording, truth, segments = quiet
+    found, _ = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
+    quality = found.quality
+    z = quality.held_out / quality.held_out_sigma
+    # 51 scores, two thirds independent: mean square 1 with standard deviation √(2/34); four of them.
+    assert abs(np.mean(z**2) - 1.0) < 1.0
+    assert quality.held_out_rms > quality.rms
+    # ‖residual‖ against the prediction: 34 numbers less 9, three standard deviations of their root mean square.
+    assert abs(quality.rms_dof / quality.floor - 1.0) < 0.45
+
+
+def test_all_rate_models_agree_within_noise_on_a_hand_session(quiet):
+    recording, truth, segments = quiet
+    found = [
+        calibrate_moves(
+            recording,
+            segments,
+            given_accelerometer(truth),
+            truth.gravity_m_s2,
+            MoveOptions(rate_degree=degree, n_folds=0),
+        )[0]
+        for degree in (0, 1, 3)
+    ]
+    # At 100 Hz a hand turning by 2 rad/s leaves 1e-5 of the constant model's order; noise is ten times that.
+    assert np.abs(found[0].S - found[2].S).max() < found[2].sigma_S.max()
+    assert np.abs(found[1].S - found[2].S).max() < 0.3 * found[2].sigma_S.max()
+
+
+def test_the_same_recording_gives_the_same_answer_twice(quiet):
+    recording, truth, segments = quiet
+    one, _ = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
+    two, _ = calibrate_moves(recording, segments, given_accelerometer(truth), truth.gravity_m_s2)
+    np.testing.assert_array_equal(one.S, two.S)
+
+
+def test_a_missing_sensor_or_missing_moves_are_refused_in_one_sentence(quiet):
+    recording, truth, segments = quiet
+    given = given_accelerometer(truth)
+    with pytest.raises(ValueError, match="no gyroscope"):
+        calibrate_moves(replace(recording, gyroscope=None), segments, given, 9.8)
+    with pytest.raises(ValueError, match="no move between two still poses"):
+        calibrate_moves(recording, replace(segments, moves=()), given, 9.8)
+    short = replace(
+        recording,
+        time_s=recording.time_s[:500],
+        accelerometer=recording.accelerometer[:500],
+        gyroscope=recording.gyroscope[:500],
+    )
+    with pytest.raises(ValueError, match="another log"):
+        calibrate_moves(short, segments, given, 9.8)
+    with pytest.raises(ValueError, match=r"\(3, 3\)"):
+        calibrate_moves(recording, segments, given, 9.8, MoveOptions(nominal_scale=np.ones(3)))
+
+
+@pytest.mark.parametrize("duration_s", [1.5, 4.0, 10.0])
+def test_the_scale_does_not_depend_on_how_long_the_moves_last(duration_s):
+    motion = hand_session(12, hold_s=4.0, move_s=duration_s, first_hold_s=10.0)
+    recording, truth = simulate(scenario(motion), seed=11)
+    segments = segment_recording(recording)
+    found, _ = calibrate_moves(
+        recording, segments, given_accelerometer(truth), truth.gravity_m_s2, MoveOptions(n_folds=0)
+    )
+    # Cut edges of moves would make every scale too large, by 1e-3 and more.
+    error = np.diag(found.S - truth.gyroscope_S)
+    assert np.abs(error / np.diag(found.sigma_S)).max() < 3.5
+    assert abs(error.mean()) < 5e-4

@@ -148,7 +148,9 @@ def nominal_matrix(
     for divisor in range(1, 17):
         quantum_raw = float(sizes.min()) / divisor
         ratio = sizes / quantum_raw
-        if np.all(np.abs(ratio - np.round(ratio)) < SCALE_TOLERANCE * ratio) and ratio.max() < 0.5 / SCALE_TOLERANCE:
+        # Large turns are read once small ones have refined the scale; small ones must fit as they are.
+        small = ratio[ratio < 0.3 / SCALE_TOLERANCE]
+        if len(small) > 0 and np.all(np.abs(small - np.round(small)) < SCALE_TOLERANCE * small):
             return quantum_rad / quantum_raw * np.eye(3)
     raise ValueError(
         "the readings are counts and the turns are no small multiples of one angle: give nominal_scale, rad/s per count"

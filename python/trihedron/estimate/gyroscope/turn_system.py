@@ -23,7 +23,10 @@ LARGEST_SIGMA_TURN = math.radians(20.0)
 
 @dataclass(frozen=True, eq=False)
 class TurnSystem:
-    """Turns with known ``angles`` (k, 3), rad; a rough ``S_w`` (3, 3) turns ``sigma_turn`` (rad) into raw units."""
+    """Turns with known ``angles`` (k, 3), rad; a rough ``S_w`` (3, 3) turns ``sigma_turn`` (rad) into raw units.
+
+    ``sigma_turn`` is the standard error of a turn's size; its axis is held by the table.
+    """
 
     measured: MeasuredTurns
     angles: FloatArray
@@ -32,7 +35,10 @@ class TurnSystem:
 
     def covariances(self) -> FloatArray:
         """(k, 3, 3) of the raw turns: rate noise ``N² Δt``, a zero that wanders between holds, the turn's own error."""
-        return self._noise(self.measured.duration_s) + self.sigma_turn**2 * self.S_w @ self.S_w.T
+        size = np.linalg.norm(self.angles, axis=1, keepdims=True)
+        axis = self.sigma_turn * (self.angles / np.where(size > 0.0, size, 1.0)) @ self.S_w.T
+        covariance: FloatArray = self._noise(self.measured.duration_s) + axis[:, :, None] * axis[:, None, :]
+        return covariance
 
     def _noise(self, duration_s: FloatArray) -> FloatArray:
         t = duration_s[:, None]

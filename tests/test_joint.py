@@ -1,0 +1,119 @@
+"""Both sensors in one fit."""
+
+import numpy as np
+import pytest
+
+from trihedron.estimate.accelerometer import calibrate_norm
+from trihedron.estimate.gyroscope import MoveOptions, calibrate_moves
+from trihedron.estimate.joint import calibrate_joint, free_directions
+from trihedron.simulate import Accelerometer, Gyroscope, NoiseTerms, Scenario, hand_session, simulate
+from true_segments import segments_from_truth
+
+S_F = ((1.01, 0.0, 0.0), (0.01, 0.99, 0.0), (-0.004, 0.006, 1.02))
+S_W = ((1.02, 0.01, -0.015), (0.005, 0.98, 0.02), (-0.01, 0.008, 1.01))
+
+
+def session(seed, n_poses=20):
+    return simulate(
+        Scenario(
+            motion=hand_session(n_poses, hold_s=2.0, first_hold_s=3.0),
+            accelerometer=Accelerometer(S=S_F, b=(0.1, -0.1, 0.05), noise=NoiseTerms(N=(3e-3,) * 3)),
+            gyroscope=Gyroscope(S=S_W, b=(0.01, -0.02, 0.005), noise=NoiseTerms(N=(2e-4,) * 3)),
+        ),
+        seed,
+    )
+
+
+def solve(recording, truth, frame="lower"):
+    segments = segments_from_truth(recording, truth)
+    alone, _ = calibrate_norm(
+        segments.accelerometer_mean,
+        segments.accelerometer_sigma_mean,
+        truth.gravity_m_s2,
+        raw_unit=recording.accelerometer_unit,
+        frame=frame,
+    )
+    options = MoveOptions(n_folds=0)
+    return segments, alone, calibrate_joint(recording, segments, alone, truth.gravity_m_s2, "given", options)
+
+
+def errors(found, truth):
+    return np.concatenate(
+        [
+            (found.accelerometer.S - truth.accelerometer_S).ravel(),
+            found.accelerometer.b - truth.accelerometer_b,
+            (found.gyroscope.S - truth.gyroscope_S).ravel(),
+            found.gyroscope.b - truth.gyroscope_b,
+        ]
+    )
+
+
+def test_the_covariance_of_all_24_parameters_is_honest():
+    distance, scores = [], []
+    for seed in range(25):
+        recording, truth = session(seed)
+        _, _, found = solve(recording, truth)
+        free = np.diag(found.covariance) > 0.0
+        e = errors(found, truth)[free]
+        covariance = found.covariance[np.ix_(free, free)]
+        distance.append(e @ np.linalg.solve(covariance, e))
+        scores.append(e / np.sqrt(np.diag(covariance)))
+    assert free.sum() == 21
+    # Sum of 25 draws of χ²(21): mean 525, standard deviation 32; three of them, and 4 % for the estimated noise.
+    assert abs(sum(distance) - 525.0) < 3.0 * 32.4 + 0.04 * 525.0
+    margin = 3.0 * np.sqrt(0.683 * 0.317 / (25 * 12))
+    assert abs(np.mean(np.abs(np.array(scores)) < 1.0) - 0.683) < margin
+
+
+def test_the_gyro_alone_agrees_with_the_joint_answer_inside_its_error_bars():
+    recording, truth = session(3)
+    segments, alone, joint = solve(recording, truth)
+    moves, _ = calibrate_moves(recording, segments, alone, truth.gravity_m_s2, MoveOptions(n_folds=0))
+    assert np.abs((moves.S - joint.gyroscope.S) / joint.gyroscope.sigma_S).max() < 1.0
+    np.testing.assert_allclose(moves.sigma_S, joint.gyroscope.sigma_S, rtol=0.25)
+
+
+def test_the_gyro_sharpens_the_accelerometer():
+    recording, truth = session(3)
+    _, alone, joint = solve(recording, truth)
+    free = np.diag(alone.covariance) > 0.0
+    ratio = np.diag(joint.accelerometer.covariance)[free] / np.diag(alone.covariance)[free]
+    # Estimated scatter of the two noise figures: a few per cent.
+    assert ratio.max() < 1.1
+    assert ratio.min() < 0.8
+
+
+def test_the_frame_of_the_accelerometer_is_kept():
+    recording, truth = session(3)
+    _, _, lower = solve(recording, truth, "lower")
+    assert lower.frame == "lower"
+    assert np.all(np.triu(lower.accelerometer.S, 1) == 0.0)
+    _, _, symmetric = solve(recording, truth, "symmetric")
+    assert symmetric.frame == "symmetric"
+    # The same physics in another frame: S → U S, so SᵀS is the same; both converged to 1e-10.
+    for one, other in (
+        (lower.accelerometer.S, symmetric.accelerometer.S),
+        (lower.gyroscope.S, symmetric.gyroscope.S),
+    ):
+        np.testing.assert_allclose(one.T @ one, other.T @ other, atol=2e-6)
+
+
+@pytest.mark.parametrize("kind", ["lower", "symmetric", "case"])
+def test_free_directions_do_not_turn_the_frame(kind):
+    rng = np.random.default_rng(1)
+    S = np.array(S_F)
+    if kind != "lower":
+        values, vectors = np.linalg.eigh(S.T @ S)
+        S = vectors @ np.diag(np.sqrt(values)) @ vectors.T
+    if kind == "case":
+        S = np.linalg.qr(rng.normal(size=(3, 3)))[0] @ S
+    basis, frame = free_directions(S)
+    assert frame == kind
+    assert np.linalg.matrix_rank(basis) == 9
+    # A turn of the frame is δS = [θ]× S: it is no combination of the free directions, whatever θ.
+    turns = []
+    for i in range(3):
+        cross = np.cross(np.eye(3)[i], np.eye(3)).T
+        turns.append(np.concatenate([(cross @ S).ravel(), np.zeros(3)]))
+    together = np.column_stack([basis / np.linalg.norm(basis, axis=0), *turns])
+    assert np.linalg.matrix_rank(together, tol=1e-6) == 12
