@@ -87,7 +87,8 @@ def test_error_bars_contain_those_of_the_accelerometer():
     with_doubt, _ = calibrate_moves(recording, segments, loose, truth.gravity_m_s2, options)
     without, _ = calibrate_moves(recording, segments, tight, truth.gravity_m_s2, options)
     # Misalignments of 3 mrad turn the predicted gravity by as much: the gyro's own part is ten times smaller.
-    assert with_doubt.sigma_S.min() > 2.0 * without.sigma_S.max()
+    off_diagonal = ~np.eye(3, dtype=bool)
+    assert with_doubt.sigma_S[off_diagonal].min() > 5.0 * without.sigma_S.max()
 
 
 def test_a_wrong_accelerometer_inside_its_error_bars_leaves_the_gyro_inside_its_own():
@@ -171,7 +172,7 @@ def test_moves_about_one_axis_are_called_not_observable_with_the_moves_to_add():
     assert "axis 2" in finding.action
     assert "axis 3" in finding.action
     # What was turned about is known; what was not has error bars as large as the scale itself.
-    assert found.sigma_S[0, 0] < 0.01
+    assert found.sigma_S[0, 0] < 0.2 * found.sigma_S[:, 1:].max()
     assert found.sigma_S[:, 1:].max() > 0.3
 
 
@@ -293,4 +294,7 @@ def test_the_scale_does_not_depend_on_how_long_the_moves_last(duration_s):
     # Cut edges of moves would make every scale too large, by 1e-3 and more.
     error = np.diag(found.S - truth.gyroscope_S)
     assert np.abs(error / np.diag(found.sigma_S)).max() < 3.5
-    assert abs(error.mean()) < 5e-4
+    pick = np.zeros(12)
+    pick[[0, 4, 8]] = 1.0 / 3.0
+    assert abs(error.mean()) < 3.0 * np.sqrt(pick @ found.covariance @ pick)
+    assert np.sqrt(pick @ found.covariance @ pick) < 1e-3

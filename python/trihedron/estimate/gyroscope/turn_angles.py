@@ -186,7 +186,7 @@ def identify_turns(
         else:
             is_used = angle != 0.0 and abs(along - angle) < max(SLACK_RAD, 0.3 * abs(angle))
         is_used = is_used and off_axis < 2.0 * SLACK_RAD
-        known[index] = KnownTurn(axis, angle, is_used, along, off_axis, turn.angle_rad is not None)
+        known[index] = KnownTurn(axis, float(angle), bool(is_used), float(along), off_axis, turn.angle_rad is not None)
         if is_used:
             sums[axis] += (float(vector[axis]) * angle, angle * angle)
     return [turn for turn in known if turn is not None]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,20 +24,32 @@ LARGEST_SIGMA_TURN = math.radians(20.0)
 class TurnSystem:
     """Turns with known ``angles`` (k, 3), rad; a rough ``S_w`` (3, 3) turns ``sigma_turn`` (rad) into raw units.
 
-    ``sigma_turn`` is the standard error of a turn's size; its axis is held by the table.
+    ``sigma_turn`` is the standard error of a turn's size, ``sigma_tilt`` that of its axis times the turn (table, case).
     """
 
     measured: MeasuredTurns
     angles: FloatArray
     S_w: FloatArray
     sigma_turn: float = 0.0
+    sigma_tilt: float = 0.0
 
     def covariances(self) -> FloatArray:
         """(k, 3, 3) of the raw turns: rate noise ``N² Δt``, a zero that wanders between holds, the turn's own error."""
-        size = np.linalg.norm(self.angles, axis=1, keepdims=True)
-        axis = self.sigma_turn * (self.angles / np.where(size > 0.0, size, 1.0)) @ self.S_w.T
-        covariance: FloatArray = self._noise(self.measured.duration_s) + axis[:, :, None] * axis[:, None, :]
+        axis = self.axes @ self.S_w.T
+        along = (self.sigma_turn**2 - self.sigma_tilt**2) * axis[:, :, None] * axis[:, None, :]
+        covariance: FloatArray = self.noise() + along + self.sigma_tilt**2 * self.S_w @ self.S_w.T
         return covariance
+
+    @property
+    def axes(self) -> FloatArray:
+        """(k, 3) unit vectors along the turns."""
+        size = np.linalg.norm(self.angles, axis=1, keepdims=True)
+        axes: FloatArray = self.angles / np.where(size > 0.0, size, 1.0)
+        return axes
+
+    def noise(self) -> FloatArray:
+        """(k, 3, 3) of the raw turns from the sensor alone."""
+        return self._noise(self.measured.duration_s)
 
     def _noise(self, duration_s: FloatArray) -> FloatArray:
         t = duration_s[:, None]
@@ -175,7 +186,7 @@ def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) ->
 
     Each turn is predicted by all others. The scatter of a turn is first read from the median of these predictions,
     which one wrong turn does not move; a turn far beyond it is a suspect. It is removed when two others about its
-    axis remain to say so. The scatter is then matched to χ² of the rest, zero where the rate noise explains it.
+    axis remain to say so. The scatter is then that of the rest, zero where the rate noise explains it.
     """
     axes = np.argmax(np.abs(system.angles), axis=1)
     counts = {axis: int(np.count_nonzero(used & (axes == axis))) for axis in range(3)}
@@ -199,10 +210,10 @@ def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) ->
         used = used.copy()
         used[worst] = False
     if sigma_turn_rad is None:
-        sigma = _matching_scatter(system, used)
+        system = _matching_scatter(system, used)
     else:
-        sigma = sigma_turn_rad
-    return Screened(replace(system, sigma_turn=sigma), used, tuple(suspects), tuple(removed), unchecked)
+        system = replace(system, sigma_turn=sigma_turn_rad)
+    return Screened(system, used, tuple(suspects), tuple(removed), unchecked)
 
 
 def _distances(system: TurnSystem, used: BoolArray) -> dict[int, float]:
@@ -211,33 +222,52 @@ def _distances(system: TurnSystem, used: BoolArray) -> dict[int, float]:
 
 
 def _with_scatter(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) -> TurnSystem:
-    """The scatter of a turn from the median of the predictions, at most that of turns made by eye."""
+    """The scatter of a turn from the median of the predictions: one wrong turn does not move it."""
     if sigma_turn_rad is not None:
         return replace(system, sigma_turn=sigma_turn_rad)
+    for _ in range(3):
+        along2, across2, noise2 = _components(system, left_out(system, used).residual)
+        known = used & np.isfinite(along2)
+        if not np.any(known):
+            return system
+        system = replace(
+            system,
+            sigma_turn=_beyond(float(np.median(along2[known])) / MEDIAN_1, noise2),
+            sigma_tilt=_beyond(float(np.median(across2[known])) / MEDIAN_2, noise2),
+        )
+    return system
 
-    def median(sigma: float) -> float:
-        distances = list(_distances(replace(system, sigma_turn=sigma), used).values())
-        return float(np.median(distances)) if distances else 0.0
 
-    target = float(chi2_distribution.median(3))
-    return replace(system, sigma_turn=_solve_for(median, target))
-
-
-def _matching_scatter(system: TurnSystem, used: BoolArray) -> float:
+def _matching_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
+    """Scatter along and across the turns by moments; none where the rate noise explains the residuals."""
+    system = replace(system, sigma_turn=0.0, sigma_tilt=0.0)
     fit = solve(system, used)
     if fit.dof < 1 or chi2_distribution.sf(fit.chi2, fit.dof) > FALSE_ALARM:
-        return 0.0
-    return _solve_for(lambda sigma: solve(replace(system, sigma_turn=sigma), used).chi2, float(fit.dof))
+        return system
+    k = int(np.count_nonzero(used))
+    for _ in range(3):
+        along2, across2, noise2 = _components(system, system.residuals(solve(system, used)))
+        # Each axis spends one parameter along its turns and two across them.
+        system = replace(
+            system,
+            sigma_turn=_beyond(float(np.sum(along2[used])) / max(k - 3, 1), noise2),
+            sigma_tilt=_beyond(float(np.sum(across2[used])) / max(2 * k - 6, 1), noise2),
+        )
+    return system
 
 
-def _solve_for(statistic: Callable[[float], float], target: float) -> float:
-    """The scatter at which a statistic that falls with it meets its target; zero when it is below already."""
-    if statistic(0.0) <= target:
-        return 0.0
-    low, high = 1e-7, LARGEST_SIGMA_TURN
-    if statistic(high) >= target:
-        return high
-    for _ in range(40):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if statistic(middle) > target else (low, middle)
-    return math.sqrt(low * high)
+MEDIAN_1, MEDIAN_2 = (float(chi2_distribution.median(n)) for n in (1, 2))
+
+
+def _components(system: TurnSystem, raw: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Squares (k,) along and across each turn, rad², of raw deviations (k, 3), and the variance that noise alone
+    gives."""
+    to_si = np.linalg.inv(system.S_w)
+    deviation = raw @ to_si.T
+    along = np.einsum("ki,ki->k", deviation, system.axes)
+    noise = np.einsum("kii->k", to_si @ system.noise() @ to_si.T) / 3.0
+    return along**2, np.maximum(np.sum(deviation**2, axis=1) - along**2, 0.0), float(np.median(noise))
+
+
+def _beyond(mean_square: float, noise2: float) -> float:
+    return min(math.sqrt(max(mean_square - noise2, 0.0)), LARGEST_SIGMA_TURN)
