@@ -18,6 +18,7 @@ from trihedron.cli.calibrate import calibrate
 from trihedron.cli.check import check
 from trihedron.cli.demo import demo
 from trihedron.cli.export import export
+from trihedron.cli.kalman import kalman
 from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
 from trihedron.cli.verify import verify
@@ -28,6 +29,7 @@ COMMANDS = (
     check,
     segment,
     calibrate,
+    kalman,
     verify,
     apply,
     export,

@@ -4,6 +4,7 @@ from trihedron.pipeline.applying import apply
 from trihedron.pipeline.calibrating import METHODS, calibrate
 from trihedron.pipeline.checking import check
 from trihedron.pipeline.choices import settle_gravity
+from trihedron.pipeline.filtering import KalmanResult, kalman
 from trihedron.pipeline.reading import read, segment
 from trihedron.pipeline.results import CalibrationResult, CheckResult, VerificationResult
 from trihedron.pipeline.simulating import simulate, twin
@@ -13,10 +14,12 @@ __all__ = [
     "METHODS",
     "CalibrationResult",
     "CheckResult",
+    "KalmanResult",
     "VerificationResult",
     "apply",
     "calibrate",
     "check",
+    "kalman",
     "read",
     "segment",
     "settle_gravity",

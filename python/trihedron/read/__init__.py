@@ -4,9 +4,10 @@ The file's first bytes tell its format; names, then readings tell its columns an
 stated as a finding. A file that cannot become a recording raises :class:`ReadError` with one sentence.
 """
 
+from trihedron.read.axis_noise import read_axis_noise
 from trihedron.read.errors import ReadError
 from trihedron.read.pose_table import read_pose_table
 from trihedron.read.recording import read_recording
 from trihedron.read.table import Progress
 
-__all__ = ["Progress", "ReadError", "read_pose_table", "read_recording"]
+__all__ = ["Progress", "ReadError", "read_axis_noise", "read_pose_table", "read_recording"]

@@ -4,6 +4,7 @@ from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
 from trihedron.report.demonstration import demonstration_report
 from trihedron.report.document import Document
+from trihedron.report.kalman import kalman_report
 from trihedron.report.segments import segments_report
 from trihedron.report.text import to_text
 from trihedron.report.verification import verification_report
@@ -13,6 +14,7 @@ __all__ = [
     "calibration_report",
     "check_report",
     "demonstration_report",
+    "kalman_report",
     "segments_report",
     "to_text",
     "verification_report",

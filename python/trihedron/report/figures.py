@@ -33,7 +33,7 @@ def draw_signals(recording: Recording, segments: Segments) -> bytes:
         (recording.gyroscope, f"gyroscope\n[{unit_in_print(recording.gyroscope_unit.value)}]"),
     ]
     present = [(readings, label) for readings, label in sensors if readings is not None]
-    figure, axes = _panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
+    figure, axes = panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
     for axis, (readings, label) in zip(axes, present, strict=True):
         _shade_holds(axis, recording, segments)
         for k in range(3):
@@ -44,12 +44,12 @@ def draw_signals(recording: Recording, segments: Segments) -> bytes:
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
     _mark_disturbances(axes, recording, segments)
     axes[-1].set_xlabel("time [s]")
-    return _png(figure)
+    return png(figure)
 
 
 def draw_residuals(quality: FitQuality) -> bytes:
     """Residual of every pose with its standard error, and the held-out prediction."""
-    figure, (axis,) = _panels(1, 1, (9.5, 3.2))
+    figure, (axis,) = panels(1, 1, (9.5, 3.2))
     pose = np.arange(len(quality.residual))
     axis.axhline(0.0, color=INK, linewidth=0.8)
     if quality.held_out is not None:
@@ -78,7 +78,7 @@ def draw_residuals(quality: FitQuality) -> bytes:
     axis.set_ylabel("|f| − |g|  [mm/s²]")
     axis.set_xlim(-0.8, len(pose) - 0.2)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    return _png(figure)
+    return png(figure)
 
 
 def mm_s2(values: FloatArray) -> FloatArray:
@@ -90,7 +90,7 @@ def draw_poses(sensor: SensorCalibration, means: FloatArray) -> bytes:
     """Directions of "up" on two hemispheres, by Lambert's equal-area projection."""
     force = means @ sensor.S.T + sensor.b
     up = force / np.linalg.norm(force, axis=1)[:, None]
-    figure, axes = _panels(1, 2, (7.6, 4.1))
+    figure, axes = panels(1, 2, (7.6, 4.1))
     for axis, sign, title in ((axes[0], 1.0, "axis 3 above the horizon"), (axes[1], -1.0, "axis 3 below the horizon")):
         _hemisphere(axis, title)
         for k, direction in enumerate(up):
@@ -100,13 +100,13 @@ def draw_poses(sensor: SensorCalibration, means: FloatArray) -> bytes:
             x, y = _equal_area(direction * np.array([1.0, 1.0, sign]))
             axis.plot(x, y, "o", markersize=8, color=AXIS_COLOURS[0], alpha=0.85)
             axis.annotate(str(k), (x, y), ha="center", va="center", fontsize=5.5, color="white")
-    return _png(figure)
+    return png(figure)
 
 
 def draw_moves(quality: FitQuality) -> bytes:
     """Angle between predicted and measured gravity after every move."""
     assert quality.angle_deg is not None
-    figure, (axis,) = _panels(1, 1, (9.5, 3.0))
+    figure, (axis,) = panels(1, 1, (9.5, 3.0))
     move = np.arange(len(quality.angle_deg))
     axis.bar(move - 0.2, quality.angle_deg, 0.38, color=AXIS_COLOURS[0], label="in sample")
     if quality.held_out_angle_deg is not None:
@@ -115,10 +115,11 @@ def draw_moves(quality: FitQuality) -> bytes:
     axis.set_ylabel("gravity missed by [°]")
     axis.set_xlim(-0.8, len(move) - 0.2)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    return _png(figure)
+    return png(figure)
 
 
-def _panels(rows: int, columns: int, size: tuple[float, float], *, share_x: bool = False) -> tuple[Figure, list[Axes]]:
+def panels(rows: int, columns: int, size: tuple[float, float], *, share_x: bool = False) -> tuple[Figure, list[Axes]]:
+    """A figure of the house and its panels, row by row."""
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.subplots(rows, columns, sharex=share_x, squeeze=False)
@@ -129,7 +130,8 @@ def _panels(rows: int, columns: int, size: tuple[float, float], *, share_x: bool
     return figure, axes
 
 
-def _png(figure: Figure) -> bytes:
+def png(figure: Figure) -> bytes:
+    """A drawn figure as a PNG file."""
     buffer = io.BytesIO()
     # Without a date or version the same data give the same bytes.
     figure.savefig(buffer, format="png", metadata={"Software": None})
@@ -186,7 +188,7 @@ def _hemisphere(axis: Axes, title: str) -> None:
 def draw_verification(verification: Verification) -> bytes:
     """Norm error per pose with its standard error, and angle per move with the expected one."""
     has_moves = len(verification.angle_deg) > 0
-    figure, axes = _panels(2 if has_moves else 1, 1, (9.5, 5.2 if has_moves else 3.0))
+    figure, axes = panels(2 if has_moves else 1, 1, (9.5, 5.2 if has_moves else 3.0))
     pose = np.arange(len(verification.norm_error))
     axes[0].axhline(0.0, color=INK, linewidth=0.8)
     axes[0].errorbar(
@@ -207,4 +209,4 @@ def draw_verification(verification: Verification) -> bytes:
         axes[1].set_xlabel("move")
         axes[1].set_ylabel("gravity missed by [°]")
         axes[1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    return _png(figure)
+    return png(figure)

@@ -3,7 +3,12 @@
 from trihedron.estimate.kalman.consistency import check_innovations, normalised_error_squared
 from trihedron.estimate.kalman.guide import Goal
 from trihedron.estimate.kalman.live import LiveCalibration
-from trihedron.estimate.kalman.norm_invariant import LiveNormCalibration, NormStart, calibrate_without_references
+from trihedron.estimate.kalman.norm_invariant import (
+    LiveNormCalibration,
+    NormFrame,
+    NormStart,
+    calibrate_without_references,
+)
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
 from trihedron.estimate.kalman.session import (
     calibrate_session,
@@ -17,6 +22,7 @@ __all__ = [
     "Goal",
     "LiveCalibration",
     "LiveNormCalibration",
+    "NormFrame",
     "NormStart",
     "Prior",
     "ShapingOptions",

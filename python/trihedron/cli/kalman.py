@@ -1,0 +1,73 @@
+"""``trihedron kalman``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Optional
+
+import typer
+
+from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
+from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+
+FIRST_SCREEN = 3
+
+
+@with_options(source=LogSource, place=GravitySource)
+def kalman(
+    source: LogSource,
+    place: GravitySource,
+    reference: Annotated[
+        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+        typer.Option(
+            metavar="FILE",
+            help="Pose table with header: pitch,roll in degrees or fx,fy,fz; also hold, or start,stop. "
+            "Without it the length of gravity is used.",
+        ),
+    ] = None,
+    angle_sigma: Annotated[
+        float, typer.Option(metavar="DEG", help="Standard error of the angles in the pose table.")
+    ] = 0.0,
+    noise: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            metavar="FILE", help="Noise of the accelerometer (JSON); otherwise what is seen in the still poses."
+        ),
+    ] = None,
+    frame: Annotated[
+        str, typer.Option(help="Instrument trihedron without a pose table: lower or symmetric.")
+    ] = "lower",
+    output: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON)."),
+    ] = None,
+    json: Json = None,
+    report: Report = None,
+    full: Annotated[bool, typer.Option("--full", help="Print the whole report.")] = False,
+    force: Force = False,
+) -> None:
+    """Calibrate the accelerometer by Kalman filter, pose by pose, with its noise in the state."""
+    if frame not in ("lower", "symmetric"):
+        raise typer.BadParameter(f"--frame is one of lower, symmetric, not {frame!r}")
+    check_outputs(output, json, force=force, report=report)
+    recording = source.read()
+    from trihedron import pipeline
+    from trihedron.calibration_file import write_calibration
+    from trihedron.report import kalman_report
+    from trihedron.report.kalman import kalman_record
+
+    options: dict[str, Any] = {"frame": frame, "noise": noise, "sigma_angle_deg": angle_sigma}
+    gravity = {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
+    with progress("filtering") as tell:
+        result = pipeline.kalman(recording, reference, **gravity, **options, progress=tell)
+    document = kalman_report(result.outcome, result.calibration)
+    machine = kalman_record(result.outcome, result.calibration)
+    show(document, json, sections=None if full else FIRST_SCREEN)
+    if output is not None:
+        write_calibration(result.calibration, output, overwrite=force)
+        say(f"calibration: {output}")
+    write_json(machine, json, force=force)
+    write_report(document, machine, report, force=force)
+    if not full and report is None:
+        say("Every pose: --full; convergence, innovations and residuals drawn: --report FILE.html.")
+    leave(result.findings)

@@ -1,0 +1,44 @@
+"""Noise coefficients that somebody wrote down: JSON, per term one number or one per axis."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from trihedron.read.errors import ReadError, check_readable
+from trihedron.records import AxisNoise
+
+TERMS = ("quantisation", "white", "flicker", "walk", "ramp", "resolution", "sample_sigma")
+
+
+def read_axis_noise(path: str | os.PathLike[str]) -> tuple[AxisNoise, AxisNoise, AxisNoise]:
+    """Read ``{"white": 0.002, "walk": [1e-5, 1e-5, 2e-5], ...}``, Allan coefficients in the raw unit of the log.
+
+    Raises
+    ------
+    ReadError
+        (a ``ValueError``) when the file is no such JSON, or a term is unknown or negative.
+    """
+    file = Path(path)
+    check_readable(file)
+    try:
+        said = json.loads(file.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise ReadError(f"{file}: this is not JSON ({error}); write one object with the noise terms.") from None
+    if not isinstance(said, dict) or not said:
+        raise ReadError(f'{file}: write the noise terms as one object, such as {{"white": 0.002, "walk": 1e-5}}.')
+    unknown = sorted(set(said) - set(TERMS))
+    if unknown:
+        raise ReadError(f"{file}: there is no noise term {unknown[0]!r}; there are {', '.join(TERMS)}.")
+    axes: list[dict[str, float]] = [{}, {}, {}]
+    for name, value in said.items():
+        values = value if isinstance(value, list) else [value] * 3
+        if len(values) != 3 or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
+            raise ReadError(f"{file}: {name} must be one number, or three, one per axis.")
+        for axis, number in zip(axes, values, strict=True):
+            axis[name] = float(number)
+    try:
+        return AxisNoise(**axes[0]), AxisNoise(**axes[1]), AxisNoise(**axes[2])
+    except ValueError as error:
+        raise ReadError(f"{file}: {error}.") from None

@@ -1,0 +1,241 @@
+"""Calibration by Kalman filter as a report: constants by every method, convergence, innovations, residual."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.calibration_file import calibration_document
+from trihedron.records import (
+    CONSTANT_NAMES,
+    AxisKalmanResult,
+    Calibration,
+    Consistency,
+    KalmanCalibration,
+    NormKalmanCalibration,
+)
+from trihedron.report.calibration import parameter_table
+from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
+from trihedron.units import mm_s2_from_m_s2
+
+FloatArray = npt.NDArray[np.float64]
+AXES = "xyz"
+CLOSE = 0.01
+"""A track has arrived when every sensitivity stays within this part of the axis' own of its last value."""
+
+
+def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibration: Calibration) -> Document:
+    """Lay out what the filter found."""
+    if isinstance(outcome, KalmanCalibration):
+        sections = _with_references(outcome, calibration)
+    else:
+        sections = _without_references(outcome, calibration)
+    return Document(
+        title="Calibration by Kalman filter",
+        subtitle=calibration.recording_source or "no recording named",
+        verdict=verdict_of(
+            calibration.findings,
+            "Good: the innovations are as large and as white as the noise model says.",
+            "Usable",
+            "NOT TO BE TRUSTED",
+        ),
+        is_trustworthy=calibration.is_trustworthy,
+        sections=tuple(sections),
+    )
+
+
+def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> list[Section]:
+    facts = (
+        ("poses", f"{outcome.n_poses} in known attitudes"),
+        ("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"),
+        ("residual", _residual_words(outcome.residual_m_s2)),
+    )
+    pictures: list[Block] = [
+        Picture(
+            f"convergence-{AXES[axis.axis]}",
+            f"Constants of axis {AXES[axis.axis]} after every pose by every method, with the filter's 3σ band around "
+            "its last value.",
+            partial(_draw, "draw_convergence", axis),
+        )
+        for axis in outcome.axes
+    ]
+    pictures += [
+        Picture(
+            "innovations",
+            "Normalised innovations squared, running mean over 15 poses, with the interval in which 99 % of such means "
+            "lie when the noise model is right.",
+            partial(_draw, "draw_innovations", outcome.axes),
+        ),
+        Picture(
+            "drift",
+            "Slow noise that the filter saw: while it ran, and smoothed with all readings, with 1σ bands.",
+            partial(_draw, "draw_drift", outcome.axes),
+        ),
+        Picture(
+            "residual",
+            "Corrected minus reference specific force of every pose.",
+            partial(_draw, "draw_residual", outcome.residual_m_s2),
+        ),
+    ]
+    return [
+        Section("Result", (Facts(facts), *(_constants_table(a, outcome.accelerometer.raw_unit) for a in outcome.axes))),
+        Section("Findings", (findings_block(calibration.findings),)),
+        Section("Innovations", (_consistency_table([(AXES[a.axis], a.consistency) for a in outcome.axes]),)),
+        Section("Calibration", (parameter_table("accelerometer", outcome.accelerometer),)),
+        Section("Convergence", (_arrival_table(outcome),)),
+        Section("Poses", (_pose_table(outcome),)),
+        Section("Figures", tuple(pictures)),
+    ]
+
+
+def _without_references(outcome: NormKalmanCalibration, calibration: Calibration) -> list[Section]:
+    facts = (
+        ("poses", f"{len(outcome.residual_m_s2)} in unknown attitudes"),
+        ("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"),
+        ("frame", calibration.frame),
+        ("residual", _residual_words(outcome.residual_m_s2)),
+    )
+    pictures: tuple[Block, ...] = (
+        Picture(
+            "convergence",
+            "S and b after every pose, with the 3σ band around their last values.",
+            partial(_draw, "draw_norm_convergence", outcome),
+        ),
+        Picture(
+            "innovations",
+            "Normalised innovations squared, running mean over 15 poses, with the interval in which 99 % of such means "
+            "lie when the noise model is right.",
+            partial(_draw, "draw_innovations", (outcome,)),
+        ),
+        Picture(
+            "residual",
+            "Length of the corrected reading minus |g| in every pose.",
+            partial(_draw, "draw_residual", outcome.residual_m_s2[:, None]),
+        ),
+    )
+    return [
+        Section("Result", (Facts(facts), parameter_table("accelerometer", outcome.accelerometer))),
+        Section("Findings", (findings_block(calibration.findings),)),
+        Section("Innovations", (_consistency_table([("norm", outcome.consistency)]),)),
+        Section("Figures", pictures),
+    ]
+
+
+def _draw(name: str, *what: object) -> bytes:
+    # Drawing is imported when something is drawn: text and JSON need none of it.
+    from trihedron.report import kalman_figures
+
+    return bytes(getattr(kalman_figures, name)(*what))
+
+
+def _residual_words(residual: FloatArray) -> str:
+    rms, worst = float(np.sqrt(np.mean(residual**2))), float(np.max(np.abs(residual)))
+    return f"{plain_number(mm_s2_from_m_s2(rms))} mm/s² rms, {plain_number(mm_s2_from_m_s2(worst))} mm/s² at worst"
+
+
+def _constants_table(axis: AxisKalmanResult, raw_unit: str) -> Table:
+    unit = unit_in_print(raw_unit)
+    rows = [("Kalman filter", *_row(axis.constants, axis.sigma))]
+    rows += [(method.capitalize(), *_row(*solution)) for method, solution in axis.batch.items()]
+    last = [track for track in axis.tracks if track.method == "recursive least squares"]
+    rows += [("Recursive least squares, as it says", *_row(t.constants[-1], t.sigma[-1])) for t in last]
+    name = AXES[axis.axis]
+    head = ("", *(f"k{name}{other} [{unit}/(m/s²)]" for other in AXES), f"zero [{unit}]")
+    return Table(head, tuple(rows), f"Axis {name}: reading = k · f + zero + noise")
+
+
+def _row(constants: FloatArray, sigma: FloatArray) -> tuple[str, ...]:
+    return tuple(with_sigma(float(c), float(s)) for c, s in zip(constants, sigma, strict=True))
+
+
+def _consistency_table(seen: list[tuple[str, Consistency]]) -> Table:
+    rows = tuple(
+        (
+            name,
+            str(c.n),
+            plain_number(c.nis_mean),
+            f"{plain_number(c.nis_low)} to {plain_number(c.nis_high)}",
+            plain_number(c.whiteness_p, 2),
+        )
+        for name, c in seen
+    )
+    head = ("axis", "innovations", "mean NIS", "99 % when the noise is right", "whiteness, p")
+    return Table(head, rows, "Innovations squared over their predicted variance, and Ljung-Box test of whiteness")
+
+
+def arrival(constants: FloatArray) -> int:
+    """Pose from which on all three sensitivities (n, 4) stay within 1 % of the axis' own of their last values."""
+    away = np.abs(constants[:, :3] - constants[-1, :3]).max(axis=1) > CLOSE * np.linalg.norm(constants[-1, :3])
+    return int(np.flatnonzero(away)[-1]) + 2 if np.any(away) else 1
+
+
+def _arrival_table(outcome: KalmanCalibration) -> Table | Paragraph:
+    methods = [track.method for track in outcome.axes[0].tracks]
+    rows = tuple(
+        (method.capitalize(), *(str(arrival(axis.track(method).constants)) for axis in outcome.axes))
+        for method in methods
+    )
+    return Table(
+        ("", *(f"axis {name}" for name in AXES)),
+        rows,
+        "Poses until all sensitivities stay within 1 % of their last values",
+    )
+
+
+def _pose_table(outcome: KalmanCalibration) -> Table:
+    rows = tuple(
+        (
+            str(k),
+            plain_number(float(outcome.start_s[k]), 4),
+            *(plain_number(float(v), 3) for v in outcome.references[k]),
+            *(plain_number(mm_s2_from_m_s2(float(v)), 3) for v in outcome.residual_m_s2[k]),
+            *(plain_number(float(np.sqrt(axis.nis[k])), 2) if axis.is_settled[k] else "–" for axis in outcome.axes),
+        )
+        for k in range(outcome.n_poses)
+    )
+    head = ("pose", "start [s]", "fx", "fy", "fz [m/s²]", "rx", "ry", "rz [mm/s²]", "ix", "iy", "iz [σ]")
+    return Table(head, rows, "Reference, residual r, innovation i in its predicted standard deviations")
+
+
+def kalman_record(outcome: KalmanCalibration | NormKalmanCalibration, calibration: Calibration) -> dict[str, Any]:
+    """The same for machines: the calibration file's content, the tracks and the innovations."""
+    out: dict[str, Any] = dict(calibration_document(calibration))
+    if isinstance(outcome, KalmanCalibration):
+        out["constants"] = list(CONSTANT_NAMES)
+        out["axes"] = [_axis_record(axis) for axis in outcome.axes]
+        out["residual_m_s2"] = outcome.residual_m_s2.tolist()
+        return out
+    out["parameters"] = outcome.parameters.tolist()
+    out["parameters_sigma"] = outcome.sigma.tolist()
+    out["innovation_m_s2"] = outcome.innovation.tolist()
+    out["innovation_sigma_m_s2"] = outcome.innovation_sigma.tolist()
+    out["consistency"] = _consistency_record(outcome.consistency)
+    out["residual_m_s2"] = outcome.residual_m_s2.tolist()
+    return out
+
+
+def _consistency_record(seen: Consistency) -> dict[str, Any]:
+    return dict(vars(seen)) | {"autocorrelation": list(seen.autocorrelation)}
+
+
+def _axis_record(axis: AxisKalmanResult) -> dict[str, Any]:
+    return {
+        "axis": AXES[axis.axis],
+        "noise": dict(vars(axis.noise)),
+        "constants": axis.constants.tolist(),
+        "covariance": axis.covariance.tolist(),
+        "batch": {m: {"constants": c.tolist(), "sigma": s.tolist()} for m, (c, s) in axis.batch.items()},
+        "tracks": [
+            {"method": t.method, "constants": t.constants.tolist(), "sigma": t.sigma.tolist()} for t in axis.tracks
+        ],
+        "innovation": axis.innovation.tolist(),
+        "innovation_sigma": axis.innovation_sigma.tolist(),
+        "drift": axis.smoothed_drift.tolist(),
+        "drift_sigma": axis.smoothed_drift_sigma.tolist(),
+        "consistency": _consistency_record(axis.consistency),
+    }
