@@ -85,6 +85,12 @@ const CONVERGED: f64 = 1e-6;
 /// plane leave directions to which the length of gravity is stationary, and a full step there leads nowhere.
 const LONGEST_STEP: f64 = 0.2;
 
+/// A step longer than this many standard errors must lower the cost; shorter ones end at the fixed point of the runs,
+/// which is not exactly where the cost, whose weights move as well, is least.
+const LOOKED_AT: f64 = 0.1;
+/// A step that does not lower the cost is halved at most this often.
+const MOST_HALVINGS: usize = 12;
+
 /// Recursive estimate of a triad from the length of gravity alone.
 #[derive(Debug, Clone)]
 pub struct NormFilter {
@@ -99,6 +105,31 @@ pub struct NormFilter {
     steps: Steps,
     poses: Vec<NormPose>,
     innovations: Vec<Innovation>,
+    /// Where the last call of [`Self::relinearise`] ended.
+    settled: Vec<f64>,
+}
+
+/// Transition of the noise of all three axes over a pause and a hold.
+fn transition<'a>(
+    steps: &'a mut Steps,
+    shapings: &[Shaping; 3],
+    n_noise: usize,
+    gap: f64,
+    hold: f64,
+) -> &'a Transition {
+    steps.get(gap, hold, || {
+        let mut phi = DMatrix::zeros(n_noise, n_noise);
+        let mut q = DMatrix::zeros(n_noise, n_noise);
+        let mut at = 0;
+        for shaping in shapings {
+            let (phi_axis, q_axis) = shaping.step(gap, hold);
+            let k = phi_axis.nrows();
+            phi.view_mut((at, at), (k, k)).copy_from(&phi_axis);
+            q.view_mut((at, at), (k, k)).copy_from(&q_axis);
+            at += k;
+        }
+        Transition::new(&phi, &q)
+    })
 }
 
 impl NormFilter {
@@ -149,6 +180,7 @@ impl NormFilter {
             steps: Steps::default(),
             poses: Vec::new(),
             innovations: Vec::new(),
+            settled: prior.mean.to_vec(),
         })
     }
 
@@ -172,23 +204,55 @@ impl NormFilter {
 
     fn move_noise(&mut self, start: f64, hold: f64) -> Result<()> {
         let gap = self.timeline.gap(start, hold)?;
-        let (shapings, m) = (&self.shapings, self.n_noise);
-        let step = self.steps.get(gap, hold, || {
-            let mut phi = DMatrix::zeros(m, m);
-            let mut q = DMatrix::zeros(m, m);
-            let mut at = 0;
-            for shaping in shapings {
-                let (phi_axis, q_axis) = shaping.step(gap, hold);
-                let k = phi_axis.nrows();
-                phi.view_mut((at, at), (k, k)).copy_from(&phi_axis);
-                q.view_mut((at, at), (k, k)).copy_from(&q_axis);
-                at += k;
-            }
-            Transition::new(&phi, &q)
-        });
+        let step = transition(&mut self.steps, &self.shapings, self.n_noise, gap, hold);
         self.filter.predict(step);
         self.timeline.pass(start, hold);
         Ok(())
+    }
+
+    /// Filter over all poses with every pose linearised at `theta`.
+    fn run(&mut self, theta: &[f64], prior: &NormPrior) -> Result<(UdFilter, Vec<Innovation>)> {
+        let mut filter = Self::start(&self.shapings, self.n_noise, prior);
+        let mut timeline = Timeline::default();
+        let mut innovations = Vec::with_capacity(self.poses.len());
+        for i in 0..self.poses.len() {
+            let pose = self.poses[i];
+            let gap = timeline.gap(pose.start, pose.hold)?;
+            filter.predict(transition(
+                &mut self.steps,
+                &self.shapings,
+                self.n_noise,
+                gap,
+                pose.hold,
+            ));
+            timeline.pass(pose.start, pose.hold);
+            innovations.push(self.update_at(&mut filter, &pose, theta));
+        }
+        Ok((filter, innovations))
+    }
+
+    /// Squared innovations with the constants held at `theta`, and its squared distance from the prior.
+    ///
+    /// The weights belong to `theta`: towards `S = 0` the noise in m/s² vanishes together with the signal, so that the
+    /// worthless solution `S = 0`, `|b| = |g|` costs as much as no fit at all.
+    fn cost(&mut self, theta: &[f64]) -> Result<f64> {
+        let mut fixed = self.prior.clone();
+        fixed.mean.copy_from_slice(theta);
+        fixed.sigma = [0.0; N_PARAMETERS];
+        let (_, innovations) = self.run(theta, &fixed)?;
+        let data: f64 = innovations
+            .iter()
+            .map(|y| y.value * y.value / y.variance)
+            .sum();
+        let away: f64 = (0..N_PARAMETERS)
+            .map(|i| ((theta[i] - self.prior.mean[i]) / self.prior.sigma[i]).powi(2))
+            .sum();
+        let cost = data + away;
+        Ok(if cost.is_finite() {
+            cost
+        } else {
+            f64::INFINITY
+        })
     }
 
     /// Row, predicted length and white variance of a pose, linearised at `theta` and the given noise states.
@@ -346,30 +410,55 @@ impl NormFilter {
     /// Run over all poses again, linearised at the latest constants, until they stay. Returns the number of runs, or
     /// `None` when `most` were not enough.
     ///
+    /// Starts from the best of the latest constants, those of the last call and the prior's mean; a long step is
+    /// shortened until it lowers the cost.
+    ///
     /// # Errors
     /// Never for poses that were taken once.
     pub fn relinearise(&mut self, most: usize) -> Result<Option<usize>> {
-        let mut theta = self.filter.x[self.n_noise..].to_vec();
-        for run in 1..=most {
-            self.filter = Self::start(&self.shapings, self.n_noise, &self.prior);
-            self.timeline = Timeline::default();
-            let poses = std::mem::take(&mut self.poses);
-            let mut innovations = Vec::with_capacity(poses.len());
-            for pose in &poses {
-                self.move_noise(pose.start, pose.hold)?;
-                let mut filter = self.filter.clone();
-                innovations.push(self.update_at(&mut filter, pose, &theta));
-                self.filter = filter;
+        let mut theta = self.prior.mean.to_vec();
+        let mut cost = self.cost(&theta)?;
+        for candidate in [self.settled.clone(), self.filter.x[self.n_noise..].to_vec()] {
+            let its = self.cost(&candidate)?;
+            if its < cost {
+                (theta, cost) = (candidate, its);
             }
-            self.poses = poses;
-            self.innovations = innovations;
-            if self.moved(&self.filter, &theta) < CONVERGED {
-                return Ok(Some(run));
-            }
-            let estimate = self.filter.x[self.n_noise..].to_vec();
-            self.approach(&mut theta, &estimate);
         }
-        Ok(None)
+        let mut runs = None;
+        for run in 1..=most {
+            let (filter, innovations) = self.run(&theta, &self.prior.clone())?;
+            self.filter = filter;
+            self.innovations = innovations;
+            let moved = self.moved(&self.filter, &theta);
+            if moved < CONVERGED {
+                runs = Some(run);
+                break;
+            }
+            let from = theta.clone();
+            self.approach(&mut theta, &self.filter.x[self.n_noise..]);
+            if moved > LOOKED_AT {
+                let mut its = self.cost(&theta)?;
+                for _ in 0..MOST_HALVINGS {
+                    if its < cost {
+                        break;
+                    }
+                    for (value, start) in theta.iter_mut().zip(&from) {
+                        *value = 0.5 * (*value + start);
+                    }
+                    its = self.cost(&theta)?;
+                }
+                cost = its;
+            }
+        }
+        if runs.is_none() {
+            // The last run's estimate is a full step from `theta` that nobody has looked at.
+            let estimate = self.filter.x[self.n_noise..].to_vec();
+            if self.cost(&estimate)? > cost {
+                self.filter.x[self.n_noise..].copy_from_slice(&theta);
+            }
+        }
+        self.settled = theta;
+        Ok(runs)
     }
 
     /// What a future reading would do to the covariance.

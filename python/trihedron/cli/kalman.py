@@ -57,9 +57,9 @@ def kalman(
     from trihedron.report.kalman import kalman_record
 
     options: dict[str, Any] = {"frame": frame, "noise": noise, "sigma_angle_deg": angle_sigma}
-    gravity = {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
+    options |= {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
     with progress("filtering") as tell:
-        result = pipeline.kalman(recording, reference, **gravity, **options, progress=tell)
+        result = pipeline.kalman(recording, reference, **options, progress=tell)
     document = kalman_report(result.outcome, result.calibration)
     machine = kalman_record(result.outcome, result.calibration)
     show(document, json, sections=None if full else FIRST_SCREEN)

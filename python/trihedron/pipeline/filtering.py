@@ -1,4 +1,4 @@
-"""Calibrate by Kalman filter: known attitudes where there is a pose table, the length of gravity where there is none."""
+"""Calibrate by Kalman filter: in known attitudes where there is a pose table, by the length of gravity otherwise."""
 
 from __future__ import annotations
 

@@ -222,6 +222,13 @@ class KalmanCalibration:
     extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
+    def residual_without_drift_m_s2(self) -> FloatArray:
+        """(n, 3) the same after the smoothed slow noise was taken out of the readings."""
+        drift = np.column_stack([axis.smoothed_drift for axis in self.axes])
+        out: FloatArray = self.residual_m_s2 - drift @ self.accelerometer.S.T
+        return out
+
+    @property
     def n_poses(self) -> int:
         """Number of poses used."""
         return len(self.references)

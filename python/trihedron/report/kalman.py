@@ -54,6 +54,7 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
         ("poses", f"{outcome.n_poses} in known attitudes"),
         ("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"),
         ("residual", _residual_words(outcome.residual_m_s2)),
+        ("without drift", _residual_words(outcome.residual_without_drift_m_s2)),
     )
     pictures: list[Block] = [
         Picture(
@@ -140,12 +141,13 @@ def _residual_words(residual: FloatArray) -> str:
 
 def _constants_table(axis: AxisKalmanResult, raw_unit: str) -> Table:
     unit = unit_in_print(raw_unit)
+    per = "" if raw_unit == "m/s^2" else f" [{unit}/(m/s²)]"
     rows = [("Kalman filter", *_row(axis.constants, axis.sigma))]
     rows += [(method.capitalize(), *_row(*solution)) for method, solution in axis.batch.items()]
     last = [track for track in axis.tracks if track.method == "recursive least squares"]
     rows += [("Recursive least squares, as it says", *_row(t.constants[-1], t.sigma[-1])) for t in last]
     name = AXES[axis.axis]
-    head = ("", *(f"k{name}{other} [{unit}/(m/s²)]" for other in AXES), f"zero [{unit}]")
+    head = ("", *(f"k{name}{other}{per}" for other in AXES), f"zero [{unit}]")
     return Table(head, tuple(rows), f"Axis {name}: reading = k · f + zero + noise")
 
 

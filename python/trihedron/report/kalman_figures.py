@@ -70,8 +70,8 @@ def draw_innovations(results: Sequence[AxisKalmanResult | NormKalmanCalibration]
         mean = np.convolve(nis[pose], np.ones(window) / window, mode="valid")
         name = f"axis {'xyz'[result.axis]}" if isinstance(result, AxisKalmanResult) else "norm of gravity"
         panel.plot(pose[window - 1 :] + 1, mean, color=AXIS_COLOURS[k], linewidth=1.1, label=name)
-    low, high = stats.chi2.ppf([0.005, 0.995], window) / window
-    panel.axhspan(float(low), float(high), color=SHADE, zorder=0)
+    low, high = (float(stats.chi2.ppf(p, window)) / window for p in (0.005, 0.995))
+    panel.axhspan(low, high, color=SHADE, zorder=0)
     panel.axhline(1.0, color=INK, linewidth=0.6)
     panel.set_ylim(bottom=0.0)
     panel.set_xlabel("poses")

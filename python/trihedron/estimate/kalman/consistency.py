@@ -53,6 +53,7 @@ def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
     """What an inconsistent filter tells about the noise it was given; ``axis`` None stands for all three."""
     out: list[Finding] = []
     name = "Norm of gravity" if axis is None else f"Axis {'xyz'[axis]}"
+    error = "the axes are not linear" if axis is None else "a reference attitude is wrong"
     numbers = MappingProxyType({"nis_mean": seen.nis_mean, "nis_low": seen.nis_low, "nis_high": seen.nis_high})
     if seen.n and seen.nis_mean > seen.nis_high:
         out.append(
@@ -61,7 +62,7 @@ def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
                 Severity.WARNING,
                 f"{name}: squared innovations are {seen.nis_mean:.2f} times what the noise model predicts "
                 f"(99 % limit {seen.nis_high:.2f}).",
-                "The noise is larger than the model says, or a reference attitude is wrong.",
+                f"The noise is larger than the model says, or {error}.",
                 f"Multiply the error bars by {np.sqrt(seen.nis_mean):.2f}, or identify the noise anew.",
                 numbers,
             )
@@ -85,7 +86,7 @@ def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
                 Severity.WARNING,
                 f"{name}: innovations are correlated from pose to pose (Ljung-Box p = {seen.whiteness_p:.1e} over "
                 f"{seen.n_lags} lags, first autocorrelation {seen.autocorrelation[0]:+.2f}).",
-                "Slow noise, temperature or a systematic reference error that the noise model lacks.",
+                f"Slow noise or temperature that the noise model lacks, or {error}.",
                 "Look at the innovations against time and attitude; add the missing noise term.",
                 MappingProxyType({"whiteness_p": seen.whiteness_p, "autocorrelation_1": seen.autocorrelation[0]}),
             )

@@ -150,7 +150,7 @@ class LiveNormCalibration:
         extra = [float(v) for v in np.broadcast_to(np.asarray(extra_variance, dtype=np.float64), (3,))]
         innovation, variance = self._filter.add([float(v) for v in a - self._zero], start_s, hold_s, extra)
         if relinearise:
-            self.relinearise(3)
+            self.relinearise(10)
         return self.estimate(nis=np.full(3, innovation**2 / variance), look_ahead=look_ahead)
 
     def load(self, readings: FloatArray, start_s: FloatArray, hold_s: FloatArray, extra_variance: FloatArray) -> None:
