@@ -40,7 +40,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from trihedron.calibration_file import read_calibration, write_calibration
-    from trihedron.pipeline import apply, calibrate, check, read, segment, verify
+    from trihedron.pipeline import apply, calibrate, check, kalman, read, segment, verify
     from trihedron.records import Calibration, Finding, Recording, Segments
 
 __all__ = [
@@ -51,6 +51,7 @@ __all__ = [
     "apply",
     "calibrate",
     "check",
+    "kalman",
     "read",
     "read_calibration",
     "segment",
@@ -58,7 +59,7 @@ __all__ = [
     "write_calibration",
 ]
 
-_HOME = dict.fromkeys(("apply", "calibrate", "check", "read", "segment", "verify"), "trihedron.pipeline")
+_HOME = dict.fromkeys(("apply", "calibrate", "check", "kalman", "read", "segment", "verify"), "trihedron.pipeline")
 _HOME |= dict.fromkeys(("read_calibration", "write_calibration"), "trihedron.calibration_file")
 _HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")
 

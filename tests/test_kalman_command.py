@@ -1,0 +1,113 @@
+"""``trihedron kalman``: a log and a pose table in, report, JSON and calibration file out."""
+
+import json
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.cli import main
+from trihedron.read import ReadError, read_axis_noise
+from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise
+from trihedron.simulate import Accelerometer, Clock, NoiseTerms, Scenario, dividing_head, simulate
+
+S_TRUE = ((0.98, 0.01, -0.02), (0.005, 1.03, 0.008), (-0.01, 0.012, 0.99))
+B_TRUE = (0.2, -0.3, 0.1)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("head")
+    accelerometer = Accelerometer(S=S_TRUE, b=B_TRUE, noise=NoiseTerms(N=(0.01,) * 3, K=(0.001,) * 3))
+    scenario = Scenario(motion=dividing_head(), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
+    recording = simulate(scenario, seed=1)[0]
+    rows = np.column_stack([recording.time_s, recording.accelerometer])
+    np.savetxt(folder / "log.csv", rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.7g")
+    np.savetxt(
+        folder / "angles.csv", DIVIDING_HEAD_ANGLES_DEG, delimiter=",", header="pitch,roll", comments="", fmt="%g"
+    )
+    (folder / "noise.json").write_text('{"white": 0.01, "walk": [0.001, 0.001, 0.001]}')
+    return folder
+
+
+def run(session, *words):
+    return main(["kalman", str(session / "log.csv"), "--gravity", "9.80665", *map(str, words)])
+
+
+def test_the_report_shows_every_method_and_the_calibration_file_holds_the_truth(session, tmp_path, capsys):
+    out = tmp_path / "calibration.json"
+    status = run(session, "--reference", session / "angles.csv", "--noise", session / "noise.json", "-o", out)
+    text = capsys.readouterr().out
+    assert status == 0
+    for words in ("Kalman filter", "Least squares", "Generalised least squares", "Recursive least squares", "mean NIS"):
+        assert words in text
+    sensor = trihedron.read_calibration(out).accelerometer
+    # Twelve standard normal numbers: 5 σ is beyond all of them but once in 10⁵ runs.
+    assert np.max(np.abs(sensor.S - S_TRUE) / sensor.sigma_S) < 5.0
+    assert np.max(np.abs(sensor.b - B_TRUE) / sensor.sigma_b) < 5.0
+
+
+def test_json_holds_the_tracks(session, capsys):
+    assert run(session, "--reference", session / "angles.csv", "--json") == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["constants"] == ["kx", "ky", "kz", "U0"]
+    assert [axis["axis"] for axis in said["axes"]] == ["x", "y", "z"]
+    assert {track["method"] for track in said["axes"][0]["tracks"]} == {
+        "kalman",
+        "recursive least squares",
+        "recursive generalised least squares",
+    }
+    assert len(said["axes"][0]["tracks"][0]["constants"]) == 324
+
+
+def test_without_angles_the_length_of_gravity_is_used_and_pictures_are_drawn(session, tmp_path, capsys):
+    page = tmp_path / "report.html"
+    assert run(session, "--noise", session / "noise.json", "--report", page) == 0
+    assert "unknown attitudes" in capsys.readouterr().out
+    assert page.read_text().count("data:image/png;base64,") == 3
+
+
+def test_a_report_with_angles_has_a_picture_per_axis_and_three_more(session, tmp_path):
+    page = tmp_path / "report.html"
+    assert run(session, "--reference", session / "angles.csv", "--report", page) == 0
+    assert page.read_text().count("data:image/png;base64,") == 6
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--reference", "missing.csv"], "no such file"),
+        (["--frame", "case"], "--frame is one of lower, symmetric"),
+        (["--noise", "missing.json"], "no such file"),
+        (["--gravity", "0"], "gravity"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_sentence(session, capsys, words, message):
+    assert run(session, *words) == 1
+    said = capsys.readouterr().err.strip()
+    assert message in said
+    assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("white: 1", "not JSON"),
+        ("[1, 2]", "as one object"),
+        ('{"pink": 1}', "no noise term 'pink'"),
+        ('{"white": [1, 2]}', "one number, or three"),
+        ('{"white": "much"}', "one number, or three"),
+        ('{"white": -1}', "white must be zero or positive"),
+    ],
+)
+def test_a_noise_file_that_cannot_be_used_is_refused_in_plain_words(tmp_path, text, message):
+    path = tmp_path / "noise.json"
+    path.write_text(text)
+    with pytest.raises(ReadError, match=message):
+        read_axis_noise(path)
+
+
+def test_a_noise_file_gives_one_number_or_three(tmp_path):
+    path = tmp_path / "noise.json"
+    path.write_text('{"white": 0.5, "walk": [1, 2, 3]}')
+    assert read_axis_noise(path)[2] == AxisNoise(white=0.5, walk=3.0)
