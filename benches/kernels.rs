@@ -1,8 +1,10 @@
 //! Throughput of the kernels (criterion): `cargo bench`.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use std::hint::black_box;
+use trihedron::gauss_newton::Loss;
+use trihedron::norm_invariant::{Frame, Objective, Readings, Settings, fit};
 use trihedron::rotation;
 
 fn rotations(c: &mut Criterion) {
@@ -10,5 +12,54 @@ fn rotations(c: &mut Criterion) {
     c.bench_function("rotation::exp", |b| b.iter(|| rotation::exp(black_box(&v))));
 }
 
-criterion_group!(benches, rotations);
+/// Still samples of a triad in counts, in 25 orientations that go round the sphere.
+fn still_samples(n: usize) -> Vec<Vector3<f64>> {
+    (0..n)
+        .map(|i| {
+            let pose = f64::from((i % 25) as u32) + 0.5;
+            let height = 1.0 - pose / 12.5;
+            let radius = (1.0 - height * height).sqrt();
+            let angle = 2.4 * pose;
+            let up = Vector3::new(radius * angle.cos(), radius * angle.sin(), height);
+            let ripple = Vector3::new(
+                (i as f64).sin(),
+                (1.7 * i as f64).cos(),
+                (2.3 * i as f64).sin(),
+            );
+            up.component_mul(&Vector3::new(4070.0, 4040.0, 4065.0))
+                + ripple * 5.0
+                + Vector3::repeat(32768.0)
+        })
+        .collect()
+}
+
+fn norm_fits(c: &mut Criterion) {
+    let settings = Settings {
+        gravity: 9.81,
+        frame: Frame::Lower,
+        objective: Objective::Norm,
+        loss: Loss::Linear,
+    };
+    let noise = [Matrix3::identity() * 12.5];
+    let mut group = c.benchmark_group("norm_invariant::fit");
+    group.sample_size(10);
+    for n in [50, 1_000_000] {
+        let values = still_samples(n);
+        group.bench_function(format!("{n} readings"), |b| {
+            b.iter(|| {
+                fit(
+                    Readings {
+                        values: black_box(&values),
+                        noise: &noise,
+                    },
+                    &settings,
+                    None,
+                )
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, rotations, norm_fits);
 criterion_main!(benches);

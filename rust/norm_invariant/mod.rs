@@ -173,15 +173,24 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
         )));
     }
     let standard = Standardisation::of(readings.values)?;
+    // A start need not use every sample: an even share of them shows the same poses.
+    let stride = readings.values.len().div_ceil(ROWS_KEPT);
+    let few: Vec<Vector3<f64>> = readings
+        .values
+        .chunks(stride)
+        .enumerate()
+        // One of each chunk, at a place that walks through it: a fixed one could fall in step with the poses.
+        .map(|(k, chunk)| chunk[(k * 7919) % chunk.len()])
+        .collect();
     let nominal = match start {
         Some(model) => in_frame(&model, settings.frame)?,
-        None => sphere_model(readings.values, settings)?,
+        None => sphere_model(&few, settings)?,
     };
     let is_anchored = problem::is_weak(readings, settings, &nominal);
     let begin = if is_anchored || start.is_some() {
         nominal
     } else {
-        starting_model(readings.values, settings)?
+        starting_model(&few, settings)?
     };
     let options = Options {
         loss: settings.loss,

@@ -284,7 +284,7 @@ def norm_residual(f: FloatArray, S: FloatArray, noise: FloatArray, g: float) -> 
 
 
 def _anchored_covariance(information: FloatArray, S: FloatArray, b: FloatArray, g: float, frame: Frame) -> FloatArray:
-    """(12, 12) of a fit held to ``ANCHOR`` of |g|: what was not seen is as wide as that (eq. 17)."""
+    """(12, 12) of a fit held to ``ANCHOR`` of |g|: what was not seen is as wide as that (model.md, 3)."""
     physical = np.linalg.inv(information + np.eye(9) / _core.ANCHOR**2)
     to_lower = reframing(S, b, "lower")
     L, low = to_lower.rotation @ S, to_lower.rotation @ b
