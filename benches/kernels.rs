@@ -16,7 +16,7 @@ fn rotations(c: &mut Criterion) {
 fn still_samples(n: usize) -> Vec<Vector3<f64>> {
     (0..n)
         .map(|i| {
-            let pose = f64::from((i % 25) as u32) + 0.5;
+            let pose = (i % 25) as f64 + 0.5;
             let height = 1.0 - pose / 12.5;
             let radius = (1.0 - height * height).sqrt();
             let angle = 2.4 * pose;
