@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Literal, get_args
 
 import numpy as np
+from scipy import stats
 
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm
 from trihedron.estimate.accelerometer.face_poses import identify
@@ -25,6 +27,9 @@ METHODS: tuple[Method, ...] = get_args(Method)
 ``faces``: faces of the case and turns by known angles (method 1)."""
 
 Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
+
+FALSE_ALARM = 1e-3
+"""Chance that a sound recording is taken for one whose moves exceed their noise."""
 
 Found = tuple[Finding, ...]
 
@@ -139,16 +144,40 @@ def _by_poses(
     alone = _alone(accelerometer, found, frame, gravity, source, recording)
     if recording.gyroscope is None:
         return alone
-    if not alone.is_trustworthy:
-        return _without_gyroscope(alone, "the accelerometer, which the gyro is measured by, is not determined")
     try:
-        if method == "joint":
+        # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's error bars.
+        if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
-            return replace(both, findings=(*found, *both.findings))
+            if _is_within_noise(both):
+                return replace(both, findings=(*found, *both.findings))
+            alone = replace(alone, findings=(*found, _joint_fit_left(both)))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
     except ValueError as error:
         return _without_gyroscope(alone, str(error))
     return _together(alone, gyroscope, more)
+
+
+def _is_within_noise(both: Calibration) -> bool:
+    quality = None if both.gyroscope is None else both.gyroscope.quality
+    return quality is None or quality.dof <= 0 or bool(stats.chi2.sf(quality.chi2, quality.dof) >= FALSE_ALARM)
+
+
+def _joint_fit_left(both: Calibration) -> Finding:
+    """Moves that contradict their noise must not pull the accelerometer, whose still poses are clean of them."""
+    assert both.gyroscope is not None
+    assert both.gyroscope.quality is not None
+    per_dof = both.gyroscope.quality.chi2 / both.gyroscope.quality.dof
+    return Finding(
+        FindingCode.JOINT_FIT_LEFT,
+        Severity.NOTE,
+        f"Moves and still poses together exceed their noise (χ² per degree of freedom {per_dof:.3g}); the "
+        f"accelerometer was "
+        "taken from the still poses alone, and the gyro from the moves by it.",
+        "An effect in the moves that the model does not have, which one fit of both would spread over the "
+        "accelerometer.",
+        "Say --method separate to choose this from the start.",
+        MappingProxyType({"chi2_per_dof": per_dof}),
+    )
 
 
 def _by_faces(

@@ -70,6 +70,7 @@ class FindingCode(str, Enum):
     GYRO_BIAS_DRIFT = "gyro-bias-drift"
     GYRO_G_SENSITIVITY = "gyro-g-sensitivity"
     NOT_CONVERGED = "not-converged"
+    JOINT_FIT_LEFT = "joint-fit-left"
     GYROSCOPE_LEFT_OUT = "gyroscope-left-out"
     # verify, check
     LIMIT_EXCEEDED = "limit-exceeded"

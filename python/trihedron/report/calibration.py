@@ -139,7 +139,12 @@ def _angle_words(quality: FitQuality) -> str:
         if len(finite):
             rms, worst = float(np.sqrt(np.mean(finite**2))), float(finite.max())
             parts.append(f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}")
-    return "gravity after a move predicted to " + "; ".join(parts) if parts else "no move to judge by"
+    if parts:
+        return "gravity after a move predicted to " + "; ".join(parts)
+    if quality.dof <= 0:
+        return "none: as many parameters as measured turns, so the fit cannot be judged"
+    rms, floor = (plain_number(degrees_from_radians(value)) for value in (quality.rms_dof, quality.floor))
+    return f"angle of a turn missed by {rms}° (rms per degree of freedom, {quality.dof}); noise alone {floor}°"
 
 
 def _meaning(calibration: Calibration) -> tuple[Block, ...]:
