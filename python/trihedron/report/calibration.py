@@ -143,8 +143,8 @@ def _angle_words(quality: FitQuality) -> str:
         return "gravity after a move predicted to " + "; ".join(parts)
     if quality.dof <= 0:
         return "none: as many parameters as measured turns, so the fit cannot be judged"
-    rms, floor = (plain_number(degrees_from_radians(value)) for value in (quality.rms_dof, quality.floor))
-    return f"angle of a turn missed by {rms}° (rms per degree of freedom, {quality.dof}); noise alone {floor}°"
+    seen, noise = (plain_number(degrees_from_radians(value)) for value in (quality.rms_dof, quality.floor))
+    return f"angle of a turn missed by {seen}° (rms per degree of freedom, {quality.dof}); noise alone {noise}°"
 
 
 def _meaning(calibration: Calibration) -> tuple[Block, ...]:

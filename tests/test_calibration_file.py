@@ -1,0 +1,175 @@
+"""The calibration file: round trip, refusal, and what it says about itself."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trihedron import calibrate
+from trihedron.calibration_file import (
+    CalibrationFileError,
+    calibration_document,
+    calibration_from_document,
+    read_calibration,
+    schema,
+    write_calibration,
+)
+from trihedron.output_file import OutputError
+from trihedron.pipeline import apply
+from trihedron.simulate import hand_session, scenario_by_name, simulate
+from trihedron.units import AccelerationUnit
+
+
+@pytest.fixture(scope="module")
+def session():
+    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(n_poses=14, first_hold_s=5.0))
+    recording, truth = simulate(scenario, seed=7)
+    return recording, calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
+
+
+def same(a, b):
+    if isinstance(a, np.ndarray):
+        return np.array_equal(a, b, equal_nan=True)
+    if isinstance(a, float) and np.isnan(a):
+        return np.isnan(b)
+    return a == b
+
+
+def test_a_round_trip_gives_back_every_number_exactly(session, tmp_path):
+    calibration = session[1].calibration
+    write_calibration(calibration, tmp_path / "c.json")
+    back = read_calibration(tmp_path / "c.json")
+    assert np.array_equal(back.covariance, calibration.covariance)
+    for name in ("accelerometer", "gyroscope"):
+        was, now = getattr(calibration, name), getattr(back, name)
+        assert all(same(getattr(was, key), getattr(now, key)) for key in ("S", "b", "covariance", "raw_unit", "method"))
+        for part in ("quality", "observability"):
+            before, after = vars(getattr(was, part)), vars(getattr(now, part))
+            assert before.keys() == after.keys()
+            assert all(same(before[key], after[key]) for key in before), part
+    rest = ("frame", "gravity_m_s2", "gravity_source", "recording_source", "recording_sha256", "findings")
+    assert all(getattr(back, key) == getattr(calibration, key) for key in rest)
+
+
+def test_a_calibration_of_the_accelerometer_alone_makes_the_round_trip(session, tmp_path):
+    recording = session[0]
+    alone = calibrate(replace(recording, gyroscope=None), gravity_m_s2=9.80665).calibration
+    write_calibration(alone, tmp_path / "c.json")
+    back = read_calibration(tmp_path / "c.json")
+    assert back.gyroscope is None
+    assert np.array_equal(back.covariance, alone.covariance)
+
+
+def test_the_file_follows_its_own_schema_and_states_equation_direction_and_units(session):
+    import jsonschema
+
+    document = json.loads(json.dumps(calibration_document(session[1].calibration)))
+    jsonschema.Draft202012Validator.check_schema(schema())
+    jsonschema.validate(document, schema(), cls=jsonschema.Draft202012Validator)
+    assert document["format_version"] == 1
+    assert document["equation"] == "truth = S * raw + b"
+    assert "raw to true" in document["direction"]
+    assert document["accelerometer"]["raw_unit"] == "counts"
+    assert document["parameter_order"][:2] == ["accelerometer.S11", "accelerometer.S12"]
+    assert np.shape(document["covariance"]) == (24, 24)
+    assert len(document["recording"]["sha256"]) == 64
+
+
+def test_the_equation_written_in_the_file_reproduces_what_apply_does(session):
+    """A user who follows the file's words, and nothing else, must get what the tool gets."""
+    recording, result = session
+    document = json.loads(json.dumps(calibration_document(result.calibration)))
+    corrected = apply(result, recording)
+    for name in ("accelerometer", "gyroscope"):
+        S, b = (np.array(document[name][key]) for key in ("S", "b"))
+        expected = [S @ row + b for row in getattr(recording, name)[:50]]
+        np.testing.assert_allclose(getattr(corrected, name)[:50], expected, rtol=0, atol=1e-12)
+
+
+def test_readings_in_other_units_are_refused_with_both_units_named(session):
+    recording, result = session
+    other = replace(recording, accelerometer_unit=AccelerationUnit.G)
+    with pytest.raises(ValueError, match="accelerometer is in g, and this calibration maps counts"):
+        apply(result, other)
+
+
+def test_an_existing_file_is_left_alone_unless_replacing_is_asked_for(session, tmp_path):
+    path = tmp_path / "c.json"
+    path.write_text("precious")
+    with pytest.raises(OutputError, match="was left alone"):
+        write_calibration(session[1].calibration, path)
+    assert path.read_text() == "precious"
+    write_calibration(session[1].calibration, path, overwrite=True)
+    assert read_calibration(path).frame == "lower"
+    assert [p.name for p in tmp_path.iterdir()] == ["c.json"]
+
+
+def damaged(document, path, value):
+    at = document
+    for key in path[:-1]:
+        at = at[key]
+    if value is None:
+        del at[path[-1]]
+    else:
+        at[path[-1]] = value
+    return document
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        (("format",), "something else", "not a calibration"),
+        (("format_version",), 99, "update trihedron"),
+        (("equation",), "truth = S * (raw - b)", "states the equation"),
+        (("accelerometer", "S"), [[1.0, 0.0], [0.0, 1.0]], "accelerometer.S"),
+        (("accelerometer", "b"), None, "'b' is a required property"),
+        (("accelerometer", "raw_unit"), "furlongs", "accelerometer.raw_unit"),
+        (("covariance",), [[1.0]], "covariance must be 24 x 24"),
+        (("gravity_m_s2",), -9.8, "gravity_m_s2"),
+        (("parameter_order",), ["b1"], "parameter_order"),
+        (("frame",), "sideways", "frame"),
+    ],
+)
+def test_a_changed_file_is_refused_with_the_place_named(session, tmp_path, path, value, said):
+    document = json.loads(json.dumps(calibration_document(session[1].calibration)))
+    file = tmp_path / "c.json"
+    file.write_text(json.dumps(damaged(document, path, value)))
+    with pytest.raises(CalibrationFileError, match=r"c\.json") as caught:
+        read_calibration(file)
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("content", ["", "{", "[1, 2]", "NaN", '"text"', "{" * 2000, "a,b\n1,2\n"])
+def test_what_is_no_calibration_is_refused_in_one_sentence(tmp_path, content):
+    file = tmp_path / "c.json"
+    file.write_text(content)
+    with pytest.raises(CalibrationFileError) as caught:
+        read_calibration(file)
+    assert "c.json" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_binary_and_directory_are_told_apart(tmp_path):
+    with pytest.raises(CalibrationFileError, match="no such file"):
+        read_calibration(tmp_path / "none.json")
+    with pytest.raises(CalibrationFileError, match="directory"):
+        read_calibration(tmp_path)
+    (tmp_path / "b.json").write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(CalibrationFileError, match="not text"):
+        read_calibration(tmp_path / "b.json")
+
+
+def test_a_covariance_that_disagrees_with_a_sensor_is_not_written(session):
+    calibration = session[1].calibration
+    other = replace(calibration, covariance=2.0 * calibration.covariance)
+    with pytest.raises(ValueError, match="not its block"):
+        calibration_document(other)
+
+
+def test_unknown_extensions_survive(session):
+    calibration = replace(
+        session[1].calibration, extensions={"temperature": {"at_degc": 21.5, "rows": [[1, 2], [3, 4]]}}
+    )
+    back = calibration_from_document(json.loads(json.dumps(calibration_document(calibration))))
+    assert back.extensions["temperature"] == {"at_degc": 21.5, "rows": [[1, 2], [3, 4]]}
