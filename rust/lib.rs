@@ -15,6 +15,7 @@ pub mod poisson;
 pub mod rotation;
 pub mod simulate;
 pub mod stillness;
+pub mod trajectory;
 
 #[cfg(feature = "python")]
 mod python;

@@ -20,6 +20,7 @@ mod poisson;
 mod rotation;
 mod simulate;
 mod stillness;
+mod trajectory;
 
 /// The one doorway: run a kernel without holding the interpreter, map its refusal to `ValueError`.
 pub(crate) fn run<T: Send>(
@@ -41,6 +42,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     rotation::register(module)?;
     simulate::register(module)?;
     stillness::register(module)?;
+    trajectory::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
     module.delattr("__all__")?;
     Ok(())

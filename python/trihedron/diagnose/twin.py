@@ -1,0 +1,413 @@
+"""The digital twin: the calibrated model with every hidden state of one session, and its linearised residuals.
+
+Unknowns: accelerometer S (lower) and b, gyro S, and for every hold the vertical in the body (2 angles), the gyro bias
+and the slow part of the accelerometer bias. Both biases are random walks whose strength comes from the corner time of
+the sensor's noise (docs/diagnosis.md, eq. 8.1-8.6). Every residual is whitened by the noise predicted for it, so a
+healthy recording gives rows of standard normal numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.diagnose.observations import FloatArray, Observations
+
+STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
+"""Labels of residual rows; ``PRIOR`` rows keep flat directions finite and belong to no domain."""
+
+_LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
+N_ACCEL, N_GYRO, N_HOLD = 9, 9, 8
+"""Unknowns: accelerometer, gyro, and per hold (2 tilt, 3 gyro bias, 3 accelerometer bias)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """A given calibration: values the fit is pulled to with their covariance (18 unknowns, centred model)."""
+
+    mean: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Twin:
+    """State of the model. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per hold."""
+
+    gravity: float
+    accel_S: FloatArray
+    accel_b: FloatArray
+    gyro_S: FloatArray
+    up: FloatArray
+    gyro_bias: FloatArray
+    accel_bias: FloatArray
+    gyro_corner_s: float
+    accel_corner_s: float
+    effect: FloatArray
+
+    def advanced(self, step: FloatArray) -> Twin:
+        """The state moved by a step in the unknowns (and effect parameters, if the step carries them)."""
+        n = len(self.up)
+        accel_S = self.accel_S.copy()
+        for k, (i, j) in enumerate(_LOWER):
+            accel_S[i, j] += step[k]
+        holds = step[N_ACCEL + N_GYRO : N_ACCEL + N_GYRO + N_HOLD * n].reshape(n, N_HOLD)
+        up = self.up + np.einsum("nij,nj->ni", tangents(self.up), holds[:, :2])
+        return replace(
+            self,
+            accel_S=accel_S,
+            accel_b=self.accel_b + step[6:9],
+            gyro_S=self.gyro_S + step[9:18].reshape(3, 3),
+            up=up / np.linalg.norm(up, axis=1, keepdims=True),
+            gyro_bias=self.gyro_bias + holds[:, 2:5],
+            accel_bias=self.accel_bias + holds[:, 5:8],
+            effect=self.effect + step[N_ACCEL + N_GYRO + N_HOLD * n :],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Distortion:
+    """What effects add to the corrected readings, linear in their parameters: SI, instrument frame.
+
+    ``force`` and ``rate`` (points, 3, K) or None, at the points of :class:`Trajectory` (holds, then move samples).
+    """
+
+    force: FloatArray | None
+    rate: FloatArray | None
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of effect parameters."""
+        given = self.force if self.force is not None else self.rate
+        return 0 if given is None else int(given.shape[2])
+
+
+NO_DISTORTION = Distortion(None, None)
+
+
+def stacked(parts: list[Distortion]) -> Distortion:
+    """Several distortions side by side."""
+    parts = [p for p in parts if p.n_parameters]
+    if not parts:
+        return NO_DISTORTION
+
+    def side(name: str) -> FloatArray | None:
+        given = [getattr(p, name) for p in parts]
+        present = next((g for g in given if g is not None), None)
+        if present is None:
+            return None
+        shape = present.shape[:2]
+        blocks = [np.zeros((*shape, p.n_parameters)) if g is None else g for p, g in zip(parts, given, strict=True)]
+        return np.concatenate(blocks, axis=2)
+
+    return Distortion(side("force"), side("rate"))
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """The motion as the twin sees it, at its *points*: one per hold, then every sample of every move.
+
+    ``force`` (points, 3) specific force and ``rate`` (points, 3) angular rate in SI, corrected by the twin (distortions
+    of accepted effects removed); ``attitude`` (move samples, 3, 3) rotation since the move began; ``move_slices`` of the
+    points of each move.
+    """
+
+    force: FloatArray
+    rate: FloatArray
+    attitude: FloatArray
+    move_slices: tuple[slice, ...]
+    point_samples: npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Whitened residuals and Jacobians: ``residual`` (rows,), ``jacobian`` (rows, unknowns), row labels.
+
+    ``columns(distortion)`` gives the whitened rows of further effect parameters. ``log_weight`` is the log-determinant
+    of the whitening of rows whose noise depends on the corner times.
+    """
+
+    residual: FloatArray
+    jacobian: FloatArray
+    domain: npt.NDArray[np.int8]
+    segment: npt.NDArray[np.intp]
+    channel: npt.NDArray[np.int8]
+    log_weight: float
+    scale: FloatArray
+
+
+def tangents(up: FloatArray) -> FloatArray:
+    """(n, 3, 2) orthonormal bases of the planes normal to unit vectors (n, 3)."""
+    helper = np.zeros_like(up)
+    helper[np.arange(len(up)), np.abs(up).argmin(axis=1)] = 1.0
+    first = np.cross(up, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(up, first)], axis=2)
+
+
+def trajectory(obs: Observations, twin: Twin, distortion: Distortion) -> Trajectory:
+    """Corrected motion at every point (eq. 8.2)."""
+    h = obs.n_holds
+    samples = [np.arange(start, stop) for start, stop in obs.move_ranges]
+    slices, first = [], h
+    for part in samples:
+        slices.append(slice(first, first + len(part)))
+        first += len(part)
+    index = np.concatenate(samples) if samples else np.zeros(0, dtype=np.intp)
+    bias_rate, bias_force = np.zeros((len(index), 3)), np.zeros((len(index), 3))
+    for part, where, (before, after) in zip(samples, slices, obs.move_holds, strict=True):
+        t = obs.time_s[part]
+        blend = ((t - t[0]) / max(t[-1] - t[0], 1e-12))[:, None]
+        rows = slice(where.start - h, where.stop - h)
+        bias_rate[rows] = twin.gyro_bias[before] * (1 - blend) + twin.gyro_bias[after] * blend
+        bias_force[rows] = twin.accel_bias[before] * (1 - blend) + twin.accel_bias[after] * blend
+    hold_force = twin.gravity * twin.up
+    move_force = obs.raw_force[index] @ twin.accel_S.T + twin.accel_b - bias_force
+    if distortion.force is not None:
+        move_force = move_force - distortion.force[h:] @ twin.effect
+    rate = np.zeros((h + len(index), 3))
+    if obs.raw_rate is not None:
+        rate[h:] = obs.raw_rate[index] @ twin.gyro_S.T - bias_rate
+        if distortion.rate is not None:
+            rate[h:] -= distortion.rate[h:] @ twin.effect
+    local = [(s.start - h, s.stop - h) for s in slices]
+    attitude = (
+        _core.attitude_in_moves(np.ascontiguousarray(obs.time_s[index]), np.ascontiguousarray(rate[h:]), local)
+        if local
+        else np.zeros((0, 3, 3))
+    )
+    mid = np.array([(hold.start + hold.stop) // 2 for hold in obs.segments.holds], dtype=np.intp)
+    return Trajectory(np.vstack([hold_force, move_force]), rate, attitude, tuple(slices), np.concatenate([mid, index]))
+
+
+class Linearisation:
+    """Whitened residual rows of one twin on one recording, and the means to add columns to them."""
+
+    def __init__(self, obs: Observations, twin: Twin, distortion: Distortion, prior: Prior | None = None) -> None:
+        self.obs, self.twin, self.distortion, self.prior = obs, twin, distortion, prior
+        self.path = trajectory(obs, twin, distortion)
+        self.tangent = tangents(twin.up)
+        self._moves = [self._move(m) for m in range(obs.n_moves)]
+        cov = np.einsum("ij,nj,kj->nik", twin.accel_S, obs.hold_force_sigma**2, twin.accel_S)
+        self._accel_white = np.linalg.inv(np.linalg.cholesky(cov))
+        self._gyro_white = None
+        if obs.hold_rate_sigma is not None:
+            cov = np.einsum("ij,nj,kj->nik", twin.gyro_S, obs.hold_rate_sigma**2, twin.gyro_S)
+            self._gyro_white = np.linalg.inv(np.linalg.cholesky(cov))
+
+    # -- one move -------------------------------------------------------------------------------------------------
+    def _move(self, m: int) -> dict[str, FloatArray]:
+        obs, twin, path = self.obs, self.twin, self.path
+        where = path.move_slices[m]
+        h = obs.n_holds
+        before, after = obs.move_holds[m]
+        t = obs.time_s[path.point_samples[where]]
+        dt = np.diff(t)
+        weight = np.zeros(len(t))
+        weight[:-1] += dt / 2
+        weight[1:] += dt / 2
+        C = path.attitude[where.start - h : where.stop - h]
+        lifted = np.einsum("nji,nj->ni", C, path.force[where])  # specific force in the frame of the move's start
+        tail = np.cumsum((weight[:, None] * lifted)[::-1], axis=0)[::-1] - 0.5 * weight[:, None] * lifted
+        duration = t[-1] - t[0]
+        tangent_after = self.tangent[after]
+        lever = twin.gravity * tangent_after.T @ C[-1]
+        residual_m = lever @ twin.up[before] - twin.gravity * tangent_after.T @ twin.up[after]
+        residual_v = (weight[:, None] * lifted).sum(axis=0) - twin.gravity * duration * twin.up[before]
+        # Noise: attitude error is a Wiener process of the gyro's white noise, velocity its integral over the force.
+        assert obs.rate_density is not None
+        q = np.einsum("ij,j->i", twin.gyro_S**2, obs.rate_density**2).mean()
+        qa = np.einsum("ij,j->i", twin.accel_S**2, obs.force_density**2).mean()
+        A = lever @ _skew(twin.up[before])
+        outer = (weight[:, None, None] * tail[:, :, None] * tail[:, None, :]).sum(axis=0)
+        cov = np.zeros((5, 5))
+        cov[:2, :2] = q * duration * A @ A.T
+        cov[2:, 2:] = q * (np.trace(outer) * np.eye(3) - outer) + qa * duration * np.eye(3)
+        cross = q * A @ _skew((weight[:, None] * tail).sum(axis=0))
+        cov[:2, 2:], cov[2:, :2] = cross, cross.T
+        return {
+            "t": t, "weight": weight, "dt": dt, "C": C, "lifted": lifted, "lever": lever,
+            "residual": np.concatenate([residual_m, residual_v]),
+            "white": np.linalg.inv(np.linalg.cholesky(cov)), "duration": np.array(duration),
+        }  # fmt: skip
+
+    def _move_rows(self, m: int, rate: FloatArray | None, force: FloatArray | None) -> FloatArray:
+        """(5, K) change of a move's residuals when true rate and force change by (samples, 3, K)."""
+        one = self._moves[m]
+        given = rate if rate is not None else force
+        assert given is not None
+        out = np.zeros((5, given.shape[2]))
+        before = self.obs.move_holds[m, 0]
+        if rate is not None:
+            lifted = np.einsum("nji,njk->nik", one["C"], rate)
+            psi = np.zeros_like(lifted)
+            np.cumsum((lifted[1:] + lifted[:-1]) * (0.5 * one["dt"])[:, None, None], axis=0, out=psi[1:])
+            out[:2] = one["lever"] @ _skew(self.twin.up[before]) @ psi[-1]
+            out[2:] = np.einsum(
+                "n,nik->ik", one["weight"], np.cross(psi, one["lifted"][:, :, None], axisa=1, axisb=1, axisc=1)
+            )
+        if force is not None:
+            out[2:] += np.einsum("n,nji,njk->ik", one["weight"], one["C"], force, optimize=True)
+        return out
+
+    # -- everything -----------------------------------------------------------------------------------------------
+    def columns(self, distortion: Distortion) -> FloatArray:
+        """(rows, K) whitened change of every residual row per effect parameter (eq. 8.4)."""
+        obs, h = self.obs, self.obs.n_holds
+        k = distortion.n_parameters
+        parts = []
+        force = distortion.force
+        parts.append(
+            np.zeros((3 * h, k)) if force is None else -(self._accel_white @ force[:h]).reshape(3 * h, k)
+        )
+        if self._gyro_white is not None:
+            rate = distortion.rate
+            parts.append(np.zeros((3 * h, k)) if rate is None else -(self._gyro_white @ rate[:h]).reshape(3 * h, k))
+        for m, where in enumerate(self.path.move_slices):
+            rate_part = None if distortion.rate is None else -distortion.rate[where]
+            force_part = None if force is None else -force[where]
+            parts.append(self._moves[m]["white"] @ self._move_rows(m, rate_part, force_part))
+        parts.append(np.zeros((self._n_prior_rows(), k)))
+        return np.vstack(parts)
+
+    def _n_prior_rows(self) -> int:
+        h = self.obs.n_holds
+        return 6 * h + (18 if self.prior is not None else 0)
+
+    def system(self) -> System:
+        """Whitened residuals and their Jacobian in the baseline unknowns."""
+        obs, twin, h = self.obs, self.twin, self.obs.n_holds
+        n = N_ACCEL + N_GYRO + N_HOLD * h
+
+        def at(hold: int, part: slice) -> slice:
+            first = N_ACCEL + N_GYRO + N_HOLD * hold
+            return slice(first + part.start, first + part.stop)
+
+        tilt, rate_bias, force_bias = slice(0, 2), slice(2, 5), slice(5, 8)
+        rows_r: list[FloatArray] = []
+        rows_j: list[FloatArray] = []
+        label: list[tuple[int, int, int]] = []
+        eye = np.eye(3)
+        for i in range(h):
+            r = twin.accel_S @ obs.hold_force[i] + twin.accel_b - twin.accel_bias[i] - twin.gravity * twin.up[i]
+            if self.distortion.force is not None:
+                r = r - self.distortion.force[i] @ twin.effect
+            J = np.zeros((3, n))
+            for k, (row, col) in enumerate(_LOWER):
+                J[row, k] = obs.hold_force[i, col]
+            J[:, 6:9] = eye
+            J[:, at(i, tilt)] = -twin.gravity * self.tangent[i]
+            J[:, at(i, force_bias)] = -eye
+            W = self._accel_white[i]
+            rows_r.append(W @ r)
+            rows_j.append(W @ J)
+            label += [(STATIC_ACCEL, i, c) for c in range(3)]
+        if self._gyro_white is not None:
+            assert obs.hold_rate is not None
+            for i in range(h):
+                r = twin.gyro_S @ obs.hold_rate[i] - twin.gyro_bias[i]
+                if self.distortion.rate is not None:
+                    r = r - self.distortion.rate[i] @ twin.effect
+                J = np.zeros((3, n))
+                J[:, 9:18] = np.kron(eye, obs.hold_rate[i][None])
+                J[:, at(i, rate_bias)] = -eye
+                W = self._gyro_white[i]
+                rows_r.append(W @ r)
+                rows_j.append(W @ J)
+                label += [(STATIC_GYRO, i, c) for c in range(3)]
+        for m in range(obs.n_moves):
+            one, where = self._moves[m], self.path.move_slices[m]
+            before, after = obs.move_holds[m]
+            sample = self.path.point_samples[where]
+            assert obs.raw_rate is not None
+            blend = (one["t"] - one["t"][0]) / max(one["t"][-1] - one["t"][0], 1e-12)
+            two = np.concatenate([(1 - blend)[:, None, None] * eye, blend[:, None, None] * eye], axis=2)
+            J = np.zeros((5, n))
+            by_S = np.einsum("ia,nj->niaj", eye, obs.raw_rate[sample]).reshape(len(sample), 3, 9)
+            by_bias = -two
+            rate_cols = self._move_rows(m, np.concatenate([by_S, by_bias], axis=2), None)
+            J[:, 9:18] = rate_cols[:, :9]
+            J[:, at(before, rate_bias)] = rate_cols[:, 9:12]
+            J[:, at(after, rate_bias)] = rate_cols[:, 12:15]
+            lower = np.zeros((len(sample), 3, 6))
+            for k, (row, col) in enumerate(_LOWER):
+                lower[:, row, k] = obs.raw_force[sample, col]
+            force_cols = self._move_rows(
+                m, None, np.concatenate([lower, np.broadcast_to(eye, (len(sample), 3, 3)), -two], axis=2)
+            )
+            J[:, :9] = force_cols[:, :9]
+            J[:, at(before, force_bias)] = force_cols[:, 9:12]
+            J[:, at(after, force_bias)] = force_cols[:, 12:15]
+            J[:2, at(before, tilt)] = one["lever"] @ self.tangent[before]
+            J[:2, at(after, tilt)] = -twin.gravity * np.eye(2)
+            J[2:, at(before, tilt)] = -twin.gravity * float(one["duration"]) * self.tangent[before]
+            rows_r.append(one["white"] @ one["residual"])
+            rows_j.append(one["white"] @ J)
+            label += [(MOVES, m, 0), (MOVES, m, 1), (DYNAMICS, m, 0), (DYNAMICS, m, 1), (DYNAMICS, m, 2)]
+        log_weight = self._walk_rows(rows_r, rows_j, label, at, n)
+        if self.prior is not None:
+            current = np.concatenate(
+                [[twin.accel_S[i, j] for i, j in _LOWER], twin.accel_b, twin.gyro_S.ravel()]
+            )
+            W = np.linalg.inv(np.linalg.cholesky(self.prior.covariance))
+            J = np.zeros((18, n))
+            J[:, :18] = W
+            rows_r.append(W @ (current - self.prior.mean))
+            rows_j.append(J)
+            label += [(PRIOR, -1, 0)] * 18
+        labels = np.array(label)
+        jacobian = np.vstack(rows_j)
+        scale = np.sqrt((jacobian**2).sum(axis=0))
+        scale[scale == 0] = 1.0
+        return System(
+            residual=np.concatenate(rows_r), jacobian=jacobian, domain=labels[:, 0].astype(np.int8),
+            segment=labels[:, 1], channel=labels[:, 2].astype(np.int8), log_weight=log_weight, scale=scale,
+        )  # fmt: skip
+
+    def _walk_rows(
+        self, rows_r: list[FloatArray], rows_j: list[FloatArray], label: list[tuple[int, int, int]], at: object, n: int
+    ) -> float:
+        """Random walks of both biases between holds (eq. 8.3); the first hold carries a flat prior."""
+        obs, twin, h = self.obs, self.twin, self.obs.n_holds
+        log_weight = 0.0
+        gap = np.maximum(np.diff(obs.hold_time_s), 1e-3)
+        sensors = [(5, twin.accel_bias, np.sqrt((twin.accel_S**2) @ obs.force_density**2), twin.accel_corner_s, STATIC_ACCEL)]
+        if obs.rate_density is not None:
+            density = np.sqrt((twin.gyro_S**2) @ obs.rate_density**2)
+            sensors.append((2, twin.gyro_bias, density, twin.gyro_corner_s, STATIC_GYRO))
+        for offset, bias, density, corner_s, domain in sensors:
+            walk = np.sqrt(3.0) * density / corner_s  # K with N²/τ = K²τ/3 at the corner τ
+            first = N_ACCEL + N_GYRO + offset
+            J = np.zeros((3, n))
+            # The accelerometer's constant bias is b itself; the gyro's is only held finite.
+            sigma = 1e-6 * density if offset == 5 else np.full(3, 10.0)
+            J[:, first : first + 3] = np.diag(1 / sigma)
+            rows_r.append(bias[0] / sigma)
+            rows_j.append(J)
+            label += [(PRIOR, 0, c) for c in range(3)]
+            for i in range(h - 1):
+                sigma = walk * np.sqrt(gap[i])
+                here, there = first + N_HOLD * i, first + N_HOLD * (i + 1)
+                J = np.zeros((3, n))
+                J[:, there : there + 3] = np.diag(1 / sigma)
+                J[:, here : here + 3] = -np.diag(1 / sigma)
+                rows_r.append((bias[i + 1] - bias[i]) / sigma)
+                rows_j.append(J)
+                label += [(domain, i, c) for c in range(3)]
+                log_weight -= float(np.log(sigma).sum())
+        if obs.rate_density is None:
+            # No gyro: its unknowns per hold are pinned so that the system stays regular.
+            for i in range(h):
+                J = np.zeros((3, n))
+                first = N_ACCEL + N_GYRO + N_HOLD * i + 2
+                J[:, first : first + 3] = np.eye(3)
+                rows_r.append(np.zeros(3))
+                rows_j.append(J)
+                label += [(PRIOR, i, c) for c in range(3)]
+        return log_weight
+
+
+def _skew(v: FloatArray) -> FloatArray:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
