@@ -126,7 +126,7 @@ class System:
     """Whitened residuals and Jacobians: ``residual`` (rows,), ``jacobian`` (rows, unknowns), row labels.
 
     ``columns(distortion)`` gives the whitened rows of further effect parameters. ``log_weight`` is the log-determinant
-    of the whitening of rows whose noise depends on the corner times.
+    of the whitening of rows whose noise depends on the corner times; ``walk`` marks those rows (1 accelerometer, 2 gyro).
     """
 
     residual: FloatArray
@@ -135,7 +135,7 @@ class System:
     segment: npt.NDArray[np.intp]
     channel: npt.NDArray[np.int8]
     log_weight: float
-    scale: FloatArray
+    walk: npt.NDArray[np.int8]
 
 
 def tangents(up: FloatArray) -> FloatArray:
@@ -227,7 +227,12 @@ class Linearisation:
         cov[2:, 2:] = q * (np.trace(outer) * np.eye(3) - outer) + qa * duration * np.eye(3)
         cross = q * A @ _skew((weight[:, None] * tail).sum(axis=0))
         cov[:2, 2:], cov[2:, :2] = cross, cross.T
+        tail_skew = np.zeros((len(t), 3, 3))
+        tail_skew[:, [0, 1, 2], [1, 2, 0]] = -(weight[:, None] * tail)[:, [2, 0, 1]]
+        tail_skew[:, [1, 2, 0], [0, 1, 2]] = (weight[:, None] * tail)[:, [2, 0, 1]]
+        Ct = np.ascontiguousarray(C.transpose(0, 2, 1))
         return {
+            "Ct": Ct, "weighted_Ct": weight[:, None, None] * Ct, "tail_skew": tail_skew,
             "t": t, "weight": weight, "dt": dt, "C": C, "lifted": lifted, "lever": lever,
             "residual": np.concatenate([residual_m, residual_v]),
             "white": np.linalg.inv(np.linalg.cholesky(cov)), "duration": np.array(duration),
@@ -241,15 +246,13 @@ class Linearisation:
         out = np.zeros((5, given.shape[2]))
         before = self.obs.move_holds[m, 0]
         if rate is not None:
-            lifted = np.einsum("nji,njk->nik", one["C"], rate)
-            psi = np.zeros_like(lifted)
-            np.cumsum((lifted[1:] + lifted[:-1]) * (0.5 * one["dt"])[:, None, None], axis=0, out=psi[1:])
-            out[:2] = one["lever"] @ _skew(self.twin.up[before]) @ psi[-1]
-            out[2:] = np.einsum(
-                "n,nik->ik", one["weight"], np.cross(psi, one["lifted"][:, :, None], axisa=1, axisb=1, axisc=1)
-            )
+            # ψ(t) = ∫ Cᵀ δω: its end moves the predicted vertical, its product with the force the velocity. Written as
+            # sums over samples with the force still to come, so that no running integral per column is stored.
+            lifted = one["Ct"] @ rate
+            out[:2] = one["lever"] @ _skew(self.twin.up[before]) @ np.tensordot(one["weight"], lifted, 1)
+            out[2:] = -np.tensordot(one["tail_skew"], lifted, ((0, 2), (0, 1)))
         if force is not None:
-            out[2:] += np.einsum("n,nji,njk->ik", one["weight"], one["C"], force, optimize=True)
+            out[2:] += np.tensordot(one["weighted_Ct"], force, ((0, 2), (0, 1)))
         return out
 
     # -- everything -----------------------------------------------------------------------------------------------
@@ -288,7 +291,7 @@ class Linearisation:
         tilt, rate_bias, force_bias = slice(0, 2), slice(2, 5), slice(5, 8)
         rows_r: list[FloatArray] = []
         rows_j: list[FloatArray] = []
-        label: list[tuple[int, int, int]] = []
+        label: list[tuple[int, int, int, int]] = []
         eye = np.eye(3)
         for i in range(h):
             r = twin.accel_S @ obs.hold_force[i] + twin.accel_b - twin.accel_bias[i] - twin.gravity * twin.up[i]
@@ -303,7 +306,7 @@ class Linearisation:
             W = self._accel_white[i]
             rows_r.append(W @ r)
             rows_j.append(W @ J)
-            label += [(STATIC_ACCEL, i, c) for c in range(3)]
+            label += [(STATIC_ACCEL, i, c, 0) for c in range(3)]
         if self._gyro_white is not None:
             assert obs.hold_rate is not None
             for i in range(h):
@@ -316,7 +319,7 @@ class Linearisation:
                 W = self._gyro_white[i]
                 rows_r.append(W @ r)
                 rows_j.append(W @ J)
-                label += [(STATIC_GYRO, i, c) for c in range(3)]
+                label += [(STATIC_GYRO, i, c, 0) for c in range(3)]
         for m in range(obs.n_moves):
             one, where = self._moves[m], self.path.move_slices[m]
             before, after = obs.move_holds[m]
@@ -345,7 +348,7 @@ class Linearisation:
             J[2:, at(before, tilt)] = -twin.gravity * float(one["duration"]) * self.tangent[before]
             rows_r.append(one["white"] @ one["residual"])
             rows_j.append(one["white"] @ J)
-            label += [(MOVES, m, 0), (MOVES, m, 1), (DYNAMICS, m, 0), (DYNAMICS, m, 1), (DYNAMICS, m, 2)]
+            label += [(MOVES, m, c, 0) for c in range(2)] + [(DYNAMICS, m, c, 0) for c in range(3)]
         log_weight = self._walk_rows(rows_r, rows_j, label, at, n)
         if self.prior is not None:
             current = np.concatenate(
@@ -356,18 +359,16 @@ class Linearisation:
             J[:, :18] = W
             rows_r.append(W @ (current - self.prior.mean))
             rows_j.append(J)
-            label += [(PRIOR, -1, 0)] * 18
+            label += [(PRIOR, -1, 0, 0)] * 18
         labels = np.array(label)
         jacobian = np.vstack(rows_j)
-        scale = np.sqrt((jacobian**2).sum(axis=0))
-        scale[scale == 0] = 1.0
         return System(
             residual=np.concatenate(rows_r), jacobian=jacobian, domain=labels[:, 0].astype(np.int8),
-            segment=labels[:, 1], channel=labels[:, 2].astype(np.int8), log_weight=log_weight, scale=scale,
+            segment=labels[:, 1], channel=labels[:, 2].astype(np.int8), log_weight=log_weight, walk=labels[:, 3].astype(np.int8),
         )  # fmt: skip
 
     def _walk_rows(
-        self, rows_r: list[FloatArray], rows_j: list[FloatArray], label: list[tuple[int, int, int]], at: object, n: int
+        self, rows_r: list[FloatArray], rows_j: list[FloatArray], label: list[tuple[int, int, int, int]], at: object, n: int
     ) -> float:
         """Random walks of both biases between holds (eq. 8.3); the first hold carries a flat prior."""
         obs, twin, h = self.obs, self.twin, self.obs.n_holds
@@ -386,7 +387,7 @@ class Linearisation:
             J[:, first : first + 3] = np.diag(1 / sigma)
             rows_r.append(bias[0] / sigma)
             rows_j.append(J)
-            label += [(PRIOR, 0, c) for c in range(3)]
+            label += [(PRIOR, 0, c, 0) for c in range(3)]
             for i in range(h - 1):
                 sigma = walk * np.sqrt(gap[i])
                 here, there = first + N_HOLD * i, first + N_HOLD * (i + 1)
@@ -395,7 +396,7 @@ class Linearisation:
                 J[:, here : here + 3] = -np.diag(1 / sigma)
                 rows_r.append((bias[i + 1] - bias[i]) / sigma)
                 rows_j.append(J)
-                label += [(domain, i, c) for c in range(3)]
+                label += [(domain, i, c, 1 if offset == 5 else 2) for c in range(3)]
                 log_weight -= float(np.log(sigma).sum())
         if obs.rate_density is None:
             # No gyro: its unknowns per hold are pinned so that the system stays regular.
@@ -405,7 +406,7 @@ class Linearisation:
                 J[:, first : first + 3] = np.eye(3)
                 rows_r.append(np.zeros(3))
                 rows_j.append(J)
-                label += [(PRIOR, i, c) for c in range(3)]
+                label += [(PRIOR, i, c, 0) for c in range(3)]
         return log_weight
 
 

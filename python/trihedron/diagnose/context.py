@@ -1,0 +1,210 @@
+"""What an effect may look at: the motion as the twin sees it, along every sensor axis, with the auxiliary channels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.diagnose.observations import FloatArray, Observations
+from trihedron.diagnose.solve import Fit
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """Signals at the twin's points (one per hold, then every sample of every move), SI, instrument frame.
+
+    Everything is computed from the fitted twin when first asked for. ``latitude_deg`` is the user's, if given.
+    """
+
+    obs: Observations
+    fitted: Fit
+    latitude_deg: float | None = None
+
+    # -- time and layout ------------------------------------------------------------------------------------------
+    @property
+    def n_points(self) -> int:
+        """Number of points."""
+        return len(self.fitted.line.path.force)
+
+    @property
+    def moves(self) -> tuple[slice, ...]:
+        """Points of each move."""
+        return self.fitted.line.path.move_slices
+
+    @cached_property
+    def time_s(self) -> FloatArray:
+        """(points,) middle of each hold, time of each sample."""
+        times: FloatArray = self.obs.time_s[self.fitted.line.path.point_samples].copy()
+        times[: self.obs.n_holds] = self.obs.hold_time_s
+        return times
+
+    @cached_property
+    def elapsed(self) -> FloatArray:
+        """(points,) time from 0 at the first to 1 at the last sample of the recording."""
+        out: FloatArray = (self.time_s - self.obs.time_s[0]) / max(self.obs.time_s[-1] - self.obs.time_s[0], 1e-9)
+        return out
+
+    # -- motion ---------------------------------------------------------------------------------------------------
+    @property
+    def force(self) -> FloatArray:
+        """(points, 3) specific force: exactly g along the fitted vertical in holds."""
+        return self.fitted.line.path.force
+
+    @property
+    def rate(self) -> FloatArray:
+        """(points, 3) angular rate: zero in holds."""
+        return self.fitted.line.path.rate
+
+    def derivative(self, values: FloatArray) -> FloatArray:
+        """(points, 3) time derivative inside moves; zero in holds."""
+        out = np.zeros_like(values)
+        for where in self.moves:
+            out[where] = np.gradient(values[where], self.time_s[where], axis=0)
+        return out
+
+    @cached_property
+    def force_rate(self) -> FloatArray:
+        """(points, 3) derivative of specific force."""
+        return self.derivative(self.force)
+
+    @cached_property
+    def angular_acceleration(self) -> FloatArray:
+        """(points, 3) derivative of angular rate."""
+        return self.derivative(self.rate)
+
+    # -- sensor axes ----------------------------------------------------------------------------------------------
+    @cached_property
+    def accel_axes(self) -> FloatArray:
+        """(3, 3) columns: change of corrected force when accelerometer j alone reads 1 m/s² more along its own axis."""
+        S = self.fitted.twin.accel_S
+        out: FloatArray = S * np.linalg.norm(np.linalg.inv(S), axis=1)
+        return out
+
+    @cached_property
+    def gyro_axes(self) -> FloatArray:
+        """(3, 3) columns: the same for gyros."""
+        S = self.fitted.twin.gyro_S
+        out: FloatArray = S * np.linalg.norm(np.linalg.inv(S), axis=1)
+        return out
+
+    @cached_property
+    def axis_force(self) -> FloatArray:
+        """(points, 3) specific force along each accelerometer's own axis."""
+        out: FloatArray = self.force @ np.linalg.inv(self.accel_axes).T
+        return out
+
+    @cached_property
+    def axis_rate(self) -> FloatArray:
+        """(points, 3) angular rate along each gyro's own axis."""
+        out: FloatArray = self.rate @ np.linalg.inv(self.gyro_axes).T
+        return out
+
+    def on_accelerometers(self, values: FloatArray) -> FloatArray:
+        """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of accelerometer j."""
+        out: FloatArray = self.accel_axes[None] * values[:, None, :]
+        return out
+
+    def on_gyros(self, values: FloatArray) -> FloatArray:
+        """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of gyro j."""
+        out: FloatArray = self.gyro_axes[None] * values[:, None, :]
+        return out
+
+    # -- whole-recording signals ----------------------------------------------------------------------------------
+    def at_points(self, samples: FloatArray) -> FloatArray:
+        """Values of a whole-recording signal (n, ...) at the points: hold means, then move samples."""
+        path = self.fitted.line.path
+        h = self.obs.n_holds
+        out = np.array(samples[path.point_samples], dtype=np.float64)
+        for i, hold in enumerate(self.obs.segments.holds):
+            out[i] = np.nanmean(samples[hold.samples()], axis=0)
+        assert len(out) >= h
+        return out
+
+    @cached_property
+    def history(self) -> FloatArray:
+        """(n, 3) specific force along each accelerometer's axis at every sample: the fitted pose in holds."""
+        obs, twin = self.obs, self.fitted.twin
+        force = obs.raw_force @ twin.accel_S.T + twin.accel_b
+        for i, hold in enumerate(obs.segments.holds):
+            force[hold.start : hold.stop] = twin.gravity * twin.up[i]
+        finite = np.where(np.isfinite(force), force, 0.0)
+        out: FloatArray = finite @ np.linalg.inv(self.accel_axes).T
+        return out
+
+    @cached_property
+    def temperature(self) -> FloatArray | None:
+        """(points,) logged temperature minus its mean, °C."""
+        logged = self.obs.recording.temperature_degc
+        if logged is None or not np.isfinite(logged).any():
+            return None
+        values = self.at_points(logged)
+        centred: FloatArray = values - np.nanmean(values[: self.obs.n_holds])
+        return np.where(np.isfinite(centred), centred, 0.0)
+
+    @cached_property
+    def supply(self) -> FloatArray | None:
+        """(points,) logged supply voltage over its mean, minus one."""
+        logged = self.obs.recording.supply_v
+        if logged is None or not np.isfinite(logged).any():
+            return None
+        values = self.at_points(logged)
+        relative: FloatArray = values / np.nanmean(values[: self.obs.n_holds]) - 1.0
+        return np.where(np.isfinite(relative), relative, 0.0)
+
+    def hold_power(self, sensor: str) -> FloatArray:
+        """(holds, 3) variance inside each hold, SI², along the instrument axes."""
+        obs, twin = self.obs, self.fitted.twin
+        raw, S = (obs.raw_force, twin.accel_S) if sensor == "accelerometer" else (obs.raw_rate, twin.gyro_S)
+        assert raw is not None
+        out = np.zeros((obs.n_holds, 3))
+        for i, hold in enumerate(obs.segments.holds):
+            values = raw[hold.samples()] @ S.T
+            # Differences of neighbours forget slow drift; half their mean square is the fast part's variance.
+            out[i] = np.nanvar(values, axis=0)
+        return out
+
+    def between_holds(self, per_hold: FloatArray) -> FloatArray:
+        """(points, ...) a per-hold quantity, carried linearly in time through the moves."""
+        out = np.zeros((self.n_points, *per_hold.shape[1:]))
+        out[: self.obs.n_holds] = per_hold
+        for where, (before, after) in zip(self.moves, self.obs.move_holds, strict=True):
+            t = self.time_s[where]
+            blend = ((t - t[0]) / max(t[-1] - t[0], 1e-12)).reshape(-1, *([1] * (per_hold.ndim - 1)))
+            out[where] = per_hold[before] * (1 - blend) + per_hold[after] * blend
+        return out
+
+    @cached_property
+    def hold_attitude(self) -> FloatArray:
+        """(holds, 3, 3) local level (z up, arbitrary azimuth) → body, chained through the moves and levelled at holds.
+
+        Holds that no chain of moves reaches keep NaN.
+        """
+        obs, twin, path = self.obs, self.fitted.twin, self.fitted.line.path
+        out = np.full((obs.n_holds, 3, 3), np.nan)
+
+        def levelled(x_guess: FloatArray, up: FloatArray) -> FloatArray:
+            x = x_guess - up * (up @ x_guess)
+            x /= np.linalg.norm(x)
+            return np.stack([x, np.cross(up, x), up], axis=1)
+
+        up = twin.up
+        out[0] = levelled(np.eye(3)[np.abs(up[0]).argmin()], up[0])
+        for where, (before, after) in zip(self.moves, obs.move_holds, strict=True):
+            if np.isfinite(out[before]).all():
+                turned = path.attitude[where.stop - 1 - obs.n_holds] @ out[before]
+                out[after] = levelled(turned[:, 0], up[after])
+        return out
+
+    @cached_property
+    def noise_floor(self) -> npt.NDArray[np.float64]:
+        """(2, 3) white noise of one sample, SI: accelerometer, gyro."""
+        obs, twin = self.obs, self.fitted.twin
+        root_rate = np.sqrt(obs.recording.rate_hz)
+        out = np.zeros((2, 3))
+        out[0] = np.sqrt((twin.accel_S**2) @ obs.force_density**2) * root_rate
+        if obs.rate_density is not None:
+            out[1] = np.sqrt((twin.gyro_S**2) @ obs.rate_density**2) * root_rate
+        return out

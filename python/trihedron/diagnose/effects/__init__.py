@@ -1,0 +1,26 @@
+"""The catalogue: every file of this folder that defines an :class:`Effect` is found by itself."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from functools import cache
+
+from trihedron.diagnose.effects.contract import Effect
+
+__all__ = ["Effect", "catalogue"]
+
+
+@cache
+def catalogue() -> tuple[Effect, ...]:
+    """One instance of every effect in this folder, sorted by id."""
+    for module in pkgutil.iter_modules(__path__):
+        importlib.import_module(f"{__name__}.{module.name}")
+    return tuple(sorted((kind() for kind in _concrete(Effect)), key=lambda effect: effect.id))
+
+
+def _concrete(kind: type[Effect]) -> list[type[Effect]]:
+    found = [] if getattr(kind, "__abstractmethods__", None) else [kind]
+    for child in kind.__subclasses__():
+        found += _concrete(child)
+    return found

@@ -1,0 +1,18 @@
+"""Odd-order response of the accelerometers: a capacitive bridge beyond first order."""
+
+from __future__ import annotations
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+
+
+class AccelCubic(Effect):
+    """Adds K3 f³ along each axis: the first odd term of ξ/2 (1 + ξ²/4 + …)."""
+
+    id = "accel-cubic"
+    mechanism = "accelerometers respond to the cube of specific force, as a differential capacitive bridge does"
+    experiment = "add tilts between the faces (20° steps): an odd curve bends between level and 1 g"
+
+    def variants(self, context: Context) -> list[Variant]:
+        columns = context.on_accelerometers(context.axis_force**3)
+        return [Variant(force_only(columns), per_axis("K3"), ("1/(m/s^2)^2",) * 3)]

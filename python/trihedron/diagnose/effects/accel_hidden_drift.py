@@ -1,0 +1,21 @@
+"""Accel bias that drifts smoothly in time; no logged channel explains it."""
+
+from __future__ import annotations
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only
+from trihedron.diagnose.effects.drift_shapes import drift_variants
+
+
+class AccelHiddenDrift(Effect):
+    """Warm-up exponential, straight line or slow curve per axis."""
+
+    id = "accel-hidden-drift"
+    mechanism = "accelerometer bias drifts smoothly in time though no logged channel explains it"
+    experiment = "log the temperature, or let the sensor warm up and repeat the first poses at the end"
+
+    def unavailable(self, context: Context) -> str | None:
+        return "fewer than six still poses" if context.obs.n_holds < 6 else None
+
+    def variants(self, context: Context) -> list[Variant]:
+        return drift_variants(context, context.on_accelerometers, force_only, "m/s^2")

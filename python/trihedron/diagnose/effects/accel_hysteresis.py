@@ -1,0 +1,51 @@
+"""Accelerometer offset that remembers the previous orientation."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import lfilter
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+from trihedron.diagnose.observations import FloatArray
+
+PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
+CREEP_TIMES_S = (5.0, 20.0, 60.0)
+
+
+def play(path: FloatArray, half_width: float) -> FloatArray:
+    """Play operator: follows the path with slack; output over half-width is in [-1, 1] and holds the last direction."""
+    out = np.empty_like(path)
+    follower = path[0].copy()
+    # Only extremes move the follower: the running clip is sequential by nature, but cheap on decimated input.
+    for k in range(len(path)):
+        np.clip(follower, path[k] - half_width, path[k] + half_width, out=follower)
+        out[k] = follower
+    return (path - out) / half_width
+
+
+class AccelHysteresis(Effect):
+    """Offset per axis that depends on the direction of arrival (play operator) or creeps after a turn."""
+
+    id = "accel-hysteresis"
+    mechanism = "accelerometer offsets remember the previous orientation"
+    experiment = "reach the same pose from opposite directions, twice each"
+
+    def variants(self, context: Context) -> list[Variant]:
+        history = context.history
+        step = max(1, round(0.05 * context.obs.recording.rate_hz))
+        coarse = history[::step]
+        index = np.minimum(np.arange(len(history)) // step, len(coarse) - 1)
+        out = []
+        for width in PLAY_WIDTHS_M_S2:
+            memory = play(coarse, width)[index]
+            columns = context.on_accelerometers(context.at_points(memory))
+            shape = {"half_width": (width, "m/s^2")}
+            out.append(Variant(force_only(columns), per_axis("offset"), ("m/s^2",) * 3, shape, "play"))
+        for tau in CREEP_TIMES_S:
+            keep = float(np.exp(-step / context.obs.recording.rate_hz / tau))
+            slow, _ = lfilter([1 - keep], [1, -keep], coarse, axis=0, zi=keep * coarse[:1])
+            columns = context.on_accelerometers(context.at_points((slow - coarse)[index]))
+            shape = {"time_constant": (tau, "s")}
+            out.append(Variant(force_only(columns), per_axis("creep"), ("1",) * 3, shape, "creep"))
+        return out

@@ -1,0 +1,18 @@
+"""Second-order response of the accelerometers."""
+
+from __future__ import annotations
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+
+
+class AccelQuadratic(Effect):
+    """Adds K2 f² along each accelerometer's own axis."""
+
+    id = "accel-quadratic"
+    mechanism = "accelerometers respond to the square of specific force"
+    experiment = "add tilts of 30°, 45° and 60° on both sides of level: a square and a modulus differ between the faces"
+
+    def variants(self, context: Context) -> list[Variant]:
+        columns = context.on_accelerometers(context.axis_force**2)
+        return [Variant(force_only(columns), per_axis("K2"), ("1/(m/s^2)",) * 3)]

@@ -1,0 +1,20 @@
+"""Different scale for positive and negative force."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+
+
+class AccelScaleAsymmetry(Effect):
+    """Adds a |f|: half the difference between the scales of the two directions."""
+
+    id = "accel-scale-asymmetry"
+    mechanism = "accelerometers scale positive and negative force differently"
+    experiment = "add tilts of 30°, 45° and 60° on both sides of level: a square and a modulus differ between the faces"
+
+    def variants(self, context: Context) -> list[Variant]:
+        columns = context.on_accelerometers(np.abs(context.axis_force))
+        return [Variant(force_only(columns), per_axis("half_difference"), ("1",) * 3)]

@@ -1,0 +1,82 @@
+"""What an effect is: a mechanism that predicts, per parameter, what it adds to the readings.
+
+To add one: write a file in this folder with a subclass of :class:`Effect` and nothing else (docs/adding-an-effect.md).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.observations import FloatArray
+from trihedron.diagnose.twin import Distortion
+from trihedron.records.diagnosis import EffectParameter
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """One shape of an effect: the distortion per unit of each parameter, and the shape numbers it was made with.
+
+    ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; each costs as a parameter does.
+    """
+
+    distortion: Distortion
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    shape: dict[str, tuple[float, str]] = field(default_factory=dict)
+    label: str = ""
+
+
+class Effect(ABC):
+    """One physical mechanism."""
+
+    id: ClassVar[str]
+    mechanism: ClassVar[str]
+    experiment: ClassVar[str] = ""
+    """What to record so that this effect cannot be mistaken for another."""
+
+    def unavailable(self, context: Context) -> str | None:  # noqa: ARG002
+        """Why this recording cannot show the effect; ``None`` when it can."""
+        return None
+
+    @abstractmethod
+    def variants(self, context: Context) -> list[Variant]:
+        """Forward models to compete, simplest first; SI, at the context's points."""
+
+    def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
+        """Physical parameters from the linear ones; shape numbers follow without a standard error of their own."""
+        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        linear = tuple(
+            EffectParameter(name, float(v), float(s), unit)
+            for name, v, s, unit in zip(variant.names, value, sigma, variant.units, strict=True)
+        )
+        shape = tuple(EffectParameter(name, v, float("nan"), unit) for name, (v, unit) in variant.shape.items())
+        return linear + shape
+
+    def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
+        """The finding in one plain sentence."""
+        known = [p for p in parameters if np.isfinite(p.std)]
+        strongest = max(known, key=lambda p: abs(p.value) / max(p.std, 1e-300))
+        size = f"{strongest.value:.3g} ± {strongest.std:.1g} {strongest.unit}"
+        return f"{self.mechanism} (strongest term {strongest.name}: {size})."
+
+
+def per_axis(symbol: str) -> tuple[str, ...]:
+    """Names of one parameter per axis."""
+    return tuple(f"{symbol}_{axis}" for axis in AXES)
+
+
+def force_only(columns: FloatArray) -> Distortion:
+    """A distortion of the accelerometer alone."""
+    return Distortion(columns, None)
+
+
+def rate_only(columns: FloatArray) -> Distortion:
+    """A distortion of the gyro alone."""
+    return Distortion(None, columns)

@@ -1,0 +1,25 @@
+"""Gyro bias that depends on specific force."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import AXES, Effect, Variant, rate_only
+
+
+class GyroGSensitivity(Effect):
+    """Rate bias linear in specific force: ω reads G f more."""
+
+    id = "gyro-g-sensitivity"
+    mechanism = "gyro bias depends on specific force: the rate read at rest changes with the pose"
+    experiment = "hold each of the six faces for a minute; turn the table by 180° under a level sensor to rule out Earth rate"
+
+    def unavailable(self, context: Context) -> str | None:
+        return "the log has no gyro" if context.obs.raw_rate is None else None
+
+    def variants(self, context: Context) -> list[Variant]:
+        eye = np.eye(9).reshape(9, 3, 3)
+        columns = np.einsum("kij,nj->nik", eye, context.force)
+        names = tuple(f"G_{i}{j}" for i in AXES for j in AXES)
+        return [Variant(rate_only(columns), names, ("(rad/s)/(m/s^2)",) * 9)]

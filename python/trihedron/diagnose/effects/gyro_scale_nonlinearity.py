@@ -1,0 +1,31 @@
+"""Gyro scale that depends on rate."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, rate_only
+
+
+class GyroScaleNonlinearity(Effect):
+    """Cubic (odd), quadratic (even), or both, along each gyro's own axis."""
+
+    id = "gyro-scale-nonlinearity"
+    mechanism = "gyro scale depends on the rate"
+    experiment = "turn by the same angle slowly and fast, both ways, about each axis"
+
+    def unavailable(self, context: Context) -> str | None:
+        return "the log has no moves with a gyro" if not context.moves else None
+
+    def variants(self, context: Context) -> list[Variant]:
+        w = context.axis_rate
+        cubic, square = context.on_gyros(w**3), context.on_gyros(w**2)
+        both = np.concatenate([cubic, square], axis=2)
+        c, q = per_axis("cubic"), per_axis("quadratic")
+        cu, qu = ("1/(rad/s)^2",) * 3, ("1/(rad/s)",) * 3
+        return [
+            Variant(rate_only(cubic), c, cu, label="cubic"),
+            Variant(rate_only(square), q, qu, label="quadratic"),
+            Variant(rate_only(both), c + q, cu + qu, label="both"),
+        ]

@@ -1,0 +1,28 @@
+"""Gyro scale that follows the logged temperature."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, rate_only
+
+
+class GyroThermalScale(Effect):
+    """Relative scale linear in temperature (about its mean over the holds)."""
+
+    id = "gyro-thermal-scale"
+    mechanism = "gyro scale follows the temperature"
+    experiment = "repeat the same faces and turns at two temperatures"
+
+    def unavailable(self, context: Context) -> str | None:
+        if context.temperature is None:
+            return "the log has no temperature"
+        if np.ptp(context.temperature) < 0.2:
+            return "the temperature changes by less than 0.2 °C"
+        return None
+
+    def variants(self, context: Context) -> list[Variant]:
+        assert context.temperature is not None
+        columns = context.on_gyros(context.temperature[:, None] * context.axis_rate)
+        return [Variant(rate_only(columns), per_axis("scale_per_kelvin"), ("1/K",) * 3)]

@@ -1,0 +1,35 @@
+"""Bias that follows the power of vibration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
+
+
+class VibrationRectification(Effect):
+    """Bias proportional to vibration power above the quiet floor, per axis."""
+
+    id = "vibration-rectification"
+    mechanism = "bias follows the power of vibration"
+    experiment = "hold one pose with the vibration on and off"
+
+    def unavailable(self, context: Context) -> str | None:
+        power = context.hold_power("accelerometer").sum(axis=1)
+        # White noise of a hold of n samples has its variance known to sqrt(2/n): only a clear excess is vibration.
+        if power.max() < 1.5 * np.median(power):
+            return "no pose vibrates more than the others"
+        return None
+
+    def variants(self, context: Context) -> list[Variant]:
+        power = context.hold_power("accelerometer")
+        excess = np.maximum(power - np.quantile(power, 0.1, axis=0), 0.0)
+        own = context.on_accelerometers(context.between_holds(excess))
+        out = [Variant(force_only(own), per_axis("accel_bias_per_power"), ("1/(m/s^2)",) * 3, label="accelerometer")]
+        if context.obs.raw_rate is not None:
+            total = excess.sum(axis=1, keepdims=True) * np.ones(3)
+            gyro = context.on_gyros(context.between_holds(total))
+            units = ("(rad/s)/(m/s^2)^2",) * 3
+            out.append(Variant(rate_only(gyro), per_axis("gyro_bias_per_power"), units, label="gyro"))
+        return out

@@ -1,0 +1,160 @@
+"""Effects compete: score test, joint refit, blocked cross-validation; one is added at a time (eq. 8.7-8.10)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import chdtrc
+
+from trihedron.diagnose.agreement import ROW_DOMAINS
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects import Effect, catalogue
+from trihedron.diagnose.effects.contract import Variant
+from trihedron.diagnose.observations import FloatArray
+from trihedron.diagnose.solve import Fit, leverage, predict_held_out, reduce, score, tune_noise
+from trihedron.diagnose.twin import DYNAMICS, MOVES, PRIOR, STATIC_ACCEL, STATIC_GYRO, Distortion, Prior, stacked
+
+N_DOMAINS = len(ROW_DOMAINS)
+MAX_EFFECTS = 4
+"""Effects accepted at most: a recording of one session does not carry evidence for more."""
+MIN_DELTA_BIC = 10.0
+"""Kass and Raftery's bound for very strong evidence."""
+CONFOUNDED_DELTA_BIC = 6.0
+"""Below a difference of 6 (strong evidence) two explanations are named together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """One candidate's best variant under the score test."""
+
+    effect: Effect
+    variant: Variant
+    gain: float
+    rank: int
+    p_value: float
+    merit: float
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """An effect in the model, with the variant that won and how the model stood before."""
+
+    effect: Effect
+    variant: Variant
+    p_adjusted: float
+    delta_bic: float
+    rivals: tuple[str, ...]
+
+
+def folds_of(fitted: Fit, n_folds: int = 8) -> list[npt.NDArray[np.bool_]]:
+    """Blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
+    system, obs = fitted.system, fitted.line.obs
+    direct = system.walk == 0
+    out = []
+    for labels, count in (((STATIC_ACCEL, STATIC_GYRO), obs.n_holds), ((MOVES, DYNAMICS), obs.n_moves)):
+        for block in np.array_split(np.arange(count), min(n_folds, max(count // 2, 1))):
+            held = np.isin(system.domain, labels) & direct & np.isin(system.segment, block)
+            if held.any():
+                out.append(held)
+    return out
+
+
+def dispersion(residual: FloatArray, fitted: Fit, used: FloatArray) -> FloatArray:
+    """(domains,) how far each domain's misfit exceeds its noise, at least 1."""
+    out = np.ones(N_DOMAINS)
+    for d in range(N_DOMAINS):
+        rows = fitted.system.domain == d
+        dof = float((1.0 - used[rows]).sum())
+        if dof >= 1.0:
+            out[d] = max(1.0, float((residual[rows] ** 2).sum()) / dof)
+    return out
+
+
+def score_all(context: Context, exclude: set[str]) -> tuple[list[Scored], list[tuple[str, str]]]:
+    """Score test of every applicable effect; the gain is judged against what remains after it.
+
+    Returns the scored candidates, best first, and ``(id, reason)`` of those that do not apply.
+    """
+    fitted = context.fitted
+    reduced = reduce(fitted)
+    used = leverage(fitted)
+    residual = fitted.system.residual
+    n_rows = int((fitted.system.domain != PRIOR).sum())
+    out, missing = [], []
+    for effect in catalogue():
+        if effect.id in exclude:
+            continue
+        reason = effect.unavailable(context)
+        if reason is not None:
+            missing.append((effect.id, reason))
+            continue
+        best: Scored | None = None
+        variants = effect.variants(context)
+        for variant in variants:
+            columns = fitted.line.columns(variant.distortion)
+            result = score(reduced, columns)
+            if result.rank == 0:
+                continue
+            after = residual + reduced.project(columns) @ result.estimate
+            scale = dispersion(after, fitted, used)
+            gain = 0.0
+            for d in range(N_DOMAINS):
+                rows = fitted.system.domain == d
+                gain += float((residual[rows] ** 2).sum() - (after[rows] ** 2).sum()) / scale[d]
+            prior_rows = fitted.system.domain == PRIOR
+            gain += float((residual[prior_rows] ** 2).sum() - (after[prior_rows] ** 2).sum())
+            gain = max(gain, 0.0)
+            n_shape = len(variant.shape)
+            merit = gain - np.log(n_rows) * (result.rank + n_shape) - 2.0 * np.log(len(variants))
+            p = min(1.0, float(chdtrc(result.rank, gain)) * len(variants))
+            scored = Scored(effect, variant, gain, result.rank, p, merit)
+            if best is None or merit > best.merit:
+                best = scored
+        if best is None:
+            missing.append((effect.id, "the calibration itself imitates it in this recording"))
+        else:
+            out.append(best)
+    out.sort(key=lambda s: -s.merit)
+    return out, missing
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A candidate fitted jointly with everything accepted before."""
+
+    scored: Scored
+    fitted: Fit
+    bic_gain: float
+    held_out_gain: float
+
+
+def refit(
+    context: Context, accepted: list[Distortion], scored: Scored, prior: Prior | None, base_density: float
+) -> Refit:
+    """Joint fit of a candidate: BIC and held-out log density against the model without it."""
+    base = context.fitted
+    distortion = stacked([*accepted, scored.variant.distortion])
+    start = replace(base.twin, effect=np.concatenate([base.twin.effect, np.zeros(scored.variant.distortion.n_parameters)]))
+    fitted = tune_noise(context.obs, start, distortion, prior)
+    n_rows = int((base.system.domain != PRIOR).sum())
+    cost = np.log(n_rows) * (scored.rank + len(scored.variant.shape))
+    # Marginal likelihoods differ by the flat prior of the new parameters; their own log-determinant is taken out so
+    # that the difference is that of the profile likelihoods with noise tuned on either side.
+    gain = 2.0 * (profile(fitted) - profile(base))
+    density = predict_held_out(fitted, folds_of(fitted), N_DOMAINS).log_density
+    return Refit(scored, fitted, gain - cost, density - base_density)
+
+
+def profile(fitted: Fit) -> float:
+    """Marginal log-likelihood over the hidden states with the model's parameters at their optimum."""
+    from trihedron.diagnose.twin import N_ACCEL, N_GYRO, N_HOLD
+
+    first, last = N_ACCEL + N_GYRO, N_ACCEL + N_GYRO + N_HOLD * fitted.line.obs.n_holds
+    hidden = fitted.jacobian[:, first:last] / fitted.scale[first:last]
+    normal = hidden.T @ hidden
+    normal[np.diag_indices_from(normal)] += 1e-12
+    log_det = 2.0 * float(np.log(np.diag(np.linalg.cholesky(normal))).sum())
+    log_det += 2.0 * float(np.log(fitted.scale[first:last]).sum())
+    return -0.5 * fitted.chi2 - 0.5 * log_det + fitted.system.log_weight

@@ -1,0 +1,235 @@
+"""Linear-Gaussian inference on the whitened rows: fit, marginal likelihood, score tests, held-out prediction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_factor, cho_solve, cholesky, eigh, solve_triangular
+
+from trihedron.diagnose.observations import FloatArray, Observations
+from trihedron.diagnose.twin import Distortion, Linearisation, Prior, System, Twin
+
+RELATIVE_RIDGE = 1e-12
+"""Added to the diagonal of the scaled normal matrix: directions the recording does not see stay finite."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A twin at its optimum on some rows: the state, the linearisation there and the normal equations.
+
+    ``n_effect`` columns at the end of ``jacobian`` belong to effects. ``covariance`` of all unknowns.
+    """
+
+    twin: Twin
+    line: Linearisation
+    system: System
+    jacobian: FloatArray
+    scale: FloatArray
+    chi2: float
+    log_marginal: float
+
+    @property
+    def n_effect(self) -> int:
+        """Number of effect parameters in the fit."""
+        return self.line.distortion.n_parameters
+
+    def covariance(self) -> FloatArray:
+        """(unknowns, unknowns) covariance at the optimum."""
+        scaled = self.jacobian / self.scale
+        normal = scaled.T @ scaled
+        normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE
+        inverse = np.linalg.inv(normal)
+        cov: FloatArray = inverse / np.outer(self.scale, self.scale)
+        return cov
+
+
+def _scaled(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+    scale = np.sqrt((jacobian**2).sum(axis=0))
+    scale[scale == 0] = 1.0
+    return jacobian / scale, scale
+
+
+def _with_effects(line: Linearisation) -> tuple[System, FloatArray]:
+    system = line.system()
+    jacobian = system.jacobian
+    if line.distortion.n_parameters:
+        jacobian = np.hstack([jacobian, line.columns(line.distortion)])
+    return system, jacobian
+
+
+def fit(
+    obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None = None, n_iterations: int = 4
+) -> Fit:
+    """Gauss-Newton on every row; the model is close to linear, so a few full steps converge (eq. 8.5)."""
+    twin = start
+    if len(twin.effect) != distortion.n_parameters:
+        twin = replace(twin, effect=np.zeros(distortion.n_parameters))
+    for _ in range(n_iterations):
+        line = Linearisation(obs, twin, distortion, prior)
+        system, jacobian = _with_effects(line)
+        scaled, scale = _scaled(jacobian)
+        normal = scaled.T @ scaled
+        normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE
+        step = -cho_solve(cho_factor(normal), scaled.T @ system.residual) / scale
+        twin = twin.advanced(step)
+        if np.linalg.norm(scaled @ (step * scale)) < 1e-3:  # the whitened rows move by less than a thousandth of sigma
+            break
+    line = Linearisation(obs, twin, distortion, prior)
+    system, jacobian = _with_effects(line)
+    scaled, scale = _scaled(jacobian)
+    normal = scaled.T @ scaled
+    normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE
+    chi2 = float(system.residual @ system.residual)
+    log_det = 2.0 * float(np.log(np.diag(cholesky(normal))).sum()) + 2.0 * float(np.log(scale).sum())
+    return Fit(twin, line, system, jacobian, scale, chi2, -0.5 * chi2 - 0.5 * log_det + system.log_weight)
+
+
+def leverage(fitted: Fit) -> FloatArray:
+    """(rows,) share of every row that the fit used up; degrees of freedom of a block are the sum of one minus it."""
+    scaled = fitted.jacobian / fitted.scale
+    normal = scaled.T @ scaled
+    normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE
+    half = solve_triangular(cholesky(normal, lower=True), scaled.T, lower=True)
+    out: FloatArray = (half**2).sum(axis=0)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """The rows of a fit with its unknowns projected out, ready to score many candidates cheaply."""
+
+    fitted: Fit
+    factor: FloatArray
+    scaled: FloatArray
+
+    def project(self, columns: FloatArray) -> FloatArray:
+        """Columns minus what the unknowns of the fit can imitate."""
+        return columns - self.scaled @ cho_solve((self.factor, True), self.scaled.T @ columns)
+
+
+def reduce(fitted: Fit) -> Reduced:
+    """Factor the normal equations of a fit once."""
+    scaled = fitted.jacobian / fitted.scale
+    normal = scaled.T @ scaled
+    normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE
+    return Reduced(fitted, np.asarray(cholesky(normal, lower=True)), scaled)
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """Score test of added columns: ``chi2`` gained, ``rank`` directions seen, the one-step estimate and its covariance."""
+
+    chi2: float
+    rank: int
+    estimate: FloatArray
+    covariance: FloatArray
+    visible: npt.NDArray[np.bool_]
+
+
+def score(reduced: Reduced, columns: FloatArray) -> Score:
+    """Rao's score test of effect columns against the fitted twin (eq. 8.7).
+
+    Directions whose projection keeps less than 1e-6 of their length are imitated by the calibration itself and are not
+    counted: they cannot be seen in this recording.
+    """
+    residual = reduced.fitted.system.residual
+    projected = reduced.project(columns)
+    length = np.sqrt((columns**2).sum(axis=0))
+    length[length == 0] = 1.0
+    normal = (projected / length).T @ (projected / length)
+    gradient = (projected / length).T @ residual
+    value, vector = eigh(normal)
+    seen = value > 1e-6
+    along = vector[:, seen].T @ gradient
+    chi2 = float((along**2 / value[seen]).sum())
+    inverse = (vector[:, seen] / value[seen]) @ vector[:, seen].T
+    visible = np.diag(normal) > 1e-6
+    return Score(
+        chi2, int(seen.sum()), -(inverse @ gradient) / length, inverse / np.outer(length, length), visible
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Held-out prediction of rows: innovation chi-square per domain, and log predictive density."""
+
+    chi2: npt.NDArray[np.float64]
+    n_rows: npt.NDArray[np.float64]
+    log_density: float
+    residual: FloatArray
+
+
+def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains: int) -> Prediction:
+    """Predict every fold's rows from the others (blocked cross-validation, eq. 8.8).
+
+    The held-out hold's own vertical and biases are unknown to the training rows; a weak prior (its column scale) keeps
+    them proper, and it is the same for every model that is compared.
+    """
+    residual = fitted.system.residual
+    scaled = fitted.jacobian / fitted.scale
+    # The state at the optimum of all rows: the training optimum is one linear step away.
+    normal = scaled.T @ scaled
+    ridge = 1e-6
+    chi2 = np.zeros(n_domains)
+    count = np.zeros(n_domains)
+    log_density = 0.0
+    out = np.zeros_like(residual)
+    for held in folds:
+        rows = scaled[held]
+        train = normal - rows.T @ rows
+        train[np.diag_indices_from(train)] += ridge
+        gradient = scaled[~held].T @ residual[~held]
+        factor = cho_factor(train)
+        innovation = residual[held] - rows @ cho_solve(factor, gradient)
+        spread = rows @ cho_solve(factor, rows.T)
+        spread[np.diag_indices_from(spread)] += 1.0
+        # Directions the training rows leave open (the held-out vertical) carry no information: keep the others.
+        value, vector = eigh(spread)
+        along = vector.T @ innovation
+        known = value < 1e4
+        log_density += float(-0.5 * (along[known] ** 2 / value[known]).sum() - 0.5 * np.log(value[known]).sum())
+        whitened = vector[:, known] @ (along[known] / np.sqrt(value[known]))
+        share = (vector[:, known] ** 2).sum(axis=1)
+        out[held] = whitened
+        domain = fitted.system.domain[held]
+        for d in range(n_domains):
+            chi2[d] += float((whitened[domain == d] ** 2).sum())
+            count[d] += float(share[domain == d].sum())
+    return Prediction(chi2, count, log_density, out)
+
+
+def tune_noise(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None) -> Fit:
+    """Choose the two corner times by marginal likelihood on a grid (eq. 8.6).
+
+    Only the rows of the two walks depend on a corner time, each in proportion to it: the linear optimum and its
+    evidence follow from the rows already made, without running the motion again.
+    """
+    fitted = fit(obs, start, distortion, prior)
+    best = (-np.inf, fitted.twin.accel_corner_s, fitted.twin.gyro_corner_s)
+    walk, residual = fitted.system.walk, fitted.system.residual
+    scaled = fitted.jacobian / fitted.scale
+    blocks = [scaled[walk == w].T @ scaled[walk == w] for w in range(3)]
+    sides = [scaled[walk == w].T @ residual[walk == w] for w in range(3)]
+    sums = [float(residual[walk == w] @ residual[walk == w]) for w in range(3)]
+    gyro_grid = CORNER_GRID_S if obs.rate_density is not None else (fitted.twin.gyro_corner_s,)
+    for accel_corner in CORNER_GRID_S:
+        for gyro_corner in gyro_grid:
+            factors = (1.0, accel_corner / fitted.twin.accel_corner_s, gyro_corner / fitted.twin.gyro_corner_s)
+            normal = sum(f * f * b for f, b in zip(factors, blocks, strict=True))
+            side = sum(f * f * s for f, s in zip(factors, sides, strict=True))
+            normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE
+            half = np.linalg.cholesky(normal)
+            inner = np.linalg.solve(half, side)
+            chi2 = sum(f * f * s for f, s in zip(factors, sums, strict=True)) - float(inner @ inner)
+            weight = sum(int((walk == w).sum()) * np.log(factors[w]) for w in (1, 2))
+            evidence = -0.5 * chi2 - float(np.log(np.diag(half)).sum()) + weight
+            if evidence > best[0]:
+                best = (evidence, accel_corner, gyro_corner)
+    tuned = replace(fitted.twin, accel_corner_s=best[1], gyro_corner_s=best[2])
+    return fit(obs, tuned, distortion, prior, n_iterations=2)
+
+
+CORNER_GRID_S = (20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 2560.0)
+"""Corner times where white noise and bias walk meet. Below 20 s a bias is not noise any more but drift to be explained."""
