@@ -75,6 +75,15 @@ class Context:
         """(points, 3) derivative of angular rate."""
         return self.derivative(self.rate)
 
+    @cached_property
+    def gravity_in_moves(self) -> FloatArray:
+        """(points, 3) minus gravity in the body, carried by the gyro from the start of each move; the force in holds."""
+        path, twin, h = self.fitted.line.path, self.fitted.twin, self.obs.n_holds
+        out = self.force.copy()
+        for where, (before, _) in zip(self.moves, self.obs.move_holds, strict=True):
+            out[where] = twin.gravity * path.attitude[where.start - h : where.stop - h] @ twin.up[before]
+        return out
+
     # -- sensor axes ----------------------------------------------------------------------------------------------
     @cached_property
     def accel_axes(self) -> FloatArray:

@@ -21,7 +21,8 @@ class Observations:
     the centred hold means, ``hold_force_sigma``, ``hold_rate_sigma`` (h, 3) their standard errors. ``move_ranges`` are
     half-open sample ranges that include the last sample of the hold before and the first of the hold after, so that
     neighbouring still samples bracket the whole motion; ``move_holds`` (m, 2) their holds. ``force_density`` and
-    ``rate_density`` (3,) are white noise per √Hz in raw units.
+    ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about their
+    stamps, once a diagnosis has found it.
     """
 
     recording: Recording
@@ -40,6 +41,7 @@ class Observations:
     move_holds: npt.NDArray[np.intp]
     force_density: FloatArray
     rate_density: FloatArray | None
+    jitter_s: float = 0.0
 
     @property
     def n_holds(self) -> int:

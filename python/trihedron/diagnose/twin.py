@@ -221,6 +221,11 @@ class Linearisation:
         q = np.einsum("ij,j->i", twin.gyro_S**2, obs.rate_density**2).mean()
         qa = np.einsum("ij,j->i", twin.accel_S**2, obs.force_density**2).mean()
         A = lever @ _skew(twin.up[before])
+        if obs.jitter_s:
+            # A sample taken δ late reads δ·derivative more: white over samples, stronger where the motion is quick.
+            step = duration / max(len(t) - 1, 1)
+            q += obs.jitter_s**2 * step * float((np.gradient(path.rate[where], t, axis=0) ** 2).mean()) 
+            qa += obs.jitter_s**2 * step * float((np.gradient(path.force[where], t, axis=0) ** 2).mean())
         outer = (weight[:, None, None] * tail[:, :, None] * tail[:, None, :]).sum(axis=0)
         cov = np.zeros((5, 5))
         cov[:2, :2] = q * duration * A @ A.T

@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+from trihedron.records.diagnosis import EffectParameter
 
 
 class DisturbedPose(Effect):
@@ -23,3 +24,8 @@ class DisturbedPose(Effect):
             shape = {"pose": (float(i), "index")}
             out.append(Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, shape, f"pose {i}"))
         return out
+
+    def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
+        pose = next(p.value for p in parameters if p.name == "pose")
+        size = float(np.sqrt(sum(p.value**2 for p in parameters if p.name.startswith("push"))))
+        return f"Pose {pose:.0f} was not still or was pushed: its mean is off by {size:.2g} m/s²; repeat or leave it out."

@@ -1,0 +1,50 @@
+"""Documented axes that form a left-handed triad."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import AXES
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.records.diagnosis import EffectParameter, Where
+
+
+class AxisHandedness(DirectEffect):
+    """The gyro's axes, as documented, turn against the accelerometers' as documented."""
+
+    id = "axis-handedness"
+    mechanism = "the documented axes do not form one right-handed triad"
+    experiment = "tilt each axis up in turn and turn about it by hand: the signs show which axis is documented wrongly"
+
+    def find(self, context: Context) -> Evidence | None:
+        S = context.fitted.twin.gyro_S
+        if context.obs.raw_rate is None or len(context.moves) < 3:
+            return None
+        unit = S / np.linalg.norm(S, axis=0)
+        main = np.argmax(np.abs(unit), axis=0)
+        if sorted(main.tolist()) != [0, 1, 2]:
+            return None
+        signs = np.array([np.sign(unit[main[j], j]) for j in range(3)])
+        if (signs > 0).all() and (main == np.arange(3)).all():
+            return None
+        n_reversed = int((signs < 0).sum())
+        reversed_axes = [AXES[j] for j in range(3) if signs[j] < 0]
+        kept = [AXES[j] for j in range(3) if signs[j] > 0]
+        if n_reversed == 1:
+            which = f"gyro axis {reversed_axes[0]}, or both other gyro axes and that accelerometer axis"
+        elif n_reversed == 2:
+            # Reflecting accelerometer axis k makes the rates about the other two axes appear reversed.
+            which = f"accelerometer axis {kept[0]}, or gyro axes {reversed_axes[0]} and {reversed_axes[1]}"
+        elif n_reversed == 3:
+            which = "all accelerometer axes (the log holds gravity instead of specific force), or all gyro axes"
+        else:
+            which = "the order of the axes"
+        parameters = tuple(
+            EffectParameter(f"gyro_sign_{axis}", float(s), 0.0, "1") for axis, s in zip(AXES, signs, strict=True)
+        )
+        return Evidence(
+            1e-300, 1e6, parameters,
+            f"The documented axes of accelerometer and gyro do not fit one right-handed triad: reversed is {which}.",
+            "moves", Where(tuple(f"g{axis}" for axis in reversed_axes)),
+        )  # fmt: skip

@@ -1,0 +1,45 @@
+"""Effects that show themselves in the samples, not as a curve over poses: they bring their own evidence."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.observations import Observations
+from trihedron.records.diagnosis import Domain, EffectParameter, HeldOut, Where
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What a direct test found.
+
+    ``p_value`` before payment for the search over effects; ``held_out`` the effect's own before/after on data its
+    parameters were not fitted to; ``variant`` columns that join the model, or None; ``reweigh`` changes what the
+    observations claim (noise, excluded moves), or None; ``strength`` is the gain in 2 log-likelihood, for ranking.
+    """
+
+    p_value: float
+    strength: float
+    parameters: tuple[EffectParameter, ...]
+    statement: str
+    domain: Domain
+    where: Where = Where()
+    held_out: tuple[HeldOut, ...] = ()
+    variant: Variant | None = None
+    reweigh: Callable[[Observations], Observations] | None = None
+    confounded_with: tuple[str, ...] = ()
+
+
+class DirectEffect(Effect):
+    """An effect with a test of its own."""
+
+    @abstractmethod
+    def find(self, context: Context) -> Evidence | None:
+        """The evidence for the effect in this recording, or ``None`` when there is none."""
+
+    def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
+        """Direct effects do not compete in the score test."""
+        return []

@@ -1,0 +1,47 @@
+"""A spectral line that motion does not explain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.within_static import find_lines
+from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
+
+
+class PeriodicInterference(DirectEffect):
+    """One sinusoid, steady through all poses, in one or more channels."""
+
+    id = "periodic-interference"
+    mechanism = "a sinusoid stands in the readings while the sensor is still"
+    experiment = "record at rest at another sampling rate: an aliased line moves, a true one stays"
+
+    def find(self, context: Context) -> Evidence | None:
+        lines = find_lines(context.obs)
+        if not lines:
+            return None
+        strongest = min(lines, key=lambda line: line.p_value)
+        same = [line for line in lines if abs(line.frequency_hz - strongest.frequency_hz) < line.resolution_hz]
+        parameters = [
+            EffectParameter("frequency", strongest.frequency_hz, strongest.frequency_sigma_hz, "Hz"),
+        ]
+        twin = context.fitted.twin
+        for line in same:
+            S = twin.accel_S if line.channel[0] == "a" else twin.gyro_S
+            scale = float(1.0 / np.linalg.norm(np.linalg.inv(S)[line.axis]))
+            unit = "m/s^2" if line.channel[0] == "a" else "rad/s"
+            parameters.append(
+                EffectParameter(f"amplitude_{line.channel}", line.amplitude * scale, line.amplitude_sigma * scale, unit)
+            )
+        where = Where(tuple(line.channel for line in same), (), (), (strongest.frequency_hz,))
+        held = HeldOut(
+            "within-static", strongest.power_before, strongest.power_after, strongest.rms_before, strongest.rms_after,
+            "raw",
+        )  # fmt: skip
+        return Evidence(
+            strongest.p_value, float(-2 * np.log(strongest.p_value)), tuple(parameters),
+            f"A line at {strongest.frequency_hz:.3f} Hz stands in {', '.join(line.channel for line in same)} while the "
+            "sensor is still.",
+            "within-static", where, (held,),
+        )  # fmt: skip

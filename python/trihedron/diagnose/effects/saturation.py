@@ -1,0 +1,154 @@
+"""Range limit reached: the reading stays on a plateau while the motion goes on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import AXES, Variant
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.observations import FloatArray
+from trihedron.diagnose.twin import Distortion
+from trihedron.records.diagnosis import EffectParameter, Where
+
+BAND_SIGMA = 5.0
+"""A plateau is a run of samples within five standard deviations of the limit."""
+MIN_RUN = 4
+MIN_PLATEAUS = 3
+"""Smooth peaks differ in height from move to move; three that end on one level within noise do not happen by chance."""
+STEEP = 3.0
+"""How much faster than a parabola of the same width the signal must arrive at the plateau."""
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """One run at the limit: samples ``[start, stop)`` of channel ``axis``, on the side ``sign``."""
+
+    axis: int
+    sign: int
+    start: int
+    stop: int
+    level: float
+
+
+def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int], ...]) -> list[Plateau]:
+    """Runs of a raw (n, 3) signal on a common limit inside moves."""
+    found: list[Plateau] = []
+    for axis in range(signal.shape[1]):
+        for sign in (1, -1):
+            x = sign * signal[:, axis]
+            pieces = [x[a:b] for a, b in ranges]
+            if not pieces:
+                continue
+            top = np.array([p.max() for p in pieces])
+            width = BAND_SIGMA * max(float(sigma[axis]), 1e-300)
+            best: list[Plateau] = []
+            # The limit is a level many moves end on: try each move's highest plateau as the level.
+            for level in np.unique(np.round((top - 2 * sigma[axis]) / width) * width):
+                runs: list[Plateau] = []
+                for (a, b), high in zip(ranges, top, strict=True):
+                    if not level - width <= high <= level + 2 * width:
+                        continue
+                    near = np.abs(x[a:b] - level) <= width
+                    edges = np.flatnonzero(np.diff(np.r_[0, near.astype(np.int8), 0]))
+                    for first, last in edges.reshape(-1, 2):
+                        n = last - first
+                        if n < MIN_RUN or first < 2 or last > b - a - 2:
+                            continue
+                        step = 0.5 * (x[a + first] - x[a + first - 2] + x[a + last - 1] - x[a + last + 1])
+                        if step > STEEP * 4.0 * width / n:
+                            runs.append(Plateau(axis, sign, a + int(first), a + int(last), sign * float(level)))
+                if len(runs) > len(best):
+                    best = runs
+            exceeds = (top > (best[0].level * sign if best else np.inf) + 2 * width).any()
+            if len(best) >= MIN_PLATEAUS and not exceeds:
+                found += best
+    return found
+
+
+class _Saturation(DirectEffect):
+    sensor: ClassVar[str]
+    experiment = "repeat the moves more slowly, or choose a wider range"
+
+    def find(self, context: Context) -> Evidence | None:
+        obs = context.obs
+        is_gyro = self.sensor == "gyro"
+        raw = obs.raw_rate if is_gyro else obs.raw_force
+        density = obs.rate_density if is_gyro else obs.force_density
+        if raw is None or density is None or not obs.move_ranges:
+            return None
+        sigma = density * np.sqrt(obs.recording.rate_hz)
+        runs = plateaus(raw, sigma, obs.move_ranges)
+        if not runs:
+            return None
+        n = sum(run.stop - run.start for run in runs)
+        axes = context.gyro_axes if is_gyro else context.accel_axes
+        scale = 1.0 / np.linalg.norm(np.linalg.inv(context.fitted.twin.gyro_S if is_gyro else context.fitted.twin.accel_S), axis=1)
+        columns, names = [], []
+        for m, where in enumerate(context.moves):
+            start, stop = obs.move_ranges[m]
+            for axis in range(3):
+                mine = [r for r in runs if r.axis == axis and start <= r.start < stop]
+                if not mine:
+                    continue
+                column = np.zeros((context.n_points, 3))
+                for run in mine:
+                    k = np.arange(run.stop - run.start + 2) / (run.stop - run.start + 1)
+                    cap = 4.0 * k * (1.0 - k)
+                    rows = where.start + np.arange(run.start - 1, run.stop + 1) - start
+                    inside = (rows >= where.start) & (rows < where.stop)
+                    column[rows[inside]] -= run.sign * (cap[:, None] * axes[:, axis])[inside]
+                columns.append(column)
+                names.append(f"overshoot_{AXES[axis]}_move{m}")
+        stacked = np.stack(columns, axis=2)
+        unit = "rad/s" if is_gyro else "m/s^2"
+        variant = Variant(
+            Distortion(None, stacked) if is_gyro else Distortion(stacked, None), tuple(names), (unit,) * len(names)
+        )
+        parameters = []
+        for axis in range(3):
+            for sign in (1, -1):
+                levels = [r.level for r in runs if r.axis == axis and r.sign == sign]
+                if levels:
+                    value = levels[0] * scale[axis]  # from the middle of the still readings
+                    parameters.append(
+                        EffectParameter(
+                            f"limit_{AXES[axis]}{'+' if sign > 0 else '-'}", float(value),
+                            float(sigma[axis] * scale[axis]), unit,
+                        )
+                    )  # fmt: skip
+        parameters.append(EffectParameter("samples", float(n), 0.0, "1"))
+        t = obs.time_s
+        times = tuple((float(t[r.start]), float(t[r.stop - 1])) for r in runs[:8])
+        touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
+        prefix = "g" if is_gyro else "a"
+        channels = tuple(sorted({prefix + AXES[r.axis] for r in runs}))
+        statement = (
+            f"The {self.sensor} reaches the end of its range: {len(runs)} plateaus, {n} samples, in "
+            f"{len(touched)} of {obs.n_moves} moves."
+        )
+        # Chance that smooth peaks of different moves end within one noise band of each other.
+        p = float(np.clip((2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1), 1e-300, 1.0))
+        return Evidence(
+            p, -2.0 * np.log(p), tuple(parameters), statement, "moves" if is_gyro else "dynamics",
+            Where(channels, tuple(f"move {m}" for m in touched[:8]), times), variant=variant,
+        )  # fmt: skip
+
+
+class GyroSaturation(_Saturation):
+    """Rates beyond the gyro's range."""
+
+    id = "gyro-saturation"
+    sensor = "gyro"
+    mechanism = "the gyro reaches the end of its range"
+
+
+class AccelSaturation(_Saturation):
+    """Specific force beyond the accelerometer's range."""
+
+    id = "accel-saturation"
+    sensor = "accelerometer"
+    mechanism = "the accelerometer reaches the end of its range"

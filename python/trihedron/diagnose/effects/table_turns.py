@@ -1,0 +1,50 @@
+"""Turns on a table by multiples of a right angle: what they say about the turns and the table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.observations import FloatArray
+
+NEAR_DEG = 12.0
+"""A turn meant to be a multiple of 90° lands within this; hand moves land anywhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class TableTurn:
+    """One move about the vertical between two holds of the same face: angle and its distance from the multiple."""
+
+    move: int
+    angle_rad: float
+    error_rad: float
+    tilt_change: FloatArray
+
+
+def table_turns(context: Context) -> list[TableTurn]:
+    """Moves whose axis is the vertical throughout: the vertical ends where it began in the body."""
+    twin, path, h = context.fitted.twin, context.fitted.line.path, context.obs.n_holds
+    out = []
+    for m, where in enumerate(context.moves):
+        before, after = context.obs.move_holds[m]
+        up = twin.up[before]
+        if up @ twin.up[after] < np.cos(np.radians(3.0)):
+            continue
+        t = context.time_s[where]
+        about_up = context.rate[where] @ up
+        across = np.linalg.norm(context.rate[where] - np.outer(about_up, up), axis=1)
+        angle = float(np.trapezoid(about_up, t)) if hasattr(np, "trapezoid") else float(np.trapz(about_up, t))
+        if abs(angle) < np.radians(45.0) or np.mean(across) > 0.25 * np.mean(np.abs(about_up)):
+            continue
+        error = (angle + np.pi / 4) % (np.pi / 2) - np.pi / 4
+        rotated = path.attitude[where.stop - 1 - h] @ up
+        out.append(TableTurn(m, angle, float(error), twin.up[after] - rotated))
+    return out
+
+
+def meant_as_multiples(turns: list[TableTurn]) -> bool:
+    """Whether these are turns against a wall: at least four, nearly all close to a multiple of 90°."""
+    near = [abs(np.degrees(turn.error_rad)) < NEAR_DEG for turn in turns]
+    return len(turns) >= 4 and float(np.mean(near)) > 0.7
