@@ -163,6 +163,15 @@ class Context:
         relative: FloatArray = values / np.nanmean(values[: self.obs.n_holds]) - 1.0
         return np.where(np.isfinite(relative), relative, 0.0)
 
+    @property
+    def references(self) -> dict[str, float]:
+        """Means that centred signals are taken from: needed to apply the model to another recording."""
+        recording, out = self.obs.recording, {}
+        for name, logged in (("temperature_degc", recording.temperature_degc), ("supply_v", recording.supply_v)):
+            if logged is not None and np.isfinite(logged).any():
+                out[name] = float(np.nanmean(self.at_points(logged)[: self.obs.n_holds]))
+        return out
+
     def hold_power(self, sensor: str) -> FloatArray:
         """(holds, 3) variance inside each hold, SI², along the instrument axes."""
         obs, twin = self.obs, self.fitted.twin

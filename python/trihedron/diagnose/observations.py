@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.diagnose.repair import split_holds
 from trihedron.records import Recording, Segments
 
 FloatArray = npt.NDArray[np.float64]
@@ -22,7 +23,8 @@ class Observations:
     half-open sample ranges that include the last sample of the hold before and the first of the hold after, so that
     neighbouring still samples bracket the whole motion; ``move_holds`` (m, 2) their holds. ``force_density`` and
     ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about their
-    stamps, once a diagnosis has found it.
+    stamps, once a diagnosis has found it; ``bumped_s`` are
+    stretches inside poses that segmentation saw disturbed.
     """
 
     recording: Recording
@@ -42,6 +44,7 @@ class Observations:
     force_density: FloatArray
     rate_density: FloatArray | None
     jitter_s: float = 0.0
+    bumped_s: tuple[tuple[float, float], ...] = ()
 
     @property
     def n_holds(self) -> int:
@@ -68,7 +71,11 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         raise ValueError(
             f"a diagnosis needs still poses to hold the model against: {segments.n_holds} found, at least 2 are needed"
         )
+    t = recording.time_s
+    bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in segments.holds for a, b in hold.disturbed)
+    segments, _ = split_holds(recording, segments)
     assert segments.accelerometer_sigma is not None
+    assert segments.accelerometer_mean is not None
     assert segments.accelerometer_sigma_mean is not None
     step_s = 1.0 / recording.rate_hz
     force_origin = segments.accelerometer_mean.mean(axis=0)
@@ -106,4 +113,5 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         move_holds=np.array(holds if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
         force_density=segments.accelerometer_sigma * np.sqrt(step_s),
         rate_density=rate_density,
+        bumped_s=bumped,
     )

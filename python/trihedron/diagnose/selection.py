@@ -92,6 +92,8 @@ def score_all(context: Context, exclude: set[str]) -> tuple[list[Scored], list[t
             continue
         best: Scored | None = None
         variants = effect.variants(context)
+        if not variants:
+            continue  # judged by its own evidence
         for variant in variants:
             columns = fitted.line.columns(variant.distortion)
             result = score(reduced, columns)
@@ -128,6 +130,7 @@ class Refit:
     fitted: Fit
     bic_gain: float
     held_out_gain: float
+    base_density: float
 
 
 def refit(
@@ -144,7 +147,7 @@ def refit(
     # that the difference is that of the profile likelihoods with noise tuned on either side.
     gain = 2.0 * (profile(fitted) - profile(base))
     density = predict_held_out(fitted, folds_of(fitted), N_DOMAINS).log_density
-    return Refit(scored, fitted, gain - cost, density - base_density)
+    return Refit(scored, fitted, gain - cost, density - base_density, base_density)
 
 
 def profile(fitted: Fit) -> float:
@@ -158,3 +161,42 @@ def profile(fitted: Fit) -> float:
     log_det = 2.0 * float(np.log(np.diag(np.linalg.cholesky(normal))).sum())
     log_det += 2.0 * float(np.log(fitted.scale[first:last]).sum())
     return -0.5 * fitted.chi2 - 0.5 * log_det + fitted.system.log_weight
+
+
+def refined(context: Context, accepted: list[Distortion], best: Refit, prior: Prior | None) -> Refit:
+    """The shape number at the top of the profile likelihood, with the standard error its curvature gives.
+
+    A parabola through log-spaced values around the grid's best; done twice so that a far optimum is reached.
+    """
+    variant = best.scored.variant
+    if len(variant.shape) != 1:
+        return best
+    name, (value, unit) = next(iter(variant.shape.items()))
+    effect = best.scored.effect
+    spread = 0.5
+    reduced = reduce(context.fitted)
+
+    def gain(v: float) -> float:
+        made = effect.reshaped(context, variant, v)
+        assert made is not None
+        return score(reduced, context.fitted.line.columns(made.distortion)).chi2
+
+    if effect.reshaped(context, variant, value) is None:
+        return best
+    sigma_log = float("inf")
+    for _ in range(3):
+        x = np.linspace(-spread, spread, 5)
+        g = np.array([gain(value * float(np.exp(step))) for step in x])
+        a, b, _c = np.polyfit(x, g, 2)
+        if a < 0.0:
+            move = float(np.clip(-b / (2 * a), -spread, spread))
+            sigma_log = float(np.sqrt(-1.0 / a))
+        else:
+            move = float(x[g.argmax()])
+        value *= float(np.exp(move))
+        spread = float(np.clip(2.0 * sigma_log, 0.05, 0.5))
+    made = effect.reshaped(context, variant, value)
+    assert made is not None
+    final = replace(made, shape={name: (value, unit)}, shape_sigma=float(value * min(sigma_log, 10.0)))
+    again = refit(context, accepted, replace(best.scored, variant=final), prior, best.base_density)
+    return again if again.bic_gain >= best.bic_gain else best

@@ -364,7 +364,8 @@ class Linearisation:
             J[:, :18] = W
             rows_r.append(W @ (current - self.prior.mean))
             rows_j.append(J)
-            label += [(PRIOR, -1, 0, 0)] * 18
+            # Where a given calibration is contradicted, its sensor's own domain says so.
+            label += [(STATIC_ACCEL, 0, k % 3, 3) for k in range(9)] + [(MOVES, 0, k % 3, 3) for k in range(9)]
         labels = np.array(label)
         jacobian = np.vstack(rows_j)
         return System(

@@ -36,8 +36,12 @@ def hold_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
     """``(first sample, (n, 6 or 3) raw readings minus their hold mean)`` of every hold."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     out = []
-    for hold in obs.segments.holds:
-        keep = hold.samples()
+    # A line is looked for where the place is quiet: shaking has a spectrum of its own.
+    quiet = (hold_scatter(obs).ratio < 2.0).all(axis=1)
+    if quiet.sum() < 3:
+        quiet[:] = True
+    for i in np.flatnonzero(quiet):
+        keep = obs.segments.holds[i].samples()
         if len(keep) < 32:
             continue
         # Contiguous part only: a line keeps its phase across it.

@@ -137,3 +137,54 @@ class Candidate:
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types."""
         return {"id": self.id, "p_value": self.p_value, "applicable": self.applicable, "reason": self.reason}
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """S and b of both sensors with their standard errors (direct form, raw → SI), as plain nested tuples."""
+
+    accelerometer: MappingProxyType[str, Any]
+    gyroscope: MappingProxyType[str, Any] | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        return {
+            "accelerometer": dict(self.accelerometer),
+            "gyroscope": None if self.gyroscope is None else dict(self.gyroscope),
+        }
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What came out when the digital twin was held against the recording (schema version 1)."""
+
+    verdict: Verdict
+    domains: tuple[DomainTest, ...]
+    effects: tuple[AcceptedEffect, ...]
+    remaining: tuple[DomainTest, ...]
+    candidates: tuple[Candidate, ...]
+    baseline: LinearModel
+    extended: LinearModel
+    noise: MappingProxyType[str, Any]
+    gravity_m_s2: float
+    alpha: float
+    recording_source: str = ""
+    recording_sha256: str = ""
+    references: MappingProxyType[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types, valid against the published schema."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "verdict": self.verdict,
+            "domains": [d.to_dict() for d in self.domains],
+            "effects": [e.to_dict() for e in self.effects],
+            "remaining": [d.to_dict() for d in self.remaining],
+            "candidates": [c.to_dict() for c in self.candidates],
+            "calibration": {"baseline": self.baseline.to_dict(), "extended": self.extended.to_dict()},
+            "noise": dict(self.noise),
+            "gravity_m_s2": self.gravity_m_s2,
+            "alpha": self.alpha,
+            "recording": {"source": self.recording_source, "sha256": self.recording_sha256},
+            "references": dict(self.references),
+        }

@@ -20,7 +20,7 @@ def catalogue() -> tuple[Effect, ...]:
 
 
 def _concrete(kind: type[Effect]) -> list[type[Effect]]:
-    found = [] if getattr(kind, "__abstractmethods__", None) else [kind]
+    found = [kind] if "id" in vars(kind) else []
     for child in kind.__subclasses__():
         found += _concrete(child)
     return found

@@ -12,6 +12,7 @@ class AccelCubic(Effect):
     id = "accel-cubic"
     mechanism = "accelerometers respond to the cube of specific force, as a differential capacitive bridge does"
     experiment = "add tilts between the faces (20° steps): an odd curve bends between level and 1 g"
+    applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:
         columns = context.on_accelerometers(context.axis_force**3)

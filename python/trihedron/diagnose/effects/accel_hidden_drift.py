@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only
-from trihedron.diagnose.effects.drift_shapes import drift_variants
+from trihedron.diagnose.effects.drift_shapes import drift_variants, warm_up_variant
 
 
 class AccelHiddenDrift(Effect):
@@ -19,3 +19,8 @@ class AccelHiddenDrift(Effect):
 
     def variants(self, context: Context) -> list[Variant]:
         return drift_variants(context, context.on_accelerometers, force_only, "m/s^2")
+
+    def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
+        if variant.label != "warm-up":
+            return None
+        return warm_up_variant(context, context.on_accelerometers, force_only, "m/s^2", value)

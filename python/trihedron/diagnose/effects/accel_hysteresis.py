@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from scipy.signal import lfilter
 
 from trihedron.diagnose.context import Context
@@ -32,20 +33,31 @@ class AccelHysteresis(Effect):
     experiment = "reach the same pose from opposite directions, twice each"
 
     def variants(self, context: Context) -> list[Variant]:
-        history = context.history
+        return [self._play(context, width) for width in PLAY_WIDTHS_M_S2] + [
+            self._creep(context, tau) for tau in CREEP_TIMES_S
+        ]
+
+    def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
+        return self._play(context, value) if variant.label == "play" else self._creep(context, value)
+
+    def _coarse(self, context: Context) -> tuple[FloatArray, npt.NDArray[np.intp], int]:
+        """The path in steps of a twentieth of a second, and which of them each sample belongs to."""
         step = max(1, round(0.05 * context.obs.recording.rate_hz))
-        coarse = history[::step]
-        index = np.minimum(np.arange(len(history)) // step, len(coarse) - 1)
-        out = []
-        for width in PLAY_WIDTHS_M_S2:
-            memory = play(coarse, width)[index]
-            columns = context.on_accelerometers(context.at_points(memory))
-            shape = {"half_width": (width, "m/s^2")}
-            out.append(Variant(force_only(columns), per_axis("offset"), ("m/s^2",) * 3, shape, "play"))
-        for tau in CREEP_TIMES_S:
-            keep = float(np.exp(-step / context.obs.recording.rate_hz / tau))
-            slow, _ = lfilter([1 - keep], [1, -keep], coarse, axis=0, zi=keep * coarse[:1])
-            columns = context.on_accelerometers(context.at_points((slow - coarse)[index]))
-            shape = {"time_constant": (tau, "s")}
-            out.append(Variant(force_only(columns), per_axis("creep"), ("1",) * 3, shape, "creep"))
-        return out
+        coarse = context.history[::step]
+        return coarse, np.minimum(np.arange(len(context.history)) // step, len(coarse) - 1), step
+
+    def _play(self, context: Context, width: float) -> Variant:
+        coarse, index, _ = self._coarse(context)
+        # The path's lead over its follower: reading minus this is what hysteresis adds.
+        memory = -play(coarse, width)[index]
+        columns = context.on_accelerometers(context.at_points(memory))
+        shape = {"half_width": (width, "m/s^2")}
+        return Variant(force_only(columns), per_axis("offset"), ("m/s^2",) * 3, shape, "play")
+
+    def _creep(self, context: Context, tau: float) -> Variant:
+        coarse, index, step = self._coarse(context)
+        keep = float(np.exp(-step / context.obs.recording.rate_hz / tau))
+        slow, _ = lfilter([1 - keep], [1, -keep], coarse, axis=0, zi=keep * coarse[:1])
+        columns = context.on_accelerometers(context.at_points((slow - coarse)[index]))
+        shape = {"time_constant": (tau, "s")}
+        return Variant(force_only(columns), per_axis("creep"), ("1",) * 3, shape, "creep")

@@ -12,6 +12,7 @@ class AccelQuadratic(Effect):
     id = "accel-quadratic"
     mechanism = "accelerometers respond to the square of specific force"
     experiment = "add tilts of 30°, 45° and 60° on both sides of level: a square and a modulus differ between the faces"
+    applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:
         columns = context.on_accelerometers(context.axis_force**2)

@@ -14,6 +14,7 @@ class AccelScaleAsymmetry(Effect):
     id = "accel-scale-asymmetry"
     mechanism = "accelerometers scale positive and negative force differently"
     experiment = "add tilts of 30°, 45° and 60° on both sides of level: a square and a modulus differ between the faces"
+    applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:
         columns = context.on_accelerometers(np.abs(context.axis_force))

@@ -14,6 +14,7 @@ class AccelThermalScale(Effect):
     id = "accel-thermal-scale"
     mechanism = "accelerometer scale follows the temperature"
     experiment = "repeat the same faces and turns at two temperatures"
+    applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
         if context.temperature is None:

@@ -17,6 +17,8 @@ from trihedron.diagnose.twin import Distortion
 from trihedron.records.diagnosis import EffectParameter
 
 AXES = ("x", "y", "z")
+SHAPE_NAMES = ("time_constant", "half_width", "pose")
+"""Nonlinear parameters, chosen from a grid and refined on the profile likelihood."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +33,7 @@ class Variant:
     units: tuple[str, ...]
     shape: dict[str, tuple[float, str]] = field(default_factory=dict)
     label: str = ""
+    shape_sigma: float = 0.0
 
 
 class Effect(ABC):
@@ -40,6 +43,10 @@ class Effect(ABC):
     mechanism: ClassVar[str]
     experiment: ClassVar[str] = ""
     """What to record so that this effect cannot be mistaken for another."""
+    applies_elsewhere: ClassVar[bool] = False
+    """Whether the fitted effect can be taken off another recording of the same sensor, from logged signals alone."""
+    repeatable: ClassVar[bool] = False
+    """Whether it may be accepted more than once (another pose, another line)."""
 
     def unavailable(self, context: Context) -> str | None:  # noqa: ARG002
         """Why this recording cannot show the effect; ``None`` when it can."""
@@ -49,6 +56,10 @@ class Effect(ABC):
     def variants(self, context: Context) -> list[Variant]:
         """Forward models to compete, simplest first; SI, at the context's points."""
 
+    def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:  # noqa: ARG002
+        """The same variant at another value of its one shape number; ``None`` where the shape is not continuous."""
+        return None
+
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         """Physical parameters from the linear ones; shape numbers follow without a standard error of their own."""
         sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -56,13 +67,18 @@ class Effect(ABC):
             EffectParameter(name, float(v), float(s), unit)
             for name, v, s, unit in zip(variant.names, value, sigma, variant.units, strict=True)
         )
-        shape = tuple(EffectParameter(name, v, float("nan"), unit) for name, (v, unit) in variant.shape.items())
+        shape = tuple(
+            EffectParameter(name, v, variant.shape_sigma, unit) for name, (v, unit) in variant.shape.items()
+        )
         return linear + shape
+
+    def n_shape(self, parameters: tuple[EffectParameter, ...]) -> int:
+        """How many of the parameters, at the end, are shape numbers."""
+        return sum(1 for p in parameters if p.name in SHAPE_NAMES)
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
         """The finding in one plain sentence."""
-        known = [p for p in parameters if np.isfinite(p.std)]
-        strongest = max(known, key=lambda p: abs(p.value) / max(p.std, 1e-300))
+        strongest = max(parameters[: len(parameters) - self.n_shape(parameters)], key=lambda p: abs(p.value) / max(p.std, 1e-300))
         size = f"{strongest.value:.3g} ± {strongest.std:.1g} {strongest.unit}"
         return f"{self.mechanism} (strongest term {strongest.name}: {size})."
 

@@ -5,16 +5,49 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
-from trihedron.records.diagnosis import EffectParameter
+from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.within_static import hold_scatter
+from trihedron.records.diagnosis import EffectParameter, Where
+
+MOST = 0.25
+"""If more than a quarter of the poses are restless it is not a pose that was disturbed but the place that shakes."""
 
 
-class DisturbedPose(Effect):
-    """One pose with an extra acceleration of its own."""
+class DisturbedPose(DirectEffect):
+    """A bump seen inside the hold, or one pose with an acceleration of its own."""
 
     id = "disturbed-pose"
     mechanism = "one pose was not still or was pushed"
     experiment = "repeat that pose"
+    repeatable = True
+
+    def find(self, context: Context) -> Evidence | None:
+        obs = context.obs
+        scatter = hold_scatter(obs)
+        loud = (scatter.ratio > 2.0) & (scatter.p_value * scatter.p_value.size < 1e-6)
+        restless = sorted(set(np.flatnonzero(loud.any(axis=1)).tolist()))
+        bumped = list(obs.bumped_s)
+        if not bumped and not restless:
+            return None
+        if len(restless) > MOST * obs.n_holds:
+            return None
+        t = obs.time_s
+        holds = obs.segments.holds
+        spans = tuple(bumped) + tuple((float(t[holds[i].start]), float(t[holds[i].stop - 1])) for i in restless)
+        strength = float(sum((scatter.ratio[i].max() - 1.0) * scatter.dof[i] for i in restless)) + 100.0 * len(bumped)
+        parts = []
+        if bumped:
+            parts.append("bumped at " + ", ".join(f"{a:.1f} s" for a, _ in bumped[:4]))
+        if restless:
+            parts.append("restless: pose " + ", ".join(str(i) for i in restless[:4]))
+        parameters = tuple(
+            EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6]
+        )
+        return Evidence(
+            1e-30, strength, parameters, f"Not every pose was still ({'; '.join(parts)}).", "within-static",
+            Where((), tuple(f"hold {i}" for i in restless), spans),
+        )  # fmt: skip
 
     def variants(self, context: Context) -> list[Variant]:
         out = []

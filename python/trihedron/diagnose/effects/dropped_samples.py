@@ -2,78 +2,102 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from scipy.special import chdtrc
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.sample_steps import step_errors
-from trihedron.diagnose.twin import Distortion
+from trihedron.diagnose.effects.sample_steps import Loss, find_losses
+from trihedron.diagnose.observations import Observations, observe
+from trihedron.diagnose.repair import insert_samples
+from trihedron.diagnose.solve import fit
+from trihedron.diagnose.twin import NO_DISTORTION
 from trihedron.records.diagnosis import EffectParameter, Where
 
-MIN_LOST = 0.6
-"""A loss is a whole number of samples; below this it is jitter."""
+
+MAX_COUNTED = 4
+"""Losses whose number is settled by gravity; each costs a few fits."""
+
+
+def counted_by_gravity(context: Context, losses: list[Loss]) -> dict[int, int]:
+    """The number of samples lost at each place with which the twin predicts gravity and rest after the move best.
+
+    The joint of the two sides tells where and roughly how many; a turn whose middle is missing tells exactly.
+    """
+    counts = {loss.sample: loss.count for loss in losses}
+    if len(losses) > MAX_COUNTED:
+        return counts
+    obs = context.obs
+    twin = context.fitted.twin
+    if len(twin.effect):
+        return counts
+
+    def misfit(trial: dict[int, int]) -> float:
+        recording, segments = insert_samples(obs.recording, obs.segments, {k: n for k, n in trial.items() if n})
+        return fit(observe(recording, segments), twin, NO_DISTORTION, context.fitted.line.prior, n_iterations=2).chi2
+
+    best = misfit(counts)
+    for loss in sorted(losses, key=lambda one: -one.gain):
+        for direction in (-1, 1):
+            while 0 < counts[loss.sample] + direction <= 2 * loss.count + 2:
+                trial = counts | {loss.sample: counts[loss.sample] + direction}
+                value = misfit(trial)
+                if value >= best:
+                    break
+                best, counts = value, trial
+    return counts
 
 
 class DroppedSamples(DirectEffect):
-    """Every channel jumps at once by the same missing time, a whole number of samples."""
+    """Both sensors jump at once by the same whole number of samples; put back, the motion is smooth again."""
 
     id = "dropped-samples"
     mechanism = "samples are missing though the time stamps run on evenly"
     experiment = "log the sensor's own sample counter"
 
+    def unavailable(self, context: Context) -> str | None:
+        return "the log has no moves with a gyro" if not context.moves else None
+
     def find(self, context: Context) -> Evidence | None:
-        steps = step_errors(context)
-        if len(steps.sample) == 0:
+        losses = find_losses(context)
+        if not losses:
             return None
-        dt = 1.0 / context.obs.recording.rate_hz
-        lost = steps.extra_s / dt
-        # Judged against the scatter of all steps: quick motion and jitter widen it.
-        scatter = 1.4826 * np.median(np.abs(steps.extra_s / steps.sigma_s))
-        z = steps.extra_s / steps.sigma_s / max(float(scatter), 1.0)
-        p = np.minimum(1.0, chdtrc(1, z**2) * len(z))
-        ordinary = np.quantile(np.abs(lost[steps.sigma_s < 0.3 * dt]), 0.9) if (steps.sigma_s < 0.3 * dt).any() else 1.0
-        hit = (p < 1e-6) & (lost > max(MIN_LOST, 4.0 * ordinary)) & (steps.misfit < 0.15 * steps.gain + 4.0)
-        if not hit.any():
-            return None
-        # A jump shows in neighbouring intervals too: keep the strongest within five samples.
-        order = [k for k in np.argsort(-steps.gain) if hit[k]]
-        chosen: list[int] = []
-        for k in order:
-            if all(abs(steps.sample[k] - steps.sample[j]) > 5 for j in chosen):
-                chosen.append(int(k))
-        chosen.sort(key=lambda k: int(steps.sample[k]))
-        if len(chosen) > 0.02 * len(z):
-            return None  # everywhere is not a loss here and there: see timing-jitter
         obs = context.obs
-        columns_rate = np.zeros((context.n_points, 3, len(chosen)))
-        columns_force = np.zeros((context.n_points, 3, len(chosen)))
-        for c, k in enumerate(chosen):
-            m = int(steps.move[k])
-            where = context.moves[m]
-            row = where.start + int(steps.sample[k]) - obs.move_ranges[m][0]
-            for r in (row, row + 1):
-                # One lost sample is one more interval at the local rate; half of it goes to either side.
-                columns_rate[r, :, c] = -0.5 * context.rate[r]
-                columns_force[r, :, c] = -0.5 * (context.force[r] - context.gravity_in_moves[r])
-        names = tuple(f"lost_at_{float(obs.time_s[steps.sample[k]]):.2f}s" for k in chosen)
-        variant = Variant(Distortion(columns_force, columns_rate), names, ("samples",) * len(names))
-        total = float(lost[chosen].sum())
-        std = float(np.sqrt((np.maximum(steps.sigma_s[chosen] / dt, 0.1) ** 2).sum()))
+        n_intervals = sum(b - a for a, b in obs.move_ranges)
+        if len(losses) > 0.02 * n_intervals:
+            return None  # everywhere is not a loss here and there
+        counts = counted_by_gravity(context, losses)
+        losses = [replace(loss, count=counts[loss.sample]) for loss in losses if counts[loss.sample] > 0]
+        if not losses:
+            return None
+        counts = {loss.sample: loss.count for loss in losses}
+        t = obs.time_s
         parameters = (
-            EffectParameter("events", float(len(chosen)), 0.0, "1"),
-            EffectParameter("samples_lost", total, std, "1"),
+            EffectParameter("events", float(len(losses)), 0.0, "1"),
+            EffectParameter("samples_lost", float(sum(loss.count for loss in losses)), 0.5 * np.sqrt(len(losses)), "1"),
             *(
-                EffectParameter(name, float(lost[k]), float(max(steps.sigma_s[k] / dt, 0.1)), "samples")
-                for name, k in zip(names, chosen, strict=True)
+                EffectParameter(f"lost_at_{t[loss.sample]:.2f}s", float(loss.count), 0.5, "samples")
+                for loss in losses
             ),
         )
-        places = ", ".join(f"{lost[k]:.0f} at {obs.time_s[steps.sample[k]]:.2f} s" for k in chosen[:4])
-        t = tuple((float(obs.time_s[steps.sample[k]]), float(obs.time_s[steps.sample[k] + 1])) for k in chosen)
-        segments = tuple(dict.fromkeys(f"move {int(steps.move[k])}" for k in chosen))
+        places = ", ".join(f"{loss.count} at {t[loss.sample]:.2f} s" for loss in losses[:4])
+        more = f" and {len(losses) - 4} more" if len(losses) > 4 else ""
+
+        def reweigh(old: Observations) -> Observations:
+            recording, segments = insert_samples(old.recording, old.segments, counts)
+            return observe(recording, segments)
+
+        where = Where(
+            (),
+            tuple(dict.fromkeys(f"move {loss.move}" for loss in losses)),
+            tuple((float(t[loss.sample]), float(t[loss.sample + 1])) for loss in losses),
+        )
+        gain = sum(loss.gain for loss in losses)
+        # A chi-square of one degree of freedom, paid for by all intervals and counts looked at.
+        weakest = min(max(loss.per_sensor) for loss in losses)
+        p = float(np.clip(np.exp(-0.5 * weakest) * n_intervals * 60, 1e-300, 1.0))
         return Evidence(
-            float(max(p[chosen].min(), 1e-300)), float(steps.gain[chosen].sum()), parameters,
-            f"Samples are missing though the time stamps run on: {places}.", "timing", Where((), segments, t),
-            variant=variant,
+            p, gain, parameters, f"Samples are missing though the time stamps run on: {places}{more}.", "timing", where,
+            reweigh=reweigh,
         )  # fmt: skip

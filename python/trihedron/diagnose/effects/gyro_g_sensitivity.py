@@ -14,6 +14,7 @@ class GyroGSensitivity(Effect):
     id = "gyro-g-sensitivity"
     mechanism = "gyro bias depends on specific force: the rate read at rest changes with the pose"
     experiment = "hold each of the six faces for a minute; turn the table by 180° under a level sensor to rule out Earth rate"
+    applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
         return "the log has no gyro" if context.obs.raw_rate is None else None

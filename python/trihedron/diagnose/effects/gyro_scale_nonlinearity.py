@@ -14,6 +14,7 @@ class GyroScaleNonlinearity(Effect):
     id = "gyro-scale-nonlinearity"
     mechanism = "gyro scale depends on the rate"
     experiment = "turn by the same angle slowly and fast, both ways, about each axis"
+    applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
         return "the log has no moves with a gyro" if not context.moves else None

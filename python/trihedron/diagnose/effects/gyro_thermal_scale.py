@@ -14,6 +14,7 @@ class GyroThermalScale(Effect):
     id = "gyro-thermal-scale"
     mechanism = "gyro scale follows the temperature"
     experiment = "repeat the same faces and turns at two temperatures"
+    applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
         if context.temperature is None:

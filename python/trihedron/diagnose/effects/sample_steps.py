@@ -1,4 +1,4 @@
-"""Time errors read from the samples themselves: how far each step is from the one its neighbours announce."""
+"""Time errors read from the samples themselves: how far each step is from the one its surroundings announce."""
 
 from __future__ import annotations
 
@@ -8,58 +8,159 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.observations import FloatArray
+from trihedron.diagnose.effects.saturation import plateaus
+from trihedron.diagnose.observations import FloatArray, Observations
+
+HALF_WINDOW = 6
+"""Samples on either side from which the local motion is learnt."""
+MAX_LOST = 60
 
 
 @dataclass(frozen=True, eq=False)
 class StepErrors:
-    """Per inner sample interval of every move: estimated extra time, its noise, and how well one time explains it.
+    """Per inner interval of every move, the extra time each sensor sees in its step, with its noise.
 
-    ``sample`` (k,) index of the interval's first sample; ``extra_s`` (k,), ``sigma_s`` (k,); ``gain`` (k,) chi-square
-    explained by one extra time in all channels, ``misfit`` (k,) what is left of it per remaining degree of freedom.
+    ``sample`` (k,) first sample of the interval, ``move`` (k,); ``extra_s`` (k, sensors), ``sigma_s`` (k, sensors).
     """
 
     sample: npt.NDArray[np.intp]
     move: npt.NDArray[np.intp]
     extra_s: FloatArray
     sigma_s: FloatArray
-    gain: FloatArray
-    misfit: FloatArray
+
+
+def _whitened(obs: Observations) -> list[FloatArray]:
+    root = np.sqrt(obs.recording.rate_hz)
+    out = [obs.raw_force / (obs.force_density * root)]
+    if obs.raw_rate is not None and obs.rate_density is not None:
+        out.append(obs.raw_rate / (obs.rate_density * root))
+    return out
+
+
+def clipped_samples(obs: Observations) -> npt.NDArray[np.bool_]:
+    """Samples on or next to a plateau at the end of the range: their steps say nothing about time."""
+    mask = np.zeros(len(obs.time_s), dtype=bool)
+    root = np.sqrt(obs.recording.rate_hz)
+    pairs = [(obs.raw_force, obs.force_density)]
+    if obs.raw_rate is not None and obs.rate_density is not None:
+        pairs.append((obs.raw_rate, obs.rate_density))
+    for raw, density in pairs:
+        for run in plateaus(raw, density * root, obs.move_ranges):
+            mask[max(run.start - HALF_WINDOW, 0) : run.stop + HALF_WINDOW] = True
+    return mask
 
 
 def step_errors(context: Context) -> StepErrors:
-    """A step d_k = x_{k+1} - x_k against the mean of the two next to it, in units of the local slope (eq. 8.11).
+    """A step against the slope of a line through the samples around it (the two of the step left out), eq. 8.11.
 
-    If n samples are missing between k and k+1, every channel jumps by n dt times its own slope at once; a jittered
-    sample does it by its time error. White noise gives the step error 5 σ².
+    The slope comes from a wide window, so that shaking does not pass for motion; each sensor is judged for itself, so
+    that only what both see at once is time.
     """
     obs = context.obs
-    channels = [obs.raw_force]
-    sigmas = [obs.force_density]
-    if obs.raw_rate is not None and obs.rate_density is not None:
-        channels.append(obs.raw_rate)
-        sigmas.append(obs.rate_density)
-    x = np.hstack(channels)
-    sigma = np.concatenate(sigmas) * np.sqrt(obs.recording.rate_hz)
-    out: list[tuple[FloatArray, ...]] = []
+    sensors = _whitened(obs)
+    clipped = clipped_samples(obs)
+    w = HALF_WINDOW
+    offsets = np.r_[-w:0, 2 : w + 2].astype(float) - 0.5  # the interval's middle is zero
+    weights = offsets / (offsets**2).sum()
+    index, moves, extra, sigma = [], [], [], []
     for m, (a, b) in enumerate(obs.move_ranges):
-        z = x[a:b] / sigma
-        if len(z) < 6:
+        n = b - a
+        if n < 2 * w + 6:
             continue
-        dt = np.diff(obs.time_s[a:b])
-        d = np.diff(z, axis=0)
-        mean_dt = float(np.median(dt)) if len(dt) else 1.0
-        error = d[1:-1] - 0.5 * (d[:-2] + d[2:])
-        slope = (d[:-2] + d[2:]) / (2.0 * mean_dt)
-        # The third difference of a smooth motion also leaves a step error: its size is judged from the steps around.
-        weight = (slope**2).sum(axis=1) / 5.0
-        extra = (slope * error).sum(axis=1) / 5.0 / np.maximum(weight, 1e-30)
-        gain = weight * extra**2
-        misfit = ((error**2).sum(axis=1) / 5.0 - gain) / (z.shape[1] - 1)
-        index = np.arange(a + 1, a + 1 + len(extra))
-        out.append((index.astype(float), np.full(len(extra), float(m)), extra, 1 / np.sqrt(np.maximum(weight, 1e-30)), gain, misfit))
-    if not out:
-        empty = np.zeros(0)
-        return StepErrors(np.zeros(0, np.intp), np.zeros(0, np.intp), empty, empty, empty, empty)
-    index, move, extra, s, gain, misfit = (np.concatenate(column) for column in zip(*out, strict=True))
-    return StepErrors(index.astype(np.intp), move.astype(np.intp), extra, s, gain, misfit)
+        step_s = float(np.median(np.diff(obs.time_s[a:b])))
+        k = np.arange(w, n - w - 1)
+        ok = ~clipped[a + k]
+        columns_e, columns_s = [], []
+        for x in sensors:
+            z = x[a:b]
+            gathered = np.stack([z[k + int(o + 0.5)] for o in offsets])
+            slope = np.tensordot(weights, gathered, 1) / step_s
+            # Third derivative: the line's slope errs by it; taking the cubic part out leaves only higher orders.
+            jump = z[k + 1] - z[k]
+            near = 0.5 * ((z[k] - z[k - 1]) + (z[k + 2] - z[k + 1]))
+            error = jump - near
+            power = (slope**2).sum(axis=1) / 5.0
+            columns_e.append((slope * error).sum(axis=1) / 5.0 / np.maximum(power, 1e-30))
+            columns_s.append(1.0 / np.sqrt(np.maximum(power, 1e-30)))
+        index.append((a + k)[ok])
+        moves.append(np.full(int(ok.sum()), m))
+        extra.append(np.stack(columns_e, axis=1)[ok])
+        sigma.append(np.stack(columns_s, axis=1)[ok])
+    if not index:
+        return StepErrors(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 2)), np.zeros((0, 2)))
+    return StepErrors(
+        np.concatenate(index).astype(np.intp), np.concatenate(moves).astype(np.intp), np.concatenate(extra), np.concatenate(sigma)
+    )
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Samples missing behind ``sample`` of ``move``: how many, and the chi-square that the count explains."""
+
+    sample: int
+    move: int
+    count: int
+    gain: float
+    per_sensor: tuple[float, ...]
+
+
+def find_losses(context: Context) -> list[Loss]:
+    """Intervals where the motion on either side joins smoothly only if samples are put between (eq. 8.12).
+
+    For a trial count n one cubic is laid through six samples before and six after, those after moved by n steps. The
+    count that joins all channels best is taken if no sensor objects and what is left is ordinary.
+    """
+    obs = context.obs
+    sensors = _whitened(obs)
+    clipped = clipped_samples(obs)
+    w = HALF_WINDOW
+    projectors = []
+    for n in range(MAX_LOST + 1):
+        t = np.r_[np.arange(-w, 0) + 0.5, np.arange(w) + 0.5 + n] / (w + n / 2)
+        t = t - t.mean()
+        q, _ = np.linalg.qr(np.vander(t, 4))
+        projectors.append(np.eye(2 * w) - q @ q.T)
+    stack = np.stack(projectors)
+    losses: list[Loss] = []
+    for m, (a, b) in enumerate(obs.move_ranges):
+        if b - a < 2 * w + 2:
+            continue
+        k = np.arange(w - 1, b - a - w)
+        k = k[~clipped[a + k]]
+        if len(k) == 0:
+            continue
+        windows = [np.stack([x[a + k + o] for o in range(1 - w, w + 1)], axis=1) for x in sensors]
+        zero = np.stack([np.einsum("kic,ij,kjc->k", v, stack[0], v) for v in windows], axis=1)
+        dof = 3 * (2 * w - 4)
+        ordinary = np.median(zero, axis=0)
+        # Only steps that stand out are worth a search; the quieter sensor may be too noisy to show the jump.
+        suspect = np.flatnonzero((zero > 3.0 * np.maximum(ordinary, dof)).any(axis=1))
+        if len(suspect) == 0:
+            continue
+        trial = np.stack(
+            [np.einsum("kic,nij,kjc->kn", v[suspect], stack, v[suspect], optimize=True) for v in windows], axis=2
+        )
+        total = trial.sum(axis=2)
+        best = total.argmin(axis=1)
+        for row, s in enumerate(suspect):
+            n = int(best[row])
+            if n == 0 or n == MAX_LOST:
+                continue
+            left = trial[row, n]
+            gains = zero[s] - left
+            usual = np.maximum(ordinary, dof)
+            clear = (gains > 40.0) & (left < 0.1 * zero[s] + 3.0 * usual)
+            # A sensor that sees nothing of it must at least not object; one that sees it must see the same count.
+            silent = (np.abs(gains) <= 40.0) & (left < 2.0 * usual)
+            good = bool(clear.any() and (clear | silent).all())
+            agree = all(
+                abs(int(trial[row, :, c].argmin()) - n) <= max(1, n // 3) for c in range(len(windows)) if clear[c]
+            )
+            if good and agree:
+                losses.append(Loss(int(a + k[s]), m, n, float(gains.sum()), tuple(float(g) for g in gains)))
+    losses.sort(key=lambda loss: -loss.gain)
+    chosen: list[Loss] = []
+    for loss in losses:
+        if all(abs(loss.sample - other.sample) > 2 * w for other in chosen):
+            chosen.append(loss)
+    return sorted(chosen, key=lambda loss: loss.sample)

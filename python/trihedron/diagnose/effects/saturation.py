@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import AXES, Variant
+from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.observations import FloatArray
-from trihedron.diagnose.twin import Distortion
+from trihedron.diagnose.observations import FloatArray, Observations
+from trihedron.diagnose.repair import without_moves
 from trihedron.records.diagnosis import EffectParameter, Where
 
 BAND_SIGMA = 5.0
@@ -85,29 +85,8 @@ class _Saturation(DirectEffect):
         if not runs:
             return None
         n = sum(run.stop - run.start for run in runs)
-        axes = context.gyro_axes if is_gyro else context.accel_axes
         scale = 1.0 / np.linalg.norm(np.linalg.inv(context.fitted.twin.gyro_S if is_gyro else context.fitted.twin.accel_S), axis=1)
-        columns, names = [], []
-        for m, where in enumerate(context.moves):
-            start, stop = obs.move_ranges[m]
-            for axis in range(3):
-                mine = [r for r in runs if r.axis == axis and start <= r.start < stop]
-                if not mine:
-                    continue
-                column = np.zeros((context.n_points, 3))
-                for run in mine:
-                    k = np.arange(run.stop - run.start + 2) / (run.stop - run.start + 1)
-                    cap = 4.0 * k * (1.0 - k)
-                    rows = where.start + np.arange(run.start - 1, run.stop + 1) - start
-                    inside = (rows >= where.start) & (rows < where.stop)
-                    column[rows[inside]] -= run.sign * (cap[:, None] * axes[:, axis])[inside]
-                columns.append(column)
-                names.append(f"overshoot_{AXES[axis]}_move{m}")
-        stacked = np.stack(columns, axis=2)
         unit = "rad/s" if is_gyro else "m/s^2"
-        variant = Variant(
-            Distortion(None, stacked) if is_gyro else Distortion(stacked, None), tuple(names), (unit,) * len(names)
-        )
         parameters = []
         for axis in range(3):
             for sign in (1, -1):
@@ -124,17 +103,23 @@ class _Saturation(DirectEffect):
         t = obs.time_s
         times = tuple((float(t[r.start]), float(t[r.stop - 1])) for r in runs[:8])
         touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
+        bad = set(touched)
+
+        def reweigh(old: Observations) -> Observations:
+            ranges, holds = without_moves(old.move_ranges, old.move_holds, bad)
+            return replace(old, move_ranges=ranges, move_holds=holds)
+
         prefix = "g" if is_gyro else "a"
         channels = tuple(sorted({prefix + AXES[r.axis] for r in runs}))
         statement = (
             f"The {self.sensor} reaches the end of its range: {len(runs)} plateaus, {n} samples, in "
-            f"{len(touched)} of {obs.n_moves} moves."
+            f"{len(touched)} of {obs.n_moves} moves; what those moves read is false and is left out of the fit."
         )
         # Chance that smooth peaks of different moves end within one noise band of each other.
         p = float(np.clip((2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1), 1e-300, 1.0))
         return Evidence(
             p, -2.0 * np.log(p), tuple(parameters), statement, "moves" if is_gyro else "dynamics",
-            Where(channels, tuple(f"move {m}" for m in touched[:8]), times), variant=variant,
+            Where(channels, tuple(f"move {m}" for m in touched[:8]), times), reweigh=reweigh,
         )  # fmt: skip
 
 

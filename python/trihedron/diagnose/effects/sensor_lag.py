@@ -17,9 +17,12 @@ class SensorLag(Effect):
         return "the log has no moves with a gyro" if not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:
+        force, rate = -context.force_rate[:, :, None], -context.angular_acceleration[:, :, None]
         accel = context.on_accelerometers(-context.derivative(context.axis_force))
         gyro = context.on_gyros(-context.derivative(context.axis_rate))
         return [
-            Variant(force_only(accel), per_axis("accelerometer_lag"), ("s",) * 3, label="accelerometer"),
-            Variant(rate_only(gyro), per_axis("gyro_lag"), ("s",) * 3, label="gyro"),
+            Variant(force_only(force), ("accelerometer_lag",), ("s",), label="accelerometer"),
+            Variant(rate_only(rate), ("gyro_lag",), ("s",), label="gyro"),
+            Variant(force_only(accel), per_axis("accelerometer_lag"), ("s",) * 3, label="accelerometer, per axis"),
+            Variant(rate_only(gyro), per_axis("gyro_lag"), ("s",) * 3, label="gyro, per axis"),
         ]

@@ -14,6 +14,7 @@ class SupplySensitivity(Effect):
     id = "supply-sensitivity"
     mechanism = "readings follow the supply voltage"
     experiment = "repeat one pose at two supply voltages"
+    applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
         if context.supply is None:

@@ -9,48 +9,67 @@ from scipy.special import ndtr
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.sample_steps import step_errors
+from trihedron.diagnose.effects.sample_steps import StepErrors, step_errors
 from trihedron.diagnose.observations import Observations
 from trihedron.records.diagnosis import EffectParameter
 
+STEP_FACTOR = 5.0
+"""A jitter of σ_t moves a step error by (1.5² + 1.5² + 0.5² + 0.5²) σ_t²."""
+
+
+def common_time_error(steps: StepErrors, step_s: float) -> tuple[float, float, int]:
+    """Covariance of the extra times the two sensors see, its standard error (s²), and the number of intervals.
+
+    Noise, curvature and shaking differ between the sensors; an error of time is the same in both.
+    """
+    if steps.extra_s.shape[1] < 2:
+        return 0.0, np.inf, 0
+    sharp = (steps.sigma_s < 0.5 * step_s).all(axis=1)
+    n = int(sharp.sum())
+    if n < 50:
+        return 0.0, np.inf, n
+    # Clipped at five scatters, so that single losses do not decide.
+    e = steps.extra_s[sharp]
+    bound = 5.0 * 1.4826 * np.median(np.abs(e), axis=0)
+    product = np.prod(np.clip(e, -bound, bound), axis=1)
+    weight = 1.0 / (np.prod(steps.sigma_s[sharp], axis=1) + (0.05 * step_s) ** 2)
+    value = float((weight * product).sum() / weight.sum())
+    # Neighbouring step errors share samples (correlation over three): the error of the mean is that of blocks.
+    blocks = np.array_split(np.arange(n), max(n // 12, 4))
+    means = np.array([float((weight[b] * product[b]).sum()) for b in blocks])
+    sums = np.array([float(weight[b].sum()) for b in blocks])
+    spread = float(np.sqrt(((means - value * sums) ** 2).sum()) / sums.sum())
+    return value, spread, n
+
 
 class TimingJitter(DirectEffect):
-    """Steps scatter in proportion to the slope of the signal, the same in every channel."""
+    """Steps of both sensors scatter together, in proportion to the slope of the signal."""
 
     id = "timing-jitter"
     mechanism = "samples are taken at other instants than their time stamps say"
     experiment = "let the sensor's own clock trigger the sampling, or log its data-ready times"
 
+    def unavailable(self, context: Context) -> str | None:
+        return "the log has no moves with a gyro" if not context.moves else None
+
     def find(self, context: Context) -> Evidence | None:
-        steps = step_errors(context)
-        dt = 1.0 / context.obs.recording.rate_hz
-        sharp = steps.sigma_s < 0.5 * dt
-        if sharp.sum() < 50:
+        step_s = 1.0 / context.obs.recording.rate_hz
+        value, spread, n = common_time_error(step_errors(context), step_s)
+        if n < 50 or value <= 0.0:
             return None
-        ratio = (steps.extra_s[sharp] / steps.sigma_s[sharp]) ** 2
-        # One time error in all channels against errors that differ between channels (curvature, noise): the common
-        # part must stand out from the misfit left beside it. Medians, so that single losses do not count.
-        common = float(np.median(ratio)) / 0.4549
-        beside = float(np.median(steps.misfit[sharp])) / 0.87
-        excess = common - max(beside, 1.0)
-        sigma = 1.7 * np.sqrt(2.0 / sharp.sum()) * max(beside, 1.0) * 1.5
-        z = excess / sigma
-        if z < 5.0 or common < 1.5 * max(beside, 1.0):
+        z = value / spread
+        jitter = float(np.sqrt(value / STEP_FACTOR))
+        # A smooth motion leaves a little common curvature: less than a hundredth of a step is not worth a name.
+        if z < 5.0 or jitter < 0.01 * step_s:
             return None
-        # A jitter of σ_t moves a step error by (1.5² + 1.5² + 0.5² + 0.5²) σ_t².
-        variance = float(np.median((steps.extra_s[sharp] ** 2) / 0.4549 - max(beside, 1.0) * steps.sigma_s[sharp] ** 2))
-        jitter = float(np.sqrt(max(variance, 0.0) / 5.0))
-        if jitter < 0.005 * dt:
-            return None
-        std = jitter / np.sqrt(2.0 * sharp.sum()) * 2.0
 
         def reweigh(obs: Observations) -> Observations:
             return replace(obs, jitter_s=jitter)
 
         return Evidence(
             float(max(ndtr(-z), 1e-300)), float(z**2),
-            (EffectParameter("jitter", jitter, float(std), "s"),),
-            f"Every sample is off its time stamp by about {1e3 * jitter:.2g} ms: steps scatter with the slope of the "
-            "signal, alike in all channels.",
+            (EffectParameter("jitter", jitter, float(0.5 * spread / value * jitter), "s"),),
+            f"Every sample is off its time stamp by about {1e3 * jitter:.2g} ms: both sensors' steps scatter together, "
+            "with the slope of the signal.",
             "timing", reweigh=reweigh,
         )  # fmt: skip

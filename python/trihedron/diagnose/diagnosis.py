@@ -1,0 +1,383 @@
+"""The four steps: locate, say what was left out, model it, show the fit improve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import numpy as np
+from scipy.special import chdtrc
+
+from trihedron.diagnose.agreement import ROW_DOMAINS, physical_rms, test_rows
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.observations import Observations, observe
+from trihedron.diagnose.selection import (
+    CONFOUNDED_DELTA_BIC,
+    MAX_EFFECTS,
+    MIN_DELTA_BIC,
+    N_DOMAINS,
+    Refit,
+    folds_of,
+    profile,
+    refined,
+    refit,
+    score_all,
+)
+from trihedron.diagnose.solve import Fit, Prediction, predict_held_out, tune_noise
+from trihedron.diagnose.starting_point import linear_model, prior_of, start_twin
+from trihedron.diagnose.timing import test_timing
+from trihedron.diagnose.twin import NO_DISTORTION, PRIOR, Distortion, Prior, stacked
+from trihedron.diagnose.within_static import test_within_static
+from trihedron.records import Calibration, Recording, Segments
+from trihedron.records.diagnosis import (
+    AcceptedEffect,
+    Candidate,
+    Diagnosis,
+    Domain,
+    DomainTest,
+    EffectParameter,
+    HeldOut,
+    Verdict,
+)
+
+Progress = Callable[[float, str], None]
+N_REFITS = 4
+"""Candidates fitted jointly at each step: the leaders of the score test."""
+KEPT_EXCESS = 0.5
+"""An effect whose domain keeps more than half of its misfit after everything is accepted explains nothing."""
+
+
+@dataclass
+class _Model:
+    """The model as it grows."""
+
+    obs: Observations
+    fitted: Fit
+    prediction: Prediction
+    distortions: list[Distortion] = field(default_factory=list)
+    found: list[_Found] = field(default_factory=list)
+
+
+@dataclass
+class _Found:
+    """One accepted effect, before it is put into words."""
+
+    effect: Effect
+    variant: Variant | None
+    evidence: Evidence | None
+    p_adjusted: float
+    delta_bic: float
+    held_out: tuple[HeldOut, ...]
+    primary: int
+    rivals: tuple[str, ...]
+    order: int
+
+
+def diagnose_recording(
+    recording: Recording,
+    segments: Segments,
+    calibration: Calibration,
+    *,
+    calibration_is_given: bool = False,
+    alpha: float = 0.01,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Hold a digital twin against a recording and say which physics it lacks (docs/diagnosis.md).
+
+    Parameters
+    ----------
+    recording, segments : Recording, Segments
+        Raw readings with their still poses and moves.
+    calibration : Calibration
+        Linear model of both sensors: the start of the fit; with ``calibration_is_given`` also its prior, so that the
+        recording is held against that calibration and not against one fitted to it.
+    alpha : float
+        Chance that a healthy recording is called anything but consistent.
+    progress : callable (fraction, text), optional
+        Called as the work goes on.
+
+    Raises
+    ------
+    ValueError
+        When there is nothing to hold a model against: no accelerometer, fewer than two poses.
+    """
+    tell = progress or (lambda _fraction, _text: None)
+    if not 0.0 < alpha < 0.5:
+        raise ValueError(f"alpha is a small probability such as 0.01, got {alpha}")
+    obs = observe(recording, segments)
+    start = start_twin(obs, calibration)
+    prior = prior_of(obs, calibration) if calibration_is_given else None
+    tell(0.05, "fitting the twin")
+    base = tune_noise(obs, start, NO_DISTORTION, prior)
+    domains = _all_domains(obs, base, alpha)
+    model = _Model(obs, base, predict_held_out(base, folds_of(base), N_DOMAINS))
+    tell(0.2, "looking at the samples")
+    context = Context(obs, base)
+    candidates: dict[str, Candidate] = {}
+    _accept_direct(model, context, candidates, alpha, prior)
+    for step in range(MAX_EFFECTS):
+        tell(0.3 + 0.15 * step, "letting effects compete")
+        if not _accept_next(model, candidates, alpha, prior, first=step == 0):
+            break
+    tell(0.9, "checking what remains")
+    remaining = _all_domains(model.obs, model.fitted, alpha)
+    if _drop_hollow(model, domains, remaining, prior):
+        remaining = _all_domains(model.obs, model.fitted, alpha)
+    remaining = _settle_direct(model, remaining)
+    verdict: Verdict = "consistent"
+    if model.found:
+        verdict = "missing-physics"
+    elif any(d.disagrees for d in domains):
+        verdict = "unexplained"
+    twin = model.fitted.twin
+    result = Diagnosis(
+        verdict=verdict,
+        domains=domains,
+        effects=_worded(model),
+        remaining=remaining,
+        candidates=tuple(candidates[key] for key in sorted(candidates)),
+        baseline=linear_model(base),
+        extended=linear_model(model.fitted),
+        noise=MappingProxyType(
+            {
+                "accelerometer_density": (np.sqrt((twin.accel_S**2) @ obs.force_density**2)).tolist(),
+                "accelerometer_unit": "m/s^2/sqrt(Hz)",
+                "accelerometer_corner_s": twin.accel_corner_s,
+                "gyroscope_density": None
+                if obs.rate_density is None
+                else (np.sqrt((twin.gyro_S**2) @ obs.rate_density**2)).tolist(),
+                "gyroscope_unit": "rad/s/sqrt(Hz)",
+                "gyroscope_corner_s": twin.gyro_corner_s,
+            }
+        ),
+        gravity_m_s2=calibration.gravity_m_s2,
+        alpha=alpha,
+        recording_source=recording.source,
+        recording_sha256=recording.sha256,
+        references=MappingProxyType(Context(model.obs, model.fitted).references),
+    )
+    tell(1.0, "done")
+    return result
+
+
+def _all_domains(obs: Observations, fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
+    return (
+        *test_rows(fitted, alpha),
+        test_within_static(obs, alpha),
+        test_timing(Context(obs, fitted), alpha),
+    )
+
+
+# -- direct evidence ----------------------------------------------------------------------------------------------------
+def _accept_direct(
+    model: _Model, context: Context, candidates: dict[str, Candidate], alpha: float, prior: Prior | None
+) -> None:
+    n_effects = len(catalogue())
+    found: list[tuple[DirectEffect, Evidence]] = []
+    for effect in catalogue():
+        if not isinstance(effect, DirectEffect):
+            continue
+        reason = effect.unavailable(context)
+        if reason is not None:
+            candidates[effect.id] = Candidate(effect.id, None, False, reason)
+            continue
+        evidence = effect.find(context)
+        if not effect.repeatable or evidence is not None:
+            candidates[effect.id] = Candidate(effect.id, 1.0 if evidence is None else evidence.p_value, True)
+        if evidence is not None and evidence.p_value * n_effects < alpha / 2.0:
+            found.append((effect, evidence))
+    # A clipped reading spoils every other look at the samples: it is settled first.
+    for effect, evidence in sorted(found, key=lambda pair: ("saturation" not in pair[0].id, -pair[1].strength)):
+        before = model.prediction
+        base_fit = model.fitted
+        if evidence.reweigh is not None:
+            model.obs = evidence.reweigh(model.obs)
+        if evidence.variant is not None:
+            model.distortions.append(evidence.variant.distortion)
+        gain = evidence.strength
+        if evidence.reweigh is not None or evidence.variant is not None:
+            distortion = stacked(model.distortions)
+            n_new = 0 if evidence.variant is None else evidence.variant.distortion.n_parameters
+            start = replace(base_fit.twin, effect=np.concatenate([base_fit.twin.effect, np.zeros(n_new)]))
+            model.fitted = tune_noise(model.obs, start, distortion, prior)
+            model.prediction = predict_held_out(model.fitted, folds_of(model.fitted), N_DOMAINS)
+            gain = max(gain, 2.0 * (profile(model.fitted) - profile(base_fit)))
+        held = evidence.held_out or _held_out(base_fit, before, model.fitted, model.prediction)
+        model.found.append(
+            _Found(
+                effect, evidence.variant, evidence, min(1.0, evidence.p_value * n_effects), float(gain), held, -1,
+                evidence.confounded_with, len(model.found),
+            )
+        )  # fmt: skip
+
+
+# -- the competition ----------------------------------------------------------------------------------------------------
+def _accept_next(
+    model: _Model, candidates: dict[str, Candidate], alpha: float, prior: Prior | None, *, first: bool
+) -> bool:
+    context = Context(model.obs, model.fitted)
+    taken = {f.effect.id for f in model.found if not f.effect.repeatable}
+    scored, missing = score_all(context, taken)
+    n_effects = len(catalogue())
+    if first:
+        for effect_id, reason in missing:
+            candidates[effect_id] = Candidate(effect_id, None, False, reason)
+        for s in scored:
+            known = candidates.get(s.effect.id)
+            p = s.p_value if known is None or known.p_value is None else min(s.p_value, known.p_value)
+            candidates[s.effect.id] = Candidate(s.effect.id, p, True)
+    leaders = [s for s in scored[:N_REFITS] if s.p_value * n_effects < alpha / 2.0]
+    if not leaders:
+        return False
+    refits = [refit(context, model.distortions, s, prior, model.prediction.log_density) for s in leaders]
+    sound = [r for r in refits if r.bic_gain > MIN_DELTA_BIC and r.held_out_gain > 0.0]
+    if not sound:
+        return False
+    best = max(sound, key=lambda r: r.bic_gain)
+    rivals = tuple(
+        r.scored.effect.id for r in refits if r is not best and r.bic_gain > best.bic_gain - CONFOUNDED_DELTA_BIC
+    )
+    best = refined(context, model.distortions, best, prior)
+    before_fit, before = model.fitted, model.prediction
+    model.fitted = best.fitted
+    model.prediction = predict_held_out(best.fitted, folds_of(best.fitted), N_DOMAINS)
+    model.distortions.append(best.scored.variant.distortion)
+    model.found.append(
+        _Found(
+            best.scored.effect, best.scored.variant, None, _p_adjusted(best, n_effects), best.bic_gain,
+            _held_out(before_fit, before, model.fitted, model.prediction), _primary(before_fit, model.fitted), rivals,
+            len(model.found),
+        )
+    )  # fmt: skip
+    return True
+
+
+def _p_adjusted(best: Refit, n_effects: int) -> float:
+    gain = best.bic_gain + np.log(max(int((best.fitted.system.domain != PRIOR).sum()), 2)) * best.scored.rank
+    p = min(best.scored.p_value, float(chdtrc(best.scored.rank, max(gain, 0.0)))) if gain > 0 else best.scored.p_value
+    return float(min(1.0, max(p, 1e-300) * n_effects))
+
+
+def _primary(before: Fit, after: Fit) -> int:
+    drops = [
+        float((before.system.residual[before.system.domain == d] ** 2).sum())
+        - float((after.system.residual[after.system.domain == d] ** 2).sum())
+        for d in range(N_DOMAINS)
+    ]
+    return int(np.argmax(drops))
+
+
+def _held_out(before_fit: Fit, before: Prediction, after_fit: Fit, after: Prediction) -> tuple[HeldOut, ...]:
+    rms_before, unit = physical_rms(before_fit, before.residual)
+    rms_after, _ = physical_rms(after_fit, after.residual)
+    out = []
+    for d, name in ROW_DOMAINS.items():
+        if before.n_rows[d] < 1.0 or d not in rms_before:
+            continue
+        out.append(
+            (
+                before.chi2[d] - after.chi2[d],
+                HeldOut(
+                    name, float(before.chi2[d] / before.n_rows[d]), float(after.chi2[d] / max(after.n_rows[d], 1e-9)),
+                    rms_before[d], rms_after[d], unit[d],
+                ),
+            )
+        )  # fmt: skip
+    return tuple(h for _, h in sorted(out, key=lambda pair: -pair[0]))
+
+
+def _drop_hollow(
+    model: _Model, domains: tuple[DomainTest, ...], remaining: tuple[DomainTest, ...], prior: Prior | None
+) -> bool:
+    """Take out effects whose domain still carries most of its misfit: a least bad guess is not an answer."""
+    before = {d.domain: d for d in domains}
+    after = {d.domain: d for d in remaining}
+    hollow = []
+    for found in model.found:
+        if found.evidence is not None or found.primary < 0:
+            continue
+        name: Domain = ROW_DOMAINS[found.primary]
+        if name not in before or name not in after or not after[name].disagrees:
+            continue
+        excess_before = before[name].chi2_per_dof - 1.0
+        excess_after = after[name].chi2_per_dof - 1.0
+        if excess_before > 0 and excess_after > KEPT_EXCESS * excess_before:
+            hollow.append(found)
+    if not hollow:
+        return False
+    model.found = [f for f in model.found if f not in hollow]
+    model.distortions = [f.variant.distortion for f in model.found if f.variant is not None]
+    start = replace(model.fitted.twin, effect=np.zeros(sum(d.n_parameters for d in model.distortions)))
+    model.fitted = tune_noise(model.obs, start, stacked(model.distortions), prior)
+    model.prediction = predict_held_out(model.fitted, folds_of(model.fitted), N_DOMAINS)
+    return True
+
+
+def _settle_direct(model: _Model, remaining: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
+    """Sample-level domains whose disagreement an accepted direct effect accounts for agree afterwards."""
+    explained = {f.evidence.domain for f in model.found if f.evidence is not None}
+    if any(f.effect.id == "vibration-rectification" for f in model.found):
+        explained.add("within-static")  # the shaking that the effect follows is the disagreement seen there
+    return tuple(
+        replace(d, disagrees=False) if d.domain in explained and d.domain in ("within-static", "timing") else d
+        for d in remaining
+    )
+
+
+# -- words --------------------------------------------------------------------------------------------------------------
+def _worded(model: _Model) -> tuple[AcceptedEffect, ...]:
+    covariance = model.fitted.covariance()
+    n = model.fitted.n_effect
+    effect_cov = covariance[len(covariance) - n :, len(covariance) - n :]
+    first = 0
+    spans: dict[int, slice] = {}
+    for k, found in enumerate(model.found):
+        if found.variant is not None:
+            k_parameters = found.variant.distortion.n_parameters
+            spans[k] = slice(first, first + k_parameters)
+            first += k_parameters
+    out = []
+    for k, found in enumerate(model.found):
+        values = model.fitted.twin.effect[spans[k]] if k in spans else np.zeros(0)
+        cov = effect_cov[spans[k], spans[k]] if k in spans else np.zeros((0, 0))
+        if found.evidence is not None:
+            parameters = found.evidence.parameters
+            statement = found.evidence.statement
+        else:
+            assert found.variant is not None
+            parameters = found.effect.parameters(found.variant, values, cov)
+            statement = found.effect.statement(parameters)
+        out.append((found, values, parameters, statement))
+    out.sort(key=lambda item: (item[0].evidence is None, item[0].order))
+    return tuple(_accepted(*item) for item in out)
+
+
+def _accepted(
+    found: _Found, values: np.ndarray, parameters: tuple[EffectParameter, ...], statement: str
+) -> AcceptedEffect:
+    shape = {} if found.variant is None else {name: v for name, (v, _) in found.variant.shape.items()}
+    by_id = {effect.id: effect for effect in catalogue()}
+    experiment = by_id[found.rivals[0]].experiment if found.rivals else ""
+    experiment = " / ".join(dict.fromkeys(e for e in (found.effect.experiment if found.rivals else "", experiment) if e))
+    return AcceptedEffect(
+        id=found.effect.id,
+        statement=statement,
+        parameters=parameters,
+        p_adjusted=found.p_adjusted,
+        delta_bic=found.delta_bic,
+        held_out=found.held_out,
+        confounded_with=found.rivals,
+        separating_experiment=experiment,
+        model=MappingProxyType(
+            {
+                "variant": "" if found.variant is None else found.variant.label,
+                "shape": shape,
+                "values": [float(v) for v in values],
+                "applies_to_other_recordings": found.effect.applies_elsewhere,
+            }
+        ),
+    )

@@ -1,0 +1,196 @@
+"""Changes to what the observations claim: lost samples put back, poses split where they were bumped or shaken."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records import Hold, Move, Recording, Segments
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:
+    """Put ``n`` samples behind sample ``k`` for every ``k: n``, on a cubic through the two samples on either side.
+
+    A cubic Hermite bridge keeps value and slope at both edges of the gap, so that the rotation integrated across it is
+    right to the fifth power of its length. Time stamps behind a gap move by what was lost.
+    """
+    n_old = recording.n_samples
+    step = 1.0 / recording.rate_hz
+    extra = np.zeros(n_old + 1, dtype=np.intp)
+    for k, n in losses.items():
+        extra[k + 1] += n
+    shift = np.cumsum(extra)[:n_old]
+    new_index = np.arange(n_old) + shift
+    total = n_old + int(extra.sum())
+    time_s = np.full(total, np.nan)
+    time_s[new_index] = recording.time_s + shift * step
+    gaps = np.isnan(time_s)
+    time_s[gaps] = np.interp(np.flatnonzero(gaps), new_index, recording.time_s + shift * step)
+
+    def bridged(values: FloatArray | None) -> FloatArray | None:
+        if values is None:
+            return None
+        out = np.full((total, *values.shape[1:]), np.nan)
+        out[new_index] = values
+        for k, n in losses.items():
+            if k < 1 or k + 2 >= n_old:
+                out[k + shift[k] + 1 : k + shift[k] + 1 + n] = values[k]
+                continue
+            a, b = values[k], values[k + 1]
+            da, db = values[k] - values[k - 1], values[k + 2] - values[k + 1]
+            x = (np.arange(1, n + 1) / (n + 1)).reshape(-1, *([1] * (values.ndim - 1)))
+            width = n + 1
+            h00, h10 = 2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x
+            h01, h11 = -2 * x**3 + 3 * x**2, x**3 - x**2
+            first = k + shift[k] + 1
+            out[first : first + n] = h00 * a + h10 * width * da + h01 * b + h11 * width * db
+        return out
+
+    mended = replace(
+        recording,
+        time_s=time_s,
+        accelerometer=bridged(recording.accelerometer),
+        gyroscope=bridged(recording.gyroscope),
+        temperature_degc=bridged(recording.temperature_degc),
+        supply_v=bridged(recording.supply_v),
+        auxiliary=type(recording.auxiliary)({}),
+    )
+
+    def at(index: int) -> int:
+        return int(new_index[index]) if index < n_old else total
+
+    holds = tuple(
+        replace(
+            hold,
+            start=at(hold.start),
+            stop=at(hold.stop - 1) + 1,
+            outer_start=at(hold.outer_start),
+            outer_stop=at(hold.outer_stop - 1) + 1,
+            disturbed=tuple((at(a), at(b - 1) + 1) for a, b in hold.disturbed),
+        )
+        for hold in segments.holds
+    )
+    moves = tuple(replace(move, start=holds[move.hold_before].stop, stop=holds[move.hold_after].start) for move in segments.moves)
+    mid = np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in holds])
+    return mended, replace(segments, holds=holds, moves=moves, time_mid_s=mid)
+
+
+def split_holds(recording: Recording, segments: Segments, shortest_s: float = 0.3) -> tuple[Segments, tuple[int, ...]]:
+    """Poses as the twin needs them: cut where they were bumped, and found where they were only shaken.
+
+    A bump inside a hold turns the body; averaged over, it contradicts the moves on both sides. Cut at the bump, the gyro
+    carries the attitude across it like across any move. A pose that vibrates is no rest, but its slow part stands
+    still: it becomes a hold of its own, so that a bias that follows the vibration can be seen.
+
+    Returns the segments and the numbers of the original holds that were bumped.
+    """
+    shortest = max(int(shortest_s * recording.rate_hz), 8)
+    spans: list[tuple[int, int, int]] = []
+    bumped: list[int] = []
+    for i, hold in enumerate(segments.holds):
+        cuts = [(a, b) for a, b in hold.disturbed if b > a]
+        first = hold.start
+        pieces: list[tuple[int, int]] = []
+        for a, b in cuts:
+            pieces.append((first, a))
+            first = b
+        pieces.append((first, hold.stop))
+        kept = [(a, b) for a, b in pieces if b - a >= shortest]
+        if cuts:
+            bumped.append(i)
+        if not kept:
+            kept = [(hold.start, hold.stop)]
+        spans += [(a, b, i) for a, b in kept]
+    shaken = _shaken(recording, segments)
+    if len(spans) == segments.n_holds and not shaken and not bumped:
+        return segments, ()
+    merged = sorted([*spans, *((a, b, -1) for a, b in shaken)])
+    return _segments_of(recording, segments, merged), tuple(bumped)
+
+
+def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int, int, int]]) -> Segments:
+    holds = tuple(Hold(k, a, b, a, b) for k, (a, b, _) in enumerate(spans))
+    moves = tuple(Move(k, k, k + 1, holds[k].stop, holds[k + 1].start) for k in range(len(holds) - 1))
+
+    def statistics(values: FloatArray | None, sigma: FloatArray | None, old: FloatArray | None):  # type: ignore[no-untyped-def]
+        if values is None or sigma is None or old is None:
+            return None, None
+        mean = np.array([np.nanmean(values[a:b], axis=0) for a, b, _ in spans])
+        error = np.zeros_like(mean)
+        # How far the old means' errors exceed white noise, for pieces of other lengths.
+        colour = np.median(old / (sigma / np.sqrt(np.maximum(segments.n_averaged, 1))[:, None]), axis=0)
+        for k, (a, b, source) in enumerate(spans):
+            n = b - a
+            if source >= 0 and n == segments.holds[source].stop - segments.holds[source].start:
+                mean[k] = np.nanmean(values[a:b], axis=0)
+                error[k] = old[source]
+            else:
+                blocks = np.array_split(values[a:b], 8)
+                scatter = np.nanstd([np.nanmean(block, axis=0) for block in blocks], axis=0, ddof=1) / np.sqrt(8.0)
+                floor = np.maximum(colour, 1.0) * sigma / np.sqrt(n)
+                error[k] = np.maximum(floor, scatter) if source < 0 else floor
+        return mean, error
+
+    accel_mean, accel_error = statistics(
+        recording.accelerometer, segments.accelerometer_sigma, segments.accelerometer_sigma_mean
+    )
+    gyro_mean, gyro_error = statistics(recording.gyroscope, segments.gyroscope_sigma, segments.gyroscope_sigma_mean)
+    t = recording.time_s
+    return replace(
+        segments,
+        holds=holds,
+        moves=moves,
+        accelerometer_mean=accel_mean,
+        accelerometer_sigma_mean=accel_error,
+        gyroscope_mean=gyro_mean,
+        gyroscope_sigma_mean=gyro_error,
+        n_averaged=np.array([b - a for a, b, _ in spans]),
+        time_mid_s=np.array([0.5 * (t[a] + t[b - 1]) for a, b, _ in spans]),
+        duration_s=np.array([(b - a) / recording.rate_hz for a, b, _ in spans]),
+    )
+
+
+def _shaken(recording: Recording, segments: Segments, block_s: float = 0.25, shortest_s: float = 1.5) -> list[tuple[int, int]]:
+    """Stretches of moves whose block means stand still while the samples shake."""
+    if recording.gyroscope is None or recording.accelerometer is None or segments.gyroscope_mean is None:
+        return []
+    block = max(int(round(block_s * recording.rate_hz)), 5)
+    zero = np.median(segments.gyroscope_mean, axis=0)
+    assert segments.gyroscope_sigma is not None
+    spread = np.maximum(np.std(segments.gyroscope_mean, axis=0), segments.gyroscope_sigma / np.sqrt(block))
+    out: list[tuple[int, int]] = []
+    for move in segments.moves:
+        a, b = move.start, move.stop
+        n = (b - a) // block
+        if n * block < shortest_s * recording.rate_hz:
+            continue
+        gyro = recording.gyroscope[a : a + n * block].reshape(n, block, 3)
+        accel = recording.accelerometer[a : a + n * block].reshape(n, block, 3)
+        rate_mean = np.nanmean(gyro, axis=1)
+        own = np.nanstd(gyro, axis=1) / np.sqrt(block)
+        force_mean = np.nanmean(accel, axis=1)
+        force_own = np.nanstd(accel, axis=1)
+        # Zero rate within its own scatter, and force that steps from block to block by less than it shakes in one.
+        still = (np.abs(rate_mean - zero) < 5.0 * np.hypot(own, spread)).all(axis=1)
+        step = np.abs(np.diff(force_mean, axis=0, prepend=force_mean[:1]))
+        calm = (step < 4.0 * np.sqrt(2.0 / block) * np.maximum(force_own, segments.accelerometer_sigma)).all(axis=1)
+        shaking = (force_own > 3.0 * segments.accelerometer_sigma).any(axis=1)
+        good = still & calm & shaking
+        edges = np.flatnonzero(np.diff(np.r_[0, good.astype(np.int8), 0])).reshape(-1, 2)
+        for first, last in edges:
+            start, stop = a + first * block + block, a + last * block - block
+            if stop - start >= shortest_s * recording.rate_hz:
+                out.append((int(start), int(stop)))
+    return out
+
+
+def without_moves(
+    ranges: tuple[tuple[int, int], ...], holds: npt.NDArray[np.intp], bad: set[int]
+) -> tuple[tuple[tuple[int, int], ...], npt.NDArray[np.intp]]:
+    """Move ranges and their holds without some of them."""
+    keep = [m for m in range(len(ranges)) if m not in bad]
+    return tuple(ranges[m] for m in keep), holds[keep]

@@ -1,0 +1,128 @@
+"""From a calibration to the twin's start, and back from the twin to a linear model."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from trihedron.diagnose.observations import FloatArray, Observations
+from trihedron.diagnose.solve import Fit
+from trihedron.diagnose.twin import _LOWER, Prior, Twin
+from trihedron.records import Calibration, SensorCalibration
+from trihedron.records.diagnosis import LinearModel
+
+START_CORNER_S = 160.0
+"""Where the search for the noise corner begins."""
+
+
+def lower_frame(S: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """``(Q, L)`` with S = Q L, L lower triangular with the signs of S's own diagonal kept where they are clear."""
+    flip = np.eye(3)[::-1]
+    q, r = np.linalg.qr(S @ flip)
+    Q, L = q @ flip, flip @ r @ flip
+    signs = np.where(np.sign(np.diag(L)) * np.sign(np.diag(S)) < 0, -1.0, 1.0)
+    return Q * signs, signs[:, None] * L
+
+
+def start_twin(obs: Observations, calibration: Calibration) -> Twin:
+    """The calibration in the lower frame on centred readings, every hold at its measured vertical and bias."""
+    Q, L = lower_frame(calibration.accelerometer.S)
+    b = Q.T @ calibration.accelerometer.b + L @ obs.force_origin
+    gyro_S = np.eye(3) if calibration.gyroscope is None else Q.T @ calibration.gyroscope.S
+    force = obs.hold_force @ L.T + b
+    n = obs.n_holds
+    bias = np.zeros((n, 3)) if obs.hold_rate is None else obs.hold_rate @ gyro_S.T
+    return Twin(
+        gravity=calibration.gravity_m_s2,
+        accel_S=L,
+        accel_b=b,
+        gyro_S=gyro_S,
+        up=force / np.linalg.norm(force, axis=1, keepdims=True),
+        gyro_bias=bias,
+        accel_bias=np.zeros((n, 3)),
+        gyro_corner_s=START_CORNER_S,
+        accel_corner_s=START_CORNER_S,
+        effect=np.zeros(0),
+    )
+
+
+def prior_of(obs: Observations, calibration: Calibration) -> Prior:
+    """A given calibration as knowledge about the 18 unknowns, in the lower frame on centred readings."""
+    Q, L = lower_frame(calibration.accelerometer.S)
+    b = Q.T @ calibration.accelerometer.b + L @ obs.force_origin
+    gyro_S = np.eye(3) if calibration.gyroscope is None else Q.T @ calibration.gyroscope.S
+    mean = np.concatenate([[L[i, j] for i, j in _LOWER], b, gyro_S.ravel()])
+    turn = np.kron(Q.T, np.eye(3))
+    to_lower = np.zeros((6, 9))
+    for k, (i, j) in enumerate(_LOWER):
+        to_lower[k] = turn[3 * i + j]
+    centred = np.kron(np.eye(3), obs.force_origin[None])  # b' = b + S origin
+    A = np.zeros((18, 24))
+    A[:6, :9] = to_lower
+    A[6:9, :9] = centred @ turn
+    A[6:9, 9:12] = Q.T
+    A[9:18, 12:21] = turn
+    cov = np.zeros((24, 24))
+    given = calibration.covariance
+    cov[: len(given), : len(given)] = given
+    if calibration.gyroscope is None:
+        cov[12:, 12:] = np.eye(12)
+    out = A @ cov @ A.T
+    # A published calibration carries no error bars: then it is taken at its last printed digits.
+    floor = (1e-6 * np.maximum(np.abs(mean), 1e-3 * np.abs(mean).max())) ** 2
+    out[np.diag_indices_from(out)] += floor
+    return Prior(mean, out)
+
+
+def linear_model(fitted: Fit) -> LinearModel:
+    """S, b of both sensors from a fitted twin, with standard errors, on raw readings."""
+    twin, obs = fitted.twin, fitted.line.obs
+    cov = fitted.covariance()
+    origin = obs.force_origin
+    S = twin.accel_S
+    to_b = np.zeros((3, 9))
+    for k, (i, j) in enumerate(_LOWER):
+        to_b[i, k] = -origin[j]
+    to_b[:, 6:9] = np.eye(3)
+    sigma_S = np.zeros((3, 3))
+    for k, (i, j) in enumerate(_LOWER):
+        sigma_S[i, j] = np.sqrt(max(cov[k, k], 0.0))
+    cov_b = to_b @ cov[:9, :9] @ to_b.T
+    accel: dict[str, Any] = {
+        "S": S.tolist(),
+        "b": (twin.accel_b - S @ origin).tolist(),
+        "sigma_S": sigma_S.tolist(),
+        "sigma_b": np.sqrt(np.maximum(np.diag(cov_b), 0.0)).tolist(),
+        "raw_unit": obs.recording.accelerometer_unit.value,
+    }
+    if obs.raw_rate is None:
+        return LinearModel(MappingProxyType(accel), None)
+    mean_bias = twin.gyro_bias.mean(axis=0)
+    n = obs.n_holds
+    pick = np.zeros((3, cov.shape[0]))
+    for h in range(n):
+        pick[:, 18 + 8 * h + 2 : 18 + 8 * h + 5] = -np.eye(3) / n
+    pick[:, 9:18] = -np.kron(np.eye(3), obs.rate_origin[None])
+    gyro: dict[str, Any] = {
+        "S": twin.gyro_S.tolist(),
+        "b": (-twin.gyro_S @ obs.rate_origin - mean_bias).tolist(),
+        "sigma_S": np.sqrt(np.maximum(np.diag(cov)[9:18], 0.0)).reshape(3, 3).tolist(),
+        "sigma_b": np.sqrt(np.maximum(np.diag(pick @ cov @ pick.T), 0.0)).tolist(),
+        "raw_unit": obs.recording.gyroscope_unit.value,
+    }
+    return LinearModel(MappingProxyType(accel), MappingProxyType(gyro))
+
+
+def extended_sensor(model: MappingProxyType[str, Any], si_unit: str) -> SensorCalibration:
+    """A linear model's sensor as a calibration record (diagonal covariance: the record of the numbers, not their fit)."""
+    variance = np.concatenate([np.square(model["sigma_S"]).ravel(), np.square(model["sigma_b"])])
+    return SensorCalibration(
+        S=np.array(model["S"]),
+        b=np.array(model["b"]),
+        covariance=np.diag(variance),
+        raw_unit=str(model["raw_unit"]),
+        si_unit=si_unit,
+        method="diagnosis",
+    )
