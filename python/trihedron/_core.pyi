@@ -360,5 +360,6 @@ def simulate_convert(
     zero: Sequence[float],
     missing_every: int,
 ) -> FloatArray: ...
+
 # trajectory
 def attitude_in_moves(time_s: FloatArray, rate: FloatArray, moves: list[tuple[int, int]]) -> FloatArray: ...

@@ -77,7 +77,7 @@ class Context:
 
     @cached_property
     def gravity_in_moves(self) -> FloatArray:
-        """(points, 3) minus gravity in the body, carried by the gyro from the start of each move; the force in holds."""
+        """(points, 3) minus gravity in the body, carried by the gyro from each move's start; the force in holds."""
         path, twin, h = self.fitted.line.path, self.fitted.twin, self.obs.n_holds
         out = self.force.copy()
         for where, (before, _) in zip(self.moves, self.obs.move_holds, strict=True):

@@ -172,7 +172,7 @@ def _all_domains(obs: Observations, fitted: Fit, alpha: float) -> tuple[DomainTe
     )
 
 
-# -- direct evidence ----------------------------------------------------------------------------------------------------
+# -- direct evidence ------------------------------------------------------------
 def _accept_direct(
     model: _Model, context: Context, candidates: dict[str, Candidate], alpha: float, prior: Prior | None
 ) -> None:
@@ -215,7 +215,7 @@ def _accept_direct(
         )  # fmt: skip
 
 
-# -- the competition ----------------------------------------------------------------------------------------------------
+# -- the competition ------------------------------------------------------------
 def _accept_next(
     model: _Model, candidates: dict[str, Candidate], alpha: float, prior: Prior | None, *, first: bool
 ) -> bool:
@@ -328,7 +328,7 @@ def _settle_direct(model: _Model, remaining: tuple[DomainTest, ...]) -> tuple[Do
     )
 
 
-# -- words --------------------------------------------------------------------------------------------------------------
+# -- words ------------------------------------------------------------
 def _worded(model: _Model) -> tuple[AcceptedEffect, ...]:
     covariance = model.fitted.covariance()
     n = model.fitted.n_effect
@@ -362,7 +362,9 @@ def _accepted(
     shape = {} if found.variant is None else {name: v for name, (v, _) in found.variant.shape.items()}
     by_id = {effect.id: effect for effect in catalogue()}
     experiment = by_id[found.rivals[0]].experiment if found.rivals else ""
-    experiment = " / ".join(dict.fromkeys(e for e in (found.effect.experiment if found.rivals else "", experiment) if e))
+    experiment = " / ".join(
+        dict.fromkeys(e for e in (found.effect.experiment if found.rivals else "", experiment) if e)
+    )
     return AcceptedEffect(
         id=found.effect.id,
         statement=statement,

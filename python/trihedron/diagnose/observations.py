@@ -22,9 +22,8 @@ class Observations:
     the centred hold means, ``hold_force_sigma``, ``hold_rate_sigma`` (h, 3) their standard errors. ``move_ranges`` are
     half-open sample ranges that include the last sample of the hold before and the first of the hold after, so that
     neighbouring still samples bracket the whole motion; ``move_holds`` (m, 2) their holds. ``force_density`` and
-    ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about their
-    stamps, once a diagnosis has found it; ``bumped_s`` are
-    stretches inside poses that segmentation saw disturbed.
+    ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about
+    their stamps, once a diagnosis has found it; ``bumped_s`` are stretches inside poses that segmentation saw disturbed.
     """
 
     recording: Recording

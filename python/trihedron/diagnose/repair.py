@@ -74,7 +74,9 @@ def insert_samples(recording: Recording, segments: Segments, losses: dict[int, i
         )
         for hold in segments.holds
     )
-    moves = tuple(replace(move, start=holds[move.hold_before].stop, stop=holds[move.hold_after].start) for move in segments.moves)
+    moves = tuple(
+        replace(move, start=holds[move.hold_before].stop, stop=holds[move.hold_after].start) for move in segments.moves
+    )
     mid = np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in holds])
     return mended, replace(segments, holds=holds, moves=moves, time_mid_s=mid)
 
@@ -82,7 +84,7 @@ def insert_samples(recording: Recording, segments: Segments, losses: dict[int, i
 def split_holds(recording: Recording, segments: Segments, shortest_s: float = 0.3) -> tuple[Segments, tuple[int, ...]]:
     """Poses as the twin needs them: cut where they were bumped, and found where they were only shaken.
 
-    A bump inside a hold turns the body; averaged over, it contradicts the moves on both sides. Cut at the bump, the gyro
+    A bump inside a hold turns the body; averaged over, it contradicts the moves on both sides. Cut there, the gyro
     carries the attitude across it like across any move. A pose that vibrates is no rest, but its slow part stands
     still: it becomes a hold of its own, so that a bias that follows the vibration can be seen.
 
@@ -154,11 +156,14 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
     )
 
 
-def _shaken(recording: Recording, segments: Segments, block_s: float = 0.25, shortest_s: float = 1.5) -> list[tuple[int, int]]:
+def _shaken(
+    recording: Recording, segments: Segments, block_s: float = 0.25, shortest_s: float = 1.5
+) -> list[tuple[int, int]]:
     """Stretches of moves whose block means stand still while the samples shake."""
     if recording.gyroscope is None or recording.accelerometer is None or segments.gyroscope_mean is None:
         return []
-    block = max(int(round(block_s * recording.rate_hz)), 5)
+    assert segments.accelerometer_sigma is not None
+    block = max(round(block_s * recording.rate_hz), 5)
     zero = np.median(segments.gyroscope_mean, axis=0)
     assert segments.gyroscope_sigma is not None
     spread = np.maximum(np.std(segments.gyroscope_mean, axis=0), segments.gyroscope_sigma / np.sqrt(block))

@@ -139,7 +139,9 @@ def refit(
     """Joint fit of a candidate: BIC and held-out log density against the model without it."""
     base = context.fitted
     distortion = stacked([*accepted, scored.variant.distortion])
-    start = replace(base.twin, effect=np.concatenate([base.twin.effect, np.zeros(scored.variant.distortion.n_parameters)]))
+    start = replace(
+        base.twin, effect=np.concatenate([base.twin.effect, np.zeros(scored.variant.distortion.n_parameters)])
+    )
     fitted = tune_noise(context.obs, start, distortion, prior)
     n_rows = int((base.system.domain != PRIOR).sum())
     cost = np.log(n_rows) * (scored.rank + len(scored.variant.shape))

@@ -119,7 +119,7 @@ def reduce(fitted: Fit) -> Reduced:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Score test of added columns: ``chi2`` gained, ``rank`` directions seen, the one-step estimate and its covariance."""
+    """Score test of added columns: ``chi2`` gained, ``rank`` directions seen, the one-step estimate, its covariance."""
 
     chi2: float
     rank: int
@@ -146,9 +146,7 @@ def score(reduced: Reduced, columns: FloatArray) -> Score:
     chi2 = float((along**2 / value[seen]).sum())
     inverse = (vector[:, seen] / value[seen]) @ vector[:, seen].T
     visible = np.diag(normal) > 1e-6
-    return Score(
-        chi2, int(seen.sum()), -(inverse @ gradient) / length, inverse / np.outer(length, length), visible
-    )
+    return Score(chi2, int(seen.sum()), -(inverse @ gradient) / length, inverse / np.outer(length, length), visible)
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,4 +230,4 @@ def tune_noise(obs: Observations, start: Twin, distortion: Distortion, prior: Pr
 
 
 CORNER_GRID_S = (20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 2560.0)
-"""Corner times where white noise and bias walk meet. Below 20 s a bias is not noise any more but drift to be explained."""
+"""Corner times where white noise and bias walk meet. A bias that walks faster than 20 s is drift."""

@@ -116,7 +116,7 @@ def linear_model(fitted: Fit) -> LinearModel:
 
 
 def extended_sensor(model: MappingProxyType[str, Any], si_unit: str) -> SensorCalibration:
-    """A linear model's sensor as a calibration record (diagonal covariance: the record of the numbers, not their fit)."""
+    """A linear model's sensor as a calibration record (diagonal covariance: numbers, not their fit)."""
     variance = np.concatenate([np.square(model["sigma_S"]).ravel(), np.square(model["sigma_b"])])
     return SensorCalibration(
         S=np.array(model["S"]),

@@ -110,7 +110,7 @@ class Trajectory:
     """The motion as the twin sees it, at its *points*: one per hold, then every sample of every move.
 
     ``force`` (points, 3) specific force and ``rate`` (points, 3) angular rate in SI, corrected by the twin (distortions
-    of accepted effects removed); ``attitude`` (move samples, 3, 3) rotation since the move began; ``move_slices`` of the
+    of accepted effects removed); ``attitude`` (move samples, 3, 3) rotation since the move began; ``move_slices`` the
     points of each move.
     """
 
@@ -126,7 +126,7 @@ class System:
     """Whitened residuals and Jacobians: ``residual`` (rows,), ``jacobian`` (rows, unknowns), row labels.
 
     ``columns(distortion)`` gives the whitened rows of further effect parameters. ``log_weight`` is the log-determinant
-    of the whitening of rows whose noise depends on the corner times; ``walk`` marks those rows (1 accelerometer, 2 gyro).
+    of the whitening of rows whose noise depends on the corner times; ``walk`` marks them (1 accelerometer, 2 gyro).
     """
 
     residual: FloatArray
@@ -224,7 +224,7 @@ class Linearisation:
         if obs.jitter_s:
             # A sample taken δ late reads δ·derivative more: white over samples, stronger where the motion is quick.
             step = duration / max(len(t) - 1, 1)
-            q += obs.jitter_s**2 * step * float((np.gradient(path.rate[where], t, axis=0) ** 2).mean()) 
+            q += obs.jitter_s**2 * step * float((np.gradient(path.rate[where], t, axis=0) ** 2).mean())
             qa += obs.jitter_s**2 * step * float((np.gradient(path.force[where], t, axis=0) ** 2).mean())
         outer = (weight[:, None, None] * tail[:, :, None] * tail[:, None, :]).sum(axis=0)
         cov = np.zeros((5, 5))
@@ -263,13 +263,11 @@ class Linearisation:
     # -- everything -----------------------------------------------------------------------------------------------
     def columns(self, distortion: Distortion) -> FloatArray:
         """(rows, K) whitened change of every residual row per effect parameter (eq. 8.4)."""
-        obs, h = self.obs, self.obs.n_holds
+        h = self.obs.n_holds
         k = distortion.n_parameters
         parts = []
         force = distortion.force
-        parts.append(
-            np.zeros((3 * h, k)) if force is None else -(self._accel_white @ force[:h]).reshape(3 * h, k)
-        )
+        parts.append(np.zeros((3 * h, k)) if force is None else -(self._accel_white @ force[:h]).reshape(3 * h, k))
         if self._gyro_white is not None:
             rate = distortion.rate
             parts.append(np.zeros((3 * h, k)) if rate is None else -(self._gyro_white @ rate[:h]).reshape(3 * h, k))
@@ -354,11 +352,9 @@ class Linearisation:
             rows_r.append(one["white"] @ one["residual"])
             rows_j.append(one["white"] @ J)
             label += [(MOVES, m, c, 0) for c in range(2)] + [(DYNAMICS, m, c, 0) for c in range(3)]
-        log_weight = self._walk_rows(rows_r, rows_j, label, at, n)
+        log_weight = self._walk_rows(rows_r, rows_j, label, n)
         if self.prior is not None:
-            current = np.concatenate(
-                [[twin.accel_S[i, j] for i, j in _LOWER], twin.accel_b, twin.gyro_S.ravel()]
-            )
+            current = np.concatenate([[twin.accel_S[i, j] for i, j in _LOWER], twin.accel_b, twin.gyro_S.ravel()])
             W = np.linalg.inv(np.linalg.cholesky(self.prior.covariance))
             J = np.zeros((18, n))
             J[:, :18] = W
@@ -370,17 +366,24 @@ class Linearisation:
         jacobian = np.vstack(rows_j)
         return System(
             residual=np.concatenate(rows_r), jacobian=jacobian, domain=labels[:, 0].astype(np.int8),
-            segment=labels[:, 1], channel=labels[:, 2].astype(np.int8), log_weight=log_weight, walk=labels[:, 3].astype(np.int8),
+            segment=labels[:, 1], channel=labels[:, 2].astype(np.int8), walk=labels[:, 3].astype(np.int8),
+            log_weight=log_weight,
         )  # fmt: skip
 
     def _walk_rows(
-        self, rows_r: list[FloatArray], rows_j: list[FloatArray], label: list[tuple[int, int, int, int]], at: object, n: int
+        self,
+        rows_r: list[FloatArray],
+        rows_j: list[FloatArray],
+        label: list[tuple[int, int, int, int]],
+        n: int,
     ) -> float:
         """Random walks of both biases between holds (eq. 8.3); the first hold carries a flat prior."""
         obs, twin, h = self.obs, self.twin, self.obs.n_holds
         log_weight = 0.0
         gap = np.maximum(np.diff(obs.hold_time_s), 1e-3)
-        sensors = [(5, twin.accel_bias, np.sqrt((twin.accel_S**2) @ obs.force_density**2), twin.accel_corner_s, STATIC_ACCEL)]
+        sensors = [
+            (5, twin.accel_bias, np.sqrt((twin.accel_S**2) @ obs.force_density**2), twin.accel_corner_s, STATIC_ACCEL)
+        ]
         if obs.rate_density is not None:
             density = np.sqrt((twin.gyro_S**2) @ obs.rate_density**2)
             sensors.append((2, twin.gyro_bias, density, twin.gyro_corner_s, STATIC_GYRO))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.ndimage import median_filter
 from scipy.special import chdtrc, gammaincc
 
@@ -37,7 +38,7 @@ def hold_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     out = []
     # A line is looked for where the place is quiet: shaking has a spectrum of its own.
-    quiet = (hold_scatter(obs).ratio < 2.0).all(axis=1)
+    quiet: npt.NDArray[np.bool_] = np.asarray((hold_scatter(obs).ratio < 2.0).all(axis=1))
     if quiet.sum() < 3:
         quiet[:] = True
     for i in np.flatnonzero(quiet):
@@ -102,7 +103,13 @@ def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
 
 
 def _refine(
-    obs: Observations, pieces: list[tuple[int, FloatArray]], c: int, f0: float, resolution: float, p: float, density: float
+    obs: Observations,
+    pieces: list[tuple[int, FloatArray]],
+    c: int,
+    f0: float,
+    resolution: float,
+    p: float,
+    density: float,
 ) -> Line | None:
     """Frequency and amplitude by coherent least squares over all holds; half of each hold predicts the other half."""
     t = np.concatenate([obs.time_s[a : a + len(x)] for a, x in pieces])
@@ -159,7 +166,7 @@ def project_piece(t: FloatArray, x: FloatArray, f: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class HoldScatter:
-    """Fast scatter of every hold against the common level: ``ratio`` (holds, channels) of variances, ``dof`` (holds,)."""
+    """Fast scatter of every hold against the common level: variances ``ratio`` (holds, channels), ``dof`` (holds,)."""
 
     ratio: FloatArray
     dof: FloatArray

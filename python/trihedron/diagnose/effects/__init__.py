@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from functools import cache
+from typing import Any
 
 from trihedron.diagnose.effects.contract import Effect
 
@@ -19,7 +20,7 @@ def catalogue() -> tuple[Effect, ...]:
     return tuple(sorted((kind() for kind in _concrete(Effect)), key=lambda effect: effect.id))
 
 
-def _concrete(kind: type[Effect]) -> list[type[Effect]]:
+def _concrete(kind: Any) -> list[Any]:
     found = [kind] if "id" in vars(kind) else []
     for child in kind.__subclasses__():
         found += _concrete(child)

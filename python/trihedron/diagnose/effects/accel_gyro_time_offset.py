@@ -11,7 +11,9 @@ class AccelGyroTimeOffset(Effect):
 
     id = "accel-gyro-time-offset"
     mechanism = "accelerometer and gyro samples with the same time stamp belong to different instants"
-    experiment = "shake the sensor about one axis at several frequencies: a delay grows with frequency, a low-pass saturates"
+    experiment = (
+        "shake the sensor about one axis at several frequencies: a delay grows with frequency, a low-pass saturates"
+    )
 
     def unavailable(self, context: Context) -> str | None:
         return "the log has no moves with a gyro" if not context.moves else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, force_only
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
 
 
 class AccelThermalBias(Effect):
@@ -13,7 +13,9 @@ class AccelThermalBias(Effect):
 
     id = "accel-thermal-bias"
     mechanism = "accelerometer bias follows the temperature"
-    experiment = "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"
+    experiment = (
+        "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"
+    )
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, force_only
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
 
 
 class AccelThermalScale(Effect):

@@ -67,9 +67,7 @@ class Effect(ABC):
             EffectParameter(name, float(v), float(s), unit)
             for name, v, s, unit in zip(variant.names, value, sigma, variant.units, strict=True)
         )
-        shape = tuple(
-            EffectParameter(name, v, variant.shape_sigma, unit) for name, (v, unit) in variant.shape.items()
-        )
+        shape = tuple(EffectParameter(name, v, variant.shape_sigma, unit) for name, (v, unit) in variant.shape.items())
         return linear + shape
 
     def n_shape(self, parameters: tuple[EffectParameter, ...]) -> int:
@@ -78,7 +76,9 @@ class Effect(ABC):
 
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
         """The finding in one plain sentence."""
-        strongest = max(parameters[: len(parameters) - self.n_shape(parameters)], key=lambda p: abs(p.value) / max(p.std, 1e-300))
+        strongest = max(
+            parameters[: len(parameters) - self.n_shape(parameters)], key=lambda p: abs(p.value) / max(p.std, 1e-300)
+        )
         size = f"{strongest.value:.3g} ± {strongest.std:.1g} {strongest.unit}"
         return f"{self.mechanism} (strongest term {strongest.name}: {size})."
 

@@ -12,6 +12,9 @@ from trihedron.diagnose.observations import Observations
 from trihedron.records.diagnosis import Domain, EffectParameter, HeldOut, Where
 
 
+NOWHERE = Where()
+
+
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """What a direct test found.
@@ -26,7 +29,7 @@ class Evidence:
     parameters: tuple[EffectParameter, ...]
     statement: str
     domain: Domain
-    where: Where = Where()
+    where: Where = NOWHERE
     held_out: tuple[HeldOut, ...] = ()
     variant: Variant | None = None
     reweigh: Callable[[Observations], Observations] | None = None

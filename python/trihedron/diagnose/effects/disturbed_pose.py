@@ -41,9 +41,7 @@ class DisturbedPose(DirectEffect):
             parts.append("bumped at " + ", ".join(f"{a:.1f} s" for a, _ in bumped[:4]))
         if restless:
             parts.append("restless: pose " + ", ".join(str(i) for i in restless[:4]))
-        parameters = tuple(
-            EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6]
-        )
+        parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])
         return Evidence(
             1e-30, strength, parameters, f"Not every pose was still ({'; '.join(parts)}).", "within-static",
             Where((), tuple(f"hold {i}" for i in restless), spans),
@@ -61,4 +59,6 @@ class DisturbedPose(DirectEffect):
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
         pose = next(p.value for p in parameters if p.name == "pose")
         size = float(np.sqrt(sum(p.value**2 for p in parameters if p.name.startswith("push"))))
-        return f"Pose {pose:.0f} was not still or was pushed: its mean is off by {size:.2g} m/s²; repeat or leave it out."
+        return (
+            f"Pose {pose:.0f} was not still or was pushed: its mean is off by {size:.2g} m/s²; repeat or leave it out."
+        )

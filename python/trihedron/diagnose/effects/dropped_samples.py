@@ -15,7 +15,6 @@ from trihedron.diagnose.solve import fit
 from trihedron.diagnose.twin import NO_DISTORTION
 from trihedron.records.diagnosis import EffectParameter, Where
 
-
 MAX_COUNTED = 4
 """Losses whose number is settled by gravity; each costs a few fits."""
 
@@ -76,10 +75,7 @@ class DroppedSamples(DirectEffect):
         parameters = (
             EffectParameter("events", float(len(losses)), 0.0, "1"),
             EffectParameter("samples_lost", float(sum(loss.count for loss in losses)), 0.5 * np.sqrt(len(losses)), "1"),
-            *(
-                EffectParameter(f"lost_at_{t[loss.sample]:.2f}s", float(loss.count), 0.5, "samples")
-                for loss in losses
-            ),
+            *(EffectParameter(f"lost_at_{t[loss.sample]:.2f}s", float(loss.count), 0.5, "samples") for loss in losses),
         )
         places = ", ".join(f"{loss.count} at {t[loss.sample]:.2f} s" for loss in losses[:4])
         more = f" and {len(losses) - 4} more" if len(losses) > 4 else ""

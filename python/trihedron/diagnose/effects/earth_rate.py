@@ -17,7 +17,9 @@ class EarthRate(Effect):
 
     id = "earth-rate"
     mechanism = "the gyros see the Earth turn"
-    experiment = "turn the level sensor by 180° on the table: Earth rate changes its horizontal part, g-sensitivity does not"
+    experiment = (
+        "turn the level sensor by 180° on the table: Earth rate changes its horizontal part, g-sensitivity does not"
+    )
 
     def unavailable(self, context: Context) -> str | None:
         if context.obs.raw_rate is None or not context.moves:

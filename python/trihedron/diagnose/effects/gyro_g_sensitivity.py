@@ -13,7 +13,9 @@ class GyroGSensitivity(Effect):
 
     id = "gyro-g-sensitivity"
     mechanism = "gyro bias depends on specific force: the rate read at rest changes with the pose"
-    experiment = "hold each of the six faces for a minute; turn the table by 180° under a level sensor to rule out Earth rate"
+    experiment = (
+        "hold each of the six faces for a minute; turn the table by 180° under a level sensor to rule out Earth rate"
+    )
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:

@@ -13,7 +13,9 @@ class GyroThermalBias(Effect):
 
     id = "gyro-thermal-bias"
     mechanism = "gyro bias follows the temperature"
-    experiment = "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"
+    experiment = (
+        "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"
+    )
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:

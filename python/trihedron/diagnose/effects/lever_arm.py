@@ -24,7 +24,9 @@ class LeverArm(DirectEffect):
 
     id = "lever-arm"
     mechanism = "the accelerometers sit away from the centre of rotation"
-    experiment = "turn about another point: an arm follows the centre of rotation, a displacement inside the case does not"
+    experiment = (
+        "turn about another point: an arm follows the centre of rotation, a displacement inside the case does not"
+    )
 
     def unavailable(self, context: Context) -> str | None:
         return "fewer than six moves with a gyro" if len(context.moves) < 6 else None
@@ -66,17 +68,15 @@ class LeverArm(DirectEffect):
         before_rms, after_rms = float(np.sqrt(e2.sum() / n)), float(np.sqrt(after / n))
         sigma = np.sqrt(np.diag(cov))
         noise = float(np.sqrt((context.noise_floor[0] ** 2).mean()))
-        held = HeldOut(
-            "dynamics", (before_rms / noise) ** 2, (after_rms / noise) ** 2, before_rms, after_rms, "m/s^2"
-        )
+        held = HeldOut("dynamics", (before_rms / noise) ** 2, (after_rms / noise) ** 2, before_rms, after_rms, "m/s^2")
         parameters = tuple(
             EffectParameter(f"r_{axis}", float(v), float(s), "m") for axis, v, s in zip(AXES, arm, sigma, strict=True)
         )
         length = float(np.linalg.norm(arm))
         return Evidence(
             max(p, 1e-300), float(m * np.log(float(e2.sum()) / after)), parameters,
-            f"The accelerometers sit {100 * length:.1f} cm from the centre of rotation: one arm predicts {100 * share:.0f} % "
-            "of the acceleration in moves it was not fitted to.",
+            f"The accelerometers sit {100 * length:.1f} cm from the centre of rotation: one arm predicts "
+            f"{100 * share:.0f} % of the acceleration in moves it was not fitted to.",
             "dynamics", Where(("ax", "ay", "az")), (held,),
         )  # fmt: skip
 

@@ -89,7 +89,9 @@ class Quantisation(DirectEffect):
             scale = float(1.0 / np.linalg.norm(np.linalg.inv(S)[c % 3]))
             unit = "m/s^2" if c < 3 else "rad/s"
             name = CHANNELS[c]
-            parameters.append(EffectParameter(f"lsb_{name}", grid_found.step * scale, 1e-6 * grid_found.step * scale, unit))
+            parameters.append(
+                EffectParameter(f"lsb_{name}", grid_found.step * scale, 1e-6 * grid_found.step * scale, unit)
+            )
             if grid_found.missing:
                 parameters.append(EffectParameter(f"missing_codes_{name}", float(grid_found.missing), 0.0, "1"))
 

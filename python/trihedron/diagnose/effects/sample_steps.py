@@ -89,7 +89,10 @@ def step_errors(context: Context) -> StepErrors:
     if not index:
         return StepErrors(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 2)), np.zeros((0, 2)))
     return StepErrors(
-        np.concatenate(index).astype(np.intp), np.concatenate(moves).astype(np.intp), np.concatenate(extra), np.concatenate(sigma)
+        np.concatenate(index).astype(np.intp),
+        np.concatenate(moves).astype(np.intp),
+        np.concatenate(extra),
+        np.concatenate(sigma),
     )
 
 

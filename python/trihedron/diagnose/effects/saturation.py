@@ -25,13 +25,17 @@ STEEP = 3.0
 
 @dataclass(frozen=True)
 class Plateau:
-    """One run at the limit: samples ``[start, stop)`` of channel ``axis``, on the side ``sign``."""
+    """One run at the limit: samples ``[start, stop)`` of channel ``axis``, on the side ``sign``.
+
+    ``is_rail``: every sample is the same number, the largest of the recording. One such run is proof enough.
+    """
 
     axis: int
     sign: int
     start: int
     stop: int
     level: float
+    is_rail: bool = False
 
 
 def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int], ...]) -> list[Plateau]:
@@ -58,13 +62,17 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
                         n = last - first
                         if n < MIN_RUN or first < 2 or last > b - a - 2:
                             continue
+                        run = x[a + first : a + last]
+                        is_rail = n >= MIN_RUN and bool((run == run[0]).all()) and run[0] == x.max()
                         step = 0.5 * (x[a + first] - x[a + first - 2] + x[a + last - 1] - x[a + last + 1])
                         if step > STEEP * 4.0 * width / n:
-                            runs.append(Plateau(axis, sign, a + int(first), a + int(last), sign * float(level)))
+                            runs.append(
+                                Plateau(axis, sign, a + int(first), a + int(last), sign * float(level), is_rail)
+                            )
                 if len(runs) > len(best):
                     best = runs
             exceeds = (top > (best[0].level * sign if best else np.inf) + 2 * width).any()
-            if len(best) >= MIN_PLATEAUS and not exceeds:
+            if (len(best) >= MIN_PLATEAUS or any(r.is_rail for r in best)) and not exceeds:
                 found += best
     return found
 
@@ -85,7 +93,9 @@ class _Saturation(DirectEffect):
         if not runs:
             return None
         n = sum(run.stop - run.start for run in runs)
-        scale = 1.0 / np.linalg.norm(np.linalg.inv(context.fitted.twin.gyro_S if is_gyro else context.fitted.twin.accel_S), axis=1)
+        scale = 1.0 / np.linalg.norm(
+            np.linalg.inv(context.fitted.twin.gyro_S if is_gyro else context.fitted.twin.accel_S), axis=1
+        )
         unit = "rad/s" if is_gyro else "m/s^2"
         parameters = []
         for axis in range(3):
@@ -116,7 +126,11 @@ class _Saturation(DirectEffect):
             f"{len(touched)} of {obs.n_moves} moves; what those moves read is false and is left out of the fit."
         )
         # Chance that smooth peaks of different moves end within one noise band of each other.
-        p = float(np.clip((2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1), 1e-300, 1.0))
+        p = float(
+            np.clip((2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1), 1e-300, 1.0)
+        )
+        if any(run.is_rail for run in runs):
+            p = min(p, 1e-30)
         return Evidence(
             p, -2.0 * np.log(p), tuple(parameters), statement, "moves" if is_gyro else "dynamics",
             Where(channels, tuple(f"move {m}" for m in touched[:8]), times), reweigh=reweigh,

@@ -32,7 +32,11 @@ class TableTilt(DirectEffect):
             if half < 0.3:
                 continue
             change = twin.up[after] - twin.up[before]
-            sigma = float(np.sqrt(((twin.accel_S**2) @ (obs.hold_force_sigma[before] ** 2 + obs.hold_force_sigma[after] ** 2)).mean()))
+            sigma = float(
+                np.sqrt(
+                    ((twin.accel_S**2) @ (obs.hold_force_sigma[before] ** 2 + obs.hold_force_sigma[after] ** 2)).mean()
+                )
+            )
             sigma /= twin.gravity
             chi2 += float(change @ change) / sigma**2
             dof += 2

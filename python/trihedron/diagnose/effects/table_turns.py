@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.observations import FloatArray
@@ -35,7 +36,7 @@ def table_turns(context: Context) -> list[TableTurn]:
         t = context.time_s[where]
         about_up = context.rate[where] @ up
         across = np.linalg.norm(context.rate[where] - np.outer(about_up, up), axis=1)
-        angle = float(np.trapezoid(about_up, t)) if hasattr(np, "trapezoid") else float(np.trapz(about_up, t))
+        angle = float(trapezoid(about_up, t))
         if abs(angle) < np.radians(45.0) or np.mean(across) > 0.25 * np.mean(np.abs(about_up)):
             continue
         error = (angle + np.pi / 4) % (np.pi / 2) - np.pi / 4

@@ -43,7 +43,9 @@ class TurnAngleError(DirectEffect):
         if p > 1e-4 or len(bad) == 0:
             return None
         parameters = tuple(
-            EffectParameter(f"error_move{turns[k].move}", float(np.degrees(errors[k])), float(np.degrees(sigmas[k])), "deg")
+            EffectParameter(
+                f"error_move{turns[k].move}", float(np.degrees(errors[k])), float(np.degrees(sigmas[k])), "deg"
+            )
             for k in bad
         )
         t = context.obs.time_s
