@@ -23,7 +23,7 @@ class Observations:
     half-open sample ranges that include the last sample of the hold before and the first of the hold after, so that
     neighbouring still samples bracket the whole motion; ``move_holds`` (m, 2) their holds. ``force_density`` and
     ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about
-    their stamps, once a diagnosis has found it; ``bumped_s`` are stretches inside poses that segmentation saw disturbed.
+    their stamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
     """
 
     recording: Recording

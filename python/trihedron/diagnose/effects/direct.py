@@ -11,7 +11,6 @@ from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.observations import Observations
 from trihedron.records.diagnosis import Domain, EffectParameter, HeldOut, Where
 
-
 NOWHERE = Where()
 
 

@@ -7,11 +7,41 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.observations import Observations
 from trihedron.diagnose.within_static import hold_scatter
 from trihedron.records.diagnosis import EffectParameter, Where
 
 MOST = 0.25
 """If more than a quarter of the poses are restless it is not a pose that was disturbed but the place that shakes."""
+
+
+BUMP_SIGMA = 7.0
+"""A tenth of a second must leave the line through its surroundings by this much: drift inside a hold does not."""
+
+
+def _is_bump(obs: Observations, span: tuple[float, float]) -> bool:
+    """Whether the readings of a stretch leave the straight line from before to after it."""
+    rate = obs.recording.rate_hz
+    a, b = (int(k) for k in np.searchsorted(obs.time_s, span))
+    side = max(int(0.5 * rate), 5)
+    block = max(int(0.1 * rate), 2)
+    first, last = max(a - side, 0), min(b + side, len(obs.time_s))
+    pairs = [(obs.raw_force, obs.force_density)]
+    if obs.raw_rate is not None and obs.rate_density is not None:
+        pairs.append((obs.raw_rate, obs.rate_density))
+    for values, density in pairs:
+        x = values[first:last]
+        n = len(x) // block
+        if n < 4:
+            return True
+        means = x[: n * block].reshape(n, block, 3).mean(axis=1)
+        k = np.arange(n)
+        outer = (k < max(side // block, 2)) | (k >= n - max(side // block, 2))
+        line = np.polynomial.polynomial.polyfit(k[outer], means[outer], 1)
+        away = means - (line[0] + np.outer(k, line[1]))
+        if (np.abs(away) > BUMP_SIGMA * density * np.sqrt(rate / block)).any():
+            return True
+    return False
 
 
 class DisturbedPose(DirectEffect):
@@ -27,7 +57,7 @@ class DisturbedPose(DirectEffect):
         scatter = hold_scatter(obs)
         loud = (scatter.ratio > 2.0) & (scatter.p_value * scatter.p_value.size < 1e-6)
         restless = sorted(set(np.flatnonzero(loud.any(axis=1)).tolist()))
-        bumped = list(obs.bumped_s)
+        bumped = [span for span in obs.bumped_s if _is_bump(obs, span)]
         if not bumped and not restless:
             return None
         if len(restless) > MOST * obs.n_holds:

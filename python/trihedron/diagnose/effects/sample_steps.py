@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import percentile_filter
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.saturation import plateaus
@@ -135,7 +136,10 @@ def find_losses(context: Context) -> list[Loss]:
         windows = [np.stack([x[a + k + o] for o in range(1 - w, w + 1)], axis=1) for x in sensors]
         zero = np.stack([np.einsum("kic,ij,kjc->k", v, stack[0], v) for v in windows], axis=1)
         dof = 3 * (2 * w - 4)
-        ordinary = np.median(zero, axis=0)
+        # What a join costs anyway where the motion is as quick as here: jitter and curvature are no losses.
+        ordinary = np.stack(
+            [percentile_filter(zero[:, c], 75, size=8 * w + 1, mode="nearest") for c in range(zero.shape[1])], axis=1
+        )
         # Only steps that stand out are worth a search; the quieter sensor may be too noisy to show the jump.
         suspect = np.flatnonzero((zero > 3.0 * np.maximum(ordinary, dof)).any(axis=1))
         if len(suspect) == 0:
@@ -151,7 +155,7 @@ def find_losses(context: Context) -> list[Loss]:
                 continue
             left = trial[row, n]
             gains = zero[s] - left
-            usual = np.maximum(ordinary, dof)
+            usual = np.maximum(ordinary[s], dof)
             clear = (gains > 40.0) & (left < 0.1 * zero[s] + 3.0 * usual)
             # A sensor that sees nothing of it must at least not object; one that sees it must see the same count.
             silent = (np.abs(gains) <= 40.0) & (left < 2.0 * usual)
