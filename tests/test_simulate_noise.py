@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from trihedron.estimate.noise.allan import allan_deviation
 from trihedron.simulate import NoiseTerms, make_noise
 from twins_simulate import slow_allan_variance
 
@@ -50,6 +51,20 @@ def test_the_allan_variance_of_a_term_is_the_one_that_defines_it(term):
         # no randomness but rounding.
         slack = {"B": 0.03, "R": 1e-9}.get(term, 0.0) * EXPECTED[term](m)
         assert abs(variances.mean() - EXPECTED[term](m)) < 4.0 * error + slack, (term, m)
+
+
+@pytest.mark.parametrize("term", ["Q", "N", "B", "K"])
+def test_the_intervals_of_the_allan_estimator_hold_the_defining_variance(term):
+    clusters = [1, 4, 16, 64]
+    inside = total = 0
+    for x in realisations(term):
+        curve = allan_deviation(x, 1.0 / DT, clusters)
+        expected = np.sqrt([EXPECTED[term](m) for m in clusters])
+        inside += int(np.sum((curve.lower[:, 0] <= expected) & (expected <= curve.upper[:, 0])))
+        total += len(clusters)
+    # 95 % intervals, 240 of them in sets of four that are not independent: four binomial deviations of 60 sets, and one
+    # per cent for intervals that take the noise type from the curve's own slope.
+    assert inside / total > 0.95 - 4.0 * np.sqrt(0.95 * 0.05 / 60.0) / 2.0 - 0.01
 
 
 def test_white_noise_has_density_over_root_step_and_no_memory():

@@ -78,7 +78,7 @@ def _manual() -> Scenario:
     for face in FACES[::2]:
         steps += poses_in_order([face], hold_s=4.0, move_s=3.0, arrive=True).steps
         for angle in (1440.0, -1440.0):
-            steps += [Turn(face, angle, 16.0, ramp=0.25, wobble_deg=1.5), Hold(4.0, "rest")]
+            steps += [Turn(face, angle, 16.0, ramp=0.25, wobble_deg=0.4), Hold(4.0, "rest")]
     profile = ANALOG_6DOF
     motion = Motion(tuple(steps), start=poses.start)
     return Scenario(motion, "manual-example", profile.accelerometer, profile.gyroscope, profile.clock)

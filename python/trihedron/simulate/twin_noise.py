@@ -17,6 +17,7 @@ from trihedron.simulate.readout import Smoother
 FloatArray = npt.NDArray[np.float64]
 
 
+_FREQUENCIES = np.pi * (np.arange(1 << 13) + 0.5) / (1 << 13)
 # Corners in parts of the sampling rate, and orders, that are tried.
 _CORNERS = (0.03, 0.045, 0.06, 0.08, 0.1, 0.12, 0.15, 0.19, 0.24, 0.3, 0.37, 0.45)
 _ORDERS = (1, 2, 3, 4, 6)
@@ -32,7 +33,11 @@ def noise_of_holds(
     steps = np.broadcast_to(np.asarray(step, dtype=np.float64), (3,))
     measured = [_pooled(signal[:, k], holds, float(steps[k])) for k in range(3)]
     filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
-    fits = [[_fit(axis, dt, low_pass) for axis in measured] for low_pass in filters]
+    windows = [_windows(axis[0]) for axis in measured]
+    powers = [_power(low_pass, dt) for low_pass in filters]
+    fits = [
+        [_fit(axis, dt, window @ power) for axis, window in zip(measured, windows, strict=True)] for power in powers
+    ]
     best = int(np.argmin([sum(misfit for _, misfit in fit) for fit in fits]))
     columns = [terms for terms, _ in fits[best]]
 
@@ -71,17 +76,15 @@ def _pooled(x: FloatArray, holds: Sequence[tuple[int, int]], step: float) -> tup
 
 
 def _fit(
-    pooled: tuple[FloatArray, FloatArray, FloatArray], dt: float, low_pass: Smoother
+    pooled: tuple[FloatArray, FloatArray, FloatArray], dt: float, passed: FloatArray
 ) -> tuple[tuple[float, ...], float]:
-    """(N, B) and how badly they fit behind a low-pass: minus twice the logarithm of the likelihood."""
+    """(N, B) and how badly they fit, as -2 log-likelihood; ``passed`` is what a low-pass leaves of unit white."""
     size, measured, freedom = pooled
     if not np.any(measured > 0.0):
         return (0.0, 0.0), 0.0
-    passed = _passed_white(size, dt, low_pass)
-    tau = size * dt
     # The filter colours what is fast; flicker is slow enough to pass it whole. A walk is not offered: holds of seconds
     # would let it grow over the minutes between them without a trace of evidence.
-    flat = np.full(len(tau), 2.0 * np.log(2.0) / np.pi)
+    flat = np.full(len(size), 2.0 * np.log(2.0) / np.pi)
     design = np.column_stack([passed / dt, flat])
     # Relative errors of a variance with so many degrees of freedom; at least 3 %, which the shapes do not keep. They
     # are relative to the model: a variance that came out small by accident must not weigh the most.
@@ -96,12 +99,16 @@ def _fit(
     return (white, flicker), float(misfit) ** 2 + 2.0 * float(np.sum(np.log(model)))
 
 
-def _passed_white(size: FloatArray, dt: float, low_pass: Smoother) -> FloatArray:
-    """Allan variance of unit white noise behind the low-pass, by its power transfer."""
-    w = np.pi * (np.arange(1 << 13) + 0.5) / (1 << 13)
-    power = np.ones(len(w))
-    if low_pass.corner_hz > 0.0:
-        a = low_pass.feedback(dt)
-        power = np.abs(a.sum() / np.polyval(a[::-1], np.exp(-1j * w))) ** 2
-    half = 0.5 * w
-    return np.array([2.0 / m**2 * np.mean(np.sin(half * m) ** 4 / np.sin(half) ** 2 * power) for m in size])
+def _windows(size: FloatArray) -> FloatArray:
+    """(k, 8192) what the Allan variance at each cluster size sees of a spectrum over (0, π)."""
+    half = 0.5 * _FREQUENCIES
+    return np.array([2.0 / m**2 * np.sin(half * m) ** 4 / np.sin(half) ** 2 / len(half) for m in size])
+
+
+def _power(low_pass: Smoother, dt: float) -> FloatArray:
+    """(8192,) power transfer of the low-pass."""
+    if low_pass.corner_hz == 0.0:
+        return np.ones(len(_FREQUENCIES))
+    a = low_pass.feedback(dt)
+    out: FloatArray = np.abs(a.sum() / np.polyval(a[::-1], np.exp(-1j * _FREQUENCIES))) ** 2
+    return out
