@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::hint::black_box;
 use trihedron::gauss_newton::Loss;
 use trihedron::norm_invariant::{Frame, Objective, Readings, Settings, fit};
+use trihedron::poisson::{MoveRange, RateModel, RateNoise, prepare};
 use trihedron::rotation;
 
 fn rotations(c: &mut Criterion) {
@@ -61,5 +62,36 @@ fn norm_fits(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, rotations, norm_fits);
+/// One move of 10 000 samples: reduced to moments once, then integrated with all sensitivities per fit iteration.
+fn poisson(c: &mut Criterion) {
+    let n = 10_000;
+    let time: Vec<f64> = (0..n).map(|k| f64::from(k) * 1e-3).collect();
+    let raw: Vec<_> = time
+        .iter()
+        .map(|t| Vector3::new(t.sin(), (1.3 * t).cos(), 0.5))
+        .collect();
+    let range = MoveRange {
+        start: 0,
+        stop: raw.len(),
+        anchor_before_s: -1.0,
+        anchor_after_s: 11.0,
+    };
+    let noise = RateNoise {
+        density: Vector3::repeat(1e-4),
+        sigma_time_s: 0.0,
+        nominal_step_s: 1e-3,
+    };
+    let scale = Matrix3::identity() * 1.01;
+    let bias = Vector3::new(0.01, 0.0, -0.01);
+    c.bench_function("poisson::prepare 10k coning", |b| {
+        b.iter(|| prepare(black_box(&time), &raw, None, &range, RateModel::Coning));
+    });
+    if let Ok(prepared) = prepare(&time, &raw, None, &range, RateModel::Coning) {
+        c.bench_function("poisson::integrate 10k with sensitivities", |b| {
+            b.iter(|| prepared.integrate(black_box(&scale), &bias, &bias, &noise));
+        });
+    }
+}
+
+criterion_group!(benches, rotations, norm_fits, poisson);
 criterion_main!(benches);

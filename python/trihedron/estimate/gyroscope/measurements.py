@@ -268,6 +268,9 @@ def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArra
     quality = accelerometer.quality
     if quality is None or not np.isfinite(quality.rms_dof) or not np.isfinite(quality.floor):
         return np.zeros(3)
+    # Only beyond chance: half of all sound recordings scatter a little more than predicted.
+    if quality.dof < 1 or chi2_distribution.sf(quality.chi2, quality.dof) > 1e-3:
+        return np.zeros(3)
     excess = max(quality.rms_dof**2 - quality.floor**2, 0.0)
     gains: FloatArray = np.sum(accelerometer.S**2, axis=0)
     return excess / gains
