@@ -12,7 +12,6 @@ for name, motion in (("rest", long_rest(1e5)), ("hand session", hand_session(n_p
     recording, truth = simulate(scenario)
     took, cpu = time.perf_counter() - began, time.process_time() - worked
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    print(
-        f"{name}: {recording.n_samples} samples of 6 channels in {took:.2f} s ({cpu:.2f} s of processor), peak memory {memory:.1f} GB"
-    )
+    what = f"{name}: {recording.n_samples} samples of 6 channels"
+    print(f"{what} in {took:.2f} s ({cpu:.2f} s of processor), peak memory {memory:.1f} GB")
     del recording, truth

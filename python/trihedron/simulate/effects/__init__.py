@@ -1,0 +1,66 @@
+"""The catalogue's effects switched on at the level of the mechanism, at a stated size, and read back as truth.
+
+``with_effect(scenario, id, ...)`` returns a new scenario; sizes are SI. Nothing here is shared with an estimator.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from trihedron.simulate.effects import experiment, sensor
+from trihedron.simulate.effects.sizes import Change
+from trihedron.simulate.effects.truth import effects_of
+from trihedron.simulate.scenario import Scenario
+
+__all__ = ["EFFECT_IDS", "effects_of", "with_effect"]
+
+_EFFECTS: dict[str, Change] = {
+    "accel-quadratic": sensor.accel_quadratic,
+    "accel-cubic": sensor.accel_cubic,
+    "accel-scale-asymmetry": sensor.accel_asymmetry,
+    "accel-hysteresis": sensor.accel_hysteresis,
+    "accel-thermal-bias": sensor.thermal("accelerometer", "bias"),
+    "accel-thermal-scale": sensor.thermal("accelerometer", "scale"),
+    "gyro-thermal-bias": sensor.thermal("gyroscope", "bias"),
+    "gyro-thermal-scale": sensor.thermal("gyroscope", "scale"),
+    "accel-hidden-drift": sensor.drift("accelerometer"),
+    "gyro-hidden-drift": sensor.drift("gyroscope"),
+    "gyro-g-sensitivity": sensor.g_sensitivity,
+    "gyro-scale-nonlinearity": sensor.gyro_nonlinearity,
+    "gyro-saturation": sensor.saturation("gyroscope"),
+    "accel-saturation": sensor.saturation("accelerometer"),
+    "lever-arm": sensor.lever_arm,
+    "accel-size-effect": sensor.size_effect,
+    "accel-gyro-time-offset": experiment.time_offset,
+    "sensor-lag": sensor.lag,
+    "dropped-samples": experiment.dropped,
+    "timing-jitter": experiment.jitter,
+    "earth-rate": experiment.earth_rate,
+    "vibration-rectification": experiment.rectification,
+    "periodic-interference": sensor.interference,
+    "quantisation": sensor.quantisation,
+    "supply-sensitivity": sensor.supply,
+    "disturbed-pose": experiment.disturbed,
+    "turn-angle-error": experiment.turn_errors,
+    "table-tilt": experiment.table_tilt,
+    "axis-handedness": sensor.handedness,
+}
+
+EFFECT_IDS: tuple[str, ...] = tuple(_EFFECTS)
+"""Ids of the diagnosis catalogue that can be simulated: all of them."""
+
+
+def with_effect(scenario: Scenario, effect_id: str, **size: Any) -> Scenario:
+    """The same scenario with one effect of the catalogue switched on at a stated size.
+
+    Raises
+    ------
+    ValueError
+        When the id is unknown or its parameters are not what the effect takes.
+    """
+    if effect_id not in _EFFECTS:
+        raise ValueError(f"no effect is called {effect_id!r}; there are {', '.join(_EFFECTS)}")
+    try:
+        return _EFFECTS[effect_id](scenario, **size)
+    except TypeError as error:
+        raise ValueError(f"effect {effect_id}: {str(error).split('() ', 1)[-1]}") from None

@@ -1,0 +1,100 @@
+"""Effects of the clock, the place and the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from trihedron.simulate.effects.sizes import Sensor, Values, checked, triple
+from trihedron.simulate.motion import Disturb, Hold, Motion, Step, Turn, Vibrate
+from trihedron.simulate.scenario import Loss, Scenario
+
+
+def time_offset(scenario: Scenario, offset_s: float) -> Scenario:
+    return replace(scenario, clock=replace(scenario.clock, gyroscope_offset_s=offset_s))
+
+
+def dropped(
+    scenario: Scenario,
+    losses: Sequence[Sequence[float]] = (),
+    probability: float = 0.0,
+    restamped: bool = True,
+) -> Scenario:
+    listed = tuple(Loss(float(t), int(n)) for t, n in losses)
+    clock = replace(scenario.clock, losses=listed, loss_probability=probability, restamped=restamped)
+    return replace(scenario, clock=clock)
+
+
+def jitter(scenario: Scenario, jitter_s: float = 0.0, rate_error: float = 0.0, shown: bool = False) -> Scenario:
+    clock = replace(scenario.clock, jitter_s=jitter_s, rate_error=rate_error, stamps_show_jitter=shown)
+    return replace(scenario, clock=clock)
+
+
+def earth_rate(scenario: Scenario, latitude_deg: float = 55.7, heading_deg: float = 0.0) -> Scenario:
+    place = replace(scenario.environment, earth_rate=True, latitude_deg=latitude_deg, heading_deg=heading_deg)
+    return replace(scenario, environment=place)
+
+
+def rectification(
+    scenario: Scenario,
+    sensor: Sensor,
+    coefficient: Values,
+    rms_m_s2: float = 2.0,
+    low_hz: float = 20.0,
+    high_hz: float = 40.0,
+    every: int = 2,
+) -> Scenario:
+    """Every ``every``-th hold after the first stands on a machine that shakes."""
+    part = replace(getattr(scenario, checked(sensor)), rectification=triple(coefficient))
+    steps: list[Step] = []
+    count = 0
+    for step in scenario.motion.steps:
+        if isinstance(step, Hold):
+            count += 1
+            if count > 1 and count % every == 0:
+                shaken = Vibrate((1.0, 1.0, 1.0), rms_m_s2, low_hz, step.duration_s, high_hz=high_hz, name=step.name)
+                steps.append(shaken)
+                continue
+        steps.append(step)
+    return replace(scenario, **{sensor: part}, motion=replace(scenario.motion, steps=tuple(steps)))
+
+
+def disturbed(scenario: Scenario, poses: Sequence[int], tilt_deg: float = 0.5, shift_m: float = 0.001) -> Scenario:
+    """The holds of these numbers (from 0) are pushed in their middle."""
+    steps: list[Step] = []
+    count = 0
+    for step in scenario.motion.steps:
+        if isinstance(step, Hold):
+            if count in poses:
+                rest = max((step.duration_s - 0.6) / 2.0, 0.1)
+                steps += [
+                    replace(step, duration_s=rest),
+                    Disturb(0.6, tilt_deg, shift_m),
+                    replace(step, duration_s=rest),
+                ]
+            else:
+                steps.append(step)
+            count += 1
+        else:
+            steps.append(step)
+    if any(not 0 <= p < count for p in poses):
+        raise ValueError(f"the motion has holds 0 to {count - 1}, got {list(poses)}")
+    return replace(scenario, motion=replace(scenario.motion, steps=tuple(steps)))
+
+
+def turn_errors(scenario: Scenario, errors_deg: Sequence[float]) -> Scenario:
+    steps: list[Step] = []
+    count = 0
+    for step in scenario.motion.steps:
+        if isinstance(step, Turn):
+            step = replace(step, error_deg=float(errors_deg[count % len(errors_deg)]))
+            count += 1
+        steps.append(step)
+    if count == 0:
+        raise ValueError("turn-angle-error needs a motion with turns of stated angles, for instance table-turns")
+    return replace(scenario, motion=replace(scenario.motion, steps=tuple(steps)))
+
+
+def table_tilt(scenario: Scenario, tilt_deg: Sequence[float]) -> Scenario:
+    motion: Motion = replace(scenario.motion, table_tilt_deg=(float(tilt_deg[0]), float(tilt_deg[1])))
+    return replace(scenario, motion=motion)

@@ -1,0 +1,218 @@
+"""Steps laid end to end in time, as the tables that the kernel evaluates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from trihedron import _core
+from trihedron.records.truth import SegmentKind
+from trihedron.simulate.motion.attitude import (
+    quaternion_from_vector,
+    quaternion_product,
+    shortest_turn,
+    unit,
+    up_in_body,
+    vector_from_quaternion,
+)
+from trihedron.simulate.motion.steps import (
+    NOWHERE,
+    FloatArray,
+    Hold,
+    Motion,
+    MoveTo,
+    Oscillate,
+    Quaternion,
+    Replay,
+    Step,
+    Turn,
+    Vector,
+    Vibrate,
+)
+from trihedron.units import radians_from_degrees
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """One step on the motion's clock."""
+
+    kind: SegmentKind
+    name: str
+    start_s: float
+    stop_s: float
+    axis: Vector
+    turn_rad: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A motion laid out in time: the tables that the kernel evaluates, and the label of every step."""
+
+    segments: FloatArray
+    wobble: FloatArray
+    shake: FloatArray
+    replay: FloatArray
+    labels: tuple[Label, ...] = field(default=())
+
+    @property
+    def duration_s(self) -> float:
+        """End of the last step."""
+        return float(self.segments[-1, 0] + self.segments[-1, 1])
+
+    def evaluate(
+        self, time_s: FloatArray, gravity_m_s2: float, earth_rate_rad_s: Vector = NOWHERE
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Attitude (n, 4), inertial rate (n, 3), its derivative (n, 3), specific force (n, 3) at the instants.
+
+        All in the body frame at its reference point, SI. Exact: closed forms with their derivatives.
+        """
+        return _core.simulate_motion(
+            self.segments,
+            self.wobble,
+            self.shake,
+            self.replay,
+            np.ascontiguousarray(time_s, dtype=np.float64),
+            gravity_m_s2,
+            earth_rate_rad_s,
+        )
+
+
+class _Planner:
+    """Lays steps end to end, keeping the attitude."""
+
+    def __init__(self, motion: Motion, rng: np.random.Generator) -> None:
+        tilt = [radians_from_degrees(motion.table_tilt_deg[0]), radians_from_degrees(motion.table_tilt_deg[1]), 0.0]
+        self.tilt = quaternion_from_vector(tilt)
+        self.attitude = quaternion_product(self.tilt, motion.start)
+        self.time = 0.0
+        self.rng = rng
+        self.rows: list[list[float]] = []
+        self.wobble: list[list[float]] = []
+        self.shake: list[list[float]] = []
+        self.replay: list[FloatArray] = []
+        self.labels: list[Label] = []
+
+    def add(
+        self,
+        kind: SegmentKind,
+        name: str,
+        duration_s: float,
+        rotation: FloatArray | None = None,
+        ramp: float = 0.5,
+        travel: Vector = NOWHERE,
+        arm: Vector = NOWHERE,
+        fade: float = 0.5,
+        stated_rad: float | None = None,
+    ) -> int:
+        if not (math.isfinite(duration_s) and duration_s > 0.0):
+            raise ValueError(f"step {len(self.rows)} ({kind} {name}) must last a positive time, got {duration_s} s")
+        vector = np.zeros(3) if rotation is None else rotation
+        angle = float(np.linalg.norm(vector))
+        axis = vector / angle if angle > 0.0 else np.array([1.0, 0.0, 0.0])
+        if stated_rad is not None and stated_rad < 0.0:
+            axis, signed = -axis, -angle
+        else:
+            signed = angle
+        row = [self.time, duration_s, *self.attitude, *axis, signed, ramp, *travel, *arm, fade]
+        self.rows.append(row)
+        stop = self.time + duration_s
+        label_axis = (float(axis[0]), float(axis[1]), float(axis[2])) if angle > 0.0 else NOWHERE
+        self.labels.append(Label(kind, name, self.time, stop, label_axis, signed))
+        self.time = stop
+        self.attitude = quaternion_product(self.attitude, quaternion_from_vector(vector))
+        return len(self.rows) - 1
+
+    def add_wobble(self, segment: int, size_deg: float, frequency_hz: float) -> None:
+        if size_deg == 0.0:
+            return
+        size = radians_from_degrees(size_deg) / math.sqrt(3.0)
+        for factor in (0.37, 0.71, 1.0):
+            amplitude = size * self.rng.normal(size=3)
+            self.wobble.append([segment, *amplitude, factor * frequency_hz, self.rng.uniform(0.0, 2.0 * math.pi)])
+
+    def step(self, step: Step) -> None:
+        if isinstance(step, Hold):
+            creep = radians_from_degrees(step.creep_deg) * unit(step.creep_axis)
+            self.add("hold", step.name, step.duration_s, creep if step.creep_deg else None, ramp=0.05)
+        elif isinstance(step, MoveTo):
+            # Body vector v turns so that the new zenith is `up`: R' = R exp(v), exp(v) up = old zenith in the body.
+            turn = quaternion_from_vector(shortest_turn(unit(step.up), up_in_body(self.attitude_above_table())))
+            heading = quaternion_from_vector(radians_from_degrees(step.heading_deg) * unit(step.up))
+            rotation = vector_from_quaternion(quaternion_product(turn, heading))
+            k = self.add("move", step.name, step.duration_s, rotation, step.ramp, step.travel_m, step.arm_m)
+            self.add_wobble(k, step.wobble_deg, step.wobble_hz)
+        elif isinstance(step, Turn):
+            sign = 1.0 if step.angle_deg >= 0.0 else -1.0
+            angle = radians_from_degrees(step.angle_deg + step.error_deg)
+            k = self.add(
+                "turn",
+                step.name,
+                step.duration_s,
+                angle * unit(step.axis),
+                step.ramp,
+                step.travel_m,
+                step.arm_m,
+                stated_rad=sign,
+            )
+            self.add_wobble(k, step.wobble_deg, step.wobble_hz)
+        elif isinstance(step, Oscillate):
+            k = self.add("oscillation", step.name, step.duration_s, arm=step.arm_m, fade=step.fade)
+            amplitude = radians_from_degrees(step.amplitude_deg) * unit(step.axis)
+            self.wobble.append([k, *amplitude, step.frequency_hz, 0.0])
+        elif isinstance(step, Vibrate):
+            k = self.add("vibration", step.name, step.duration_s, fade=step.fade)
+            lines = [step.low_hz] if step.high_hz == 0.0 else np.linspace(step.low_hz, step.high_hz, step.n_lines)
+            peak = step.rms_m_s2 * math.sqrt(2.0 / len(lines))
+            for line in lines:
+                amplitude = peak / (2.0 * math.pi * float(line)) ** 2 * unit(step.direction)
+                self.shake.append([k, *amplitude, float(line), self.rng.uniform(0.0, 2.0 * math.pi)])
+        elif isinstance(step, Replay):
+            k = self.add("move", step.name, step.duration_s, arm=step.arm_m)
+            knots = np.column_stack([np.full(len(step.rate_rad_s), float(k)), step.rate_rad_s, step.acceleration_m_s2])
+            self.replay.append(knots)
+            self.attitude = self.end_of_replay(knots)
+        else:
+            k = self.add("disturbance", step.name, step.duration_s)
+            self.add_wobble(k, step.tilt_deg, step.frequency_hz)
+            if step.shift_m:
+                shift = step.shift_m * self.rng.normal(size=3)
+                self.shake.append([k, *shift, step.frequency_hz, self.rng.uniform(0.0, 2.0 * math.pi)])
+
+    def end_of_replay(self, knots: FloatArray) -> Quaternion:
+        """Attitude after the last row, which is a replay."""
+        alone = knots.copy()
+        alone[:, 0] = 0.0
+        empty = np.zeros((0, 6))
+        end = np.array([self.time])
+        q, *_ = _core.simulate_motion(np.array([self.rows[-1]]), empty, empty, alone, end, 0.0, NOWHERE)
+        w, x, y, z = (float(c) for c in q[0])
+        return (w, x, y, z)
+
+    def attitude_above_table(self) -> Quaternion:
+        """Attitude relative to the table, which is what a person aims at."""
+        w, x, y, z = self.tilt
+        return quaternion_product((w, -x, -y, -z), self.attitude)
+
+
+def plan_motion(motion: Motion, rng: np.random.Generator) -> Plan:
+    """Lay a motion out in time.
+
+    Raises
+    ------
+    ValueError
+        Without steps, with a duration that is not positive, or a direction of zero length.
+    """
+    if not motion.steps:
+        raise ValueError("a motion needs at least one step, for instance a Hold")
+    planner = _Planner(motion, rng)
+    for step in motion.steps:
+        planner.step(step)
+    return Plan(
+        np.array(planner.rows),
+        np.array(planner.wobble).reshape(-1, 6),
+        np.array(planner.shake).reshape(-1, 6),
+        np.concatenate(planner.replay) if planner.replay else np.zeros((0, 7)),
+        tuple(planner.labels),
+    )

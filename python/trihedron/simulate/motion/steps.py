@@ -1,0 +1,157 @@
+"""What a person, a turntable or a shaker does with the instrument, step by step.
+
+A motion is a start attitude and a list of steps; each starts where the last one ended, at rest. Attitudes are
+quaternions (w, x, y, z) from the body frame Mz to a level frame whose z axis points up. Angles that people write are
+in degrees (``_deg``), everything else is SI.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+Vector: TypeAlias = tuple[float, float, float]
+Quaternion: TypeAlias = tuple[float, float, float, float]
+
+LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
+NOWHERE: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Stand still. ``creep_deg`` turns slowly by that angle about ``creep_axis`` (body) over the whole hold."""
+
+    duration_s: float
+    name: str = ""
+    creep_deg: float = 0.0
+    creep_axis: Vector = (1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class MoveTo:
+    """Bring the body direction ``up`` to the vertical by the shortest way, with a turn of heading on the way.
+
+    ``wobble_deg`` is the size of the hand's departure from the straight turn (smooth, gone at both ends),
+    ``travel_m`` how far the hand carries the case (level frame), ``arm_m`` the way from the pivot of the turn to the
+    body's reference point (body frame).
+    """
+
+    up: Vector
+    duration_s: float = 2.0
+    heading_deg: float = 0.0
+    wobble_deg: float = 0.0
+    wobble_hz: float = 2.0
+    travel_m: Vector = NOWHERE
+    arm_m: Vector = NOWHERE
+    ramp: float = 0.5
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Turn by a known angle about a fixed body axis; speed rises and falls over the fraction ``ramp`` of the time.
+
+    ``error_deg`` is what the turn truly exceeds its stated angle by.
+    """
+
+    axis: Vector
+    angle_deg: float
+    duration_s: float
+    ramp: float = 0.2
+    error_deg: float = 0.0
+    wobble_deg: float = 0.0
+    wobble_hz: float = 2.0
+    travel_m: Vector = NOWHERE
+    arm_m: Vector = NOWHERE
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Oscillate:
+    """Swing about a body axis: ``amplitude_deg · sin(2π frequency t)``, faded in and out."""
+
+    axis: Vector
+    amplitude_deg: float
+    frequency_hz: float
+    duration_s: float
+    fade: float = 0.1
+    arm_m: Vector = NOWHERE
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Vibrate:
+    """Shake the standing body along a level-frame direction.
+
+    A line at ``low_hz`` when ``high_hz`` is 0, else a band: ``n_lines`` lines of random phase spread evenly over
+    ``[low_hz, high_hz]``, flat in acceleration. ``rms_m_s2`` is the acceleration's root mean square.
+    """
+
+    direction: Vector
+    rms_m_s2: float
+    low_hz: float
+    duration_s: float
+    high_hz: float = 0.0
+    n_lines: int = 40
+    fade: float = 0.02
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Disturb:
+    """A push during a hold: a half-second rocking and shift that leaves the pose as it was."""
+
+    duration_s: float = 0.6
+    tilt_deg: float = 0.3
+    shift_m: float = 0.0005
+    frequency_hz: float = 5.0
+    name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """A rate given at evenly spaced knots over the duration, straight lines between them: a rate table's profile, or
+    the moves of a real recording.
+
+    ``rate_rad_s`` (m, 3) body frame, ``acceleration_m_s2`` (m, 3) of the reference point, level frame.
+    """
+
+    rate_rad_s: FloatArray
+    acceleration_m_s2: FloatArray
+    duration_s: float
+    arm_m: Vector = NOWHERE
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        rate, acceleration = np.asarray(self.rate_rad_s, dtype=float), np.asarray(self.acceleration_m_s2, dtype=float)
+        if rate.ndim != 2 or rate.shape[1:] != (3,) or len(rate) < 2 or rate.shape != acceleration.shape:
+            shapes = f"{rate.shape} and {acceleration.shape}"
+            raise ValueError(f"a replay needs rate and acceleration of one shape (m, 3), m >= 2, got {shapes}")
+        if not (np.isfinite(rate).all() and np.isfinite(acceleration).all()):
+            raise ValueError("a replay must not hold values that are not finite")
+        object.__setattr__(self, "rate_rad_s", rate)
+        object.__setattr__(self, "acceleration_m_s2", acceleration)
+
+
+Step: TypeAlias = Hold | MoveTo | Turn | Oscillate | Vibrate | Disturb | Replay
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Steps from a start attitude.
+
+    ``table_tilt_deg`` leans the whole level frame about its x and y axes: what is called level is not.
+    """
+
+    steps: tuple[Step, ...]
+    start: Quaternion = LEVEL
+    table_tilt_deg: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def duration_s(self) -> float:
+        """Sum of the steps."""
+        return float(sum(step.duration_s for step in self.steps))
