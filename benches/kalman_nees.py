@@ -48,7 +48,6 @@ def main():
             model = shaping_model(noise, options, session_s=SESSION_S, hold_s=5.0)
             values, errors, nis, alarms = [], [], [], np.zeros(2, dtype=int)
             for seed in range(SEEDS):
-                # Another order of the poses for every seed where the rounding of exact angles would repeat itself.
                 z, start, hold = readings(mix, 10_000 + seed)
                 runs = [nees(model, z, REFERENCES, start, hold, n) for n in AT]
                 values.append([r[0] for r in runs])

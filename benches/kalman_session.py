@@ -113,6 +113,8 @@ def readings(mix, seed, references=REFERENCES):
     clean = references @ CONSTANTS[:3] + CONSTANTS[3]
     samples = clean[:, None] + x.reshape(len(references), per_pose)[:, :per_hold]
     if mix.converter:
-        samples = np.round(samples / STEP) * STEP
+        # Where the steps lie differs from converter to converter; without it every seed would round the same way.
+        shift = STEP * rng.random()
+        samples = np.round((samples - shift) / STEP) * STEP + shift
     start = (HOLD_S + pause) * np.arange(len(references))
     return samples.mean(axis=1), start, np.full(len(references), HOLD_S)

@@ -4,6 +4,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{Matrix3, Vector3};
 use std::hint::black_box;
 use trihedron::gauss_newton::Loss;
+use trihedron::kalman::{AxisFilter, NoiseTerms, Pose, Prior, ShapingModel};
 use trihedron::norm_invariant::{Frame, Objective, Readings, Settings, fit};
 use trihedron::poisson::{MoveRange, RateModel, RateNoise, prepare};
 use trihedron::rotation;
@@ -93,5 +94,65 @@ fn poisson(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, rotations, norm_fits, poisson);
+/// One pose of the Kalman filter of one axis: time update, measurement update, on a regular log.
+fn kalman_poses(c: &mut Criterion) {
+    let model = |averages, flicker_rates: &[f64]| ShapingModel {
+        terms: NoiseTerms {
+            quantisation: 0.0,
+            white: 0.02,
+            flicker: 0.01,
+            walk: 1e-3,
+            ramp: 1e-5,
+            resolution: 0.0,
+        },
+        flicker_rates: flicker_rates.to_vec(),
+        ramp_frequency: 1e-5,
+        ramp_damping: 0.7,
+        dither: 0.0,
+        averages,
+    };
+    let prior = Prior {
+        mean: [0.0; 4],
+        sigma: [1e6; 4],
+        walk: [0.0; 4],
+    };
+    let six_rates = [1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0];
+    for (name, model) in [
+        (
+            "kalman::AxisFilter::add, 8 states of the article",
+            model(false, &[0.01]),
+        ),
+        (
+            "kalman::AxisFilter::add, 9 states, exact means",
+            model(true, &[0.01]),
+        ),
+        (
+            "kalman::AxisFilter::add, 14 states, exact means",
+            model(true, &six_rates),
+        ),
+    ] {
+        let mut filter = AxisFilter::new(model, &prior).expect("a sound model");
+        let mut k = 0_u32;
+        c.bench_function(name, |b| {
+            b.iter(|| {
+                let angle = f64::from(k % 360).to_radians();
+                let pose = Pose {
+                    reading: 0.1 * angle.sin(),
+                    reference: [
+                        9.8 * angle.sin(),
+                        9.8 * angle.cos(),
+                        4.9 * (3.0 * angle).sin(),
+                    ],
+                    start: 10.0 * f64::from(k),
+                    hold: 5.0,
+                    extra_variance: 0.0,
+                };
+                k += 1;
+                black_box(filter.add(black_box(&pose)))
+            });
+        });
+    }
+}
+
+criterion_group!(benches, rotations, norm_fits, poisson, kalman_poses);
 criterion_main!(benches);
