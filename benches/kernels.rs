@@ -103,6 +103,8 @@ fn kalman_poses(c: &mut Criterion) {
             flicker: 0.01,
             walk: 1e-3,
             ramp: 1e-5,
+            gauss_markov: 0.0,
+            gauss_markov_rate: 0.0,
             resolution: 0.0,
         },
         flicker_rates: flicker_rates.to_vec(),

@@ -31,15 +31,8 @@ SIGMA = 0.11 * 0.032002 / GRAVITY
 
 
 def compiled(*, rates=(0.01,), averages=True, ramp_frequency=1e-4, **terms):
-    named = {
-        "quantisation": 0.0,
-        "white": 0.0,
-        "flicker": 0.0,
-        "walk": 0.0,
-        "ramp": 0.0,
-        "resolution": 0.0,
-        "dither": 0.0,
-    }
+    names = "quantisation white flicker walk ramp gauss_markov gauss_markov_rate resolution dither"
+    named = dict.fromkeys(names.split(), 0.0)
     return _core.AxisKalmanModel(
         **(named | terms),
         flicker_rates=list(rates),
@@ -64,6 +57,7 @@ MIXES = {
     "walk": {"white": 0.02, "walk": 0.004},
     "ramp": {"white": 0.02, "ramp": 0.001, "ramp_frequency": 1e-11},
     "flicker": {"white": 0.02, "flicker": 0.02, "rates": (0.003, 0.03, 0.3)},
+    "Gauss-Markov": {"white": 0.02, "gauss_markov": 0.03, "gauss_markov_rate": 0.02},
     "everything": {
         "white": 0.02,
         "quantisation": 0.03,
@@ -72,6 +66,8 @@ MIXES = {
         "ramp_frequency": 1e-11,
         "flicker": 0.02,
         "rates": (0.003, 0.03, 0.3),
+        "gauss_markov": 0.03,
+        "gauss_markov_rate": 0.02,
     },
 }
 
@@ -84,8 +80,9 @@ def covariance_by_hand(mix, start, hold):
     sigma = flicker * np.sqrt(np.log(10.0) / np.pi)
     ends = {min(rates, default=0.0), max(rates, default=0.0)}
     # The slowest and fastest process also stand for what lies beyond them.
+    alone = (terms.pop("gauss_markov_rate", 0.0), terms.pop("gauss_markov", 0.0))
     processes = [(beta, sigma * np.sqrt(1.25 if beta in ends else 1.0)) for beta in rates]
-    return covariance_of_hold_means(start, hold, gauss_markov=processes, **terms)
+    return covariance_of_hold_means(start, hold, gauss_markov=processes + [alone] * (alone[1] > 0), **terms)
 
 
 @pytest.mark.parametrize("mix", MIXES.values(), ids=MIXES)
@@ -329,6 +326,27 @@ def test_one_angle_alone_does_not_determine_an_axis():
         calibrate_with_references(
             table.specific_force, table, AxisNoise(white=0.01), start_s=10.0 * np.arange(36), hold_s=5.0
         )
+
+
+def test_a_head_with_one_axis_is_enough_with_a_prior():
+    table = PoseTable.from_angles(np.arange(0.0, 360.0, 10.0), gravity_m_s2=GRAVITY)
+    rng = np.random.default_rng(15)
+    readings = table.specific_force + 0.01 * rng.standard_normal((36, 3))
+    mean, sigma = np.hstack([np.eye(3), np.zeros((3, 1))]), np.full((3, 4), 0.05)
+    result = calibrate_with_references(
+        readings,
+        table,
+        AxisNoise(white=0.01 * 5**0.5),
+        start_s=10.0 * np.arange(36),
+        hold_s=5.0,
+        prior=Prior(mean, sigma, np.zeros((3, 4))),
+    )
+    for axis in result.axes:
+        # What gravity does not show stays as it was believed; the rest is twenty times better known.
+        assert axis.sigma[1] == pytest.approx(0.05, rel=1e-6)
+        assert np.all(axis.sigma[[0, 2, 3]] < 0.05 / 20)
+        assert axis.batch == {}
+    assert FindingCode.WEAKLY_OBSERVABLE in {finding.code for finding in result.findings}
 
 
 def test_an_uncertain_head_widens_the_error_bars_by_its_angle():

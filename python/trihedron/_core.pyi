@@ -122,6 +122,8 @@ class AxisKalmanModel:
         flicker: float,
         walk: float,
         ramp: float,
+        gauss_markov: float,
+        gauss_markov_rate: float,
         resolution: float,
         dither: float,
         flicker_rates: Sequence[float],

@@ -22,6 +22,10 @@ pub struct NoiseTerms {
     pub walk: f64,
     /// Standard deviation of the slope of the drift, u/s.
     pub ramp: f64,
+    /// Standard deviation of a Gauss-Markov process that was seen as such, u.
+    pub gauss_markov: f64,
+    /// Its inverse correlation time, 1/s.
+    pub gauss_markov_rate: f64,
     /// Resolution of the reading itself (one step of the converter), u.
     pub resolution: f64,
 }
@@ -97,6 +101,7 @@ impl ShapingModel {
             ("flicker", t.flicker),
             ("walk", t.walk),
             ("ramp", t.ramp),
+            ("Gauss-Markov", t.gauss_markov),
             ("resolution", t.resolution),
         ] {
             if !(value.is_finite() && value >= 0.0) {
@@ -128,6 +133,11 @@ impl ShapingModel {
                     "the inverse correlation times of flicker noise must be positive and increasing",
                 ));
             }
+        }
+        if t.gauss_markov > 0.0 && !(t.gauss_markov_rate.is_finite() && t.gauss_markov_rate > 0.0) {
+            return Err(Error::bad_input(
+                "a Gauss-Markov process needs a positive and finite correlation time",
+            ));
         }
         if t.ramp > 0.0
             && !(self.ramp_frequency > 0.0
@@ -168,25 +178,26 @@ impl ShapingModel {
     pub fn system(&self) -> Result<Shaping> {
         self.check()?;
         let t = &self.terms;
-        let n_flicker = if t.flicker > 0.0 {
-            self.flicker_rates.len()
-        } else {
-            0
-        };
-        let n = n_flicker + usize::from(t.walk > 0.0) + 2 * usize::from(t.ramp > 0.0);
+        let mut processes: Vec<(f64, f64)> = Vec::new();
+        if t.flicker > 0.0 {
+            let sigmas = self.flicker_sigmas();
+            processes.extend(self.flicker_rates.iter().copied().zip(sigmas));
+        }
+        if t.gauss_markov > 0.0 {
+            processes.push((t.gauss_markov_rate, t.gauss_markov));
+        }
+        let n = processes.len() + usize::from(t.walk > 0.0) + 2 * usize::from(t.ramp > 0.0);
         let mut f = DMatrix::zeros(n, n);
         let mut qc = DMatrix::zeros(n, n);
         let mut h = DVector::zeros(n);
         let mut p0 = DMatrix::zeros(n, n);
-        let sigmas = self.flicker_sigmas();
-        for i in 0..n_flicker {
-            let beta = self.flicker_rates[i];
+        for (i, (beta, sigma)) in processes.iter().enumerate() {
             f[(i, i)] = -beta;
             qc[(i, i)] = 2.0 * beta;
-            h[i] = sigmas[i];
+            h[i] = *sigma;
             p0[(i, i)] = 1.0;
         }
-        let mut i = n_flicker;
+        let mut i = processes.len();
         if t.walk > 0.0 {
             // Starts at zero: U0 is the zero reading at the start, which a free start could not be told from.
             qc[(i, i)] = 1.0;

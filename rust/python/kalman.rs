@@ -101,7 +101,7 @@ pub(super) struct AxisKalmanModel {
 #[pymethods]
 impl AxisKalmanModel {
     #[new]
-    #[pyo3(signature = (*, quantisation, white, flicker, walk, ramp, resolution, dither, flicker_rates, ramp_frequency, ramp_damping, averages))]
+    #[pyo3(signature = (*, quantisation, white, flicker, walk, ramp, gauss_markov, gauss_markov_rate, resolution, dither, flicker_rates, ramp_frequency, ramp_damping, averages))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         quantisation: f64,
@@ -109,6 +109,8 @@ impl AxisKalmanModel {
         flicker: f64,
         walk: f64,
         ramp: f64,
+        gauss_markov: f64,
+        gauss_markov_rate: f64,
         resolution: f64,
         dither: f64,
         flicker_rates: Vec<f64>,
@@ -123,6 +125,8 @@ impl AxisKalmanModel {
                 flicker,
                 walk,
                 ramp,
+                gauss_markov,
+                gauss_markov_rate,
                 resolution,
             },
             flicker_rates,

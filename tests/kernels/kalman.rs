@@ -123,6 +123,8 @@ fn model() -> ShapingModel {
             flicker: 0.0,
             walk: 0.001,
             ramp: 0.0,
+            gauss_markov: 0.0,
+            gauss_markov_rate: 0.0,
             resolution: 0.0,
         },
         flicker_rates: vec![],

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import fields
 from pathlib import Path
 
 from trihedron.read.errors import ReadError, check_readable
 from trihedron.records import AxisNoise
 
-TERMS = ("quantisation", "white", "flicker", "walk", "ramp", "resolution", "sample_sigma")
+TERMS = tuple(field.name for field in fields(AxisNoise))
 
 
 def read_axis_noise(path: str | os.PathLike[str]) -> tuple[AxisNoise, AxisNoise, AxisNoise]:

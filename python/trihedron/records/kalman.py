@@ -22,8 +22,9 @@ class AxisNoise:
     """Noise of one axis by its Allan coefficients, in the raw unit ``u`` of the axis (docs/kalman.md, eq. 3).
 
     ``quantisation`` Q [u·s] of the integrated output, ``white`` N [u/√Hz], ``flicker`` B [u], ``walk`` K [u/√s],
-    ``ramp`` R [u/s]; ``resolution`` is one step of the converter [u] and ``sample_sigma`` the noise of one sample
-    before it [u], which decides how much of the rounding error averages out (0: none of it).
+    ``ramp`` R [u/s]; ``gauss_markov`` [u] is the standard deviation of a first-order process seen as such, with
+    correlation time ``gauss_markov_time_s``. ``resolution`` is one step of the converter [u] and ``sample_sigma`` the
+    noise of one sample before it [u], which decides how much of the rounding error averages out (0: none of it).
     """
 
     quantisation: float = 0.0
@@ -31,6 +32,8 @@ class AxisNoise:
     flicker: float = 0.0
     walk: float = 0.0
     ramp: float = 0.0
+    gauss_markov: float = 0.0
+    gauss_markov_time_s: float = 0.0
     resolution: float = 0.0
     sample_sigma: float = 0.0
 
@@ -41,7 +44,8 @@ class AxisNoise:
 
     def scaled(self, factor: float) -> AxisNoise:
         """The same noise in another unit, or with every amplitude multiplied."""
-        return AxisNoise(**{name: factor * value for name, value in vars(self).items()})
+        times = {"gauss_markov_time_s"}
+        return AxisNoise(**{k: v if k in times else factor * v for k, v in vars(self).items()})
 
 
 def _dividing_head() -> FloatArray:

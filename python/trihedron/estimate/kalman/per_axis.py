@@ -84,7 +84,8 @@ def calibrate_with_references(
     extra_variance : (n,), (n, 3) or scalar
         Variance of a reading on top of the noise model, raw².
     prior : Prior, optional
-        Default: none at all (diffuse).
+        Default: none at all (diffuse). With a prior the poses need not determine every constant (a head with one axis);
+        the batch solutions are then left out.
     with_baselines : bool
         Also run recursive and batch least squares, ordinary and generalised. The latter cost O(n³).
 
@@ -113,6 +114,7 @@ def calibrate_with_references(
     if table.sigma_m_s2 > 0:
         # An angle error moves the reference sideways by σ; the axis' own sensitivity turns it into raw units.
         extra = extra + (table.sigma_m_s2 * _sensitivity(z, f)) ** 2
+    is_diffuse = prior is None
     if prior is None:
         prior = Prior.diffuse([model.fast_variance(float(np.min(hold))) ** 0.5 for model in models])
 
@@ -122,6 +124,7 @@ def calibrate_with_references(
         result = _one_axis(
             axis, noises[axis], models[axis], prior, z[:, axis].copy(), f, start, hold, extra[:, axis].copy(),
             with_baselines=with_baselines,
+            must_determine=is_diffuse,
         )  # fmt: skip
         axes.append(result)
         findings += consistency_findings(axis, result.consistency)
@@ -155,6 +158,7 @@ def _one_axis(
     extra: FloatArray,
     *,
     with_baselines: bool,
+    must_determine: bool,
 ) -> AxisKalmanResult:
     mean, sigma, walk = prior.mean[axis].copy(), prior.sigma[axis].copy(), prior.walk[axis].copy()
     constants, stated, covariance, innovation, variance, drift, drift_sigma = _core.kalman_track(
@@ -167,17 +171,20 @@ def _one_axis(
         # Ordinary least squares is told the scatter of one reading, which is all it can use.
         white = model.fast_variance(float(np.median(hold))) + float(np.median(extra))
         recursive = _core.kalman_least_squares(z, f, white, mean, sigma)
-        ols, ols_cov, gls, gls_cov, track, track_sigma = _core.kalman_generalised_least_squares(
-            model, mean, sigma, z, f, start, hold, extra
-        )
-        tracks += [
-            ConstantsTrack("recursive least squares", *recursive),
-            ConstantsTrack("recursive generalised least squares", track, track_sigma),
-        ]
-        batch = {
-            "least squares": (ols, np.sqrt(np.diag(ols_cov))),
-            "generalised least squares": (gls, np.sqrt(np.diag(gls_cov))),
-        }
+        tracks.append(ConstantsTrack("recursive least squares", *recursive))
+        try:
+            ols, ols_cov, gls, gls_cov, *track = _core.kalman_generalised_least_squares(
+                model, mean, sigma, z, f, start, hold, extra
+            )
+        except ValueError:
+            if must_determine:
+                raise
+        else:
+            tracks.append(ConstantsTrack("recursive generalised least squares", track[0], track[1]))
+            batch = {
+                "least squares": (ols, np.sqrt(np.diag(ols_cov))),
+                "generalised least squares": (gls, np.sqrt(np.diag(gls_cov))),
+            }
     innovation_sigma = np.sqrt(variance)
     return AxisKalmanResult(
         axis=axis,

@@ -50,6 +50,8 @@ def shaping_model(
         flicker=noise.flicker,
         walk=noise.walk,
         ramp=noise.ramp,
+        gauss_markov=noise.gauss_markov,
+        gauss_markov_rate=1.0 / noise.gauss_markov_time_s if noise.gauss_markov_time_s > 0 else 0.0,
         resolution=noise.resolution,
         dither=noise.sample_sigma,
         flicker_rates=list(rates),
