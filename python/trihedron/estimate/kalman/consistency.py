@@ -26,7 +26,7 @@ def is_settled(innovation_sigma: FloatArray) -> npt.NDArray[np.bool_]:
 
 
 def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> Consistency:
-    """Mean of the normalised innovation squared, and Ljung-Box test of whiteness (docs/kalman.md, eq. 12-13).
+    """Mean of the normalised innovation squared, and Ljung-Box test of whiteness (docs/kalman.md, eq. 11-12).
 
     Parameters
     ----------

@@ -207,7 +207,7 @@ def _one_axis(
 def direct_form(
     axes: Sequence[AxisKalmanResult], raw_unit: str, observability: Observability | None = None
 ) -> SensorCalibration:
-    """``raw = S_a f + b_a`` per axis → ``f = S raw + b`` with its covariance, to first order (docs/kalman.md, eq. 11).
+    """``raw = S_a f + b_a`` per axis → ``f = S raw + b`` with its covariance, to first order (docs/kalman.md, eq. 9).
 
     Raises
     ------
