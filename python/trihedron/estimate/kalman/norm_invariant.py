@@ -1,4 +1,4 @@
-"""Calibration without reference attitudes: at rest a corrected reading has gravity's length (docs/kalman.md, eq. 10)."""
+"""Calibration without reference attitudes: a reading at rest is as long as gravity (docs/kalman.md, eq. 10)."""
 
 from __future__ import annotations
 
