@@ -121,6 +121,7 @@ def test_a_softer_spring_and_a_wider_gap_lower_the_scale():
     warm = Environment(temperature=Temperature(start_degc=35.0))
     mass = replace(Accelerometer().mass, spring_per_k=(1e-4, 0, 0), gap_per_k=(0, 2e-4, 0))
     recording, truth = simulate(replace(IDEAL, accelerometer=Accelerometer(mass=mass), environment=warm))
+    assert truth.effects["accel-thermal-scale"]["mechanism_per_k"] == (-1e-4, -2e-4, 0)
     want = truth.specific_force_m_s2 / [1.001, 1.002, 1.0]
     assert np.abs(recording.accelerometer - want).max() < 1e-12
 
@@ -189,7 +190,8 @@ def test_a_butterworth_filter_is_3_db_down_at_its_corner_and_stops_what_would_al
 def test_a_moving_proof_mass_rings_at_its_resonance():
     mass = replace(Accelerometer().mass, moves=True, resonance_hz=(20.0,) * 3, quality=(3.0,) * 3)
     shaken = Motion((Hold(0.5), Vibrate((0, 0, 1), 0.5, 20.0, 20.0, fade=0.05)))
-    recording, _ = simulate(Scenario(shaken, accelerometer=Accelerometer(mass=mass)))
+    recording, truth = simulate(Scenario(shaken, accelerometer=Accelerometer(mass=mass)))
+    assert "sensor-lag" in truth.effects
     # Transfer at resonance is Q; the sinc² of 160 Hz fine steps at 20 Hz... is 5 % at 8 per sample of 100 Hz: 0.2 %.
     assert abs(recording.accelerometer[800:1900, 2].std() / (3.0 * 0.5) - 1.0) < 5e-3
 

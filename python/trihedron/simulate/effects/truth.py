@@ -29,6 +29,14 @@ def effects_of(scenario: Scenario) -> MappingProxyType[str, MappingProxyType[str
         note("accel-quadratic", k2=k2)
     if any(abs(v) > 1e-12 for v in k3):
         note("accel-cubic", k3=k3)
+    if accel.mass.moves:
+        note("sensor-lag", proof_mass=(accel.mass.resonance_hz, accel.mass.quality))
+    if gyro.sense_mode.bandwidth_hz:
+        note("sensor-lag", sense_mode=(gyro.sense_mode.bandwidth_hz, gyro.sense_mode.quality))
+    softer = (accel.mass.spring_per_k, accel.mass.gap_per_k)
+    if any(map(any, softer)) and not place.temperature.is_constant_reference:
+        # Both lower the scale: the mechanism's share of the linear coefficient.
+        note("accel-thermal-scale", mechanism_per_k=tuple(-a - b for a, b in zip(*softer, strict=True)))
     memory = accel.hysteresis
     if any(memory.offset_m_s2) or any(memory.creep_fraction):
         note("accel-hysteresis", **{name: getattr(memory, name) for name in memory.__dataclass_fields__})
