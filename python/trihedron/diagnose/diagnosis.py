@@ -238,9 +238,14 @@ def _accept_next(
     if not sound:
         return False
     best = max(sound, key=lambda r: r.bic_gain)
-    rivals = tuple(
-        r.scored.effect.id for r in refits if r is not best and r.bic_gain > best.bic_gain - CONFOUNDED_DELTA_BIC
-    )
+    # What another mechanism explains as well: by its joint fit, or, for all of its shapes, by the score test.
+    close = [r.scored.effect.id for r in refits if r is not best and r.bic_gain > best.bic_gain - CONFOUNDED_DELTA_BIC]
+    close += [
+        s.effect.id
+        for s in scored
+        if s.effect is not best.scored.effect and max(s.merits) > best.scored.merit - CONFOUNDED_DELTA_BIC
+    ]
+    rivals = tuple(dict.fromkeys(close))
     best = refined(context, model.distortions, best, prior)
     before_fit, before = model.fitted, model.prediction
     model.fitted = best.fitted

@@ -35,6 +35,7 @@ class Scored:
     rank: int
     p_value: float
     merit: float
+    merits: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +92,7 @@ def score_all(context: Context, exclude: set[str]) -> tuple[list[Scored], list[t
             missing.append((effect.id, reason))
             continue
         best: Scored | None = None
+        merits: list[float] = []
         variants = effect.variants(context)
         if not variants:
             continue  # judged by its own evidence
@@ -110,6 +112,7 @@ def score_all(context: Context, exclude: set[str]) -> tuple[list[Scored], list[t
             gain = max(gain, 0.0)
             n_shape = len(variant.shape)
             merit = gain - np.log(n_rows) * (result.rank + n_shape) - 2.0 * np.log(len(variants))
+            merits.append(float(merit))
             p = min(1.0, float(chdtrc(result.rank, gain)) * len(variants))
             scored = Scored(effect, variant, gain, result.rank, p, merit)
             if best is None or merit > best.merit:
@@ -117,7 +120,7 @@ def score_all(context: Context, exclude: set[str]) -> tuple[list[Scored], list[t
         if best is None:
             missing.append((effect.id, "the calibration itself imitates it in this recording"))
         else:
-            out.append(best)
+            out.append(replace(best, merits=tuple(merits)))
     out.sort(key=lambda s: -s.merit)
     return out, missing
 

@@ -25,6 +25,11 @@ class AxisHandedness(DirectEffect):
         main = np.argmax(np.abs(unit), axis=0)
         if sorted(main.tolist()) != [0, 1, 2]:
             return None
+        cov = context.fitted.covariance()[9:18, 9:18]
+        sigma = np.sqrt(np.maximum(np.diag(cov), 0.0)).reshape(3, 3)
+        # A sign is only claimed where the scale itself is known.
+        if any(abs(S[main[j], j]) < 5.0 * sigma[main[j], j] for j in range(3)):
+            return None
         signs = np.array([np.sign(unit[main[j], j]) for j in range(3)])
         if (signs > 0).all() and (main == np.arange(3)).all():
             return None

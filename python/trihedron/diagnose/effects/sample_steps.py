@@ -156,7 +156,8 @@ def find_losses(context: Context) -> list[Loss]:
             left = trial[row, n]
             gains = zero[s] - left
             usual = np.maximum(ordinary[s], dof)
-            clear = (gains > 40.0) & (left < 0.1 * zero[s] + 3.0 * usual)
+            # The gain must also exceed what a trial count wins where the signal is merely rough (shaking, jitter).
+            clear = (gains > 40.0) & (gains > 5.0 * usual) & (left < 0.1 * zero[s] + 3.0 * usual)
             # A sensor that sees nothing of it must at least not object; one that sees it must see the same count.
             silent = (np.abs(gains) <= 40.0) & (left < 2.0 * usual)
             good = bool(clear.any() and (clear | silent).all())

@@ -12,6 +12,7 @@ from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.observations import FloatArray, Observations
 from trihedron.diagnose.repair import without_moves
+from trihedron.diagnose.twin import DYNAMICS, MOVES
 from trihedron.records.diagnosis import EffectParameter, Where
 
 BAND_SIGMA = 5.0
@@ -19,6 +20,8 @@ BAND_SIGMA = 5.0
 MIN_RUN = 4
 MIN_PLATEAUS = 3
 """Smooth peaks differ in height from move to move; three that end on one level within noise do not happen by chance."""
+CONTRADICTION = 4.0
+"""Chi-square per row of the moves concerned above which their readings are false."""
 STEEP = 3.0
 """How much faster than a parabola of the same width the signal must arrive at the plateau."""
 
@@ -48,7 +51,11 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
             if not pieces:
                 continue
             top = np.array([p.max() for p in pieces])
-            width = BAND_SIGMA * max(float(sigma[axis]), 1e-300)
+            codes = np.unique(np.concatenate(pieces))
+            step_size = float(np.diff(codes).min()) if len(codes) > 1 else 0.0
+            # On a coarse grid equal readings are the rule, at the top of a peak too.
+            is_fine = step_size < 2.0 * float(sigma[axis])
+            width = BAND_SIGMA * max(float(sigma[axis]), 0.5 * step_size, 1e-300)
             best: list[Plateau] = []
             # The limit is a level many moves end on: try each move's highest plateau as the level.
             for level in np.unique(np.round((top - 2 * sigma[axis]) / width) * width):
@@ -63,7 +70,7 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
                         if n < MIN_RUN or first < 2 or last > b - a - 2:
                             continue
                         run = x[a + first : a + last]
-                        is_rail = n >= MIN_RUN and bool((run == run[0]).all()) and run[0] == x.max()
+                        is_rail = is_fine and n >= MIN_RUN and bool((run == run[0]).all()) and run[0] == x.max()
                         step = 0.5 * (x[a + first] - x[a + first - 2] + x[a + last - 1] - x[a + last + 1])
                         if step > STEEP * 4.0 * width / n:
                             runs.append(
@@ -92,6 +99,13 @@ class _Saturation(DirectEffect):
         runs = plateaus(raw, sigma, obs.move_ranges)
         if not runs:
             return None
+        touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
+        # Turns at one steady speed share a level too. A false reading contradicts gravity or rest after the move.
+        system = context.fitted.system
+        rows = np.isin(system.domain, (MOVES, DYNAMICS)) & np.isin(system.segment, touched) & (system.walk == 0)
+        contradicts = float(np.mean(system.residual[rows] ** 2)) > CONTRADICTION
+        if not contradicts and not any(run.is_rail for run in runs):
+            return None
         n = sum(run.stop - run.start for run in runs)
         scale = 1.0 / np.linalg.norm(
             np.linalg.inv(context.fitted.twin.gyro_S if is_gyro else context.fitted.twin.accel_S), axis=1
@@ -112,7 +126,6 @@ class _Saturation(DirectEffect):
         parameters.append(EffectParameter("samples", float(n), 0.0, "1"))
         t = obs.time_s
         times = tuple((float(t[r.start]), float(t[r.stop - 1])) for r in runs[:8])
-        touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
         bad = set(touched)
 
         def reweigh(old: Observations) -> Observations:
