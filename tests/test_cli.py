@@ -1,0 +1,393 @@
+"""The command line end to end: results, exit status, and one sentence for every question that cannot be answered."""
+
+import gzip
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trihedron.cli import main
+from trihedron.records import Recording
+from trihedron.simulate import Hold, Motion, MoveTo, hand_session, scenario_by_name, simulate, six_faces
+
+G = "9.80665"
+
+
+def log_text(recording: Recording, *, columns="time_s,ax,ay,az,gx,gy,gz", scale=1.0):
+    rows = np.column_stack([recording.time_s * scale, recording.accelerometer, recording.gyroscope])
+    return columns + "\n" + "\n".join(",".join(f"{v:.10g}" for v in row) for row in rows) + "\n"
+
+
+def simulated(motion, seed=3):
+    return simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)[0]
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return simulated(hand_session(n_poses=16, hold_s=3.0, move_s=1.5, first_hold_s=5.0))
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory, recording):
+    """A folder with a good log and its calibration."""
+    folder = tmp_path_factory.mktemp("session")
+    (folder / "log.csv").write_text(log_text(recording))
+    assert main(["calibrate", str(folder / "log.csv"), "--gravity", G, "-o", str(folder / "c.json")]) == 0
+    return folder
+
+
+def refused(capsys, *arguments):
+    """The one sentence with which a command refuses."""
+    status = main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    assert status == 1, (status, err)
+    assert out == ""
+    lines = err.strip().splitlines()
+    assert len(lines) == 1, err
+    assert lines[0].startswith("trihedron: ")
+    assert "Traceback" not in err
+    assert len(lines[0]) < 400
+    return lines[0]
+
+
+# What works
+
+
+def test_calibrate_prints_a_report_and_writes_what_was_asked_for(session, tmp_path, capsys):
+    page, machine = tmp_path / "r.html", tmp_path / "m.json"
+    status = main(
+        ["calibrate", str(session / "log.csv"), "--gravity", G, "--report", str(page), "--json", str(machine)]
+    )
+    out, err = capsys.readouterr()
+    assert status == 0
+    assert "Accelerometer   f = S a′ + b" in out
+    assert "±" in out
+    assert "report:" in err
+    document = json.loads(machine.read_text())
+    assert np.shape(document["accelerometer"]["S"]) == (3, 3)
+    assert document["gravity_m_s2"] == 9.80665
+    text = page.read_text()
+    assert text.count("data:image/png;base64,") == 4
+    # Self-contained: nothing is fetched.
+    assert "http" not in text
+    assert "<script" not in text
+
+
+@pytest.mark.parametrize("command", ["segment", "check", "calibrate", "verify", "apply"])
+def test_json_on_stdout_is_json_and_nothing_else(session, tmp_path, capsys, command):
+    log, known = str(session / "log.csv"), str(session / "c.json")
+    more = {"calibrate": ["--gravity", G], "apply": ["-o", str(tmp_path / "x.csv")]}.get(command, [])
+    first = [known] if command in ("verify", "apply") else []
+    assert main([command, *first, log, *more, "--json"]) == 0
+    json.loads(capsys.readouterr().out)
+
+
+def test_apply_writes_si_readings_that_the_tool_reads_back_at_the_norm_of_gravity(session, tmp_path):
+    for name in ("out.csv", "out.parquet"):
+        assert main(["apply", str(session / "c.json"), str(session / "log.csv"), "-o", str(tmp_path / name)]) == 0
+        from trihedron import read, segment
+
+        back = read(tmp_path / name)
+        assert back.accelerometer_unit.value == "m/s^2"
+        assert back.gyroscope_unit.value == "rad/s"
+        norm = np.linalg.norm(segment(back).accelerometer_mean, axis=1)
+        # Noise of a mean over 3 s at 3.9e-3 m/s²/√Hz is 2.3e-3 m/s²; five times that.
+        np.testing.assert_allclose(norm, 9.80665, atol=0.012)
+
+
+def test_verify_on_another_session_passes_and_a_limit_turns_the_status(session, tmp_path, capsys):
+    other = tmp_path / "other.csv"
+    other.write_text(log_text(simulated(hand_session(n_poses=10, hold_s=3.0, move_s=1.5, layout=4), seed=9)))
+    assert main(["verify", str(session / "c.json"), str(other)]) == 0
+    assert "gravity predicted" in capsys.readouterr().out
+    assert main(["verify", str(session / "c.json"), str(other), "--limit-mg", "0.001"]) == 2
+    assert "NOT PASSED" in capsys.readouterr().out
+
+
+def test_verify_says_when_it_is_given_the_recording_the_calibration_was_made_from(session, capsys):
+    main(["verify", str(session / "c.json"), str(session / "log.csv")])
+    assert "proves nothing" in capsys.readouterr().out
+
+
+def test_export_writes_to_stdout_or_a_file(session, tmp_path, capsys):
+    assert main(["export", str(session / "c.json"), "--to", "c"]) == 0
+    assert "trihedron_correct" in capsys.readouterr().out
+    assert main(["export", str(session / "c.json"), "--to", "kalibr", "-o", str(tmp_path / "imu.yaml")]) == 0
+    assert "C_gyro_i" in (tmp_path / "imu.yaml").read_text()
+
+
+def test_gravity_that_was_not_given_is_said_with_what_it_may_cost(session, capsys):
+    assert main(["calibrate", str(session / "log.csv")]) == 0
+    out = capsys.readouterr().out
+    assert "Gravity was not given" in out
+    assert "0.4 %" in out
+
+
+def test_latitude_and_height_give_gravity(session, capsys):
+    assert main(["calibrate", str(session / "log.csv"), "--latitude", "45", "--height", "0", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["gravity_m_s2"] == pytest.approx(9.806198, abs=1e-6)
+
+
+@pytest.mark.parametrize("change", ["gzip", "tabs", "milliseconds", "no time"])
+def test_the_same_readings_in_another_dress_give_the_same_calibration(session, recording, tmp_path, change, capsys):
+    path, more = tmp_path / "log.csv", []
+    text = log_text(recording)
+    if change == "gzip":
+        path.write_bytes(gzip.compress(text.encode()))
+    elif change == "tabs":
+        path.write_text(text.replace(",", "\t"))
+    elif change == "milliseconds":
+        path.write_text(log_text(recording, columns="time_ms,ax,ay,az,gx,gy,gz", scale=1e3))
+    else:
+        path.write_text("\n".join(line.split(",", 1)[1] for line in text.splitlines()))
+        more = ["--rate", "100"]
+    assert main(["calibrate", str(path), "--gravity", G, "--json", *more]) == 0
+    S = np.array(json.loads(capsys.readouterr().out)["gyroscope"]["S"])
+    np.testing.assert_allclose(S, json.loads((session / "c.json").read_text())["gyroscope"]["S"], rtol=1e-6, atol=1e-12)
+
+
+def test_two_files_with_clocks_of_their_own_are_merged(recording, tmp_path, capsys):
+    late = recording.time_s + 0.003
+    for name, time_s, readings in (
+        ("a.csv", recording.time_s, recording.accelerometer),
+        ("g.csv", late, recording.gyroscope),
+    ):
+        rows = "\n".join(",".join(f"{v:.9g}" for v in row) for row in np.column_stack([time_s, readings]))
+        (tmp_path / name).write_text("t,x,y,z\n" + rows + "\n")
+    arguments = ["--accel", str(tmp_path / "a.csv"), "--gyro", str(tmp_path / "g.csv"), "--gravity", G]
+    assert main(["calibrate", *arguments]) == 0
+    assert "Gyroscope" in capsys.readouterr().out
+
+
+def test_the_demonstration_writes_its_files_and_never_over_others(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["demo"]) == 0
+    out = capsys.readouterr().out
+    assert "Compare with the truth" in out
+    names = {"session.csv", "second-session.csv", "calibration.json", "report.html", "verification.html", "truth.json"}
+    assert {p.name for p in Path("trihedron-demo").iterdir()} == names
+    (Path("trihedron-demo") / "calibration.json").write_text("precious")
+    assert main(["demo"]) == 0
+    assert (Path("trihedron-demo") / "calibration.json").read_text() == "precious"
+    assert Path("trihedron-demo-2").is_dir()
+    assert "left alone" in refused_only(capsys, "demo", "trihedron-demo")
+
+
+def refused_only(capsys, *arguments):
+    capsys.readouterr()
+    return refused(capsys, *arguments)
+
+
+def test_help_comes_at_once():
+    def run():
+        began = time.perf_counter()
+        done = subprocess.run([sys.executable, "-m", "trihedron", "--help"], capture_output=True, text=True, check=True)
+        return time.perf_counter() - began, done.stdout
+
+    fastest, out = min(run() for _ in range(3))
+    assert "calibrate" in out
+    # The fastest of three: other work on the machine is not ours. Numpy alone would take a third of it.
+    assert fastest < 0.3
+
+
+def test_the_command_as_a_process_ends_with_the_status_and_no_traceback(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "trihedron", "calibrate", str(tmp_path / "none.csv")], capture_output=True, text=True
+    )
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
+    assert "no such file" in done.stderr
+
+
+def test_a_reader_that_leaves_early_is_no_error(session):
+    command = f"{sys.executable} -m trihedron apply {session / 'c.json'} {session / 'log.csv'} | head -1"
+    done = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True, text=True)
+    assert done.stdout.startswith("time_s,acc_x")
+    assert "Traceback" not in done.stderr
+    assert "Exception" not in done.stderr
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["calibrat", "x.csv"], "Did you mean 'calibrate'"),
+        (["calibrate", "--gravty", "9.8", "x.csv"], "--gravity"),
+        (["calibrate"], "no log was named"),
+        (["calibrate", "x.csv", "--method", "magic"], "joint, separate, faces"),
+        (["calibrate", "x.csv", "--frame", "upper"], "lower, symmetric, case"),
+        (["calibrate", "x.csv", "--gravity", "heavy"], "number"),
+        (["calibrate", "x.csv", "--faces", "1,two"], "--faces"),
+        (["calibrate", "x.csv", "--axis-signs", "++"], "three signs"),
+        (["calibrate", "x.csv", "--report", "r.docx"], ".html, .txt or .json"),
+        (["export", "x.json"], "--to"),
+    ],
+)
+def test_a_slip_of_the_pen_is_answered_with_what_there_is(capsys, arguments, said):
+    assert said in refused(capsys, *arguments)
+
+
+def bad_log(name, recording):
+    """Content of a log that cannot be calibrated."""
+    text = log_text(recording)
+    lines = text.splitlines()
+    header = lines[0]
+    body = {
+        "empty": b"",
+        "one row": "\n".join(lines[:2]),
+        "header only": header,
+        "text in numbers": "\n".join([*lines[:500], "12.0,oops,oops,oops,1,2,3", *lines[500:]]),
+        "constant column": "\n".join(
+            [header, *(",".join([*r.split(",")[:3], "7", *r.split(",")[4:]]) for r in lines[1:])]
+        ),
+        "all not a number": "\n".join([header, *(f"{k / 100},nan,nan,nan,nan,nan,nan" for k in range(500))]),
+        "truncated gzip": gzip.compress(text.encode())[:-2000],
+        "a picture": b"\x89PNG\r\n\x1a\n" + b"\x00" * 100,
+        "words": "dear diary\n" * 50,
+        "reversed time": "\n".join([header, *lines[:0:-1]]),
+    }[name]
+    return body if isinstance(body, bytes) else body.encode()
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["empty", "one row", "header only", "constant column", "all not a number", "truncated gzip", "a picture", "words"],
+)
+def test_a_log_that_is_none_is_refused_by_name_and_nothing_is_written(recording, tmp_path, capsys, name):
+    log = tmp_path / "bad.csv"
+    log.write_bytes(bad_log(name, recording))
+    for command in ("segment", "check", "calibrate"):
+        said = refused_only(capsys, command, log, *(["-o", tmp_path / "c.json"] if command == "calibrate" else []))
+        assert "bad.csv" in said
+    assert [p.name for p in tmp_path.iterdir()] == ["bad.csv"]
+
+
+@pytest.mark.parametrize("name", ["text in numbers", "reversed time"])
+def test_a_damaged_log_is_refused_or_calibrated_with_a_finding_but_never_in_silence(recording, tmp_path, capsys, name):
+    log = tmp_path / "bad.csv"
+    log.write_bytes(bad_log(name, recording))
+    status = main(["calibrate", str(log), "--gravity", G])
+    out, err = capsys.readouterr()
+    assert "Traceback" not in err
+    if status == 1:
+        assert "bad.csv" in err
+    else:
+        assert "warning" in out or "serious" in out
+
+
+def test_a_directory_and_a_file_without_permission_are_told_apart(tmp_path, capsys):
+    assert "directory" in refused(capsys, "calibrate", tmp_path)
+    closed = tmp_path / "closed.csv"
+    closed.write_text("t,ax,ay,az\n")
+    closed.chmod(0)
+    if os.access(closed, os.R_OK):
+        pytest.skip("this user may read everything")
+    assert "permission" in refused(capsys, "calibrate", closed)
+
+
+def test_an_output_that_exists_is_refused_before_the_work_and_left_as_it_was(session, tmp_path, capsys):
+    kept = tmp_path / "kept.json"
+    kept.write_text("precious")
+    for option in ("-o", "--json", "--report"):
+        assert "left alone" in refused(capsys, "calibrate", session / "log.csv", option, kept)
+        assert kept.read_text() == "precious"
+    assert main(["calibrate", str(session / "log.csv"), "--gravity", G, "-o", str(kept), "--force"]) == 0
+    assert json.loads(kept.read_text())["format_version"] == 1
+
+
+def test_the_log_itself_is_never_overwritten_by_a_forgotten_argument(session, capsys):
+    before = (session / "log.csv").read_bytes()
+    main(["calibrate", "--json", str(session / "log.csv")])
+    assert (session / "log.csv").read_bytes() == before
+    capsys.readouterr()
+
+
+def test_an_output_folder_that_is_missing_is_named(session, tmp_path, capsys):
+    assert "there is no folder" in refused(capsys, "calibrate", session / "log.csv", "-o", tmp_path / "no" / "c.json")
+
+
+def test_two_outputs_of_one_name_are_refused(session, tmp_path, capsys):
+    path = tmp_path / "x.json"
+    assert "two outputs" in refused(capsys, "calibrate", session / "log.csv", "-o", path, "--json", path)
+
+
+def test_units_that_a_calibration_does_not_map_are_refused(session, recording, tmp_path, capsys):
+    other = tmp_path / "si.csv"
+    in_si = replace(recording, accelerometer=recording.accelerometer * 6e-4, gyroscope=recording.gyroscope * 1.3e-4)
+    other.write_text(log_text(in_si))
+    for command in ("apply", "verify"):
+        assert "maps counts" in refused(capsys, command, session / "c.json", other)
+
+
+def test_gravity_said_twice_or_by_height_alone_is_refused(session, capsys):
+    log = session / "log.csv"
+    assert "given twice" in refused(capsys, "calibrate", log, "--gravity", G, "--latitude", "50")
+    assert "--latitude" in refused(capsys, "calibrate", log, "--height", "100")
+    assert "latitude" in refused(capsys, "calibrate", log, "--latitude", "95")
+    assert "m/s²" in refused(capsys, "calibrate", log, "--gravity", "980")
+
+
+def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tmp_path, capsys):
+    two = tmp_path / "two.csv"
+    two.write_text(log_text(simulated(Motion((Hold(5.0), MoveTo((1.0, 0.0, 0.0), 2.0), Hold(5.0))))))
+    said = refused(capsys, "calibrate", two)
+    assert "two.csv" in said
+    assert "poses" in said
+    rng = np.random.default_rng(1)
+    time_s = np.arange(3000) / 100.0
+    swing = 9.8 * np.sin(np.outer(time_s, [2.1, 3.3, 4.7])) + rng.normal(size=(3000, 3))
+    moving = Recording(time_s, swing, 2.0 * np.cos(np.outer(time_s, [2.1, 3.3, 4.7])), 100.0)
+    shaken = tmp_path / "shaken.csv"
+    shaken.write_text(log_text(moving))
+    assert "still" in refused(capsys, "calibrate", shaken)
+    assert main(["check", str(shaken)]) == 2
+    assert "NOT FIT" in capsys.readouterr().out
+
+
+# What runs but is not to be trusted
+
+
+def tilted_about_one_axis():
+    steps = [Hold(5.0)]
+    for k in range(1, 14):
+        angle = 2.0 * np.pi * k / 14
+        steps += [MoveTo((0.0, float(np.sin(angle)), float(np.cos(angle))), 1.5), Hold(3.0)]
+    return Motion(tuple(steps))
+
+
+@pytest.mark.parametrize(
+    ("name", "motion"), [("all poses in one plane", tilted_about_one_axis()), ("six faces", six_faces(2, 3.0, 1.5))]
+)
+def test_poses_that_do_not_determine_the_answer_end_with_status_two_and_poses_to_add(tmp_path, capsys, name, motion):
+    log = tmp_path / "log.csv"
+    log.write_text(log_text(simulated(motion)))
+    assert main(["calibrate", str(log), "--gravity", G]) == 2, name
+    out = capsys.readouterr().out
+    assert "NOT TO BE TRUSTED" in out
+    assert "Add still poses" in out
+    assert main(["check", str(log)]) == 2
+
+
+def test_six_faces_and_turns_are_calibrated_by_method_one(tmp_path, capsys):
+    from trihedron.simulate import table_turns
+
+    log = tmp_path / "log.csv"
+    faces = ((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
+    log.write_text(log_text(simulated(table_turns((90.0, -90.0), hold_s=3.0, faces=faces))))
+    status = main(["calibrate", str(log), "--gravity", G, "--method", "faces", "--json"])
+    document = json.loads(capsys.readouterr().out)
+    assert document["frame"] == "case"
+    scale = np.diag(np.linalg.inv(np.array(document["gyroscope"]["S"])))
+    truth = np.diag(np.linalg.inv(np.array(scenario_by_name("hand-session").gyroscope.S)))
+    # A turn of 90 deg is known to 0.01 deg by noise; the simulated table is level: 0.1 % is far above both.
+    np.testing.assert_allclose(scale, truth, rtol=1e-3)
+    assert status in (0, 2)
