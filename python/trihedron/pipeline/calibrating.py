@@ -29,7 +29,7 @@ METHODS: tuple[Method, ...] = get_args(Method)
 Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
 
 FALSE_ALARM = 1e-3
-"""Chance that a sound recording is taken for one whose moves exceed their noise."""
+"""Chance that a sound recording is taken for one whose moves contradict its still poses."""
 
 Found = tuple[Finding, ...]
 
@@ -148,35 +148,35 @@ def _by_poses(
         # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's error bars.
         if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
-            if _is_within_noise(both):
+            pull = _pull_on_accelerometer(accelerometer, both.accelerometer)
+            if pull <= stats.chi2.isf(FALSE_ALARM, 9):
                 return replace(both, findings=(*found, *both.findings))
-            alone = replace(alone, findings=(*found, _joint_fit_left(both)))
+            alone = replace(alone, findings=(*found, _joint_fit_left(pull)))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
     except ValueError as error:
         return _without_gyroscope(alone, str(error))
     return _together(alone, gyroscope, more)
 
 
-def _is_within_noise(both: Calibration) -> bool:
-    quality = None if both.gyroscope is None else both.gyroscope.quality
-    return quality is None or quality.dof <= 0 or bool(stats.chi2.sf(quality.chi2, quality.dof) >= FALSE_ALARM)
+def _pull_on_accelerometer(alone: SensorCalibration, joint: SensorCalibration) -> float:
+    """By how much the moves raise χ² of the still poses' norms: χ² with at most 9 degrees of freedom if both agree."""
+    if alone.quality is None or joint.quality is None:
+        return 0.0
+    return joint.quality.chi2 - alone.quality.chi2
 
 
-def _joint_fit_left(both: Calibration) -> Finding:
-    """Moves that contradict their noise must not pull the accelerometer, whose still poses are clean of them."""
-    assert both.gyroscope is not None
-    assert both.gyroscope.quality is not None
-    per_dof = both.gyroscope.quality.chi2 / both.gyroscope.quality.dof
+def _joint_fit_left(pull: float) -> Finding:
+    """Moves that contradict the still poses must not pull the accelerometer, which the poses show without them."""
     return Finding(
         FindingCode.JOINT_FIT_LEFT,
         Severity.NOTE,
-        f"Moves and still poses together exceed their noise (χ² per degree of freedom {per_dof:.3g}); the "
-        f"accelerometer was "
-        "taken from the still poses alone, and the gyro from the moves by it.",
+        f"The moves contradict the still poses (one fit of both raises χ² of the poses by {pull:.3g}; noise "
+        f"explains 28); "
+        "the accelerometer was therefore taken from the still poses alone, and the gyro from the moves by it.",
         "An effect in the moves that the model does not have, which one fit of both would spread over the "
         "accelerometer.",
         "Say --method separate to choose this from the start.",
-        MappingProxyType({"chi2_per_dof": per_dof}),
+        MappingProxyType({"chi2_increase": pull}),
     )
 
 
