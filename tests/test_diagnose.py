@@ -69,5 +69,35 @@ def test_parameters_come_with_honest_errors_and_the_fit_improves_held_out():
 def test_ids_of_the_catalogue_are_unique_and_published():
     ids = [effect.id for effect in catalogue()]
     assert len(ids) == len(set(ids))
-    published = ["accel-quadratic", "accel-cubic", "accel-scale-asymmetry", "accel-hysteresis", "accel-thermal-bias", "accel-thermal-scale", "gyro-thermal-bias", "gyro-thermal-scale", "accel-hidden-drift", "gyro-hidden-drift", "gyro-g-sensitivity", "gyro-scale-nonlinearity", "gyro-saturation", "accel-saturation", "lever-arm", "accel-size-effect", "accel-gyro-time-offset", "sensor-lag", "dropped-samples", "timing-jitter", "earth-rate", "vibration-rectification", "periodic-interference", "quantisation", "supply-sensitivity", "disturbed-pose", "turn-angle-error", "table-tilt", "axis-handedness"]
+    published = [
+        "accel-quadratic",
+        "accel-cubic",
+        "accel-scale-asymmetry",
+        "accel-hysteresis",
+        "accel-thermal-bias",
+        "accel-thermal-scale",
+        "gyro-thermal-bias",
+        "gyro-thermal-scale",
+        "accel-hidden-drift",
+        "gyro-hidden-drift",
+        "gyro-g-sensitivity",
+        "gyro-scale-nonlinearity",
+        "gyro-saturation",
+        "accel-saturation",
+        "lever-arm",
+        "accel-size-effect",
+        "accel-gyro-time-offset",
+        "sensor-lag",
+        "dropped-samples",
+        "timing-jitter",
+        "earth-rate",
+        "vibration-rectification",
+        "periodic-interference",
+        "quantisation",
+        "supply-sensitivity",
+        "disturbed-pose",
+        "turn-angle-error",
+        "table-tilt",
+        "axis-handedness",
+    ]
     assert set(published) <= set(ids)

@@ -32,14 +32,16 @@ def calibration_report(
     sections = [
         Section("Result", _result(calibration, segments, recording)),
         Section("Findings", (findings_block(calibration.findings),)),
+    ]
+    if segments is not None and recording is not None:
+        sections.append(Section("Figures", tuple(_figures(calibration, segments, recording))))
+    sections += [
         Section("Axes", _meaning(calibration)),
         Section("Certainty", tuple(_certainty(calibration))),
     ]
     residuals = tuple(_residuals(calibration, segments))
     if residuals:
         sections.append(Section("Residuals", residuals))
-    if segments is not None and recording is not None:
-        sections.append(Section("Figures", tuple(_figures(calibration, segments, recording))))
     return Document(
         title="Calibration",
         subtitle=calibration.recording_source or "no recording named",
