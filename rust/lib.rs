@@ -5,6 +5,7 @@
 
 pub mod allan;
 pub mod banded;
+pub mod chi_square;
 pub mod ellipsoid;
 pub mod error;
 pub mod gauss_newton;
@@ -13,7 +14,9 @@ pub mod kalman;
 pub mod norm_invariant;
 pub mod poisson;
 pub mod rotation;
+pub mod screening;
 pub mod simulate;
+pub mod spectral_likelihood;
 pub mod stillness;
 pub mod trajectory;
 

@@ -13,12 +13,15 @@ use crate::error::Result as KernelResult;
 
 mod accelerometer;
 mod allan;
+mod chi_square;
 mod gyro_alignment;
 mod kalman;
 mod kalman_norm;
 mod poisson;
 mod rotation;
+mod screening;
 mod simulate;
+mod spectral_likelihood;
 mod stillness;
 mod trajectory;
 
@@ -34,13 +37,16 @@ pub(crate) fn run<T: Send>(
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     allan::register(module)?;
+    chi_square::register(module)?;
     gyro_alignment::register(module)?;
     poisson::register(module)?;
     kalman::register(module)?;
     accelerometer::register(module)?;
     kalman_norm::register(module)?;
     rotation::register(module)?;
+    screening::register(module)?;
     simulate::register(module)?;
+    spectral_likelihood::register(module)?;
     stillness::register(module)?;
     trajectory::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.

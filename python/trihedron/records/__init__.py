@@ -25,6 +25,7 @@ from trihedron.records.kalman import (
     NormKalmanCalibration,
     PoseTable,
 )
+from trihedron.records.noise import AllanCurve, GaussMarkov, Noise, NoiseAxis, NoiseTerm, SpectralLine, TermName
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Hold, Move, Segments
 from trihedron.records.truth import TrueSegment, Truth
@@ -34,6 +35,7 @@ __all__ = [
     "CONSTANT_NAMES",
     "DIVIDING_HEAD_ANGLES_DEG",
     "PARAMETER_NAMES",
+    "AllanCurve",
     "AxisKalmanResult",
     "AxisNoise",
     "Calibration",
@@ -44,10 +46,14 @@ __all__ = [
     "FindingCode",
     "FitQuality",
     "Frame",
+    "GaussMarkov",
     "Hold",
     "KalmanCalibration",
     "LiveEstimate",
     "Move",
+    "Noise",
+    "NoiseAxis",
+    "NoiseTerm",
     "NormKalmanCalibration",
     "Observability",
     "PoseTable",
@@ -55,6 +61,8 @@ __all__ = [
     "Segments",
     "SensorCalibration",
     "Severity",
+    "SpectralLine",
+    "TermName",
     "TrueSegment",
     "Truth",
     "Verification",

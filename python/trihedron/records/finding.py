@@ -76,6 +76,18 @@ class FindingCode(str, Enum):
     LIMIT_EXCEEDED = "limit-exceeded"
     SAME_RECORDING = "same-recording"
     NOT_FIT = "not-fit"
+    # noise
+    LOG_STEP = "log-step"
+    LOG_KNOCK = "log-knock"
+    LOG_DRIFT = "log-drift"
+    LOG_MOTION = "log-motion"
+    LOG_TOO_SHORT = "log-too-short"
+    TEMPERATURE_DRIVEN = "temperature-driven"
+    SPECTRAL_LINE = "spectral-line"
+    SPECTRUM_COLOURED = "spectrum-coloured"
+    SPECTRUM_UNEXPLAINED = "spectrum-unexplained"
+    QUANTISATION_DEAD = "quantisation-dead"
+    STRETCHES_EXCLUDED = "stretches-excluded"
     # kalman
     INNOVATIONS_TOO_LARGE = "innovations-too-large"
     INNOVATIONS_TOO_SMALL = "innovations-too-small"

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from enum import Enum
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+
+from trihedron.records.finding import Finding, Severity
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -71,3 +75,185 @@ class AllanCurve:
     def n_channels(self) -> int:
         """Number of channels."""
         return int(self.deviation.shape[1])
+
+
+@dataclass(frozen=True)
+class NoiseTerm:
+    """One term of IEEE 952, present with its certainty or absent with its limit.
+
+    ``value`` is zero when the log does not show the term; ``limit`` is then the largest value that it does not exclude
+    (95 %, one-sided). ``sigma`` is the standard error, ``lower`` and ``upper`` the 95 % interval from the likelihood.
+    ``evidence`` is the drop of the deviance (twice the log likelihood) that the term earns: 4 is weak, 8 was asked for.
+    """
+
+    symbol: TermName
+    is_present: bool
+    value: float
+    sigma: float
+    lower: float
+    upper: float
+    limit: float
+    evidence: float
+
+
+@dataclass(frozen=True)
+class GaussMarkov:
+    """A Gauss-Markov (first-order, exponentially correlated) process: ``sigma_process`` and its time constant."""
+
+    sigma_process: float
+    correlation_time_s: float
+    sigma: float
+    lower: float
+    upper: float
+    evidence: float
+
+
+@dataclass(frozen=True)
+class SpectralLine:
+    """A sinusoid ``amplitude · sin(2π frequency t)`` found above the noise, with standard errors.
+
+    ``width_hz`` above zero: not one frequency but a resonance, whose power is spread over that width.
+    """
+
+    frequency_hz: float
+    amplitude: float
+    sigma_amplitude: float
+    sigma_frequency_hz: float
+    width_hz: float = 0.0
+
+
+@dataclass(frozen=True)
+class NoiseAxis:
+    """What one axis' noise is made of.
+
+    All values are in ``unit`` (the SI unit, or the raw unit where the log does not tell the scale) and seconds: Q
+    [unit·s], N [unit·√s = unit/√Hz], B [unit], K [unit/√s], R [unit/s]. ``lowest_hz`` … ``highest_hz`` is the part of
+    the spectrum that the terms describe. ``longest_tau_s`` is the longest averaging time at which the log determines an
+    Allan deviation to 25 %. ``covariance_scale`` multiplies the variances because the spectrum scatters more than its
+    terms explain; 1 when it does not.
+    """
+
+    name: str
+    unit: str
+    rate_hz: float
+    n_samples: int
+    duration_s: float
+    mean: float
+    sample_sigma: float
+    resolution: float
+    terms: MappingProxyType[TermName, NoiseTerm]
+    gauss_markov: GaussMarkov | None = None
+    lines: tuple[SpectralLine, ...] = ()
+    lowest_hz: float = 0.0
+    highest_hz: float = 0.0
+    longest_tau_s: float = 0.0
+    covariance_scale: float = 1.0
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        missing = [term.value for term in TermName if term not in self.terms]
+        if missing:
+            raise ValueError(f"the noise of axis {self.name} lacks the terms {', '.join(missing)}")
+
+    def value(self, symbol: TermName | str) -> float:
+        """Value of a term, 0 when it is absent."""
+        return self.terms[TermName(symbol)].value
+
+    def allan_variance(self, tau_s: npt.ArrayLike) -> FloatArray:
+        """(k,) Allan variance of all terms found, at averaging times ``tau_s`` (docs/noise.md, eq. 7)."""
+        tau = np.atleast_1d(np.asarray(tau_s, dtype=np.float64))
+        Q, N, B, K, R = (self.value(term) for term in TermName)
+        total = 3 * (Q / tau) ** 2 + N**2 / tau + 2 * math.log(2) / math.pi * B**2 + K**2 * tau / 3 + (R * tau) ** 2 / 2
+        if self.gauss_markov is not None:
+            total = total + _gauss_markov_allan(self.gauss_markov, tau)
+        for line in self.lines:
+            x = math.pi * line.frequency_hz * tau
+            total = total + (line.amplitude * np.sin(x) ** 2 / x) ** 2
+        return np.asarray(total, dtype=np.float64)
+
+    def variance_of_mean(self, window_s: float, session_s: float | None = None) -> float:
+        """Variance of the mean of ``window_s`` seconds (docs/noise.md, eq. 11).
+
+        Without ``session_s`` half the variance of the difference to the next such mean (the Allan variance): the
+        uncertainty when the zero reading is taken next to the window. With it the variance about the mean of a session
+        of that length: the weight of one hold when one bias is fitted to all of them.
+        """
+        if not window_s > 0:
+            raise ValueError(f"a window must last longer than 0 s, got {window_s}")
+        if session_s is None:
+            return float(self.allan_variance(window_s)[0])
+        if session_s < window_s:
+            raise ValueError(f"a session of {session_s} s holds no window of {window_s} s")
+        Q, N, B, K, R = (self.value(term) for term in TermName)
+        t, d = window_s, session_s
+        total = 2 * Q**2 * (1 / t**2 - 1 / d**2) + N**2 * (1 / t - 1 / d) + B**2 / math.pi * math.log(d / t)
+        total += K**2 * (d - t) / 6 + R**2 * (d**2 - t**2) / 12
+        if self.gauss_markov is not None:
+            total += _gauss_markov_mean(self.gauss_markov, t) - _gauss_markov_mean(self.gauss_markov, d)
+        return total
+
+    def optimal_averaging(self) -> tuple[float, float] | None:
+        """Averaging time of least Allan deviation and that deviation; None when it falls on to the end of the log.
+
+        The minimum is that of the fitted terms, not of the scattered curve. It is not the bias instability: white noise
+        and random walk make a minimum of their own.
+        """
+        tau = np.geomspace(1.0 / self.rate_hz, max(self.duration_s / 2.0, 2.0 / self.rate_hz), 2000)
+        # Sinusoids make minima at their periods that hold for no other purpose than theirs.
+        variance = NoiseAxis(**{**self.__dict__, "lines": ()}).allan_variance(tau)
+        place = int(np.argmin(variance))
+        if place == len(tau) - 1 or variance[-1] < 1.02 * variance[place]:
+            return None
+        return float(tau[place]), float(np.sqrt(variance[place]))
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No finding says that the terms are not to be trusted."""
+        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
+
+
+def _gauss_markov_mean(process: GaussMarkov, window_s: float) -> float:
+    ratio = process.correlation_time_s / window_s
+    return 2 * process.sigma_process**2 * ratio * (1 + ratio * math.expm1(-1 / ratio))
+
+
+def _gauss_markov_allan(process: GaussMarkov, tau: FloatArray) -> FloatArray:
+    ratio = process.correlation_time_s / tau
+    decay = np.exp(-1.0 / ratio)
+    shape = 2 * ratio * (1 - ratio / 2 * (3 - 4 * decay + decay**2))
+    return np.asarray(process.sigma_process**2 * shape)
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of a log: its axes, the Allan curve as the picture, and what is wrong with the log.
+
+    ``excluded_s`` are the stretches left out, ``breaks_s`` the instants where the level jumped and the fit starts anew.
+    """
+
+    axes: tuple[NoiseAxis, ...]
+    curve: AllanCurve
+    source: str = ""
+    excluded_s: tuple[tuple[float, float], ...] = ()
+    breaks_s: tuple[float, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))
+
+    def axis(self, name: str) -> NoiseAxis:
+        """The axis of that name.
+
+        Raises
+        ------
+        KeyError
+            Naming the axes there are.
+        """
+        for axis in self.axes:
+            if axis.name == name:
+                return axis
+        raise KeyError(f"no axis {name!r}; there are {', '.join(axis.name for axis in self.axes)}")
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No finding says that the answer is not to be trusted."""
+        every = (*self.findings, *(finding for axis in self.axes for finding in axis.findings))
+        return not any(finding.severity is Severity.SERIOUS for finding in every)

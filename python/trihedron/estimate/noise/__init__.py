@@ -2,5 +2,6 @@
 
 from trihedron.estimate.noise.allan import allan_deviation, default_clusters, stream_allan_deviation
 from trihedron.estimate.noise.degrees import degrees_of_freedom
+from trihedron.estimate.noise.identify import identify_noise
 
-__all__ = ["allan_deviation", "default_clusters", "degrees_of_freedom", "stream_allan_deviation"]
+__all__ = ["allan_deviation", "default_clusters", "degrees_of_freedom", "identify_noise", "stream_allan_deviation"]

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.estimate.noise.degrees import FLICKER, QUANTISATION, WALK, WHITE, degrees_of_freedom
-from trihedron.estimate.noise.quantiles import chi_square_quantile
 from trihedron.records.noise import AllanCurve, AllanKind, FloatArray
 
 _KINDS = {
@@ -195,7 +194,7 @@ def curve_with_intervals(
     channels = variance.shape[1]
     edf = np.column_stack([_edf_along(n, clusters, variance[:, c], weight[:, c], kind) for c in range(channels)])
     tail = (1.0 - confidence) / 2.0
-    high, low = chi_square_quantile(1.0 - tail, edf), chi_square_quantile(tail, edf)
+    high, low = (_core.chi_square_quantile(share, edf.ravel()).reshape(edf.shape) for share in (1.0 - tail, tail))
     return AllanCurve(
         kind=kind,
         rate_hz=float(rate_hz),

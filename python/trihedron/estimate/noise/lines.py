@@ -1,0 +1,177 @@
+"""Periodic disturbance and colouring: what in a spectrum no sum of noise terms can be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned
+from trihedron.estimate.noise.spectrum import Ordinates
+from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
+from trihedron.records.noise import FloatArray, SpectralLine
+
+FALSE_ALARM = 1e-4
+TOLERANCE = 0.05
+"""Deviation of a third of an octave from the fitted terms that counts as colouring, when it is significant as well:
+noise terms are idealisations, and the share of white noise that a filter takes below this does not change a digit."""
+MOST_LINES = 24
+
+
+def expected_power(band: Ordinates, selection: Selection, step_s: float) -> FloatArray:
+    """(k,) power of every ordinate of ``band`` that the selected terms explain."""
+    out = np.asarray(selection.fit.strength[: len(SYMBOLS)]) @ band.basis
+    if selection.correlation_time_s is not None:
+        density = gauss_markov_density(band.frequency_hz, step_s, selection.correlation_time_s)
+        out = out + selection.fit.strength[len(SYMBOLS)] * density
+    return np.asarray(out)
+
+
+def find_lines(
+    bands: Sequence[Ordinates], selection: Selection, step_s: float
+) -> tuple[list[SpectralLine], list[npt.NDArray[np.bool_]]]:
+    """Sinusoids that stand out of the fitted noise, and the ordinates that they spoil."""
+    lines: list[SpectralLine] = []
+    masks = []
+    total = sum(len(band.power) for band in bands)
+    for band in bands:
+        expected = expected_power(band, selection, step_s)
+        power = band.power - 2 * selection.fit.slope * band.cross + (selection.fit.slope * band.line) ** 2
+        level = smooth_level(band, power / expected) * expected
+        ratio = power / level
+        limit = float(_core.chi_square_quantile(1.0 - FALSE_ALARM / total, band.count[:1])[0] / band.count[0])
+        mask = np.zeros(len(ratio), dtype=bool)
+        for i in np.argsort(-ratio):
+            if ratio[i] < limit or len(lines) >= MOST_LINES:
+                break
+            # The lowest eight ordinates hold drift, of which no period was seen more than four times.
+            if mask[i] or band.order[i] < 8:
+                continue
+            near = _skirt(ratio, int(i))
+            mask[near] = True
+            lines.append(_line(band, power[near], level[near], near))
+        masks.append(mask)
+    return sorted(lines, key=lambda line: line.frequency_hz), masks
+
+
+def _skirt(ratio: FloatArray, peak: int) -> slice:
+    """Ordinates around a peak that it raises: outward until the mean of the next 24 is below 1.4."""
+    window = 24
+    start = stop = peak
+    while start > 0 and np.mean(ratio[max(0, start - window) : start]) > 1.4:
+        start = max(0, start - window // 4)
+    while stop < len(ratio) - 1 and np.mean(ratio[stop + 1 : stop + 1 + window]) > 1.4:
+        stop = min(len(ratio) - 1, stop + window // 4)
+    return slice(max(0, start - 4), stop + 5)
+
+
+def _line(band: Ordinates, power: FloatArray, expected: FloatArray, near: slice) -> SpectralLine:
+    time_s = band.length * band.step_s
+    excess = np.maximum(power - expected, 0.0)
+    total = float(max(np.sum(power - expected), np.max(excess)))
+    amplitude = math.sqrt(2.0 * total / time_s)
+    level = float(np.mean(expected)) / float(band.count[0])
+    frequency = float(np.sum(excess * band.frequency_hz[near]) / np.sum(excess))
+    spread = math.sqrt(float(np.sum(excess * (band.frequency_hz[near] - frequency) ** 2) / np.sum(excess)))
+    return SpectralLine(
+        frequency_hz=frequency,
+        amplitude=amplitude,
+        sigma_amplitude=math.sqrt(2.0 * level / time_s),
+        sigma_frequency_hz=math.sqrt(6.0 * level / time_s) / (math.pi * amplitude * time_s),
+        width_hz=max(0.0, 2.0 * spread - 2.0 / time_s),
+    )
+
+
+def smooth_level(band: Ordinates, ratio: FloatArray) -> FloatArray:
+    """(k,) local level of ``ratio`` from medians of many ordinates: colouring is not a line."""
+    width = min(512, len(ratio) // 8)
+    n = len(ratio) // max(width, 1)
+    if width < 16:
+        return np.ones_like(ratio)
+    # Median of a chi-square per degree of freedom (Wilson-Hilferty).
+    centre = (1.0 - 2.0 / (9.0 * band.count[0])) ** 3 if band.count[0] > 1 else 0.4549
+    level = np.median(ratio[: n * width].reshape(n, width), axis=1) / centre
+    places = (np.arange(n) + 0.5) * width
+    return np.asarray(np.maximum(np.interp(np.arange(len(ratio)), places, level), 1e-12))
+
+
+def white_limit(
+    bands: Sequence[Ordinates], nyquist_hz: float, masked: Sequence[npt.NDArray[np.bool_]] | None
+) -> tuple[float, float]:
+    """Highest frequency up to which the spectrum is a sum of noise terms, and the power at Nyquist over the terms'.
+
+    The upper two octaves of the band are compared, by thirds of an octave, with the fit of all terms; while one of them
+    deviates, the band is lowered by half an octave.
+    """
+    highest = nyquist_hz
+    while True:
+        spectrum = binned(bands, highest, masked)
+        fit = spectrum.likelihood().fit(range(len(SYMBOLS)), True)
+        expected = spectrum.expectation(fit.strength)
+        if not _deviates(spectrum, expected, fit.slope, highest) and not _droops(spectrum, highest):
+            break
+        if highest / np.sqrt(2.0) < 16.0 * spectrum.frequency_hz[0] or highest < nyquist_hz / 64:
+            return highest, float("nan")
+        highest /= np.sqrt(2.0)
+    whole = binned(bands, nyquist_hz, masked)
+    top = whole.frequency_hz > 0.9 * nyquist_hz
+    ratio = float(np.mean(whole.power[top] / whole.expectation(fit.strength)[top])) if top.any() else float("nan")
+    return highest, ratio
+
+
+def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
+    """Whether the upper two octaves fall below what the terms found under them foretell: no noise term falls there."""
+    low = spectrum.frequency_hz <= highest_hz / 4.0
+    if np.count_nonzero(low) < 8:
+        return False
+    below = BinnedSpectrum(*(values[..., low] for values in vars(spectrum).values()))
+    fit = below.likelihood().fit((1, 2, 3), True)
+    top = spectrum.frequency_hz > highest_hz / 2.0 ** (1 / 3)
+    count = spectrum.count[top].sum()
+    ratio = spectrum.without_line(fit.slope)[top] / spectrum.expectation(fit.strength)[top]
+    mean = float(np.sum(ratio * spectrum.count[top]) / count)
+    return mean < 1.0 - max(TOLERANCE, 3.0 * math.sqrt(2.0 / count + 4.0 / below.count.sum()))
+
+
+def _deviates(spectrum: BinnedSpectrum, expected: FloatArray, slope: float, highest_hz: float) -> bool:
+    upper = spectrum.frequency_hz > highest_hz / 4.0
+    key = np.floor(3.0 * np.log2(highest_hz / spectrum.frequency_hz[upper]) + 1e-9)
+    ratio = (spectrum.without_line(slope) / expected)[upper]
+    count = spectrum.count[upper]
+    for group in np.unique(key):
+        inside = key == group
+        n = count[inside].sum()
+        mean = float(np.sum(ratio[inside] * count[inside]) / n)
+        if n >= 8 and abs(mean - 1.0) > max(TOLERANCE, 4.5 * np.sqrt(2.0 / n)):
+            return True
+    return False
+
+
+@dataclass(frozen=True, eq=False)
+class MisfitGroup:
+    """Half an octave of the spectrum: bins ``inside``, its power over the terms' minus 1, and that in sigmas."""
+
+    inside: npt.NDArray[np.bool_]
+    deviation: float
+    z: float
+    frequency_hz: float
+
+
+def misfit_groups(selection: Selection) -> list[MisfitGroup]:
+    """How far the spectrum is from the selected terms, by half octaves."""
+    spectrum = selection.spectrum
+    ratio = spectrum.without_line(selection.fit.slope) / spectrum.expectation(selection.fit.strength)
+    key = np.floor(2.0 * np.log2(spectrum.frequency_hz / spectrum.frequency_hz[0]))
+    groups = []
+    for group in np.unique(key):
+        inside = key == group
+        n = spectrum.count[inside].sum()
+        mean = float(np.sum(ratio[inside] * spectrum.count[inside]) / n)
+        # Cube root: nearly normal for few degrees of freedom (Wilson-Hilferty).
+        z = float((max(mean, 0.0) ** (1 / 3) - (1 - 2 / (9 * n))) / np.sqrt(2 / (9 * n)))
+        groups.append(MisfitGroup(inside, mean - 1.0, z, float(np.mean(spectrum.frequency_hz[inside]))))
+    return groups

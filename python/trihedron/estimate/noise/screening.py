@@ -1,0 +1,159 @@
+"""What in a static log is not stationary noise: steps, knocks, shaking; and what the converter left of the readings.
+
+Every detector measures the log's own scatter robustly and asks what Gaussian noise of any colour would exceed once in
+10 000 logs; no threshold is set by hand.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.records.noise import FloatArray
+
+FALSE_ALARM = 1e-4
+"""Probability that a clean log shows an event of one kind."""
+MOST_EVENTS = 500
+"""Events of one axis that are looked at, the strongest first."""
+_MAD_TO_SIGMA = 1.4826
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at readings ``[start, stop)``: ``size`` in their unit, ``score`` over the limit."""
+
+    start: int
+    stop: int
+    size: float
+    score: float
+
+
+def steps_and_knocks(x: FloatArray) -> tuple[list[Event], list[Event]]:
+    """Jumps of the level, and short excursions that return, of one channel ``x`` (n,); NaN marks a missing reading.
+
+    Means of neighbouring clusters are differenced at every power of two; the differences of stationary or
+    random-walk noise are Gaussian whatever the spectrum, so that one far outside their own spread is an event.
+    """
+    n = len(x)
+    scales = []
+    size = 1
+    while n // size >= 64:
+        stride = max(1, size // 4)
+        scales.append((size, stride, _limit((n - 2 * size) // stride + 1, n / size)))
+        size *= 2
+    found = _core.find_jumps(x, scales) if scales else []
+    found = sorted(found, reverse=True)[:MOST_EVENTS]
+    steps: list[Event] = []
+    knocks: list[Event] = []
+    taken: list[tuple[int, int]] = []
+    for score_ratio, at, width, jump in found:
+        if any(a - 2 * width <= at <= b + 2 * width for a, b in taken):
+            continue
+        reach = 4 * width
+        before = _mean(x[max(0, at - reach) : max(1, at - width // 4)])
+        after = _mean(x[min(n - 1, at + width + width // 4) : min(n, at + reach + width)])
+        slack = max(width // 4, 2)
+        # A step keeps at least half of what it jumped; a knock comes back.
+        if abs(after - before) > 0.5 * abs(jump) and at + reach < n and at > reach:
+            steps.append(Event(max(0, at - slack), min(n, at + slack), float(after - before), score_ratio))
+            taken.append((at - 2 * width, at + 2 * width))
+        else:
+            start, stop = max(0, at - width - slack), min(n, at + 2 * width + slack)
+            knocks.append(Event(start, stop, jump, score_ratio))
+            taken.append((start, stop))
+    return sorted(steps, key=lambda e: e.start), sorted(knocks, key=lambda e: e.start)
+
+
+def shaken(x: FloatArray, rate_hz: float) -> list[Event]:
+    """Stretches in which the scatter from reading to reading is far above that of the rest."""
+    size = int(max(16, min(rate_hz, len(x) // 64)))
+    n = len(x) // size
+    if n < 32:
+        return []
+    level = np.log(_core.block_scatter(x, size) + 1e-300)
+    centre = np.nanmedian(level)
+    # Counts that rarely change have a scatter of their own: never believe less than the chi-square's.
+    spread = max(_MAD_TO_SIGMA * float(np.nanmedian(np.abs(level - centre))), math.sqrt(2.0 / size))
+    hit = (level - centre > _limit(n, n) * spread) & (level - centre > math.log(1.5))
+    out: list[Event] = []
+    for i in np.flatnonzero(hit).tolist():
+        size_here = float(math.exp(0.5 * (level[i] - centre)))
+        score = float((level[i] - centre) / spread)
+        if out and out[-1].stop >= (i - 1) * size:
+            out[-1] = Event(out[-1].start, int((i + 1) * size), max(size_here, out[-1].size), max(score, out[-1].score))
+        else:
+            out.append(Event(int(max(0, i - 1) * size), int((i + 1) * size), size_here, score))
+    return out
+
+
+def _mean(values: FloatArray) -> float:
+    present = values[np.isfinite(values)]
+    return float(present.mean()) if len(present) else math.nan
+
+
+def _limit(n_looks: int, n_independent: float) -> float:
+    gaussian = math.sqrt(float(_core.chi_square_quantile(1.0 - FALSE_ALARM / n_looks, np.ones(1))[0]))
+    # The spread itself is known to 1.17/√(2k) from k independent values: three of its errors.
+    return gaussian * (1.0 + 3.0 * 1.17 / math.sqrt(2.0 * n_independent))
+
+
+@dataclass(frozen=True)
+class Readout:
+    """How the readings were written: ``resolution`` the smallest change, ``sigma`` the noise of one reading above it,
+    shares of readings that repeat the one before, and that lie on an extreme value that repeats."""
+
+    resolution: float
+    sigma: float
+    repeated: float
+    clipped: float
+
+    @property
+    def is_dead(self) -> bool:
+        """The noise is too small to carry the readings from one step of the converter to the next."""
+        return self.resolution > 0.0 and self.sigma < 0.5 * self.resolution
+
+
+def readout(x: FloatArray) -> Readout:
+    """Resolution, noise and saturation of one channel."""
+    values = x[np.isfinite(x)]
+    if len(values) < 2:
+        return Readout(0.0, 0.0, 0.0, 0.0)
+    sample = values if len(values) <= 200_000 else values[:200_000]
+    change = np.abs(np.diff(sample))
+    distinct = np.unique(sample)
+    steps = np.diff(distinct)
+    resolution = float(np.quantile(steps, 0.05)) if len(distinct) > 1 and len(distinct) < len(sample) / 4 else 0.0
+    sigma = float(np.sqrt(0.5 * np.mean(np.square(change))))
+    low, high = float(values.min()), float(values.max())
+    return Readout(resolution, sigma, float(np.mean(change == 0.0)), _clipped(values, low, high, resolution))
+
+
+def _clipped(values: FloatArray, low: float, high: float, resolution: float) -> float:
+    """Share of readings on an extreme value, if that is a wall: a tail thins out towards its end, a wall does not."""
+    if high - low < 8.0 * resolution or high == low:
+        return 0.0
+    shares = []
+    for edge in (low, high):
+        at_edge = np.count_nonzero(values == edge) / len(values)
+        near = np.count_nonzero(np.abs(values - edge) <= 1.5 * resolution) / len(values)
+        if at_edge > 1e-3 and at_edge > 0.6 * near and at_edge * len(values) > 10:
+            shares.append(at_edge)
+    return float(sum(shares))
+
+
+def repeated_rows(x: npt.NDArray[np.float64]) -> float:
+    """Share of rows ``x`` (n, channels) that were written twice: channels repeat together, not one at a time."""
+    sample = x[:200_000]
+    if x.shape[1] < 2 or len(sample) < 2:
+        return 0.0
+    same = np.diff(sample, axis=0) == 0.0
+    both = float(np.mean(np.all(same, axis=1)))
+    chance = float(np.prod(same.mean(axis=0)))
+    # Of what the quietest channel repeats beyond chance, more than half falls on rows that repeat as a whole.
+    possible = float(same.mean(axis=0).min()) - chance
+    error = 4.0 * math.sqrt(max(chance, 1.0 / len(sample)) / len(sample))
+    return both - chance if both - chance > max(error, 0.5 * possible) else 0.0

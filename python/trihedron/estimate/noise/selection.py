@@ -1,0 +1,231 @@
+"""Which noise terms a spectrum holds: every subset is fitted, and a term must earn its place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.estimate.noise.spectrum import Ordinates
+from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
+from trihedron.records.noise import FloatArray
+
+EVIDENCE = 8.0
+"""Drop of the deviance that a term must earn. An absent term earns it by chance with a probability of 0.25 % (half a
+chi-square with one degree of freedom; the ramp, which has two signs, 0.5 %): four absent terms together 1.5 %."""
+
+EVIDENCE_GAUSS_MARKOV = 16.0
+"""The same for a Gauss-Markov process, whose time constant was searched over a grid as well."""
+
+TOLERANCE_GAUSS_MARKOV = 0.02
+"""Share by which a half octave may miss its terms without being called a Gauss-Markov process."""
+
+BIN_WIDTH = 1.025
+"""Ratio of the edges of a bin: a random walk varies by 5 % inside it, and its mean is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class BinnedSpectrum:
+    """Ordinates averaged over narrow bins: all (b,), the basis (terms, b)."""
+
+    frequency_hz: FloatArray
+    count: FloatArray
+    power: FloatArray
+    cross: FloatArray
+    square: FloatArray
+    basis: FloatArray
+
+    def with_gauss_markov(self, step_s: float, correlation_time_s: float) -> BinnedSpectrum:
+        """The same bins with a unit Gauss-Markov process as a fifth term."""
+        row = gauss_markov_density(self.frequency_hz, step_s, correlation_time_s)
+        return replace(self, basis=np.vstack([self.basis, row]))
+
+    def capped(self, tolerance: float) -> BinnedSpectrum:
+        """The same bins, no half octave of which is believed to better than ``tolerance``."""
+        key = np.floor(2.0 * np.log2(self.frequency_hz / self.frequency_hz[0])).astype(np.int64)
+        total = np.bincount(key, weights=self.count)
+        return replace(self, count=self.count * np.minimum(1.0, 2.0 / tolerance**2 / total[key]))
+
+    def likelihood(self) -> _core.SpectralBins:
+        """The likelihood of these bins."""
+        return _core.SpectralBins(self.count, self.power, self.cross, self.square, self.basis)
+
+    def expectation(self, strength: npt.ArrayLike) -> FloatArray:
+        """(b,) expected power for the strengths (squares) of the terms."""
+        return np.asarray(np.asarray(strength) @ self.basis)
+
+    def without_line(self, slope: float) -> FloatArray:
+        """(b,) power with a line of ``slope`` taken out."""
+        return self.power - 2.0 * slope * self.cross + slope**2 * self.square
+
+
+def binned(
+    bands: Sequence[Ordinates],
+    highest_hz: float,
+    masked: Sequence[npt.NDArray[np.bool_]] | None = None,
+) -> BinnedSpectrum:
+    """Ordinates up to ``highest_hz`` that are not ``masked``, averaged over bins of 2.5 %."""
+    pick = [band.frequency_hz <= highest_hz for band in bands]
+    if masked is not None:
+        pick = [p & ~m for p, m in zip(pick, masked, strict=True)]
+    frequency = np.concatenate([band.frequency_hz[p] for band, p in zip(bands, pick, strict=True)])
+    if len(frequency) == 0:
+        raise ValueError(f"no spectral ordinate lies below {highest_hz} Hz")
+    order = np.argsort(frequency, kind="stable")
+
+    def gather(parts: list[FloatArray]) -> FloatArray:
+        return np.asarray(np.concatenate(parts, axis=-1)[..., order])
+
+    frequency = frequency[order]
+    count = gather([band.count[p] for band, p in zip(bands, pick, strict=True)])
+    key = np.floor(np.log(frequency / frequency[0]) / np.log(BIN_WIDTH))
+    edges = np.flatnonzero(np.concatenate([[True], np.diff(key) > 0]))
+    total = np.add.reduceat(count, edges)
+
+    def averaged(parts: list[FloatArray]) -> FloatArray:
+        return np.asarray(np.add.reduceat(gather(parts) * count, edges, axis=-1) / total)
+
+    chosen = list(zip(bands, pick, strict=True))
+    return BinnedSpectrum(
+        frequency_hz=averaged([band.frequency_hz[p] for band, p in chosen]),
+        count=total,
+        power=averaged([band.power[p] for band, p in chosen]),
+        cross=averaged([band.cross[p] for band, p in chosen]),
+        square=averaged([band.line[p] ** 2 for band, p in chosen]),
+        basis=averaged([band.basis[:, p] for band, p in chosen]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The chosen model: ``active`` indices of the basis, whether it has a ramp, its fit, the evidence of each term."""
+
+    active: tuple[int, ...]
+    has_ramp: bool
+    fit: _core.SpectralFit
+    spectrum: BinnedSpectrum
+    evidence: tuple[float, ...]
+    evidence_ramp: float
+    correlation_time_s: float | None = None
+    correlation_interval_s: tuple[float, float] = (0.0, 0.0)
+    evidence_gauss_markov: float = 0.0
+
+
+def select(
+    bands: Sequence[Ordinates],
+    highest_hz: float,
+    masked: Sequence[npt.NDArray[np.bool_]] | None = None,
+    evidence: float = EVIDENCE,
+    *,
+    tolerance: float = 0.0,
+    is_cornered: bool = False,
+) -> Selection:
+    """The subset of {Q, N, B, K, R} of least deviance plus ``evidence`` per term, and a Gauss-Markov process if earned.
+
+    Raises
+    ------
+    ValueError
+        When the channel does not change, or nothing is left of the spectrum.
+    """
+    spectrum = binned(bands, highest_hz, masked)
+    if tolerance > 0.0:
+        spectrum = spectrum.capped(tolerance)
+    likelihood = spectrum.likelihood()
+    table: dict[tuple[tuple[int, ...], bool], _core.SpectralFit] = {}
+    for size in range(1, len(SYMBOLS) + 1):
+        for active in combinations(range(len(SYMBOLS)), size):
+            for has_ramp in (False, True):
+                table[active, has_ramp] = likelihood.fit(active, has_ramp)
+
+    def price(key: tuple[tuple[int, ...], bool]) -> float:
+        return table[key].deviance + evidence * (len(key[0]) + key[1])
+
+    best = min(table, key=price)
+    if not is_cornered:
+        cornered = _cornered(bands, table[best].strength)
+        if any(c.any() for c in cornered):
+            both = cornered if masked is None else [c | m for c, m in zip(cornered, masked, strict=True)]
+            return select(bands, highest_hz, both, evidence, tolerance=tolerance, is_cornered=True)
+    active, has_ramp = best
+    earned = []
+    for k in range(len(SYMBOLS)):
+        with_k = tuple(sorted({*active, k}))
+        without = tuple(i for i in active if i != k)
+        base = table[without, has_ramp].deviance if without else float("inf")
+        earned.append(base - table[with_k, has_ramp].deviance)
+    earned_ramp = table[active, False].deviance - table[active, True].deviance
+    plain = Selection(active, has_ramp, table[best], spectrum, tuple(earned), earned_ramp)
+    step_s = min(band.step_s / band.block for band in bands)
+    return _with_gauss_markov(step_s, plain, evidence) or plain
+
+
+def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[npt.NDArray[np.bool_]]:
+    """Ordinates in which the unpaired first and last phase of quantisation weigh: all share two random numbers."""
+    out = []
+    for band in bands:
+        expectation = np.asarray(strength) @ band.basis
+        out.append(strength[0] * band.corner_floor > 0.05 * expectation)
+    return out
+
+
+def _with_gauss_markov(step_s: float, plain: Selection, evidence: float) -> Selection | None:
+    # Filters bend a spectrum by a few per cent: a process must show in what is left when that is not believed.
+    spectrum = plain.spectrum.capped(TOLERANCE_GAUSS_MARKOV)
+    frequency = spectrum.frequency_hz
+    price_plain = spectrum.likelihood().fit(plain.active, plain.has_ramp).deviance
+    price_plain += evidence * (len(plain.active) + plain.has_ramp)
+    # Shorter than this it is white, longer a random walk, as far as this log can tell.
+    shortest, longest = 1.0 / (2 * np.pi * frequency[-1]), 1.0 / (2 * np.pi * frequency[0])
+    extra = len(SYMBOLS)
+    # It may stand beside the terms found, or explain what B, K or both were found for.
+    models = {(*(k for k in plain.active if k not in drop), extra) for drop in ((), (2,), (3,), (2, 3))}
+    if not longest > 64 * shortest:
+        return None
+
+    def best_at(time_s: float) -> tuple[float, tuple[int, ...], bool, float]:
+        likelihood = spectrum.with_gauss_markov(step_s, time_s).likelihood()
+        found = []
+        for model in models:
+            deviance = likelihood.fit(model, plain.has_ramp).deviance
+            price = deviance + evidence * (len(model) - 1 + plain.has_ramp) + EVIDENCE_GAUSS_MARKOV
+            found.append((price, model, plain.has_ramp, deviance))
+        return min(found)
+
+    # A corner in the uppermost three octaves is the colouring of a filter, not a process of the sensor.
+    grid = np.geomspace(8 * shortest, longest / 2, max(4, int(np.log2(longest / shortest)) - 3))
+    coarse = [best_at(time_s)[0] for time_s in grid]
+    place = int(np.argmin(coarse))
+    if coarse[place] > price_plain + EVIDENCE_GAUSS_MARKOV / 2:
+        return None
+    step = grid[1] / grid[0]
+    fine = np.geomspace(max(grid[place] / step, grid[0]), grid[place] * step, 17)
+    finer = [best_at(time_s) for time_s in fine]
+    place = int(np.argmin([item[0] for item in finer]))
+    price, model, has_ramp, least = finer[place]
+    if price > price_plain:
+        return None
+    inside = [t for t, item in zip(fine, finer, strict=True) if item[3] < least + 3.84]
+    time_s = float(fine[place])
+    full = plain.spectrum.with_gauss_markov(step_s, time_s)
+    likelihood = full.likelihood()
+    fit = likelihood.fit(model, has_ramp)
+    evidence_terms = []
+    for k in range(extra):
+        with_k = tuple(sorted({*model, k}))
+        without = tuple(i for i in model if i != k)
+        evidence_terms.append(likelihood.fit(without, has_ramp).deviance - likelihood.fit(with_k, has_ramp).deviance)
+    return Selection(
+        active=model,
+        has_ramp=has_ramp,
+        fit=fit,
+        spectrum=full,
+        evidence=tuple(evidence_terms),
+        evidence_ramp=abs(likelihood.fit(model, not has_ramp).deviance - fit.deviance),
+        correlation_time_s=time_s,
+        correlation_interval_s=(float(min(inside)), float(max(inside))),
+        evidence_gauss_markov=price_plain - price + EVIDENCE_GAUSS_MARKOV,
+    )

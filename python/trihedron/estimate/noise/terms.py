@@ -1,0 +1,34 @@
+"""What each noise term contributes to a spectral ordinate, and to the Allan variance (docs/noise.md, eq. 7-10)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from trihedron.records.noise import FloatArray
+
+SYMBOLS = ("Q", "N", "B", "K")
+"""Order of the terms in every basis; the ramp R is a line, not a spectrum."""
+
+
+def gauss_markov_density(frequency_hz: FloatArray, step_s: float, correlation_time_s: float) -> FloatArray:
+    """Two-sided density of a Gauss-Markov process of unit variance, sampled in steps of ``step_s``."""
+    decay = math.exp(-step_s / correlation_time_s)
+    cosine = np.cos(2.0 * np.pi * frequency_hz * step_s)
+    return np.asarray(step_s * (1.0 - decay**2) / (1.0 - 2.0 * decay * cosine + decay**2))
+
+
+def allan_variance_of_terms(tau_s: FloatArray, symbol: str, value: float) -> FloatArray:
+    """Allan variance at ``tau_s`` of one term of IEEE 952 (docs/noise.md, eq. 7)."""
+    tau = np.asarray(tau_s, dtype=np.float64)
+    square = value**2
+    if symbol == "Q":
+        return np.asarray(3.0 * square / tau**2)
+    if symbol == "N":
+        return np.asarray(square / tau)
+    if symbol == "B":
+        return np.full_like(tau, 2.0 * math.log(2.0) / math.pi * square)
+    if symbol == "K":
+        return np.asarray(square * tau / 3.0)
+    return np.asarray(square * tau**2 / 2.0)

@@ -1,0 +1,151 @@
+//! What happens in a static log: differences of neighbouring means that stand far outside their own scatter.
+
+use rayon::prelude::*;
+
+use crate::allan::prefix::Prefix;
+use crate::error::{Error, Result};
+
+/// Differences from which a spread is read: its error is 0.8 %, far below that of the limit.
+const SAMPLE: usize = 16384;
+/// Median absolute deviation to standard deviation of a Gaussian.
+const MAD_TO_SIGMA: f64 = 1.4826;
+/// What a Gaussian exceeds once in a hundred, either side, in sigmas.
+const TWO_SIDED_HUNDREDTH: f64 = 2.5758;
+
+/// One scale at which the log is searched.
+#[derive(Debug, Clone, Copy)]
+pub struct Scale {
+    /// Readings per mean.
+    pub size: usize,
+    /// Distance of neighbouring starts.
+    pub stride: usize,
+    /// Sigmas above which a difference is an event.
+    pub limit: f64,
+}
+
+/// The largest of a run of differences above the limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jump {
+    /// Difference over limit times spread.
+    pub score: f64,
+    /// Reading at which the later mean begins.
+    pub at: usize,
+    /// Readings per mean.
+    pub size: usize,
+    /// Later mean minus earlier.
+    pub difference: f64,
+}
+
+/// Events of one channel at every scale; readings that are not finite count as the mean.
+///
+/// # Errors
+/// `BadInput` for a scale that does not fit into the log.
+pub fn jumps<F: Fn(usize) -> f64 + Sync>(n: usize, get: F, scales: &[Scale]) -> Result<Vec<Jump>> {
+    if scales
+        .iter()
+        .any(|s| s.size == 0 || s.stride == 0 || 2 * s.size > n)
+    {
+        return Err(Error::bad_input(
+            "every scale must hold at least one reading, and the log two of them",
+        ));
+    }
+    let sums = Prefix::new(n, &get).sums;
+    Ok(scales
+        .par_iter()
+        .flat_map_iter(|&scale| at_scale(&sums, scale))
+        .collect())
+}
+
+fn at_scale(sums: &[f64], scale: Scale) -> Vec<Jump> {
+    let Scale {
+        size,
+        stride,
+        limit,
+    } = scale;
+    let count = (sums.len() - 1 - 2 * size) / stride + 1;
+    let difference = |i: usize| {
+        let k = i * stride;
+        ((sums[k + 2 * size] - sums[k + size]) - (sums[k + size] - sums[k])) / size as f64
+    };
+    let spread = spread(
+        (0..count)
+            .step_by((count / SAMPLE).max(1))
+            .map(difference)
+            .collect(),
+    );
+    let threshold = limit * spread;
+    let apart = (2 * size / stride).max(1);
+    let mut out: Vec<Jump> = Vec::new();
+    let mut last = 0;
+    for i in 0..count {
+        let d = difference(i);
+        if d.abs() <= threshold {
+            continue;
+        }
+        let jump = Jump {
+            score: d.abs() / threshold,
+            at: i * stride + size,
+            size,
+            difference: d,
+        };
+        match out.last_mut() {
+            Some(open) if i - last <= apart => {
+                if jump.score > open.score {
+                    *open = jump;
+                }
+            }
+            _ => out.push(jump),
+        }
+        last = i;
+    }
+    // Events are rare. Where every thousandth mean is one, the noise at this scale is not Gaussian, and no judge.
+    if out.len() > 10 + sums.len() / size / 1000 {
+        Vec::new()
+    } else {
+        out
+    }
+}
+
+/// Spread of the bulk, and not less than what one difference in a hundred demands: readings with long tails are noise,
+/// not events, and counts that mostly stand still have no median.
+fn spread(mut values: Vec<f64>) -> f64 {
+    let rms = (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
+    let centre = median(&mut values);
+    values.iter_mut().for_each(|v| *v = (*v - centre).abs());
+    let mut spread = MAD_TO_SIGMA * median(&mut values);
+    if values.len() >= 4096 {
+        let rank = values.len() - values.len() / 100;
+        spread = spread
+            .max(*values.select_nth_unstable_by(rank, f64::total_cmp).1 / TWO_SIDED_HUNDREDTH);
+    }
+    if spread > 0.0 {
+        spread
+    } else {
+        rms.max(f64::MIN_POSITIVE)
+    }
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Mean squares of the differences from reading to reading in blocks of `size`; NaN where a block has none.
+#[must_use]
+pub fn scatter<F: Fn(usize) -> f64 + Sync>(n: usize, get: F, size: usize) -> Vec<f64> {
+    (0..n / size.max(1))
+        .into_par_iter()
+        .with_min_len(256)
+        .map(|block| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for i in block * size..((block + 1) * size).min(n - 1) {
+                let d = get(i + 1) - get(i);
+                if d.is_finite() {
+                    sum += d * d;
+                    count += 1.0;
+                }
+            }
+            sum / count
+        })
+        .collect()
+}

@@ -1,0 +1,286 @@
+"""Noise terms from simulated logs of known truth; what disturbs a log is found and named."""
+
+import numpy as np
+import pytest
+from scipy.fft import dct
+from scipy.stats import chi2, norm
+
+from noise_series import fractional, series
+from trihedron import _core
+from trihedron.estimate.noise import identify_noise
+from trihedron.estimate.noise.spectrum import cosine_transform, line_coefficients, ordinates
+from trihedron.records.finding import FindingCode, Severity
+from trihedron.records.noise import TermName
+
+RATE = 100.0
+
+
+def present(axis):
+    found = {term.value for term, value in axis.terms.items() if value.is_present}
+    return found | ({"G"} if axis.gauss_markov else set())
+
+
+def codes(noise):
+    return {finding.code for axis in noise.axes for finding in axis.findings} | {f.code for f in noise.findings}
+
+
+@pytest.fixture(scope="module")
+def published_setting():
+    """Ten axes of the published setting: 400 Hz, 11 000 s, N 2.502e-3, K 6.972e-5."""
+    rng = np.random.default_rng(21)
+    return [identify_noise(series(rng, 4_400_000, 400.0, N=2.502e-3, K=6.972e-5), 400.0).axes[0] for _ in range(10)]
+
+
+def test_the_published_setting_is_recovered_near_its_bound(published_setting):
+    N = np.array([axis.value("N") for axis in published_setting]) / 2.502e-3
+    K = np.array([axis.value("K") for axis in published_setting]) / 6.972e-5
+    # Bounds for one axis: 0.05 % of N, 8.1 % of K; four standard errors of the mean and of the deviation of ten.
+    assert np.abs(N - 1.0).max() < 0.01
+    assert abs(K.mean() - 1.0) < 4 * 0.081 / np.sqrt(10)
+    assert K.std(ddof=1) < 0.081 * np.sqrt(chi2.ppf(0.9999, 9) / 9)
+
+
+def test_pure_white_and_walk_yield_no_other_term(published_setting):
+    # 1.5 % chance of an invented term for each: three of ten have a probability of 4e-4.
+    assert sum(present(axis) != {"N", "K"} for axis in published_setting) <= 2
+
+
+def test_an_absent_term_has_a_limit_and_no_value(published_setting):
+    for axis in published_setting:
+        for symbol in ("Q", "B", "R"):
+            term = axis.terms[TermName(symbol)]
+            if not term.is_present:
+                assert term.value == 0.0
+                assert 0.0 < term.limit < np.inf
+
+
+def test_intervals_cover_the_truth():
+    rng = np.random.default_rng(22)
+    hits = []
+    for _ in range(120):
+        axis = identify_noise(series(rng, 40_000, RATE, N=1e-2, K=6e-4), RATE).axes[0]
+        for symbol, truth in (("N", 1e-2), ("K", 6e-4)):
+            term = axis.terms[TermName(symbol)]
+            hits.append(term.lower <= truth <= term.upper)
+    # 240 intervals of 95 %: binomial limits at p = 1e-3.
+    assert 0.90 <= np.mean(hits) <= 0.99
+
+
+@pytest.mark.parametrize("truth", ["N", "K", "B", "NK", "NB", "QN", "NKR", "QNK"])
+def test_the_terms_present_are_found(truth):
+    rng = np.random.default_rng(23)
+    size = {"Q": 3e-4, "N": 1e-2, "B": 4e-3, "K": 1.2e-3, "R": 6e-4}
+    found = [
+        present(identify_noise(series(rng, 1 << 16, RATE, **{s: size[s] for s in truth}), RATE).axes[0])
+        for _ in range(6)
+    ]
+    # At 95 % each, four of six or more has a probability of 0.998.
+    assert sum(f == set(truth) for f in found) >= 4, found
+
+
+def test_the_answer_survives_decimation_by_ten():
+    rng = np.random.default_rng(24)
+    x = series(rng, 400_000, RATE, N=1e-2, K=5e-4)
+    whole = identify_noise(x, RATE).axes[0]
+    means = identify_noise(x.reshape(-1, 10).mean(axis=1), RATE / 10).axes[0]
+    assert present(whole) == present(means) == {"N", "K"}
+    for symbol in ("N", "K"):
+        term = whole.terms[TermName(symbol)]
+        other = means.terms[TermName(symbol)]
+        assert term.lower < other.value < term.upper or other.lower < term.value < other.upper
+
+
+def test_a_gauss_markov_process_is_told_from_flicker_and_walk():
+    rng = np.random.default_rng(25)
+    n, tau, sigma = 1 << 17, 10.0, 5e-3
+    decay = np.exp(-1.0 / (RATE * tau))
+    drive = sigma * np.sqrt(1 - decay**2) * rng.normal(size=n)
+    process = np.empty(n)
+    value = sigma * rng.normal()
+    for i in range(n):
+        value = decay * value + drive[i]
+        process[i] = value
+    axis = identify_noise(series(rng, n, RATE, N=2e-3) + process, RATE).axes[0]
+    assert present(axis) == {"N", "G"}
+    assert 4.0 < axis.gauss_markov.correlation_time_s < 25.0
+    assert axis.gauss_markov.sigma_process == pytest.approx(sigma, rel=0.25)
+
+
+@pytest.fixture(scope="module")
+def quiet():
+    return series(np.random.default_rng(26), 300_000, RATE, N=1e-3, K=3e-5)
+
+
+def test_a_clean_log_has_nothing_to_report(quiet):
+    assert identify_noise(quiet, RATE).findings == ()
+    assert identify_noise(quiet, RATE).axes[0].findings == ()
+
+
+def test_a_step_is_found_and_does_not_become_a_random_walk(quiet):
+    stepped = quiet.copy()
+    stepped[170_000:] += 5e-3
+    noise = identify_noise(stepped, RATE)
+    assert FindingCode.LOG_STEP in codes(noise)
+    assert noise.breaks_s[0] == pytest.approx(1700.0, abs=20.0)
+    clean = identify_noise(quiet, RATE).axes[0]
+    assert noise.axes[0].value("K") == pytest.approx(clean.value("K"), rel=0.15)
+
+
+def test_knocks_are_left_out_and_named(quiet):
+    knocked = quiet.copy()
+    knocked[1000] += 1.0
+    knocked[200_000:200_005] -= 0.2
+    noise = identify_noise(knocked, RATE)
+    assert FindingCode.LOG_KNOCK in codes(noise)
+    assert FindingCode.STRETCHES_EXCLUDED in codes(noise)
+    assert noise.axes[0].value("N") == pytest.approx(1e-3, rel=0.01)
+    assert any(start <= 10.0 <= stop for start, stop in noise.excluded_s)
+
+
+def test_shaking_is_left_out_and_named(quiet):
+    shaken = quiet.copy()
+    shaken[100_000:103_000] += 0.05 * np.random.default_rng(1).normal(size=3000)
+    noise = identify_noise(shaken, RATE)
+    assert FindingCode.LOG_MOTION in codes(noise)
+    assert noise.axes[0].value("N") == pytest.approx(1e-3, rel=0.01)
+
+
+def test_a_periodic_line_is_found_with_its_amplitude(quiet):
+    t = np.arange(len(quiet)) / RATE
+    noise = identify_noise(quiet + 1e-3 * np.sin(2 * np.pi * 7.3 * t), RATE)
+    (line,) = noise.axes[0].lines
+    assert line.frequency_hz == pytest.approx(7.3, abs=0.01)
+    assert line.amplitude == pytest.approx(1e-3, rel=0.1)
+    assert present(noise.axes[0]) == {"N", "K"}
+
+
+def test_filtering_is_recognised_before_terms_are_quoted(quiet):
+    filtered = np.convolve(quiet, np.full(5, 0.2), mode="valid")
+    noise = identify_noise(filtered, RATE)
+    assert FindingCode.SPECTRUM_COLOURED in codes(noise)
+    assert noise.axes[0].highest_hz < 10.0
+    # What the filter takes below the frequency where it is noticed: 2.5 % of N.
+    assert noise.axes[0].value("N") == pytest.approx(1e-3, rel=0.025)
+
+
+def test_rows_written_twice_are_told_from_coarse_readings(quiet):
+    held = np.repeat(quiet[::4], 4)
+    noise = identify_noise(np.column_stack([held, held[::-1]]), RATE)
+    assert FindingCode.REPEATED_ROWS in codes(noise)
+    coarse = np.round(np.column_stack([quiet, quiet[::-1]]) / 0.02) * 0.02
+    assert FindingCode.REPEATED_ROWS not in codes(identify_noise(coarse, RATE))
+
+
+def test_a_converter_coarser_than_the_noise_is_serious(quiet):
+    noise = identify_noise(np.round(quiet / 0.05) * 0.05, RATE)
+    assert FindingCode.QUANTISATION_DEAD in codes(noise)
+    assert not noise.is_trustworthy
+
+
+def test_clipping_is_serious(quiet):
+    noise = identify_noise(np.clip(quiet, None, np.quantile(quiet, 0.95)), RATE)
+    assert any(f.code is FindingCode.CLIPPING and f.severity is Severity.SERIOUS for f in noise.axes[0].findings)
+
+
+def test_a_channel_that_never_changes_is_serious_not_an_error(quiet):
+    noise = identify_noise(np.column_stack([quiet, np.full(len(quiet), 3.0)]), RATE)
+    assert not noise.is_trustworthy
+    assert noise.axes[1].value("N") == 0.0
+    assert noise.axes[0].value("N") == pytest.approx(1e-3, rel=0.01)
+
+
+def test_excluded_stretches_do_not_count(quiet):
+    spoiled = quiet.copy()
+    spoiled[50_000:80_000] += np.linspace(0, 1, 30_000)
+    noise = identify_noise(spoiled, RATE, exclude_s=[(500.0, 800.0)])
+    assert noise.excluded_s == ((500.0, 800.0),)
+    assert noise.axes[0].value("K") == pytest.approx(3e-5, rel=0.5)
+    assert not noise.axes[0].terms[TermName.RATE_RAMP].is_present
+
+
+def test_missing_readings_are_no_obstacle(quiet):
+    lossy = quiet.copy()
+    lossy[np.random.default_rng(2).random(len(lossy)) < 0.01] = np.nan
+    axis = identify_noise(lossy, RATE).axes[0]
+    assert present(axis) == {"N", "K"}
+    assert axis.value("N") == pytest.approx(1e-3, rel=0.02)
+
+
+def test_the_cosine_transform_is_the_orthonormal_one():
+    rng = np.random.default_rng(27)
+    for n in (2, 3, 16, 101):
+        x = rng.normal(size=(3, n))
+        assert cosine_transform(x) == pytest.approx(dct(x, norm="ortho", axis=1), abs=1e-12)
+    assert line_coefficients(50, np.arange(1, 50)) == pytest.approx(dct(np.arange(50.0), norm="ortho")[1:], abs=1e-11)
+
+
+def test_ordinates_have_the_expectations_of_the_basis():
+    rng = np.random.default_rng(28)
+    n, runs = 4096, 600
+    for k, make in enumerate(
+        (
+            lambda: np.diff(rng.normal(size=n + 1)) * RATE,
+            lambda: rng.normal(size=n) * np.sqrt(RATE),
+            lambda: fractional(rng, n),
+            lambda: np.cumsum(rng.normal(size=n)) / np.sqrt(RATE),
+        )
+    ):
+        band = ordinates(make(), RATE, [(0, n)])[0]
+        mean = np.mean([ordinates(make(), RATE, [(0, n)])[0].power for _ in range(runs)], axis=0)
+        ratio = mean / band.basis[k]
+        # Chi-square with one degree of freedom: 4.5 standard errors for the first ten orders, and in octaves beyond.
+        assert np.all(np.abs(ratio[:10] - 1.0) < 4.5 * np.sqrt(2.0 / runs)), (k, ratio[:10])
+        for start in (16, 128, 1024):
+            group = ratio[start : 2 * start]
+            assert abs(group.mean() - 1.0) < 4.5 * np.sqrt(2.0 / runs / start), (k, start, group.mean())
+
+
+def test_variance_of_a_mean_is_what_means_scatter_by():
+    rng = np.random.default_rng(29)
+    n = 60_000
+    x = series(rng, n, RATE, N=1e-2, K=2e-3)
+    axis = identify_noise(x, RATE).axes[0]
+    window, session = 5.0, n / RATE
+    scatter = []
+    for _ in range(40):
+        means = series(rng, n, RATE, N=1e-2, K=2e-3).reshape(-1, int(window * RATE)).mean(axis=1)
+        scatter.append(np.mean((means - means.mean()) ** 2))
+    truth = 1e-4 * (1 / window - 1 / session) + 4e-6 * (session - window) / 6
+    assert np.mean(scatter) == pytest.approx(truth, rel=4 * np.std(scatter) / np.mean(scatter) / np.sqrt(40))
+    # The identified K is within 20 % here; its square enters.
+    assert axis.variance_of_mean(window, session) == pytest.approx(truth, rel=0.4)
+    assert axis.variance_of_mean(window) == pytest.approx(1e-4 / window + 4e-6 * window / 3, rel=0.4)
+
+
+def test_the_best_averaging_time_is_that_of_the_terms(published_setting):
+    for axis in published_setting:
+        tau, deviation = axis.optimal_averaging()
+        N, K = axis.value("N"), axis.value("K")
+        if present(axis) == {"N", "K"}:
+            assert tau == pytest.approx(np.sqrt(3) * N / K, rel=0.02)
+            assert deviation == pytest.approx(np.sqrt(2 * N * K / np.sqrt(3)), rel=1e-3)
+
+
+@pytest.mark.parametrize("dof", [0.7, 1.0, 3.3, 40.0, 3000.0, 5e5])
+def test_chi_square_quantiles_are_those_of_scipy(dof):
+    for p in (1e-9, 0.025, 0.5, 0.975, 1 - 1e-9):
+        got = float(_core.chi_square_quantile(p, np.array([dof]))[0])
+        # Close to 1 the probability itself is rounded at 1e-16 of 1e-9.
+        assert got == pytest.approx(chi2.ppf(p, dof), rel=2e-7)
+    assert _core.chi_square_above(9.0, 1.0) == pytest.approx(2 * norm.sf(3.0), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("question", "words"),
+    [
+        (lambda x: identify_noise(x[:100], RATE), "too few"),
+        (lambda x: identify_noise(x, -1.0), "rate_hz"),
+        (lambda x: identify_noise(x, RATE, exclude_s=[(5.0, 2.0)]), "earlier to a later"),
+        (lambda x: identify_noise(x, RATE, exclude_s=[(1e6, 2e6)]), "outside the log"),
+        (lambda x: identify_noise(x, RATE, names=("a", "b")), "as many names"),
+        (lambda x: identify_noise(np.full_like(x, np.nan), RATE), "no finite reading"),
+    ],
+)
+def test_a_malformed_question_is_refused_in_words(quiet, question, words):
+    with pytest.raises(ValueError, match=words):
+        question(quiet)
