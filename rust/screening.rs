@@ -111,7 +111,9 @@ fn at_scale(sums: &[f64], scale: Scale) -> Vec<Jump> {
 fn spread(mut values: Vec<f64>) -> f64 {
     let rms = (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
     let centre = median(&mut values);
-    values.iter_mut().for_each(|v| *v = (*v - centre).abs());
+    for v in &mut values {
+        *v = (*v - centre).abs();
+    }
     let mut spread = MAD_TO_SIGMA * median(&mut values);
     if values.len() >= 4096 {
         let rank = values.len() - values.len() / 100;

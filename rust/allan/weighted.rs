@@ -6,6 +6,11 @@
 //! random walk this is unbiased up to the position of the gap in its cluster; for white noise it is the variance of
 //! means of the readings that are there.
 
+#![expect(
+    clippy::inline_always,
+    reason = "a loop that is not inlined keeps the features of the baseline"
+)]
+
 use rayon::prelude::*;
 
 use super::prefix::compensated_sum;
@@ -152,10 +157,6 @@ fn stretch_avx2(p: [&[f64]; 3], c: [&[f64]; 3]) -> (f64, f64, usize) {
     stretch_portable(p, c)
 }
 
-#[expect(
-    clippy::inline_always,
-    reason = "a loop that is not inlined keeps the features of the baseline"
-)]
 #[inline(always)]
 fn stretch_portable(p: [&[f64]; 3], c: [&[f64]; 3]) -> (f64, f64, usize) {
     const LANES: usize = 8;
