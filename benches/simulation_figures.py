@@ -85,6 +85,20 @@ def spectrum(readings, holds, window=128):
     return total / count
 
 
+def report(name, recording, copy, segments, calibration):
+    """The numbers of docs/simulation.md, section 7."""
+    S = calibration.gyroscope.S
+    moving = np.concatenate([np.arange(move.start, move.stop) for move in segments.moves])
+    rate = (recording.gyroscope @ S.T + calibration.gyroscope.b)[moving]
+    apart = ((recording.gyroscope - copy.gyroscope) @ S.T)[moving]
+    ratio = np.sqrt(np.mean(apart**2, axis=0) / np.mean(rate**2, axis=0))
+    print(f"{name}: rate in moves, rms difference / rms rate {ratio.min():.2%} to {ratio.max():.2%}")
+    for sensor in ("accelerometer", "gyroscope"):
+        spectra = spectrum(getattr(copy, sensor), segments.holds) / spectrum(getattr(recording, sensor), segments.holds)
+        octaves = [np.exp(np.log(spectra[a:b]).mean(axis=0)) for a, b in ((2, 4), (4, 8), (8, 16), (16, 32), (32, 65))]
+        print(f"{name}: {sensor} noise, twin / recording by octave {np.min(octaves):.2f} to {np.max(octaves):.2f}")
+
+
 def twins(data):
     """Spectra inside the holds and one move, of two recordings and their twins."""
     cases = (
@@ -111,6 +125,7 @@ def twins(data):
             axis.xaxis.set_minor_formatter(NullFormatter())
             axis.set(title=f"{name}: {sensor} in the holds", xlabel="frequency [Hz]", ylabel=f"density [({unit})/√Hz]")
             axis.legend(fontsize=8)
+        report(name, recording, copy, segments, calibration)
         move = segments.moves[3]
         a, b = max(move.start - 100, 0), move.stop + 100
         w = [(s.gyroscope @ calibration.gyroscope.S.T + calibration.gyroscope.b)[a:b] for s in (recording, copy)]
