@@ -1,5 +1,7 @@
 """From a log and a pose table to the filters: matching, noise from the holds, recordings."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from trihedron.estimate.kalman import (
     calibrate_session_without_references,
     calibrate_without_references,
     noise_from_holds,
+    noise_from_identified,
     normalised_error_squared,
     pose_readings,
 )
@@ -194,3 +197,37 @@ def test_a_pose_table_that_cannot_be_used_is_refused_in_plain_words(tmp_path, te
     path.write_text(text)
     with pytest.raises(ReadError, match=message):
         read_pose_table(path, gravity_m_s2=GRAVITY)
+
+
+@dataclass(frozen=True)
+class Identified:
+    """An axis as the identification describes it."""
+
+    name: str
+    unit: str
+    terms: dict
+    sample_sigma: float = 0.02
+    resolution: float = 0.001
+    gauss_markov: object = None
+
+    def value(self, symbol):
+        return self.terms.get(symbol, 0.0)
+
+
+def test_identified_noise_is_taken_in_the_raw_unit():
+    axes = [Identified("gx", "rad/s", {"N": 1.0})] + [
+        Identified(name, "m/s^2", {"N": 0.02, "K": 0.001, "R": -1e-6}) for name in ("ax", "ay", "az")
+    ]
+    in_g = noise_from_identified(axes, "g")
+    assert in_g[2].white == pytest.approx(0.02 / 9.80665)
+    assert in_g[0].ramp == pytest.approx(1e-6 / 9.80665)
+    assert noise_from_identified(axes, "m/s^2")[1] == AxisNoise(
+        white=0.02, walk=0.001, ramp=1e-6, resolution=0.001, sample_sigma=0.02
+    )
+
+
+def test_identified_noise_in_another_unit_or_of_other_axes_is_refused():
+    with pytest.raises(ValueError, match="in m/s\\^2 and the log in counts"):
+        noise_from_identified([Identified(n, "m/s^2", {"N": 0.02}) for n in "xyz"], "counts")
+    with pytest.raises(ValueError, match="three accelerometer axes"):
+        noise_from_identified([Identified("only", "m/s^2", {"N": 0.02})], "m/s^2")
