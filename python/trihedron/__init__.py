@@ -17,6 +17,9 @@ S, b
     raw → truth, *distort* truth → raw.
 calibration
     S and b of both sensors with the covariance of every number. (:func:`calibrate`; :func:`apply`, :func:`verify`)
+diagnosis
+    Where a recording and its model differ, the effect (physical mechanism) left out, with ± and held-out proof.
+    (:func:`diagnose`)
 finding
     Something noticed that bears on the answer: what was seen, with its number; the likely cause; the next action. A
     *serious* finding means that the answer is not to be trusted.
@@ -40,17 +43,20 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from trihedron.calibration_file import read_calibration, write_calibration
-    from trihedron.pipeline import apply, calibrate, check, kalman, read, segment, verify
+    from trihedron.pipeline import apply, calibrate, check, diagnose, kalman, read, segment, verify
     from trihedron.records import Calibration, Finding, Recording, Segments
+    from trihedron.records.diagnosis import Diagnosis
 
 __all__ = [
     "Calibration",
+    "Diagnosis",
     "Finding",
     "Recording",
     "Segments",
     "apply",
     "calibrate",
     "check",
+    "diagnose",
     "kalman",
     "read",
     "read_calibration",
@@ -59,7 +65,9 @@ __all__ = [
     "write_calibration",
 ]
 
-_HOME = dict.fromkeys(("apply", "calibrate", "check", "kalman", "read", "segment", "verify"), "trihedron.pipeline")
+_VERBS = ("apply", "calibrate", "check", "diagnose", "kalman", "read", "segment", "verify")
+_HOME = dict.fromkeys(_VERBS, "trihedron.pipeline")
+_HOME |= {"Diagnosis": "trihedron.records.diagnosis"}
 _HOME |= dict.fromkeys(("read_calibration", "write_calibration"), "trihedron.calibration_file")
 _HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")
 

@@ -72,3 +72,8 @@ def mm_s2_from_m_s2(acceleration_m_s2: float) -> float:
 def mrad_from_radians(angle_rad: float) -> float:
     """Angle, rad → mrad."""
     return 1000.0 * angle_rad
+
+
+def ms_from_s(time_s: float) -> float:
+    """Time, s → ms."""
+    return 1000.0 * time_s

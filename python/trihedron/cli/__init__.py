@@ -17,6 +17,7 @@ from trihedron.cli.apply import apply
 from trihedron.cli.calibrate import calibrate
 from trihedron.cli.check import check
 from trihedron.cli.demo import demo
+from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
 from trihedron.cli.kalman import kalman
 from trihedron.cli.segment import segment
@@ -31,6 +32,7 @@ COMMANDS = (
     calibrate,
     kalman,
     verify,
+    diagnose,
     apply,
     export,
     simulate,

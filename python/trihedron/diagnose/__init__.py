@@ -1,5 +1,6 @@
 """Where simulation and recording differ, which physics was left out, and the proof that adding it helps."""
 
+from trihedron.diagnose.application import TakenOff, take_off
 from trihedron.diagnose.diagnosis import diagnose_recording
 
-__all__ = ["diagnose_recording"]
+__all__ = ["TakenOff", "diagnose_recording", "take_off"]

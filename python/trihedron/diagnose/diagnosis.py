@@ -15,6 +15,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.observations import Observations, observe
+from trihedron.diagnose.pictures import residuals_before_after, with_covariance
 from trihedron.diagnose.selection import (
     CONFOUNDED_DELTA_BIC,
     MAX_EFFECTS,
@@ -140,8 +141,8 @@ def diagnose_recording(
         effects=_worded(model),
         remaining=remaining,
         candidates=tuple(candidates[key] for key in sorted(candidates)),
-        baseline=linear_model(base),
-        extended=linear_model(model.fitted),
+        baseline=with_covariance(linear_model(base), base),
+        extended=with_covariance(linear_model(model.fitted), model.fitted),
         noise=MappingProxyType(
             {
                 "accelerometer_density": (np.sqrt((twin.accel_S**2) @ obs.force_density**2)).tolist(),
@@ -159,6 +160,7 @@ def diagnose_recording(
         recording_source=recording.source,
         recording_sha256=recording.sha256,
         references=MappingProxyType(Context(model.obs, model.fitted).references),
+        residuals=residuals_before_after(base, model.fitted),
     )
     tell(1.0, "done")
     return result

@@ -4,9 +4,10 @@ from trihedron.pipeline.applying import apply
 from trihedron.pipeline.calibrating import METHODS, calibrate
 from trihedron.pipeline.checking import check
 from trihedron.pipeline.choices import settle_gravity
+from trihedron.pipeline.diagnosing import diagnose, extend
 from trihedron.pipeline.filtering import KalmanResult, kalman
 from trihedron.pipeline.reading import read, segment
-from trihedron.pipeline.results import CalibrationResult, CheckResult, VerificationResult
+from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
 from trihedron.pipeline.simulating import simulate, twin
 from trihedron.pipeline.verifying import verify
 
@@ -14,11 +15,14 @@ __all__ = [
     "METHODS",
     "CalibrationResult",
     "CheckResult",
+    "DiagnosisResult",
     "KalmanResult",
     "VerificationResult",
     "apply",
     "calibrate",
     "check",
+    "diagnose",
+    "extend",
     "kalman",
     "read",
     "segment",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +29,8 @@ def calibration_of(given: AnyCalibration) -> Calibration:
 def apply(calibration: AnyCalibration, recording: Recording) -> Recording:
     """The recording in SI, in the calibration's instrument trihedron: ``S raw + b`` for every row.
 
+    Where the calibration is extended, its effects are taken off first; a finding names those that cannot be.
+
     Raises
     ------
     ValueError
@@ -35,8 +38,9 @@ def apply(calibration: AnyCalibration, recording: Recording) -> Recording:
     """
     known = calibration_of(calibration)
     check_units(known, recording)
+    recording, more = without_effects(known, recording)
     accelerometer, gyroscope = recording.accelerometer, recording.gyroscope
-    findings = recording.findings
+    findings = (*recording.findings, *more)
     if gyroscope is not None and known.gyroscope is None:
         gyroscope = None
         findings = (*findings, _left_out())
@@ -51,6 +55,35 @@ def apply(calibration: AnyCalibration, recording: Recording) -> Recording:
         source=f"{recording.source}, calibrated",
         findings=findings,
     )
+
+
+def without_effects(calibration: Calibration, recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """Raw readings without the effects of an extended calibration, so that ``S raw + b`` holds again.
+
+    Raises
+    ------
+    ValueError
+        When the calibration's extensions are not what a diagnosis writes.
+    """
+    effects = calibration.extensions.get("effects")
+    if not effects:
+        return recording, ()
+    # Imported here: a linear calibration needs none of it.
+    from trihedron.diagnose import take_off
+
+    references = calibration.extensions.get("references", {})
+    if not isinstance(effects, list | tuple) or not isinstance(references, dict | MappingProxyType):
+        raise ValueError("the calibration's extensions are not those of a diagnosis: calibrate with --extended again.")
+    gyroscope = calibration.gyroscope
+    done = take_off(
+        recording,
+        effects,
+        references,
+        (calibration.accelerometer.S, calibration.accelerometer.b),
+        None if gyroscope is None else (gyroscope.S, gyroscope.b),
+    )
+    findings = tuple(_not_applied(effect_id, why) for effect_id, why in done.left_out.items())
+    return replace(recording, accelerometer=done.accelerometer, gyroscope=done.gyroscope), findings
 
 
 def check_units(calibration: Calibration, recording: Recording) -> None:
@@ -85,4 +118,15 @@ def _left_out() -> Finding:
         "The gyro was left out: the calibration holds none.",
         "It was made without gyro readings, or they did not suffice.",
         "Calibrate both sensors in one recording.",
+    )
+
+
+def _not_applied(effect_id: str, why: str) -> Finding:
+    is_of_session = "session" in why
+    return Finding(
+        FindingCode.EFFECT_NOT_APPLIED,
+        Severity.NOTE if is_of_session else Severity.WARNING,
+        f"{effect_id} of the extended calibration was not taken off: {why}.",
+        "It was in the recording that was calibrated; S and b were fitted beside it.",
+        "" if is_of_session else "Log that channel, or update the program that applies the calibration.",
     )

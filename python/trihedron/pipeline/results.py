@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
+from trihedron.records.diagnosis import Diagnosis
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -95,3 +97,37 @@ class CheckResult:
         from trihedron.report import check_report, to_text
 
         return to_text(check_report(self.recording, self.segments, self.calibration, self.findings))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DiagnosisResult(Diagnosis):
+    """A diagnosis with what it was made from. ``print`` gives a short laboratory report.
+
+    ``calibration`` is the linear model at the start: fitted to this recording, or given (``model_is_given``).
+    """
+
+    recording: Recording = field(kw_only=True)
+    segments: Segments = field(kw_only=True)
+    calibration: Calibration = field(kw_only=True)
+    gravity_source: str = ""
+    model_is_given: bool = False
+    findings: tuple[Finding, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types, with the findings about the recording."""
+        return {
+            **super().to_dict(),
+            "gravity_source": self.gravity_source,
+            "model_is_given": self.model_is_given,
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def __repr__(self) -> str:
+        named = ", ".join(effect.id for effect in self.effects)
+        return f"<DiagnosisResult of {self.recording.source}: {self.verdict}{': ' + named if named else ''}>"
+
+    def __str__(self) -> str:
+        from trihedron.report import diagnosis_report, to_text
+        from trihedron.report.diagnosis import FIRST_SCREEN
+
+        return to_text(diagnosis_report(self), sections=FIRST_SCREEN)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from trihedron.estimate.verification import verify_calibration
-from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units
+from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import Progress, segment
 from trihedron.pipeline.results import VerificationResult
@@ -38,13 +38,16 @@ def verify(
     """
     known = calibration_of(calibration)
     check_units(known, recording)
+    recording, more = without_effects(known, recording)
+    if known.extensions.get("effects"):
+        segments = None
     segments = segment(recording, progress=progress) if segments is None else segments
     if gravity_m_s2 is None and latitude_deg is None and height_m is None:
         gravity, source = known.gravity_m_s2, "that of the calibration"
     else:
         gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     judged = verify_calibration(known, recording, segments, gravity, source)
-    findings = (*recording.findings, *segments.findings, *judged.findings, *_limits(judged, limit_mg, limit_deg))
+    findings = (*recording.findings, *segments.findings, *judged.findings, *more, *_limits(judged, limit_mg, limit_deg))
     findings += _same_recording(known.recording_sha256, recording.sha256)
     return VerificationResult(replace(judged, findings=findings), known, segments, recording)
 

@@ -6,6 +6,11 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Literal
 
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
 Verdict = Literal["consistent", "missing-physics", "unexplained"]
 Domain = Literal["static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing"]
 DOMAINS: tuple[Domain, ...] = ("static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing")
@@ -55,6 +60,40 @@ class DomainTest:
             "where": self.where.to_dict(),
             "rms": self.rms,
             "unit": self.unit,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class DomainResiduals:
+    """What one domain looks like before and after the accepted effects, pose by pose or move by move, SI or degrees.
+
+    ``before`` (n, k) and ``after`` (m, k) at ``time_before_s`` (n,), ``time_after_s`` (m,) (middle of pose or move),
+    with ``sigma_before`` (n,), ``sigma_after`` (m,) the noise predicted for one number. An effect that leaves moves
+    out or splits poses makes n and m differ. ``channels`` (k,) names the columns, ``kind`` is ``hold`` or ``move``.
+    """
+
+    domain: Domain
+    quantity: str
+    unit: str
+    kind: Literal["hold", "move"]
+    channels: tuple[str, ...]
+    time_before_s: FloatArray
+    before: FloatArray
+    sigma_before: FloatArray
+    time_after_s: FloatArray
+    after: FloatArray
+    sigma_after: FloatArray
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        arrays = ("time_before_s", "before", "sigma_before", "time_after_s", "after", "sigma_after")
+        return {
+            "domain": self.domain,
+            "quantity": self.quantity,
+            "unit": self.unit,
+            "kind": self.kind,
+            "channels": list(self.channels),
+            **{name: getattr(self, name).tolist() for name in arrays},
         }
 
 
@@ -141,16 +180,21 @@ class Candidate:
 
 @dataclass(frozen=True)
 class LinearModel:
-    """S and b of both sensors with their standard errors (direct form, raw → SI), as plain nested tuples."""
+    """S and b of both sensors with their standard errors (direct form, raw → SI), as plain nested tuples.
+
+    ``covariance`` (24, 24), or (12, 12) without a gyro, in the order of a calibration file; ``None`` if not kept.
+    """
 
     accelerometer: MappingProxyType[str, Any]
     gyroscope: MappingProxyType[str, Any] | None
+    covariance: FloatArray | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types."""
         return {
             "accelerometer": dict(self.accelerometer),
             "gyroscope": None if self.gyroscope is None else dict(self.gyroscope),
+            "covariance": None if self.covariance is None else self.covariance.tolist(),
         }
 
 
@@ -171,6 +215,7 @@ class Diagnosis:
     recording_source: str = ""
     recording_sha256: str = ""
     references: MappingProxyType[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    residuals: tuple[DomainResiduals, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types, valid against the published schema."""
@@ -187,4 +232,5 @@ class Diagnosis:
             "alpha": self.alpha,
             "recording": {"source": self.recording_source, "sha256": self.recording_sha256},
             "references": dict(self.references),
+            "residuals": [r.to_dict() for r in self.residuals],
         }

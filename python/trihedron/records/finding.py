@@ -72,6 +72,10 @@ class FindingCode(str, Enum):
     NOT_CONVERGED = "not-converged"
     JOINT_FIT_LEFT = "joint-fit-left"
     GYROSCOPE_LEFT_OUT = "gyroscope-left-out"
+    # diagnose, extended calibration
+    EFFECTS_MODELLED = "effects-modelled"
+    EFFECT_NOT_APPLIED = "effect-not-applied"
+    PROTOCOL_DIFFERS = "protocol-differs"
     # verify, check
     LIMIT_EXCEEDED = "limit-exceeded"
     SAME_RECORDING = "same-recording"

@@ -3,6 +3,7 @@
 from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
 from trihedron.report.demonstration import demonstration_report
+from trihedron.report.diagnosis import diagnosis_report
 from trihedron.report.document import Document
 from trihedron.report.kalman import kalman_report
 from trihedron.report.segments import segments_report
@@ -14,6 +15,7 @@ __all__ = [
     "calibration_report",
     "check_report",
     "demonstration_report",
+    "diagnosis_report",
     "kalman_report",
     "segments_report",
     "to_text",

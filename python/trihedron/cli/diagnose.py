@@ -1,0 +1,68 @@
+"""``trihedron diagnose``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
+from trihedron.cli.output import check_outputs, say, show, write_json, write_report
+
+
+@with_options(source=LogSource, place=GravitySource)
+def diagnose(
+    source: LogSource,
+    place: GravitySource,
+    calibration: Annotated[
+        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+        typer.Option(
+            "--calibration", metavar="FILE", help="Calibration to hold against the log; otherwise one is fitted to it."
+        ),
+    ] = None,
+    against: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--against", metavar="SIMULATED_LOG", help="Your own simulation of the same protocol, as model."),
+    ] = None,
+    alpha: Annotated[
+        float, typer.Option(metavar="P", help="Chance that a healthy log is called anything but consistent.")
+    ] = 0.01,
+    json: Json = None,
+    report: Report = None,
+    full: Annotated[bool, typer.Option("--full", help="Print the whole report, with every candidate.")] = False,
+    force: Force = False,
+) -> None:
+    """Where a log and its model differ, which physics was left out, and does adding it help. Status 0 if it ran."""
+    if calibration is not None and against is not None:
+        raise typer.BadParameter("give either --calibration or --against: each is the model")
+    if not 0.0 < alpha < 0.5:
+        raise typer.BadParameter(f"--alpha is a small probability such as 0.01, not {alpha:g}")
+    check_outputs(json, force=force, report=report)
+    from trihedron.calibration_file import read_calibration
+
+    known = None if calibration is None else read_calibration(calibration)
+    recording = source.read()
+    from trihedron import pipeline
+    from trihedron.diagnosis_file import diagnosis_document
+    from trihedron.report import diagnosis_report
+    from trihedron.report.diagnosis import FIRST_SCREEN
+
+    with progress("diagnosing") as tell:
+        result = pipeline.diagnose(
+            recording,
+            gravity_m_s2=place.gravity,
+            latitude_deg=place.latitude,
+            height_m=place.height,
+            calibration=known,
+            against=against,
+            alpha=alpha,
+            progress=tell,
+        )
+    document = diagnosis_report(result)
+    machine = diagnosis_document(result)
+    show(document, json, sections=None if full else FIRST_SCREEN)
+    write_json(machine, json, force=force)
+    write_report(document, machine, report, force=force)
+    if not full and report is None:
+        say("Every candidate, both models and findings: --full; pictures before and after: --report FILE.html.")

@@ -1,0 +1,178 @@
+"""Accepted effects taken off another recording of the same sensor, sample by sample.
+
+The effects' own forward models are used (their ``variants``): here every sample is a point, and the motion is what the
+sensor itself reads, corrected by S and b.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType, SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.observations import FloatArray, Observations
+from trihedron.diagnose.solve import Fit
+from trihedron.records import Recording
+
+N_ITERATIONS = 2
+"""Effects are per mille of the motion: the second pass of the fixed point leaves their square."""
+
+
+class SignalMissing(ValueError):
+    """The recording lacks a channel that an effect follows."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampleContext(Context):
+    """What an effect may look at when it is taken off: every sample is a point, holds and moves are not known."""
+
+    recording: Recording = field(kw_only=True)
+    given_force: FloatArray = field(kw_only=True)
+    given_rate: FloatArray = field(kw_only=True)
+    accel_S: FloatArray = field(kw_only=True)
+    gyro_S: FloatArray = field(kw_only=True)
+    reference: Mapping[str, float] = field(kw_only=True)
+
+    @property
+    def n_points(self) -> int:
+        return len(self.given_force)
+
+    @property
+    def moves(self) -> tuple[slice, ...]:
+        return (slice(0, self.n_points),)
+
+    @cached_property
+    def time_s(self) -> FloatArray:
+        return self.recording.time_s
+
+    @property
+    def force(self) -> FloatArray:
+        return self.given_force
+
+    @property
+    def rate(self) -> FloatArray:
+        return self.given_rate
+
+    @cached_property
+    def accel_axes(self) -> FloatArray:
+        out: FloatArray = self.accel_S * np.linalg.norm(np.linalg.inv(self.accel_S), axis=1)
+        return out
+
+    @cached_property
+    def gyro_axes(self) -> FloatArray:
+        out: FloatArray = self.gyro_S * np.linalg.norm(np.linalg.inv(self.gyro_S), axis=1)
+        return out
+
+    def at_points(self, samples: FloatArray) -> FloatArray:
+        return samples
+
+    @cached_property
+    def temperature(self) -> FloatArray | None:
+        centred = self._logged("temperature_degc", "temperature") - self.reference["temperature_degc"]
+        return np.where(np.isfinite(centred), centred, 0.0)
+
+    @cached_property
+    def supply(self) -> FloatArray | None:
+        relative = self._logged("supply_v", "supply voltage") / self.reference["supply_v"] - 1.0
+        return np.where(np.isfinite(relative), relative, 0.0)
+
+    def _logged(self, name: str, words: str) -> FloatArray:
+        logged: FloatArray | None = getattr(self.recording, name)
+        if logged is None or not np.isfinite(logged).any():
+            raise SignalMissing(f"this recording has no {words}")
+        if name not in self.reference:
+            raise SignalMissing(f"the calibration does not say at which {words} it holds")
+        return logged
+
+
+@dataclass(frozen=True, eq=False)
+class TakenOff:
+    """Raw readings without the effects, (n, 3) or ``None``; ``applied`` ids, ``left_out`` id → why not."""
+
+    accelerometer: FloatArray | None
+    gyroscope: FloatArray | None
+    applied: tuple[str, ...]
+    left_out: MappingProxyType[str, str]
+
+
+def take_off(
+    recording: Recording,
+    effects: Sequence[Mapping[str, Any]],
+    references: Mapping[str, float],
+    accelerometer: tuple[FloatArray, FloatArray],
+    gyroscope: tuple[FloatArray, FloatArray] | None,
+) -> TakenOff:
+    """Take accepted effects off raw readings: ``a' − S⁻¹ D(f) p``, with f the motion without them (eq. 8.2).
+
+    ``effects`` and ``references`` are those of a diagnosis (``Diagnosis.to_dict``), ``accelerometer`` and
+    ``gyroscope`` the extended model's ``(S, b)``. What cannot be taken off is left, and said.
+
+    Raises
+    ------
+    ValueError
+        When an effect is not written as a diagnosis writes it.
+    """
+    S_f, b_f = accelerometer
+    S_w, b_w = gyroscope if gyroscope is not None else (np.eye(3), np.zeros(3))
+    raw_f, raw_w = recording.accelerometer, recording.gyroscope if gyroscope is not None else None
+    zero = np.zeros((recording.n_samples, 3))
+    read_f = zero if raw_f is None else raw_f @ S_f.T + b_f
+    read_w = zero if raw_w is None else raw_w @ S_w.T + b_w
+    obs = cast(Observations, SimpleNamespace(recording=recording, raw_rate=raw_w, raw_force=raw_f, n_holds=0))
+    left_out: dict[str, str] = {}
+    known = {effect.id: effect for effect in catalogue()}
+    force, rate = read_f, read_w
+    for _ in range(N_ITERATIONS):
+        context = SampleContext(
+            obs, cast(Fit, None), recording=recording, given_force=force, given_rate=rate, accel_S=S_f, gyro_S=S_w,
+            reference=references,
+        )  # fmt: skip
+        force, rate = read_f, read_w
+        for entry in effects:
+            variant = _variant(entry, known, context, left_out)
+            if variant is None:
+                continue
+            values = np.asarray(entry["model"]["values"], dtype=np.float64)
+            if variant.distortion.force is not None:
+                force = force - variant.distortion.force @ values
+            if variant.distortion.rate is not None:
+                rate = rate - variant.distortion.rate @ values
+    ids = tuple(str(entry["id"]) for entry in effects)
+    return TakenOff(
+        None if raw_f is None else raw_f + np.linalg.solve(S_f, (force - read_f).T).T,
+        recording.gyroscope if raw_w is None else raw_w + np.linalg.solve(S_w, (rate - read_w).T).T,
+        tuple(i for i in ids if i not in left_out),
+        MappingProxyType(left_out),
+    )
+
+
+def _variant(
+    entry: Mapping[str, Any], known: Mapping[str, Effect], context: SampleContext, left_out: dict[str, str]
+) -> Variant | None:
+    effect_id = str(entry.get("id", ""))
+    model = entry.get("model")
+    if not isinstance(model, Mapping) or "values" not in model or "variant" not in model:
+        raise ValueError(f"effect {effect_id!r} has no model with its variant and values")
+    effect = known.get(effect_id)
+    if effect is None:
+        left_out[effect_id] = "this version does not know it"
+    elif not effect.applies_elsewhere:
+        left_out[effect_id] = "it belongs to that session, not to the sensor"
+    else:
+        try:
+            for variant in effect.variants(context):
+                if variant.label == model["variant"] and variant.distortion.n_parameters == len(model["values"]):
+                    return variant
+            raise ValueError(
+                f"effect {effect_id!r} has no variant {model['variant']!r} of {len(model['values'])} values"
+            )
+        except SignalMissing as missing:
+            left_out[effect_id] = str(missing)
+    return None

@@ -1,0 +1,87 @@
+"""The diagnosis as JSON, checked against the schema shipped with the package (docs/diagnosis.md)."""
+
+from __future__ import annotations
+
+import json
+import os
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from trihedron.calibration_file import plain
+from trihedron.records.diagnosis import SCHEMA_VERSION, Diagnosis
+
+
+class DiagnosisFileError(ValueError):
+    """A diagnosis that cannot be read. One sentence: which file, what is wrong, what to do."""
+
+
+def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
+    """A diagnosis as plain JSON types, valid against the schema; what is not a finite number is ``null``.
+
+    Raises
+    ------
+    ValueError
+        When it does not follow the schema: a defect of this program.
+    """
+    document: dict[str, Any] = plain(diagnosis.to_dict())
+    complaint = complaint_about(document)
+    if complaint:
+        raise ValueError(f"this diagnosis does not follow its own schema ({complaint}); please report this.")
+    return document
+
+
+def read_diagnosis(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read and check a diagnosis written by ``trihedron diagnose --json``.
+
+    Raises
+    ------
+    DiagnosisFileError
+        When the file is missing, is no JSON, or does not follow the schema.
+    """
+    path = Path(path)
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise DiagnosisFileError(f"{path}: there is no such file; check the name and the folder.") from None
+    except (OSError, UnicodeDecodeError):
+        raise DiagnosisFileError(f"{path}: this file cannot be read as text; name a diagnosis (.json).") from None
+    except (ValueError, RecursionError):
+        raise DiagnosisFileError(
+            f"{path}: this is not JSON; name a file written by `trihedron diagnose --json`."
+        ) from None
+    if not isinstance(document, dict) or "verdict" not in document:
+        raise DiagnosisFileError(
+            f"{path}: this JSON is not a diagnosis; name a file written by `trihedron diagnose --json`."
+        )
+    version = document.get("schema_version")
+    if isinstance(version, int) and version > SCHEMA_VERSION:
+        raise DiagnosisFileError(
+            f"{path}: written in schema {version}, this version reads up to {SCHEMA_VERSION}; update trihedron."
+        )
+    complaint = complaint_about(document)
+    if complaint:
+        raise DiagnosisFileError(
+            f"{path}: does not follow the diagnosis schema ({complaint}); it was changed or damaged."
+        )
+    return document
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema (draft 2020-12) that every diagnosis follows."""
+    text = files("trihedron").joinpath("schema", "diagnosis.schema.json").read_text(encoding="utf-8")
+    loaded: dict[str, Any] = json.loads(text)
+    return loaded
+
+
+def complaint_about(document: object) -> str:
+    """What the schema says against a document; empty when it follows."""
+    # Imported here: it costs more than reading the file.
+    from jsonschema import Draft202012Validator
+    from jsonschema.exceptions import best_match
+
+    error = best_match(Draft202012Validator(schema()).iter_errors(document))
+    if error is None:
+        return ""
+    place = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in error.absolute_path).lstrip(".")
+    return f"{place or 'the document'}: {error.message[:120]}"

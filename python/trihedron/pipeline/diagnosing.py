@@ -1,0 +1,231 @@
+"""Diagnose: hold a digital twin against a recording, name the physics it lacks, and take that physics into use."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from trihedron.diagnose import diagnose_recording
+from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
+from trihedron.pipeline.calibrating import calibrate
+from trihedron.pipeline.choices import settle_gravity
+from trihedron.pipeline.reading import Progress, read, segment
+from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
+from trihedron.records.diagnosis import Diagnosis
+
+AnyRecording = Recording | str | os.PathLike[str]
+
+
+def diagnose(
+    recording: AnyRecording,
+    *,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    segments: Segments | None = None,
+    calibration: AnyCalibration | None = None,
+    against: AnyRecording | None = None,
+    alpha: float = 0.01,
+    progress: Progress | None = None,
+) -> DiagnosisResult:
+    """Where a recording and its model differ, which physics was left out, how big it is, and how sure that is.
+
+    Parameters
+    ----------
+    recording : Recording or path
+        Still poses and moves of one sensor.
+    gravity_m_s2 or latitude_deg, height_m : float
+        |g| at the place; with a ``calibration`` that of the calibration unless said.
+    segments : Segments, optional
+        Still poses and moves; found when not given.
+    calibration : calibration or path, optional
+        The model to be held against the recording, with its error bars. Without it one is fitted to the recording.
+    against : Recording or path, optional
+        A simulated recording of the same protocol as the model: it is calibrated, and that calibration, with the error
+        bars it has, is the model.
+    alpha : float
+        Chance that a healthy recording is called anything but consistent.
+
+    Raises
+    ------
+    ValueError
+        When there is nothing to hold a model against, units differ, or two models are given.
+    """
+    if calibration is not None and against is not None:
+        raise ValueError("two models were given: a calibration or a simulated recording to compare with, not both.")
+    if not 0.0 < alpha < 0.5:
+        raise ValueError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
+    tell = progress or (lambda _fraction, _text: None)
+    if not isinstance(recording, Recording):
+        recording = read(recording)
+    known = None if calibration is None else calibration_of(calibration)
+    said: tuple[Finding, ...] = ()
+    if known is not None and gravity_m_s2 is None and latitude_deg is None and height_m is None:
+        gravity, source = known.gravity_m_s2, "that of the calibration"
+    else:
+        gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    findings = [*said, *recording.findings]
+    if known is not None:
+        check_units(known, recording)
+        recording, more = without_effects(known, recording)
+        findings += more
+        segments = None if known.extensions.get("effects") else segments
+    tell(0.02, "finding still poses")
+    segments = segment(recording) if segments is None else segments
+    findings += segments.findings
+    if against is not None:
+        tell(0.05, "calibrating the simulated recording")
+        known, more = _model_of(against, gravity, recording, segments)
+        findings += more
+    if known is None:
+        tell(0.05, "calibrating")
+        used = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+    else:
+        used = replace(known, gravity_m_s2=gravity)
+    recording_used, segments_used = recording, segments
+    if recording.gyroscope is not None and used.gyroscope is None:
+        findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [_gyroscope_left_out()]
+        recording_used, segments_used = _accelerometer_only(recording, segments)
+    found = diagnose_recording(
+        recording_used,
+        segments_used,
+        used,
+        calibration_is_given=known is not None,
+        alpha=alpha,
+        progress=lambda fraction, text: tell(0.1 + 0.9 * fraction, text),
+    )
+    values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
+    return DiagnosisResult(
+        **values,
+        findings=tuple(findings),
+        gravity_source=source,
+        model_is_given=known is not None,
+        calibration=used,
+        segments=segments,
+        recording=recording,
+    )
+
+
+def _model_of(
+    against: AnyRecording, gravity: float, recording: Recording, segments: Segments
+) -> tuple[Calibration, tuple[Finding, ...]]:
+    simulated = against if isinstance(against, Recording) else read(against)
+    try:
+        result = calibrate(simulated, gravity_m_s2=gravity)
+    except ValueError as error:
+        raise ValueError(f"the simulated recording cannot be calibrated: {error}") from None
+    check_units(result.calibration, recording)
+    n, m = result.segments.n_holds, segments.n_holds
+    if n == m:
+        return result.calibration, ()
+    finding = Finding(
+        FindingCode.PROTOCOL_DIFFERS,
+        Severity.WARNING,
+        f"The simulated recording has {n} still poses and the real one {m}.",
+        "They do not follow the same protocol, or a pose was not still.",
+        "Simulate the same poses and moves; only the model (S, b and their error bars) is taken from the simulation.",
+        MappingProxyType({"n_simulated": float(n), "n_real": float(m)}),
+    )
+    return result.calibration, (finding,)
+
+
+def _gyroscope_left_out() -> Finding:
+    return Finding(
+        FindingCode.GYROSCOPE_LEFT_OUT,
+        Severity.WARNING,
+        "The gyro was left out: the model has none.",
+        "It was made without gyro readings, or they did not suffice.",
+        "Give a calibration of both sensors.",
+    )
+
+
+def _accelerometer_only(recording: Recording, segments: Segments) -> tuple[Recording, Segments]:
+    bare = replace(segments, gyroscope_sigma=None, gyroscope_mean=None, gyroscope_sigma_mean=None)
+    return replace(recording, gyroscope=None), bare
+
+
+def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress | None = None) -> CalibrationResult:
+    """A calibration with the effects that its own recording demands: S, b fitted with them, effects in ``extensions``.
+
+    Frame ``lower``: effects are stated along the sensor's axes and in this trihedron.
+
+    Raises
+    ------
+    ValueError
+        When the calibration is in another frame than ``lower``.
+    """
+    base = result.calibration
+    if base.frame != "lower":
+        raise ValueError(f"an extended calibration is made in frame lower, not {base.frame}: leave --frame out.")
+    diagnosis = diagnose(
+        result.recording,
+        gravity_m_s2=base.gravity_m_s2,
+        segments=result.segments,
+        alpha=alpha,
+        progress=progress,
+    )
+    finding = _modelled(diagnosis)
+    if not diagnosis.effects:
+        return replace(result, calibration=replace(base, findings=(*base.findings, finding)))
+    return replace(result, calibration=_extended(base, diagnosis, finding))
+
+
+def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Calibration:
+    model = diagnosis.extended
+    assert model.covariance is not None
+    covariance = model.covariance
+    return replace(
+        base,
+        accelerometer=_sensor(base.accelerometer, model.accelerometer, covariance[:12, :12]),
+        gyroscope=None
+        if base.gyroscope is None or model.gyroscope is None
+        else _sensor(base.gyroscope, model.gyroscope, covariance[12:, 12:]),
+        covariance=covariance,
+        findings=(*base.findings, finding),
+        extensions=MappingProxyType(
+            {
+                "effects": [effect.to_dict() for effect in diagnosis.effects],
+                "references": dict(diagnosis.references),
+                "verdict": diagnosis.verdict,
+                "remaining": [d.domain for d in diagnosis.remaining if d.disagrees],
+            }
+        ),
+    )
+
+
+def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.ndarray) -> SensorCalibration:
+    # Residuals and observability were those of the fit without the effects: they do not belong to these numbers.
+    return replace(
+        base,
+        S=np.array(model["S"]),
+        b=np.array(model["b"]),
+        covariance=covariance,
+        method=f"{base.method}, extended by diagnosis",
+        quality=None,
+        observability=None,
+    )
+
+
+def _modelled(diagnosis: Diagnosis) -> Finding:
+    left = [d.domain for d in diagnosis.remaining if d.disagrees]
+    numbers = MappingProxyType({"n_effects": float(len(diagnosis.effects)), "n_domains_left": float(len(left))})
+    if not diagnosis.effects:
+        seen = "The diagnosis accepted no effect: the linear model stands as it was"
+        seen += f", and {', '.join(left)} still disagree with it." if left else "."
+        severity = Severity.WARNING if left else Severity.NOTE
+        return Finding(FindingCode.EFFECTS_MODELLED, severity, seen, numbers=numbers)
+    named = ", ".join(effect.id for effect in diagnosis.effects)
+    return Finding(
+        FindingCode.EFFECTS_MODELLED,
+        Severity.WARNING if left else Severity.NOTE,
+        f"S and b were fitted together with {named}" + (f"; {', '.join(left)} still disagree." if left else "."),
+        "The linear model alone does not reproduce this recording.",
+        "`trihedron apply` takes off what belongs to the sensor; S and b alone are only half of this model.",
+        numbers,
+    )

@@ -1,0 +1,320 @@
+"""A diagnosis as a report: what disagrees, what was left out, how the fit improves, what remains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from trihedron.records import Finding
+from trihedron.records.diagnosis import AcceptedEffect, Diagnosis, DomainResiduals, DomainTest, HeldOut
+from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.findings import findings_block
+from trihedron.report.numbers import (
+    engineering_exponent,
+    how_many,
+    listed,
+    plain_number,
+    power_of_ten,
+    unit_in_print,
+    with_sigma,
+)
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
+
+FIRST_SCREEN = 3
+"""Sections that fit one screen: where it disagrees, what was left out, what remains."""
+
+MEANING = {
+    "static-accel": "gravity at rest",
+    "static-gyro": "gyro at rest",
+    "moves": "gravity after a move",
+    "dynamics": "velocity over a move",
+    "within-static": "inside still poses",
+    "timing": "sampling instants",
+}
+_CAPTIONS = {
+    "static-accel": "Length of gravity in every still pose.",
+    "static-gyro": "Rate that the gyro reads in every still pose, about its mean.",
+    "moves": "Angle between gravity carried through a move by the gyro and gravity measured after it.",
+    "dynamics": "Velocity over a move that the two poses at its ends do not allow.",
+}
+MOST_NAMED = 4
+MOST_PARAMETERS = 9
+
+
+def diagnosis_report(diagnosis: Diagnosis) -> Document:
+    """Lay out a diagnosis; the first sections fit one screen."""
+    sections = [
+        Section("Where recording and model differ", _located(diagnosis)),
+        Section("What was left out", _effects(diagnosis)),
+        Section("What remains", (Paragraph(_remaining(diagnosis)),)),
+        Section("Held out: before and after", _held_out(diagnosis)),
+        Section("Candidates", (_candidates(diagnosis),)),
+        Section("Calibration and noise", _models(diagnosis)),
+    ]
+    findings: Iterable[Finding] = getattr(diagnosis, "findings", ())
+    if findings:
+        sections.append(Section("Findings", (findings_block(findings),)))
+    if diagnosis.residuals:
+        sections.append(Section("Figures", tuple(_picture(diagnosis, r) for r in diagnosis.residuals)))
+    return Document(
+        title="Diagnosis",
+        subtitle=diagnosis.recording_source,
+        verdict=verdict_in_words(diagnosis),
+        is_trustworthy=diagnosis.verdict == "consistent",
+        sections=tuple(sections),
+    )
+
+
+def verdict_in_words(diagnosis: Diagnosis) -> str:
+    """The verdict and what carries it, in one sentence."""
+    off: list[str] = [d.domain for d in diagnosis.domains if d.disagrees]
+    left: list[str] = [d.domain for d in diagnosis.remaining if d.disagrees]
+    if diagnosis.verdict == "consistent":
+        return "CONSISTENT: the model and its noise account for this recording; nothing is missing that it could show."
+    if diagnosis.verdict == "unexplained":
+        return (
+            f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
+            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it."
+        )
+    named = listed([effect.id for effect in diagnosis.effects])
+    tail = (
+        f"; {listed(left)} still {'disagree' if len(left) > 1 else 'disagrees'}."
+        if left
+        else "; nothing else disagrees."
+    )
+    return f"MISSING PHYSICS: {named} {'was' if len(diagnosis.effects) == 1 else 'were'} left out of the model{tail}"
+
+
+def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    after = {d.domain: d for d in diagnosis.remaining}
+    rows: tuple[tuple[str, ...], ...] = tuple(
+        (
+            MEANING[d.domain],
+            d.domain,
+            _rms(d),
+            plain_number(d.chi2_per_dof),
+            _probability(d.p_value),
+            "disagrees" if d.disagrees else "agrees",
+            _after(after.get(d.domain)) if diagnosis.effects else "",
+        )
+        for d in diagnosis.domains
+    )
+    head: tuple[str, ...] = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
+    if not diagnosis.effects:
+        head, rows = head[:-1], tuple(row[:-1] for row in rows)
+    blocks: list[Block] = [Table(head, rows)]
+    places = tuple((d.domain, place) for d in diagnosis.domains if d.disagrees and (place := where_in_words(d)))
+    if places:
+        blocks.append(Facts(places))
+    return tuple(blocks)
+
+
+def _after(test: DomainTest | None) -> str:
+    if test is None:
+        return "–"
+    return f"{plain_number(test.chi2_per_dof)} {'disagrees' if test.disagrees else 'agrees'}"
+
+
+def _rms(test: DomainTest) -> str:
+    return _size(test.rms, test.unit) if test.unit else "–"
+
+
+def _size(value: float, unit: str) -> str:
+    """A residual in the unit that people use for errors of this kind."""
+    if unit == "m/s^2":
+        return f"{plain_number(mm_s2_from_m_s2(value))} mm/s²"
+    if unit == "rad/s":
+        return f"{plain_number(degrees_from_radians(value))} °/s"
+    if unit == "s":
+        return f"{plain_number(ms_from_s(value))} ms"
+    return plain_number(value) + ("" if unit in ("", "1", "raw") else f" {_printed(unit)}")
+
+
+def _printed(unit: str) -> str:
+    return {"deg": "°", "1": ""}.get(unit, unit_in_print(unit))
+
+
+def _probability(p: float) -> str:
+    return "< 1e−99" if p < 1e-99 else plain_number(p, 2)
+
+
+def where_in_words(test: DomainTest) -> str:
+    """Channels, poses or moves, times and frequencies that carry a disagreement."""
+    where = test.where
+    parts = []
+    if where.channels:
+        parts.append("channel " + ", ".join(where.channels))
+    if where.segments:
+        spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]
+        named = [
+            f"{name} ({span})"
+            for name, span in zip(where.segments, spans + [""] * len(where.segments), strict=False)
+            if span
+        ] or list(where.segments)
+        parts.append("most in " + ", ".join(named[:MOST_NAMED]))
+    elif where.times_s:
+        spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]
+        parts.append("at " + ", ".join(spans[:MOST_NAMED]))
+    if where.frequencies_hz:
+        parts.append("at " + ", ".join(f"{plain_number(f, 4)} Hz" for f in where.frequencies_hz))
+    return "; ".join(parts)
+
+
+def _effects(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    if not diagnosis.effects:
+        return (Paragraph("No effect of the catalogue earns its place in the model."),)
+    blocks: list[Block] = []
+    for k, effect in enumerate(diagnosis.effects):
+        rows = [(f"{k + 1}. {effect.id}", effect.statement), ("", _parameters(effect)), ("", _evidence(effect))]
+        if effect.confounded_with:
+            rows.append(
+                ("", f"This recording cannot tell it from {listed(list(effect.confounded_with))}. To separate them: ")
+            )
+            rows[-1] = ("", rows[-1][1] + (effect.separating_experiment or "record other poses and moves") + ".")
+        blocks.append(Facts(tuple(row for row in rows if row[1])))
+    return tuple(blocks)
+
+
+def _parameters(effect: AcceptedEffect) -> str:
+    """Parameters of one unit share a power of ten: ``K2_x 297 ± 16, K2_y −178 ± 15 (10⁻⁶ s²/m)``."""
+    units = list(dict.fromkeys(p.unit for p in effect.parameters))
+    groups = []
+    for unit in units:
+        members = [p for p in effect.parameters if p.unit == unit]
+        exponent = engineering_exponent(max(abs(p.value) for p in members))
+        printed = _printed(unit)
+        if printed == "°" or -3 < exponent <= 3:
+            exponent = 0
+        scale = 10.0**-exponent
+        words = [f"{p.name} {_value(scale * p.value, scale * p.std)}" for p in members[:MOST_PARAMETERS]]
+        more = len(members) - MOST_PARAMETERS
+        shared = " ".join(word for word in (power_of_ten(exponent), printed) if word)
+        groups.append(", ".join(words) + (f", {more} more" if more > 0 else "") + (f" [{shared}]" if shared else ""))
+    return "; ".join(groups)
+
+
+def _value(value: float, sigma: float) -> str:
+    return with_sigma(value, sigma) if sigma > 0.0 else plain_number(value, 4)
+
+
+def _evidence(effect: AcceptedEffect) -> str:
+    words = f"p {_probability(effect.p_adjusted)} after paying for the search, ΔBIC {plain_number(effect.delta_bic)}"
+    if effect.held_out:
+        words += "; held out, " + _improvement(effect.held_out[0])
+    return words + "."
+
+
+def _improvement(held: HeldOut) -> str:
+    return (
+        f"{held.domain} from {_size(held.rms_before, held.unit)} to {_size(held.rms_after, held.unit)} rms "
+        f"(χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)})"
+    )
+
+
+def _remaining(diagnosis: Diagnosis) -> str:
+    left = [d for d in diagnosis.remaining if d.disagrees]
+    if not left:
+        return "Nothing that this recording could show."
+    said = [
+        f"{d.domain} ({MEANING[d.domain]}): χ²/dof {plain_number(d.chi2_per_dof)}"
+        + (f", {place}" if (place := where_in_words(d)) else "")
+        for d in left
+    ]
+    return "Still unexplained: " + "; ".join(said) + "."
+
+
+def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    rows = tuple(
+        (
+            effect.id,
+            held.domain,
+            _size(held.rms_before, held.unit),
+            _size(held.rms_after, held.unit),
+            plain_number(held.chi2_per_dof_before),
+            plain_number(held.chi2_per_dof_after),
+        )
+        for effect in diagnosis.effects
+        for held in effect.held_out
+    )
+    if not rows:
+        return (Paragraph("No effect was added, so there is no before and after."),)
+    head = ("effect", "domain", "rms before", "rms after", "χ²/dof before", "after")
+    caption = "Poses and moves predicted by fits that did not see them; noise alone gives χ²/dof 1"
+    return (Table(head, rows, caption),)
+
+
+def _candidates(diagnosis: Diagnosis) -> Block:
+    accepted = {effect.id for effect in diagnosis.effects}
+    tried = [c for c in diagnosis.candidates if c.applicable]
+    tried.sort(key=lambda c: 2.0 if c.p_value is None else c.p_value)
+    rows = [
+        (c.id, "–" if c.p_value is None else _probability(c.p_value), "accepted" if c.id in accepted else c.reason)
+        for c in tried
+    ]
+    rows += [(c.id, "–", f"not applicable: {c.reason}") for c in diagnosis.candidates if not c.applicable]
+    return Table(("effect", "p against the linear model", ""), tuple(rows), "Every effect of the catalogue")
+
+
+def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    blocks: list[Block] = []
+    for name in ("accelerometer", "gyroscope"):
+        before, after = getattr(diagnosis.baseline, name), getattr(diagnosis.extended, name)
+        if before is None or after is None:
+            continue
+        rows = [
+            (f"S{i + 1}{j + 1}", _both(before, "S", (i, j)), _both(after, "S", (i, j)))
+            for i in range(3)
+            for j in range(3)
+            if before["sigma_S"][i][j] > 0.0
+        ]
+        rows += [(f"b{i + 1}", _both(before, "b", (i,)), _both(after, "b", (i,))) for i in range(3)]
+        unit = before["raw_unit"]
+        blocks.append(
+            Table(("", "linear", "with the effects"), tuple(rows), f"{name.capitalize()}, raw in {unit_in_print(unit)}")
+        )
+    gravity = getattr(diagnosis, "gravity_source", "")
+    facts = [("gravity", f"{diagnosis.gravity_m_s2:.5f} m/s²" + (f", {gravity}" if gravity else ""))]
+    for name in ("accelerometer", "gyroscope"):
+        density = diagnosis.noise.get(f"{name}_density")
+        if density is not None:
+            unit = str(diagnosis.noise.get(f"{name}_unit", ""))
+            words = ", ".join(plain_number(float(d)) for d in density)
+            corner = plain_number(float(diagnosis.noise[f"{name}_corner_s"]))
+            facts.append(
+                (
+                    f"{name} noise",
+                    f"{words} {unit_in_print(unit).replace('sqrt(Hz)', '√Hz')}; bias walk from {corner} s on",
+                )
+            )
+    blocks.append(Facts(tuple(facts)))
+    return tuple(blocks)
+
+
+def _both(model: object, key: str, place: tuple[int, ...]) -> str:
+    value, sigma = model[key], model["sigma_" + key]  # type: ignore[index]
+    for k in place:
+        value, sigma = value[k], sigma[k]
+    return _number_with_sigma(float(value), float(sigma))
+
+
+def _number_with_sigma(value: float, sigma: float) -> str:
+    exponent = engineering_exponent(max(abs(value), sigma))
+    if sigma <= 0.0 or -3 < exponent <= 3:
+        return _value(value, sigma)
+    scale = 10.0**-exponent
+    return f"({_value(scale * value, scale * sigma)}) {power_of_ten(exponent)}"
+
+
+def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
+    has_effects = bool(diagnosis.effects)
+
+    def draw() -> bytes:
+        # Drawing is imported when something is drawn: text and JSON need none of it.
+        from trihedron.report import diagnosis_figures
+
+        return diagnosis_figures.draw_before_after(residuals, has_effects=has_effects)
+
+    made: Callable[[], bytes] = draw
+    n = len(residuals.before)
+    caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'hold' else 'move')}; "
+    caption += "shaded: twice the noise of one number."
+    return Picture(f"{residuals.domain}", caption, made)

@@ -1,0 +1,55 @@
+"""Figures of a diagnosis. Every function returns a PNG file."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+
+from trihedron.records.diagnosis import DomainResiduals
+from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels, png
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+
+FloatArray = npt.NDArray[np.float64]
+
+_PRINTED = {
+    "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
+    "rad/s": (degrees_from_radians(1.0), "°/s"),
+    "deg": (1.0, "°"),
+    "m/s": (1.0, "m/s"),
+}
+
+
+def draw_before_after(residuals: DomainResiduals, *, has_effects: bool) -> bytes:
+    """One domain, before beside after on one scale; without effects only the linear model."""
+    factor, unit = _PRINTED[residuals.unit]
+    n = 2 if has_effects else 1
+    figure, axes = panels(1, n, (9.5, 3.3))
+    sides = [
+        ("linear model", residuals.time_before_s, residuals.before, residuals.sigma_before),
+        ("with the effects", residuals.time_after_s, residuals.after, residuals.sigma_after),
+    ][:n]
+    for axis, (title, time_s, value, sigma) in zip(axes, sides, strict=True):
+        _draw(axis, time_s, factor * value, factor * sigma, residuals.channels)
+        rms = float(np.sqrt(np.mean(value**2))) * factor if value.size else 0.0
+        axis.set_title(f"{title}: {rms:.3g} {unit} rms", fontsize=10, loc="left")
+        axis.set_xlabel("time [s]")
+    if len(residuals.channels) > 1:
+        axes[-1].legend(ncols=3, frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    limits = np.array([axis.get_ylim() for axis in axes])
+    low, high = float(limits[:, 0].min()), float(limits[:, 1].max())
+    for axis in axes:
+        axis.set_ylim(0.0 if residuals.domain == "moves" else low, high)
+    axes[0].set_ylabel(f"{residuals.quantity} [{unit}]", fontsize=9)
+    return png(figure)
+
+
+def _draw(axis: Axes, time_s: FloatArray, value: FloatArray, sigma: FloatArray, channels: tuple[str, ...]) -> None:
+    order = np.argsort(time_s)
+    is_angle = channels == ("angle",)
+    low = np.zeros(len(sigma)) if is_angle else -2.0 * sigma
+    axis.fill_between(time_s[order], low[order], 2.0 * sigma[order], color=SHADE, linewidth=0, zorder=0)
+    axis.axhline(0.0, color=INK, linewidth=0.8)
+    for k, name in enumerate(channels):
+        colour = AXIS_COLOURS[k] if len(channels) > 1 else ACCENT
+        axis.plot(time_s, value[:, k], "o", markersize=4.5, color=colour, label=name)
