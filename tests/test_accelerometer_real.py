@@ -41,11 +41,12 @@ def test_xsens_agrees_with_the_published_calibration(real_data):
 
 
 @pytest.mark.parametrize("unit", [0, 1, 2])
-def test_mpu9150_residuals_do_not_exceed_the_noise_floor(real_data, unit):
+def test_mpu9150_residuals_are_at_the_noise_floor(real_data, unit):
     means, sigma = still_poses(read_recording(real_data / "mpu9150" / f"imu{unit}.log", rate_hz=100.0))
     sensor, _ = calibrate_norm(means, sigma, 9.81, raw_unit="m/s^2")
-    # Only the upper limit judges the fit: a χ² that is too small means standard errors of the means stated too large.
-    assert sensor.quality.chi2 < stats.chi2.ppf(0.995, sensor.quality.dof)
+    # Both limits: a χ² that is too small means standard errors of the means stated too large.
+    low, high = stats.chi2.ppf([0.005, 0.995], sensor.quality.dof)
+    assert low < sensor.quality.chi2 < high
 
 
 def test_ctu_pose_means_fit_to_half_a_milli_g(real_data):

@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron.records import Hold, Recording
 from trihedron.segment.channels import BoolArray, Channels, FloatArray
-from trihedron.segment.noise import MeanNoise, two_sample_differences
+from trihedron.segment.noise import MeanNoise, split_by_halves
 from trihedron.segment.runs import Run
 
 OCTAVES = 4
@@ -32,7 +32,7 @@ def average_holds(
 
     The excess of a hold is the ratio of its own two-sample variances to the pooled law over the four coarsest octaves;
     being uncertain, it is drawn towards 1 by as many degrees of freedom as the ratios' scatter over holds leaves room
-    for (empirical Bayes). An unsteady hold is taken at its own word.
+    for (empirical Bayes). An unsteady hold is taken at its own word, axis by axis.
     """
     n_channels = channels.mean.shape[1]
     mean = np.empty((len(holds), n_channels))
@@ -49,13 +49,14 @@ def average_holds(
     shrunk = ratio.copy()
     for triad in range(n_channels // 3):
         axes = slice(3 * triad, 3 * triad + 3)
-        # The three axes of a triad shake together: their excess is one number.
+        # At rest the axes of a triad differ from the common law alike: their excess is one number. A tremor does not: it
+        # turns gravity across itself, and leaves the reading along it, which tells |g|, as quiet as ever.
         r, nu = ratio[:, axes].mean(axis=1), freedom * 3.0
         prior = _prior_freedom(r[steady], nu[steady])
-        pulled = np.where(steady, (prior + nu * r) / (prior + nu), np.maximum(r, 1.0))
-        shrunk[:, axes] = pulled[:, None]
+        pulled = ((prior + nu * r) / (prior + nu))[:, None]
+        shrunk[:, axes] = np.where(steady[:, None], pulled, np.maximum(ratio[:, axes], 1.0))
     duration = np.array([sum(b - a for a, b in run.quiet_ranges()) * channels.step_s for run in runs])
-    variance = np.array([noise.variance(t) for t in duration]).reshape(len(runs), n_channels) * shrunk
+    variance = noise.variance(duration[:, None]) * shrunk
     variance += rounding_bias_variance(channels, runs)
     return HoldMeans(mean, np.sqrt(variance), n_averaged)
 
@@ -69,23 +70,17 @@ def _mean(readings: FloatArray, finite: BoolArray) -> FloatArray:
 
 def _excess(channels: Channels, runs: list[Run], noise: MeanNoise) -> tuple[FloatArray, FloatArray]:
     """(h, c) own over pooled variance, and (h,) its degrees of freedom per channel."""
-    ratio = np.ones((len(runs), channels.mean.shape[1]))
-    freedom = np.zeros(len(runs))
-    for k, run in enumerate(runs):
-        total = np.zeros(channels.mean.shape[1])
-        count = 0
-        longest = max(b - a for a, b in run.quiet_ranges())
-        top = int(np.log2(max(longest // 2, 1)))
-        for octave in range(max(0, top - OCTAVES + 1), top + 1):
-            size = 2**octave
-            expected = noise.variance(size * channels.step_s) + 1e-6 * channels.quantisation_variance
-            expected = np.where(expected > 0.0, expected, 1.0)
-            for a, b in run.quiet_ranges():
-                squares = two_sample_differences(channels.mean[a:b], size)
-                total += (squares / expected).sum(axis=0)
-                count += len(squares)
-        if count:
-            ratio[k], freedom[k] = total / count, count
+    ranges = [(r, k) for k, run in enumerate(runs) for r in run.quiet_ranges()]
+    owner = np.array([k for _, k in ranges], dtype=np.int64)
+    halves = split_by_halves(channels.mean, [r for r, _ in ranges])
+    coarse = halves.depth < OCTAVES
+    hold, square = owner[halves.stretch[coarse]], halves.square[coarse]
+    duration = halves.size[coarse, None] * channels.step_s
+    expected = noise.variance(duration) + 1e-6 * channels.quantisation_variance
+    relative = square / np.where(expected > 0.0, expected, 1.0)
+    freedom = np.bincount(hold, minlength=len(runs)).astype(np.float64)
+    total = np.column_stack([np.bincount(hold, column, len(runs)) for column in relative.T])
+    ratio = np.where(freedom[:, None] > 0.0, total / np.maximum(freedom, 1.0)[:, None], 1.0)
     return ratio, freedom
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy import optimize, stats
 
 from trihedron.segment.channels import Channels, FloatArray
 
 Range = tuple[int, int]
+IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,73 +26,105 @@ class MeanNoise:
     flicker: FloatArray
     walk: FloatArray
 
-    def variance(self, duration_s: float) -> FloatArray:
-        """(c,) variance of a mean over ``duration_s`` about the mean of a like stretch next to it, halved."""
+    def variance(self, duration_s: float | FloatArray) -> FloatArray:
+        """Variance of a mean over ``duration_s`` about the mean of a like stretch next to it, halved.
+
+        (c,) for one duration, (k, c) for a column (k, 1) of them.
+        """
         out: FloatArray = self.white / duration_s + self.flicker + self.walk * duration_s / 3.0
         return out
 
 
-def two_sample_differences(mean: FloatArray, size: int) -> FloatArray:
-    """(k, c) halved squares of differences of neighbouring means of ``size`` blocks (not overlapping)."""
-    whole = len(mean) // size
-    averaged = mean[: whole * size].reshape(whole, size, mean.shape[1]).mean(axis=1)
-    pairs = averaged[: whole // 2 * 2].reshape(-1, 2, mean.shape[1])
-    out: FloatArray = (pairs[:, 1] - pairs[:, 0]) ** 2 / 2.0
-    return out
+@dataclass(frozen=True, eq=False)
+class HalvesDifferences:
+    """Stretches halved again and again: ``square`` (k, c) halved squared difference of the means of two halves.
+
+    ``size`` (k,) blocks in a half (harmonic mean where the halves differ by one), ``depth`` (k,) 0 for the stretch as a
+    whole, ``stretch`` (k,) which one it came from. For white noise the differences are independent of each other and
+    leave nothing out (an unbalanced Haar transform): n blocks give n - 1.
+    """
+
+    square: FloatArray
+    size: FloatArray
+    depth: IntArray
+    stretch: IntArray
+
+
+def split_by_halves(mean: FloatArray, ranges: list[Range]) -> HalvesDifferences:
+    """Differences of the halves of every stretch of blocks ``mean`` (m, c), of their halves, and so on to one block."""
+    total = np.vstack([np.zeros(mean.shape[1]), np.cumsum(mean - mean.mean(axis=0), axis=0)])
+    first, last = np.array(ranges, dtype=np.int64).reshape(-1, 2).T
+    stretch = np.arange(len(first))
+    squares, sizes, depths, owners = [np.zeros((0, mean.shape[1]))], [np.zeros(0)], [], []
+    depth = 0
+    while True:
+        whole = last - first >= 2
+        first, last, stretch = first[whole], last[whole], stretch[whole]
+        if not len(first):
+            break
+        middle = (first + last) // 2
+        before, after = (middle - first)[:, None], (last - middle)[:, None]
+        difference = (total[last] - total[middle]) / after - (total[middle] - total[first]) / before
+        squares.append(difference**2 / 2.0)
+        sizes.append((2.0 / (1.0 / before + 1.0 / after))[:, 0])
+        depths.append(np.full(len(first), depth))
+        owners.append(stretch)
+        first, last = np.concatenate([first, middle]), np.concatenate([middle, last])
+        stretch = np.concatenate([stretch, stretch])
+        depth += 1
+    empty = np.zeros(0, dtype=np.int64)
+    return HalvesDifferences(
+        np.vstack(squares), np.concatenate(sizes), np.concatenate([empty, *depths]), np.concatenate([empty, *owners])
+    )
 
 
 def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = False) -> MeanNoise:
-    """Fit the noise law to the two-sample variances of all stretches of blocks together, at dyadic durations.
+    """Fit the noise law to the halves' differences of all stretches of blocks together, octave by octave.
 
     Weights are those of a variance with as many degrees of freedom as there are differences; robust means the median
     of the squares (over that of chi-square with one degree of freedom), for use before the edges are trimmed.
     """
     n_channels = channels.mean.shape[1]
-    longest = max(last - first for first, last in ranges)
-    taus, counts, variances = [], [], []
-    size = 1
-    while size <= longest // 2:
-        squares = np.vstack([two_sample_differences(channels.mean[a:b], size) for a, b in ranges])
-        if len(squares):
-            pooled = np.median(squares, axis=0) / stats.chi2.median(1) if is_robust else squares.mean(axis=0)
-            taus.append(size * channels.step_s)
-            counts.append(float(len(squares)))
-            variances.append(pooled)
-        # A stretch's own halves reach further than the last power of two in it: the mean of the whole is extrapolated.
-        own = [(a, b) for a, b in ranges if size < (b - a) // 2 < 2 * size]
-        if len(own) > 1:
-            squares = np.vstack([two_sample_differences(channels.mean[a:b], (b - a) // 2)[:1] for a, b in own])
-            taus.append(float(np.mean([(b - a) // 2 for a, b in own])) * channels.step_s)
-            counts.append(float(len(own)))
-            variances.append(np.median(squares, axis=0) / stats.chi2.median(1) if is_robust else squares.mean(axis=0))
-        size *= 2
+    halves = split_by_halves(channels.mean, ranges)
     rounding = channels.quantisation_variance / channels.length
-    if not taus:
+    if not len(halves.size):
         white = np.vstack([channels.variance[a:b] for a, b in ranges]).mean(axis=0) / channels.length
         return MeanNoise(np.maximum(white, rounding) * channels.step_s, np.zeros(n_channels), np.zeros(n_channels))
-    tau, n = np.array(taus), np.array(counts)
-    design = np.column_stack([1.0 / tau, np.ones_like(tau), tau / 3.0])
+    # Octaves centred on the powers of two.
+    octave = np.round(np.log2(halves.size)).astype(np.int64)
+    members = [octave == k for k in np.unique(octave)]
+    n = np.array([float(m.sum()) for m in members])
+    if is_robust:
+        variances = np.array([np.median(halves.square[m], axis=0) for m in members]) / stats.chi2.median(1)
+    else:
+        variances = np.array([halves.square[m].mean(axis=0) for m in members])
+    tau = halves.size * channels.step_s
+    design = np.array([[np.mean(1.0 / tau[m]), 1.0, np.mean(tau[m]) / 3.0] for m in members])
     terms = np.zeros((n_channels, 3))
-    for channel in range(n_channels):
-        seen = np.array([v[channel] for v in variances]) + 1e-6 * rounding[channel]
-        if not np.any(seen > 0.0):
+    for triad in range(n_channels // 3):
+        seen = {c: variances[:, c] + 1e-6 * rounding[c] for c in range(3 * triad, 3 * triad + 3)}
+        alive = [c for c, variance in seen.items() if np.any(variance > 0.0)]
+        if not alive:
             continue
-        fits = [_fit(design, seen, n, chosen) for chosen in TERMS]
-        criterion = np.array([fit[0] for fit in fits])
+        fits = [[_fit(design, seen[c], n, chosen) for c in alive] for chosen in TERMS]
+        cost = len(alive) * math.log(max(len(ranges), 2)) * np.array([len(chosen) for chosen in TERMS])
+        criterion = np.array([sum(fit[0] for fit in axes) for axes in fits]) + cost
         weight = np.exp(-0.5 * (criterion - criterion.min()))
-        terms[channel] = np.average([fit[1] for fit in fits], axis=0, weights=weight)
+        terms[alive] = np.average([[fit[1] for fit in axes] for axes in fits], axis=0, weights=weight)
     return MeanNoise(terms[:, 0], terms[:, 1], terms[:, 2])
 
 
 TERMS = ([0], [0, 1], [0, 2], [0, 1, 2])
-"""White alone; with flicker; with walk; with both. The law is their average by Akaike's weights: a term must earn
-its place, or it would inflate every error, and none is struck out for good by too short a log."""
+"""White alone; with flicker; with walk; with both. The law is their average by Schwarz's weights (a term costs the
+logarithm of the number of stretches, for a slow term shows once in each): a term must earn its place, or it would inflate
+every error, and none is struck out for good by too short a log. Which terms a sensor has is decided on its three axes
+together, which are made alike: a few coarse differences of one axis say little, and carry far beyond their time."""
 
 
 def _fit(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int]) -> tuple[float, FloatArray]:
-    """Akaike's criterion and the non-negative terms of one choice.
+    """Deviance and the non-negative terms of one choice.
 
-    A variance with n degrees of freedom has the deviance n (s/v - 1 - ln(s/v)); a term costs 2.
+    A variance with n degrees of freedom has the deviance n (s/v - 1 - ln(s/v)).
     """
     terms = np.zeros(3)
     least = 1e-3 * seen.max() * design[:, 0] / design[0, 0]
@@ -99,4 +134,4 @@ def _fit(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int])
         terms[chosen], _ = optimize.nnls(design[:, chosen] * weight[:, None], seen * weight)
         model = np.maximum(design @ terms, least)
     ratio = np.maximum(seen, 1e-3 * least) / model
-    return float((n * (ratio - 1.0 - np.log(ratio))).sum()) + 2.0 * len(chosen), terms
+    return float((n * (ratio - 1.0 - np.log(ratio))).sum()), terms
