@@ -49,8 +49,8 @@ def average_holds(
     shrunk = ratio.copy()
     for triad in range(n_channels // 3):
         axes = slice(3 * triad, 3 * triad + 3)
-        # At rest the axes of a triad differ from the common law alike: their excess is one number. A tremor does not: it
-        # turns gravity across itself, and leaves the reading along it, which tells |g|, as quiet as ever.
+        # At rest the axes of a triad differ from the common law alike: their excess is one number. A tremor does
+        # not: it turns gravity across itself, and leaves the reading along it, which tells |g|, as quiet as ever.
         r, nu = ratio[:, axes].mean(axis=1), freedom * 3.0
         prior = _prior_freedom(r[steady], nu[steady])
         pulled = ((prior + nu * r) / (prior + nu))[:, None]

@@ -115,8 +115,8 @@ def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = F
 
 
 TERMS = ([0], [0, 1], [0, 2], [0, 1, 2])
-"""White alone; with flicker; with walk; with both. The law is their average by Schwarz's weights (a term costs the
-logarithm of the number of stretches, for a slow term shows once in each): a term must earn its place, or it would inflate
+"""White alone; with flicker; with walk; with both. The law is their average by Schwarz's weights; a term costs the
+logarithm of the number of stretches, for a slow term shows once in each: it must earn its place, or it would inflate
 every error, and none is struck out for good by too short a log. Which terms a sensor has is decided on its three axes
 together, which are made alike: a few coarse differences of one axis say little, and carry far beyond their time."""
 
