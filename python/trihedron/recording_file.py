@@ -15,6 +15,18 @@ GYROSCOPE_NAMES = ("gyr_x", "gyr_y", "gyr_z")
 FORMATS = (".csv", ".parquet")
 
 
+def check_format(path: str | os.PathLike[str]) -> None:
+    """Refuse a name whose ending tells no format, before the work.
+
+    Raises
+    ------
+    OutputError
+        Naming the endings there are.
+    """
+    if str(path) != "-" and Path(path).suffix.lower() not in FORMATS:
+        raise OutputError(f"{path}: a recording is written as .csv or .parquet; give one of these endings.")
+
+
 def write_recording(recording: Recording, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write ``time_s``, ``acc_x … acc_z``, ``gyr_x … gyr_z`` with all digits; ``-`` is CSV on stdout.
 
@@ -23,14 +35,13 @@ def write_recording(recording: Recording, path: str | os.PathLike[str], *, overw
     OutputError
         When the ending names no format, or as :func:`trihedron.output_file.write_whole`.
     """
+    check_format(path)
     # Imported here: it costs more than the rest of a short run.
     import polars
 
     target = Path(path)
     kind = target.suffix.lower()
     to_stdout = str(path) == "-"
-    if not to_stdout and kind not in FORMATS:
-        raise OutputError(f"{target}: a recording is written as .csv or .parquet; give one of these endings.")
     columns = {"time_s": recording.time_s}
     for names, readings in ((ACCELEROMETER_NAMES, recording.accelerometer), (GYROSCOPE_NAMES, recording.gyroscope)):
         if readings is not None:

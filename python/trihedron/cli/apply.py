@@ -27,11 +27,12 @@ def apply(
     """Apply a calibration to a log: time [s], specific force [m/s^2], angular rate [rad/s]."""
     check_outputs(output, json, force=force)
     from trihedron.calibration_file import read_calibration
+    from trihedron.recording_file import check_format, write_recording
 
+    check_format(output)
     known = read_calibration(calibration)
     recording = source.read()
     from trihedron import pipeline
-    from trihedron.recording_file import write_recording
     from trihedron.report.machine import recording_record
 
     done = pipeline.apply(known, recording)

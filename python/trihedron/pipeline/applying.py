@@ -102,8 +102,7 @@ def check_units(calibration: Calibration, recording: Recording) -> None:
         if readings is not None and sensor is not None and unit != sensor.raw_unit:
             raise ValueError(
                 f"{recording.source}: its {name} is in {unit}, and this calibration maps {sensor.raw_unit}: "
-                f"apply it to a "
-                f"log in {sensor.raw_unit}, or state the log's unit if it was detected wrongly."
+                f"apply it to a log in {sensor.raw_unit}, or state the log's unit if it was detected wrongly."
             )
 
 

@@ -104,18 +104,17 @@ def _require_poses(recording: Recording, segments: Segments) -> None:
     if recording.accelerometer is None:
         raise ValueError(
             f"{recording.source}: a gyro alone cannot be calibrated by gravity; log the accelerometer as well, "
-            f"or name its "
-            "columns with --columns."
+            "or name its columns with --columns."
         )
     if segments.n_holds < 3:
-        found = (
-            "no still pose was found" if segments.n_holds == 0 else f"only {segments.n_holds} still poses were found"
+        found = {0: "no still pose was found", 1: "only one still pose was found"}.get(
+            segments.n_holds, f"only {segments.n_holds} still poses were found"
         )
-        why = segments.findings[0].seen + " " if segments.findings else ""
+        grave = [finding.seen for finding in segments.findings if finding.severity is not Severity.NOTE]
+        why = grave[0] + " " if grave else ""
         raise ValueError(
             f"{recording.source}: {found}. {why}Hold the sensor still for 3 to 5 seconds in each of 18 or more "
-            f"different "
-            "poses (docs/procedure.md); `trihedron segment LOG` shows what was seen."
+            "different poses (docs/procedure.md); `trihedron segment LOG` shows what was seen."
         )
 
 
@@ -171,8 +170,8 @@ def _joint_fit_left(pull: float) -> Finding:
         FindingCode.JOINT_FIT_LEFT,
         Severity.NOTE,
         f"The moves contradict the still poses (one fit of both raises χ² of the poses by {pull:.3g}; noise "
-        f"explains 28); "
-        "the accelerometer was therefore taken from the still poses alone, and the gyro from the moves by it.",
+        "explains 28); the accelerometer was therefore taken from the still poses alone, and the gyro from "
+        "the moves by it.",
         "An effect in the moves that the model does not have, which one fit of both would spread over the "
         "accelerometer.",
         "Say --method separate to choose this from the start.",
@@ -224,8 +223,7 @@ def _turns_on_faces(
     if len(turns_deg) != len(moves):
         raise ValueError(
             f"{len(turns_deg)} turns were given and {len(moves)} were found between poses on the same face: "
-            f"give one angle "
-            "in degrees for each, 0 to leave it out."
+            "give one angle in degrees for each, 0 to leave it out."
         )
     return [
         Turn(

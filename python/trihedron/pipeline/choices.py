@@ -43,8 +43,7 @@ def _defaulted() -> Finding:
         f"Gravity was not given; {STANDARD_GRAVITY_M_S2} m/s² was used. Where people live it lies between "
         f"{low:.3f} and "
         f"{high:.3f} m/s², and its error goes into every scale and zero of the accelerometer: up to {wrong:.1f} "
-        f"% that no "
-        "residual shows and no ± contains.",
+        "% that no residual shows and no ± contains.",
         "Neither --gravity nor --latitude was said.",
         "Give --latitude DEG (and --height M), or --gravity M_S2.",
         MappingProxyType({"gravity_m_s2": STANDARD_GRAVITY_M_S2, "possible_error_percent": wrong}),

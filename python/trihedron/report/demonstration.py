@@ -50,8 +50,7 @@ def _verdict(comparison: Comparison, verification: Verification, before: float) 
     return (
         f"Gravity at rest, in a session that the calibration has not seen: {_acceleration(before)} rms wrong before, "
         f"{_acceleration(verification.norm_rms)} after. {within} of {len(comparison.names)} parameters lie "
-        f"within 2σ of "
-        "the truth."
+        "within 2σ of the truth."
     )
 
 
@@ -62,16 +61,16 @@ def _session(segments: Segments, recording: Recording) -> str:
         "of its case "
         f"and some tilts between, and never looks at an angle. After {duration(recording.duration_s)} the log holds "
         f"{recording.n_samples} rows of raw counts at {plain_number(recording.rate_hz, 4)} Hz; the sensor's own "
-        f"noise tells "
-        f"{segments.n_holds} still poses ({duration(still)} in all) from {len(segments.moves)} moves. Nothing was set."
+        f"noise tells {segments.n_holds} still poses ({duration(still)} in all) from {len(segments.moves)} "
+        "moves. Nothing was set."
     )
 
 
 def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, ...]:
     said = (
         f"Only gravity had to be said: latitude {latitude_deg:g}° gives {calibration.gravity_m_s2:.5f} m/s². In "
-        f"every still "
-        "pose the calibrated accelerometer must read that much, whatever the pose; through every move the "
+        "every still pose the calibrated accelerometer must read that much, whatever the pose; through "
+        "every move the "
         "calibrated gyro "
         "must carry gravity from one pose into the next. One fit of both gives:"
     )
