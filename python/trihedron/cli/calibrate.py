@@ -48,6 +48,9 @@ def calibrate(
         Optional[float],  # noqa: UP045
         typer.Option(metavar="X", help="Nominal rad/s per gyro unit, where counts and few moves cannot tell it."),
     ] = None,
+    extended: Annotated[
+        bool, typer.Option("--extended", help="Diagnose the log too, and store the effects it demands; for apply.")
+    ] = False,
     output: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON)."),
@@ -76,6 +79,8 @@ def calibrate(
             progress=tell,
             **choices,
         )
+        if extended:
+            result = pipeline.extend(result, progress=tell)
     document = calibration_report(result.calibration, result.segments, recording)
     machine = calibration_record(result.calibration, result.segments, recording)
     show(document, json, sections=None if full else FIRST_SCREEN)

@@ -32,4 +32,8 @@ def export(
     else:
         write_whole(output, text, overwrite=force)
         say(f"{to}: {output}")
+    effects = known.extensions.get("effects")
+    if isinstance(effects, list) and effects:
+        named = ", ".join(str(effect["id"]) for effect in effects)
+        say(f"left out: {named}. Other programs know S and b only; calibrate without --extended for numbers to export.")
     leave(known.findings)

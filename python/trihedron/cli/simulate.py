@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, Any, Optional
 
 import typer
 
@@ -32,6 +32,10 @@ def simulate(
         Optional[Path],  # noqa: UP045
         typer.Option("--calibration", metavar="FILE", help="Calibration of the recording to repeat."),
     ] = None,
+    with_effects: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--with-effects", metavar="DIAGNOSIS", help="Add the effects that this diagnosis accepted."),
+    ] = None,
     list_them: Annotated[bool, typer.Option("--list", help="List the ready-made scenarios.")] = False,
     force: Force = False,
 ) -> None:
@@ -46,6 +50,8 @@ def simulate(
         raise typer.BadParameter("give either a SCENARIO (a .toml file or a name) or --like LOG")
     if (like is None) != (calibration is None):
         raise typer.BadParameter("--like and --calibration go together")
+    if with_effects is not None and scenario is None:
+        raise typer.BadParameter("--with-effects belongs to a SCENARIO; a twin repeats its recording as it is")
     if output is None:
         raise typer.BadParameter("say where the log goes with -o LOG")
     from trihedron.log_file import LOG_SUFFIXES, write_recording
@@ -64,7 +70,7 @@ def simulate(
 
         recording, known = twin(read(like), read_calibration(calibration), seed)
     else:
-        recording, known = run(str(scenario), seed)
+        recording, known = run(_scenario(str(scenario), with_effects), seed)
     write_recording(recording, output, overwrite=force)
     if truth is not None:
         write_truth(known, truth, overwrite=force)
@@ -72,3 +78,16 @@ def simulate(
     typer.echo(f"{len(known.holds)} holds, {len(known.moves)} moves, |g| {known.gravity_m_s2:.6g} m/s²")
     for name, parameters in known.effects.items():
         typer.echo(f"effect {name}: " + ", ".join(f"{key} {value}" for key, value in parameters.items()))
+
+
+def _scenario(name: str, diagnosis: Path | None) -> Any:
+    if diagnosis is None:
+        return name
+    from trihedron.cli.output import say
+    from trihedron.diagnosis_file import read_diagnosis
+    from trihedron.pipeline import with_effects
+
+    made = with_effects(name, read_diagnosis(diagnosis)["effects"])
+    for effect_id, why in made.left_out.items():
+        say(f"effect {effect_id} was left out: {why}.")
+    return made.scenario

@@ -8,7 +8,7 @@ from trihedron.pipeline.diagnosing import diagnose, extend
 from trihedron.pipeline.filtering import KalmanResult, kalman
 from trihedron.pipeline.reading import read, segment
 from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
-from trihedron.pipeline.simulating import simulate, twin
+from trihedron.pipeline.simulating import simulate, twin, with_effects
 from trihedron.pipeline.verifying import verify
 
 __all__ = [
@@ -30,4 +30,5 @@ __all__ = [
     "simulate",
     "twin",
     "verify",
+    "with_effects",
 ]

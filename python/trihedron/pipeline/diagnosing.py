@@ -162,7 +162,10 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
     """
     base = result.calibration
     if base.frame != "lower":
-        raise ValueError(f"an extended calibration is made in frame lower, not {base.frame}: leave --frame out.")
+        raise ValueError(
+            f"an extended calibration is made in frame lower, not {base.frame}: "
+            "use method joint or separate and leave the frame out."
+        )
     diagnosis = diagnose(
         result.recording,
         gravity_m_s2=base.gravity_m_s2,
@@ -187,7 +190,7 @@ def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Cali
         if base.gyroscope is None or model.gyroscope is None
         else _sensor(base.gyroscope, model.gyroscope, covariance[12:, 12:]),
         covariance=covariance,
-        findings=(*base.findings, finding),
+        findings=(*_still_true(base, diagnosis), finding),
         extensions=MappingProxyType(
             {
                 "effects": [effect.to_dict() for effect in diagnosis.effects],
@@ -197,6 +200,22 @@ def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Cali
             }
         ),
     )
+
+
+_OF_THE_LINEAR_FIT = (
+    FindingCode.RESIDUAL_ABOVE_NOISE,
+    FindingCode.HELD_OUT_WORSE,
+    FindingCode.JOINT_FIT_LEFT,
+    FindingCode.GYRO_G_SENSITIVITY,
+    FindingCode.GYRO_BIAS_DRIFT,
+)
+
+
+def _still_true(base: Calibration, diagnosis: Diagnosis) -> tuple[Finding, ...]:
+    """Findings without those about the linear fit's residuals, where the effects account for all of them."""
+    if any(d.disagrees for d in diagnosis.remaining):
+        return base.findings
+    return tuple(f for f in base.findings if f.code not in _OF_THE_LINEAR_FIT)
 
 
 def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.ndarray) -> SensorCalibration:
@@ -225,7 +244,9 @@ def _modelled(diagnosis: Diagnosis) -> Finding:
         FindingCode.EFFECTS_MODELLED,
         Severity.WARNING if left else Severity.NOTE,
         f"S and b were fitted together with {named}" + (f"; {', '.join(left)} still disagree." if left else "."),
-        "The linear model alone does not reproduce this recording.",
+        "The linear model alone does not reproduce this recording: "
+        + "; ".join(effect.statement.rstrip(".") for effect in diagnosis.effects)
+        + ".",
         "`trihedron apply` takes off what belongs to the sensor; S and b alone are only half of this model.",
         numbers,
     )

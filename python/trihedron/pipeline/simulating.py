@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from trihedron.records import Calibration, Recording, Truth
 from trihedron.segment import segment_recording
-from trihedron.simulate import Scenario, read_scenario, scenario_by_name, twin_scenario
+from trihedron.simulate import Scenario, read_scenario, scenario_by_name, twin_scenario, with_diagnosed_effects
 from trihedron.simulate import simulate as run
 
 
@@ -19,12 +22,35 @@ def simulate(scenario: str | os.PathLike[str] | Scenario, seed: int = 0) -> tupl
     ValueError
         When there is no such scenario, or it asks for what cannot be.
     """
+    return run(scenario_of(scenario), seed)
+
+
+def scenario_of(scenario: str | os.PathLike[str] | Scenario) -> Scenario:
+    """A scenario as a record, whether it is one, a TOML file or the name of a ready-made one.
+
+    Raises
+    ------
+    ValueError
+        When there is no such scenario.
+    """
     if isinstance(scenario, Scenario):
-        return run(scenario, seed)
+        return scenario
     path = Path(scenario)
-    if path.suffix.lower() == ".toml":
-        return run(read_scenario(path), seed)
-    return run(scenario_by_name(str(scenario)), seed)
+    return read_scenario(path) if path.suffix.lower() == ".toml" else scenario_by_name(str(scenario))
+
+
+@dataclass(frozen=True)
+class WithEffects:
+    """A scenario with the accepted effects of a diagnosis: ids switched on, ids left out with the reason."""
+
+    scenario: Scenario
+    applied: tuple[str, ...]
+    left_out: Mapping[str, str]
+
+
+def with_effects(scenario: str | os.PathLike[str] | Scenario, effects: Sequence[Mapping[str, Any]]) -> WithEffects:
+    """Switch on in a scenario what a diagnosis accepted (``effects`` of ``Diagnosis.to_dict`` or of its JSON)."""
+    return WithEffects(*with_diagnosed_effects(scenario_of(scenario), effects))
 
 
 def twin(recording: Recording, calibration: Calibration, seed: int = 0) -> tuple[Recording, Truth]:

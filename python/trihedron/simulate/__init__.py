@@ -1,6 +1,7 @@
 """Simulation of the instrument: motion, mechanism, noise, converter. Produces the same records as reading a file."""
 
 from trihedron.simulate.accelerometer import Accelerometer, Hysteresis, ProofMass
+from trihedron.simulate.diagnosed import with_diagnosed_effects
 from trihedron.simulate.effects import EFFECT_IDS, effects_of, with_effect
 from trihedron.simulate.gyroscope import Gyroscope, SenseMode
 from trihedron.simulate.library import list_scenarios, scenario_by_name
@@ -68,5 +69,6 @@ __all__ = [
     "six_faces",
     "table_turns",
     "twin_scenario",
+    "with_diagnosed_effects",
     "with_effect",
 ]
