@@ -40,7 +40,9 @@ def test_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
         dof = float((1.0 - used[rows]).sum())
         if dof < 0.5:
             continue
-        chi2 = float((fitted.system.residual[rows] ** 2).sum())
+        # A widened domain is judged by the noise it was predicted to have.
+        widened = {MOVES: fitted.line.obs.moves_inflation, DYNAMICS: fitted.line.obs.dynamics_inflation}.get(label, 1.0)
+        chi2 = float((fitted.system.residual[rows] ** 2).sum()) * widened**2
         p = float(fdtrc(dof, NOISE_DOF, chi2 / dof))
         disagrees = p < alpha / 6.0
         where = locate(fitted, label) if disagrees else Where()

@@ -31,7 +31,7 @@ from trihedron.diagnose.selection import (
 from trihedron.diagnose.solve import Fit, Prediction, predict_held_out, tune_noise
 from trihedron.diagnose.starting_point import linear_model, prior_of, start_twin
 from trihedron.diagnose.timing import test_timing
-from trihedron.diagnose.twin import NO_DISTORTION, PRIOR, Distortion, Prior, stacked
+from trihedron.diagnose.twin import NO_DISTORTION, PRIOR, Distortion, Prior, Twin, stacked
 from trihedron.diagnose.within_static import test_within_static
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import (
@@ -112,23 +112,12 @@ def diagnose_recording(
     obs = observe(recording, segments)
     start = start_twin(obs, calibration)
     prior = prior_of(obs, calibration) if calibration_is_given else None
-    tell(0.05, "fitting the twin")
-    base = tune_noise(obs, start, NO_DISTORTION, prior)
-    domains = _all_domains(obs, base, alpha)
-    model = _Model(obs, base, predict_held_out(base, folds_of(base), N_DOMAINS))
-    tell(0.2, "looking at the samples")
-    context = Context(obs, base)
-    candidates: dict[str, Candidate] = {}
-    _accept_direct(model, context, candidates, alpha, prior)
-    for step in range(MAX_EFFECTS):
-        tell(0.3 + 0.15 * step, "letting effects compete")
-        if not _accept_next(model, candidates, alpha, prior, first=step == 0):
-            break
-    tell(0.9, "checking what remains")
-    remaining = _all_domains(model.obs, model.fitted, alpha)
-    if _drop_hollow(model, domains, remaining, prior):
-        remaining = _all_domains(model.obs, model.fitted, alpha)
-    remaining = _settle_direct(model, remaining)
+    run = _run(obs, start, prior, alpha, lambda done, text: tell(0.6 * done, text))
+    widened = _widened(obs, run.remaining)
+    if widened is not obs:
+        # Moves that nothing explains would bend everything fitted beside them: once more, with their noise as it is.
+        run = _run(widened, start, prior, alpha, lambda done, text: tell(0.6 + 0.4 * done, text))
+    model, base, domains, remaining, candidates = run.model, run.base, run.domains, run.remaining, run.candidates
     verdict: Verdict = "consistent"
     if model.found:
         verdict = "missing-physics"
@@ -164,6 +153,48 @@ def diagnose_recording(
     )
     tell(1.0, "done")
     return result
+
+
+@dataclass
+class _Run:
+    """One pass: the twin before any effect, the model after all, and the domains of both."""
+
+    base: Fit
+    model: _Model
+    domains: tuple[DomainTest, ...]
+    remaining: tuple[DomainTest, ...]
+    candidates: dict[str, Candidate]
+
+
+def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
+    tell(0.05, "fitting the twin")
+    base = tune_noise(obs, start, NO_DISTORTION, prior)
+    domains = _all_domains(obs, base, alpha)
+    model = _Model(obs, base, predict_held_out(base, folds_of(base), N_DOMAINS))
+    tell(0.2, "looking at the samples")
+    candidates: dict[str, Candidate] = {}
+    _accept_direct(model, Context(obs, base), candidates, alpha, prior)
+    for step in range(MAX_EFFECTS):
+        tell(0.3 + 0.15 * step, "letting effects compete")
+        if not _accept_next(model, candidates, alpha, prior, first=step == 0):
+            break
+    tell(0.9, "checking what remains")
+    remaining = _all_domains(model.obs, model.fitted, alpha)
+    if _drop_hollow(model, domains, remaining, prior):
+        remaining = _all_domains(model.obs, model.fitted, alpha)
+    return _Run(base, model, domains, _settle_direct(model, remaining), candidates)
+
+
+UNEXPLAINED = 3.0
+"""Chi-square per degree of freedom that remains in moves above which their noise is taken as it shows."""
+
+
+def _widened(obs: Observations, remaining: tuple[DomainTest, ...]) -> Observations:
+    left = {d.domain: d.chi2_per_dof for d in remaining if d.disagrees}
+    moves, dynamics = left.get("moves", 1.0), left.get("dynamics", 1.0)
+    if max(moves, dynamics) < UNEXPLAINED:
+        return obs
+    return replace(obs, moves_inflation=np.sqrt(max(moves, 1.0)), dynamics_inflation=np.sqrt(max(dynamics, 1.0)))
 
 
 def _all_domains(obs: Observations, fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
@@ -359,7 +390,8 @@ def _worded(model: _Model) -> tuple[AcceptedEffect, ...]:
             parameters = found.effect.parameters(found.variant, values, cov)
             statement = found.effect.statement(parameters)
         out.append((found, values, parameters, statement))
-    out.sort(key=lambda item: (item[0].evidence is None, item[0].order))
+    # What the recording gains most by comes first; a range that ends is no matter of degree.
+    out.sort(key=lambda item: ("saturation" not in item[0].effect.id, -item[0].delta_bic))
     return tuple(_accepted(*item) for item in out)
 
 

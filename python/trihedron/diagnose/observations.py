@@ -24,6 +24,7 @@ class Observations:
     neighbouring still samples bracket the whole motion; ``move_holds`` (m, 2) their holds. ``force_density`` and
     ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about
     their stamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
+    The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
     """
 
     recording: Recording
@@ -44,6 +45,8 @@ class Observations:
     rate_density: FloatArray | None
     jitter_s: float = 0.0
     bumped_s: tuple[tuple[float, float], ...] = ()
+    moves_inflation: float = 1.0
+    dynamics_inflation: float = 1.0
 
     @property
     def n_holds(self) -> int:

@@ -115,7 +115,10 @@ def split_holds(recording: Recording, segments: Segments, shortest_s: float = 0.
 
 
 def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int, int, int]]) -> Segments:
-    holds = tuple(Hold(k, a, b, a, b) for k, (a, b, _) in enumerate(spans))
+    def is_unsteady(source: int) -> bool:
+        return source < 0 or segments.holds[source].is_unsteady
+
+    holds = tuple(Hold(k, a, b, a, b, is_unsteady=is_unsteady(source)) for k, (a, b, source) in enumerate(spans))
     moves = tuple(Move(k, k, k + 1, holds[k].stop, holds[k + 1].start) for k in range(len(holds) - 1))
 
     def statistics(values: FloatArray | None, sigma: FloatArray | None, old: FloatArray | None):  # type: ignore[no-untyped-def]

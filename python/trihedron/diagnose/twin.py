@@ -236,6 +236,8 @@ class Linearisation:
         tail_skew[:, [0, 1, 2], [1, 2, 0]] = -(weight[:, None] * tail)[:, [2, 0, 1]]
         tail_skew[:, [1, 2, 0], [0, 1, 2]] = (weight[:, None] * tail)[:, [2, 0, 1]]
         Ct = np.ascontiguousarray(C.transpose(0, 2, 1))
+        widened = np.r_[np.full(2, obs.moves_inflation), np.full(3, obs.dynamics_inflation)]
+        cov *= np.outer(widened, widened)
         return {
             "Ct": Ct, "weighted_Ct": weight[:, None, None] * Ct, "tail_skew": tail_skew,
             "t": t, "weight": weight, "dt": dt, "C": C, "lifted": lifted, "lever": lever,

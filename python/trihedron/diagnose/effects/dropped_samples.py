@@ -82,7 +82,13 @@ class DroppedSamples(DirectEffect):
 
         def reweigh(old: Observations) -> Observations:
             recording, segments = insert_samples(old.recording, old.segments, counts)
-            return observe(recording, segments)
+            mended = observe(recording, segments)
+            return replace(
+                mended,
+                moves_inflation=old.moves_inflation,
+                dynamics_inflation=old.dynamics_inflation,
+                jitter_s=old.jitter_s,
+            )
 
         where = Where(
             (),

@@ -11,7 +11,7 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.observations import FloatArray
 from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
 
-MIN_SHARE = 0.2
+MIN_SHARE = 0.5
 """One arm must predict at least this share of the motion of moves it was not fitted to: a hand also just travels."""
 
 

@@ -9,6 +9,9 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.within_static import find_lines
 from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
 
+MIN_SHARE = 0.03
+"""Share of the variance at rest that the line must predict in the half of each hold it was not fitted to."""
+
 
 class PeriodicInterference(DirectEffect):
     """One sinusoid, steady through all poses, in one or more channels."""
@@ -19,6 +22,10 @@ class PeriodicInterference(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         lines = find_lines(context.obs)
+        if not lines:
+            return None
+        # Long holds resolve lines a hundredth of the noise high. What counts is what it adds to readings not yet seen.
+        lines = [line for line in lines if line.power_after < (1.0 - MIN_SHARE) * line.power_before]
         if not lines:
             return None
         strongest = min(lines, key=lambda line: line.p_value)

@@ -74,10 +74,10 @@ class Quantisation(DirectEffect):
             bias = step / np.pi * float(np.exp(-2.0 * np.pi**2 * (before / step) ** 2)) / np.sqrt(2.0)
             if sigma < 0.35 * step:
                 bias = step / np.sqrt(12.0)
-            if missing:
-                bias = max(bias, 0.25 * step)
+            if missing and sigma < 1.5 * step:
+                bias = max(bias, 0.25 * step)  # wider noise averages over a missing code as over any other
             mean_sigma = obs.hold_force_sigma[:, c] if c < 3 else obs.hold_rate_sigma[:, c - 3]  # type: ignore[index]
-            if bias > 1.0 * float(np.median(mean_sigma)) or (missing >= 3):
+            if bias > 1.0 * float(np.median(mean_sigma)):
                 found.append(Lattice(c, step, before, bias, missing))
                 errors[c] = bias
         if not found:
