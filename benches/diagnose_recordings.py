@@ -66,9 +66,8 @@ def main():
         seconds = time.perf_counter() - start
         print(f"\n{name}: {segments.n_holds} poses, {d.verdict} ({seconds:.1f} s)")
         for t in d.domains:
-            print(
-                f"    {t.domain:14s} chi2/dof {t.chi2_per_dof:9.2f}  {'disagrees' if t.disagrees else ''} {t.rms:.3g} {t.unit}"
-            )
+            flag = "disagrees" if t.disagrees else ""
+            print(f"    {t.domain:14s} chi2/dof {t.chi2_per_dof:9.2f}  {flag} {t.rms:.3g} {t.unit}")
         for e in d.effects:
             print(f"  {e.id}  p {e.p_adjusted:.1g}  dBIC {e.delta_bic:.0f}  confounded {list(e.confounded_with)}")
             print(f"    {e.statement}")
