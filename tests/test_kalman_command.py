@@ -9,7 +9,7 @@ import trihedron
 from trihedron.cli import main
 from trihedron.read import ReadError, read_axis_noise
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise
-from trihedron.simulate import Accelerometer, Clock, NoiseTerms, Scenario, dividing_head, simulate
+from trihedron.simulate import Accelerometer, Clock, NoiseTerms, Scenario, dividing_head, long_rest, simulate
 
 S_TRUE = ((0.98, 0.01, -0.02), (0.005, 1.03, 0.008), (-0.01, 0.012, 0.99))
 B_TRUE = (0.2, -0.3, 0.1)
@@ -71,6 +71,21 @@ def test_a_report_with_angles_has_a_picture_per_axis_and_three_more(session, tmp
     page = tmp_path / "report.html"
     assert run(session, "--reference", session / "angles.csv", "--report", page) == 0
     assert page.read_text().count("data:image/png;base64,") == 6
+
+
+def test_the_noise_may_be_a_log_of_rest(session, tmp_path, capsys):
+    accelerometer = Accelerometer(noise=NoiseTerms(N=(0.01,) * 3, K=(0.001,) * 3))
+    scenario = Scenario(motion=long_rest(1200.0), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
+    rest = simulate(scenario, seed=2)[0]
+    path = tmp_path / "rest.csv"
+    rows = np.column_stack([rest.time_s, rest.accelerometer])
+    np.savetxt(path, rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.7g")
+    assert run(session, "--reference", session / "angles.csv", "--noise", path, "--json") == 0
+    said = json.loads(capsys.readouterr().out)
+    for axis in said["axes"]:
+        # 30 000 samples tell N to 0.4 %; the walk, seen over 20 minutes, to about 15 %.
+        assert axis["noise"]["white"] == pytest.approx(0.01, rel=0.03)
+        assert axis["noise"]["walk"] == pytest.approx(0.001, rel=0.6)
 
 
 @pytest.mark.parametrize(

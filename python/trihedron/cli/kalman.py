@@ -31,7 +31,8 @@ def kalman(
     noise: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option(
-            metavar="FILE", help="Noise of the accelerometer (JSON); otherwise what is seen in the still poses."
+            metavar="FILE",
+            help="A log of rest to identify the noise from, or its terms (JSON).",
         ),
     ] = None,
     frame: Annotated[

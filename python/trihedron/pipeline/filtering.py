@@ -6,10 +6,16 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from trihedron.estimate.kalman import NormFrame, calibrate_session, calibrate_session_without_references
+from trihedron.estimate.kalman import (
+    NormFrame,
+    calibrate_session,
+    calibrate_session_without_references,
+    noise_from_identified,
+)
+from trihedron.estimate.noise import identify_noise
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import Progress, segment
-from trihedron.read import read_axis_noise, read_pose_table
+from trihedron.read import read_axis_noise, read_pose_table, read_recording
 from trihedron.records import (
     AxisNoise,
     Calibration,
@@ -21,6 +27,9 @@ from trihedron.records import (
     Segments,
     Severity,
 )
+from trihedron.records.noise import Noise
+
+NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +69,7 @@ def kalman(
     latitude_deg: float | None = None,
     height_m: float | None = None,
     sigma_angle_deg: float = 0.0,
-    noise: AxisNoise | Sequence[AxisNoise] | str | os.PathLike[str] | None = None,
+    noise: NoiseSource | None = None,
     frame: NormFrame = "lower",
     progress: Progress | None = None,
 ) -> KalmanResult:
@@ -74,8 +83,9 @@ def kalman(
         Attitudes of the still poses: pitch and roll, or directions. Without it the length of gravity must do.
     sigma_angle_deg : float
         Standard error of the angles in the file.
-    noise : AxisNoise, three of them, or file
-        Noise of the raw readings; without it, what is seen inside the still poses.
+    noise : AxisNoise, three of them, Noise, or file
+        Noise of the raw readings: as written down (a JSON file), as identified, or a log of rest to identify it from.
+        Without it, what is seen inside the still poses.
     frame : "lower" or "symmetric"
         Instrument trihedron where there is no reference; with one it is the frame of the reference.
 
@@ -88,17 +98,16 @@ def kalman(
     table = reference
     if isinstance(table, str | os.PathLike):
         table = read_pose_table(table, gravity_m_s2=gravity, sigma_angle_deg=sigma_angle_deg)
-    if isinstance(noise, str | os.PathLike):
-        noise = read_axis_noise(noise)
+    given, noted = _settle_noise(noise, recording)
     segments = segment(recording, progress=progress) if segments is None else segments
     outcome: KalmanCalibration | NormKalmanCalibration
     if table is None:
         outcome = calibrate_session_without_references(
-            recording, segments, gravity_m_s2=gravity, noise=noise, frame=frame
+            recording, segments, gravity_m_s2=gravity, noise=given, frame=frame
         )
     else:
-        outcome = calibrate_session(recording, segments, table, noise=noise)
-    findings = (*said, *recording.findings, *segments.findings, *outcome.findings)
+        outcome = calibrate_session(recording, segments, table, noise=given)
+    findings = (*said, *noted, *recording.findings, *segments.findings, *outcome.findings)
     calibration = Calibration(
         accelerometer=outcome.accelerometer,
         gyroscope=None,
@@ -111,3 +120,26 @@ def kalman(
         findings=findings,
     )
     return KalmanResult(replace(outcome, findings=findings), calibration, segments, recording)
+
+
+def _settle_noise(
+    noise: NoiseSource | None, recording: Recording
+) -> tuple[AxisNoise | Sequence[AxisNoise] | None, tuple[Finding, ...]]:
+    """Noise in raw units, and what was noticed while it was identified."""
+    if isinstance(noise, str | os.PathLike):
+        if os.fspath(noise).lower().endswith(".json"):
+            return read_axis_noise(noise), ()
+        noise = _identify(read_recording(noise))
+    if isinstance(noise, Noise):
+        noticed = [*noise.findings, *(finding for axis in noise.axes for finding in axis.findings)]
+        weighty = tuple(finding for finding in noticed if finding.severity is not Severity.NOTE)
+        return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty
+    return noise, ()
+
+
+def _identify(rest: Recording) -> Noise:
+    if rest.accelerometer is None:
+        raise ValueError(f"{rest.source}: there is no accelerometer whose noise could be identified in this log")
+    unit = rest.accelerometer_unit.value
+    names = ("accelerometer x", "accelerometer y", "accelerometer z")
+    return identify_noise(rest.accelerometer, rest.rate_hz, names=names, units=(unit, unit, unit), source=rest.source)
