@@ -1,7 +1,12 @@
 """``trihedron diagnose``: a log in; verdict, report, JSON and pictures out; extended calibrations applied."""
 
 import json
+import os
+import re
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -255,3 +260,29 @@ def test_every_accepted_effect_is_simulated_or_left_out_with_a_reason():
             entry["model"] = {"variant": "play"}
         _, done, left_out = with_diagnosed_effects(scenario(), [entry])
         assert done == (effect.id,) or left_out[effect.id]
+
+
+def test_the_worked_example_of_adding_an_effect_runs_as_it_stands(tmp_path):
+    text = (Path(__file__).parents[1] / "docs" / "adding-an-effect.md").read_text()
+    effect_file, script = re.findall(r"```python\n(.*?)```", text, re.S)
+    (tmp_path / "gyro_g2_sensitivity.py").write_text(effect_file)
+    (tmp_path / "try_it.py").write_text(script)
+    # A process of its own: the effect must not stay in the catalogue of the other tests.
+    package = str(Path(trihedron.__file__).parents[1])
+    environment = {**os.environ, "PYTHONPATH": package}
+    done = subprocess.run(
+        [sys.executable, "try_it.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    rows = [line.split() for line in done.stdout.splitlines() if line.startswith("gyro-g2-sensitivity D_")]
+    assert len(rows) == 3
+    # Three standard normal numbers, one fixed seed: 4 sigma is passed by chance once in 5000.
+    assert max(abs(float(value) - float(true)) / float(std) for _, _, value, std, true in rows) < 4.0
+
+
+def test_every_effect_the_documentation_says_is_taken_off_elsewhere_is_and_no_other():
+    text = (Path(__file__).parents[1] / "docs" / "diagnosis.md").read_text()
+    part = text.split("can be taken off another log:")[1].split("Effects\nof one session")[0]
+    named = set(re.findall(r"`([a-z-]+)`", part))
+    thermal = {f"{sensor}-thermal-{kind}" for sensor in ("accel", "gyro") for kind in ("bias", "scale")}
+    assert named | thermal == {effect.id for effect in catalogue() if effect.applies_elsewhere}
