@@ -43,7 +43,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from trihedron.calibration_file import read_calibration, write_calibration
-    from trihedron.pipeline import apply, calibrate, check, diagnose, kalman, read, segment, verify
+    from trihedron.estimate.noise import allan_deviation, identify_noise
+    from trihedron.pipeline import apply, calibrate, check, diagnose, kalman, noise, read, segment, verify
     from trihedron.records import Calibration, Finding, Recording, Segments
     from trihedron.records.diagnosis import Diagnosis
 
@@ -53,11 +54,14 @@ __all__ = [
     "Finding",
     "Recording",
     "Segments",
+    "allan_deviation",
     "apply",
     "calibrate",
     "check",
     "diagnose",
+    "identify_noise",
     "kalman",
+    "noise",
     "read",
     "read_calibration",
     "segment",
@@ -65,9 +69,10 @@ __all__ = [
     "write_calibration",
 ]
 
-_VERBS = ("apply", "calibrate", "check", "diagnose", "kalman", "read", "segment", "verify")
+_VERBS = ("apply", "calibrate", "check", "diagnose", "kalman", "noise", "read", "segment", "verify")
 _HOME = dict.fromkeys(_VERBS, "trihedron.pipeline")
 _HOME |= {"Diagnosis": "trihedron.records.diagnosis"}
+_HOME |= dict.fromkeys(("allan_deviation", "identify_noise"), "trihedron.estimate.noise")
 _HOME |= dict.fromkeys(("read_calibration", "write_calibration"), "trihedron.calibration_file")
 _HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")
 

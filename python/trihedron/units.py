@@ -77,3 +77,23 @@ def mrad_from_radians(angle_rad: float) -> float:
 def ms_from_s(time_s: float) -> float:
     """Time, s → ms."""
     return 1000.0 * time_s
+
+
+def per_root_hour(per_root_second: float) -> float:
+    """Random walk of an integral, 1/√s → 1/√h."""
+    return 60.0 * per_root_second
+
+
+def per_hour(per_second: float) -> float:
+    """Rate, 1/s → 1/h."""
+    return 3600.0 * per_second
+
+
+def arcsec_from_radians(angle_rad: float) -> float:
+    """Angle, rad → arc seconds."""
+    return 3600.0 * math.degrees(angle_rad)
+
+
+def micro_g_from_m_s2(acceleration_m_s2: float) -> float:
+    """Acceleration in millionths of standard gravity."""
+    return 1e6 * acceleration_m_s2 / STANDARD_GRAVITY_M_S2

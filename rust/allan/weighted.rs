@@ -6,11 +6,6 @@
 //! random walk this is unbiased up to the position of the gap in its cluster; for white noise it is the variance of
 //! means of the readings that are there.
 
-#![expect(
-    clippy::inline_always,
-    reason = "a loop that is not inlined keeps the features of the baseline"
-)]
-
 use rayon::prelude::*;
 
 use super::prefix::compensated_sum;

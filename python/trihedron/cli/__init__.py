@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import typer
 
+from trihedron.cli.allan import allan
 from trihedron.cli.apply import apply
 from trihedron.cli.calibrate import calibrate
 from trihedron.cli.check import check
@@ -30,6 +31,7 @@ COMMANDS = (
     check,
     segment,
     calibrate,
+    allan,
     kalman,
     verify,
     diagnose,

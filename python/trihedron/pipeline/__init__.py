@@ -6,6 +6,7 @@ from trihedron.pipeline.checking import check
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.diagnosing import diagnose, extend
 from trihedron.pipeline.filtering import KalmanResult, kalman
+from trihedron.pipeline.identifying import noise
 from trihedron.pipeline.reading import read, segment
 from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
 from trihedron.pipeline.simulating import simulate, twin, with_effects
@@ -24,6 +25,7 @@ __all__ = [
     "diagnose",
     "extend",
     "kalman",
+    "noise",
     "read",
     "segment",
     "settle_gravity",

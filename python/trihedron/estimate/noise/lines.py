@@ -130,10 +130,12 @@ def _droops(spectrum: BinnedSpectrum, highest_hz: float) -> bool:
         return False
     below = BinnedSpectrum(*(values[..., low] for values in vars(spectrum).values()))
     fit = below.likelihood().fit((1, 2, 3), True)
+    ratio = spectrum.without_line(fit.slope) / spectrum.expectation(fit.strength)
+    # The level under the top is a median of bins: a resonance there is not what the top falls short of.
+    level = float(np.median(ratio[low & (spectrum.frequency_hz > highest_hz / 32.0)]))
     top = spectrum.frequency_hz > highest_hz / 2.0 ** (1 / 3)
     count = spectrum.count[top].sum()
-    ratio = spectrum.without_line(fit.slope)[top] / spectrum.expectation(fit.strength)[top]
-    mean = float(np.sum(ratio * spectrum.count[top]) / count)
+    mean = float(np.sum(ratio[top] * spectrum.count[top]) / count) / level
     return mean < 1.0 - max(TOLERANCE, 3.0 * math.sqrt(2.0 / count + 4.0 / below.count.sum()))
 
 

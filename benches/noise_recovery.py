@@ -1,0 +1,188 @@
+"""Noise terms recovered from simulated logs of known truth; figures of docs/noise.md, section 5.
+
+python benches/noise_recovery.py            all of it, about ten minutes on one core
+python benches/noise_recovery.py published  one part: published, coverage, subsets, decimation, intervals
+"""
+
+import sys
+import time
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from noise_series import fractional, series
+from trihedron.estimate.noise import allan_deviation, identify_noise
+from trihedron.estimate.noise.selection import binned
+from trihedron.estimate.noise.spectrum import ordinates
+from trihedron.records.noise import TermName
+
+PUBLISHED = {"accelerometer": (2.502e-3, 6.972e-5), "gyroscope": (1.888e-4, 2.5565e-6)}
+
+
+def present(axis):
+    found = "".join(term.value for term, value in axis.terms.items() if value.is_present)
+    return found + ("G" if axis.gauss_markov else "")
+
+
+def information_bound(N, K, duration_s, rate_hz):
+    """Cramér-Rao bound of sd(K)/K from the exact likelihood of a random walk in white noise."""
+    n = int(duration_s * rate_hz)
+    j = np.arange(1, min(n, 200_000))
+    walk = K**2 / rate_hz**2 / (4 * np.sin(np.pi * j / (2 * n)) ** 2)
+    share = walk / (walk + N**2)
+    white = 1 - share
+    F = 0.5 * np.array([[np.sum(share**2), np.sum(share * white)], [np.sum(share * white), np.sum(white**2)]])
+    return 0.5 * np.sqrt(np.linalg.inv(F)[0, 0])
+
+
+def report_terms(name, axes, N, K, bound):
+    n = np.array([axis.value("N") for axis in axes]) / N
+    k = np.array([axis.value("K") for axis in axes]) / K
+    covered = {
+        symbol: np.mean(
+            [axis.terms[TermName(symbol)].lower <= truth <= axis.terms[TermName(symbol)].upper for axis in axes]
+        )
+        for symbol, truth in (("N", N), ("K", K))
+    }
+    others = sum(present(axis) != "NK" for axis in axes)
+    print(
+        f"{name}: {len(axes)} axes | N rms {100 * np.sqrt(np.mean((n - 1) ** 2)):.3f} %, mean {n.mean():.5f} | "
+        f"K mean {k.mean():.4f}, sd {100 * k.std(ddof=1):.1f} % (bound {100 * bound:.1f} %) | "
+        f"95 % intervals cover N {100 * covered['N']:.1f} %, K {100 * covered['K']:.1f} % | other terms in {others}",
+        flush=True,
+    )
+
+
+def published():
+    """400 Hz, 11 000 s, 30 axes of each sensor."""
+    rng = np.random.default_rng(100)
+    for name, (N, K) in PUBLISHED.items():
+        spent, axes = 0.0, []
+        for _ in range(30):
+            x = series(rng, 4_400_000, 400.0, N=N, K=K)
+            began = time.perf_counter()
+            axes.append(identify_noise(x, 400.0).axes[0])
+            spent += time.perf_counter() - began
+        report_terms(name, axes, N, K, information_bound(N, K, 11_000.0, 40.0))
+        print(f"   {spent / 30:.2f} s per axis of 4.4 million readings", flush=True)
+
+
+def coverage():
+    """The same noise logged at 4 Hz: the information on K is the same, and a thousand logs can be had."""
+    rng = np.random.default_rng(101)
+    for name, (N, K) in PUBLISHED.items():
+        axes = [identify_noise(series(rng, 44_000, 4.0, N=N, K=K), 4.0).axes[0] for _ in range(1000)]
+        report_terms(f"{name} at 4 Hz", axes, N, K, information_bound(N, K, 11_000.0, 4.0))
+        limits = [axis.terms[TermName("R")].limit for axis in axes if not axis.terms[TermName("R")].is_present]
+        print(f"   upper limit of R: median {np.median(limits):.2e}", flush=True)
+
+
+def expected_evidence(bands, rate_hz, terms):
+    """Evidence that each term has in the average log, by fitting the expectation of the spectrum."""
+    symbols = "QNBK"
+    strength = np.array([terms.get(s, 0.0) ** 2 for s in symbols])
+    slope = terms.get("R", 0.0)
+    mean = [replace(b, power=strength @ b.basis + slope**2 * b.line**2, cross=slope * b.line**2) for b in bands]
+    likelihood = binned(mean, rate_hz / 2).likelihood()
+    active = tuple(i for i, s in enumerate(symbols) if s in terms)
+    has_ramp = "R" in terms
+    full = likelihood.fit(active, has_ramp).deviance
+    out = {}
+    for s in terms:
+        if s == "R":
+            out[s] = likelihood.fit(active, False).deviance - full
+        else:
+            rest = tuple(i for i in active if symbols[i] != s)
+            # What the other terms cannot imitate: with all of them free.
+            wide = tuple(i for i in range(4) if symbols[i] != s)
+            out[s] = (likelihood.fit(wide, True).deviance - full) if rest or wide else np.inf
+    return out
+
+
+def subsets(runs=20, wanted=40.0):
+    """Every subset, each term at the size at which the average log gives it `wanted` against all other terms."""
+    rng = np.random.default_rng(102)
+    n, rate = 1 << 16, 100.0
+    bands = ordinates(rng.normal(size=n), rate, [(0, n)])
+    right = total = 0
+    for size in range(1, 6):
+        for subset in combinations("QNBKR", size):
+            terms = {s: {"Q": 1e-5, "N": 1e-2, "B": 1e-3, "K": 1e-4, "R": 1e-6}[s] for s in subset}
+            if subset == ("R",):
+                terms["N"] = 1e-2
+            for _ in range(400):
+                short = [s for s, e in expected_evidence(bands, rate, terms).items() if e < wanted]
+                if not short:
+                    break
+                for s in short:
+                    terms[s] *= 1.15
+            found = [present(identify_noise(series(rng, n, rate, **terms), rate).axes[0]) for _ in range(runs)]
+            hits = sum(set(f) == set(terms) for f in found)
+            wrong = sorted({f for f in found if set(f) != set(terms)})
+            right, total = right + hits, total + runs
+            sizes = " ".join(f"{s} {v:.2g}" for s, v in terms.items())
+            print(
+                f"  {''.join(subset):6s} {hits:3d}/{runs}  {sizes}  {'instead: ' + ' '.join(wrong) if wrong else ''}",
+                flush=True,
+            )
+    print(f"right set in {right} of {total}: {100 * right / total:.1f} %", flush=True)
+
+
+def decimation(runs=100):
+    """Means of ten readings instead of the readings."""
+    rng = np.random.default_rng(103)
+    inside = {"N": 0, "K": 0}
+    same = 0
+    for _ in range(runs):
+        x = series(rng, 440_000, 40.0, N=2.502e-3, K=6.972e-5)
+        whole = identify_noise(x, 40.0).axes[0]
+        tenth = identify_noise(x.reshape(-1, 10).mean(axis=1), 4.0).axes[0]
+        same += present(whole) == present(tenth)
+        for s in inside:
+            term = whole.terms[TermName(s)]
+            inside[s] += term.lower <= tenth.value(s) <= term.upper or not term.is_present
+    print(
+        f"decimated by ten: same terms in {same} of {runs}; inside the interval N {inside['N']}, K {inside['K']}",
+        flush=True,
+    )
+
+
+def intervals(runs=600):
+    """Chi-square intervals of the Allan deviation, pure noise of four types."""
+    rng = np.random.default_rng(104)
+    n = 4096
+    clusters = np.array([1, 8, 64, 256, 512, 1024])
+    m = clusters
+    exact = {
+        "Q": 3.0 / m**2,
+        "N": 1.0 / m,
+        "K": (2.0 * m**2 + 1) / (6 * m),
+    }
+    make = {
+        "Q": lambda: np.diff(rng.normal(size=n + 1)),
+        "N": lambda: rng.normal(size=n),
+        "B": lambda: fractional(rng, n),
+        "K": lambda: np.cumsum(rng.normal(size=n)),
+    }
+    for kind, draw in make.items():
+        curves = [allan_deviation(draw(), 1.0, clusters) for _ in range(runs)]
+        truth = exact.get(kind, np.mean([c.variance[:, 0] for c in curves], axis=0))
+        hit = np.mean([(c.lower[:, 0] ** 2 <= truth) & (truth <= c.upper[:, 0] ** 2) for c in curves], axis=0)
+        print(
+            f"  {kind}: " + ", ".join(f"m={c} {100 * h:.1f} %" for c, h in zip(clusters, hit, strict=True)), flush=True
+        )
+
+
+PARTS = (published, coverage, subsets, decimation, intervals)
+
+if __name__ == "__main__":
+    for part in PARTS:
+        if len(sys.argv) < 2 or part.__name__ in sys.argv[1:]:
+            print(f"== {part.__name__}: {part.__doc__}", flush=True)
+            began = time.perf_counter()
+            part()
+            print(f"   {time.perf_counter() - began:.0f} s", flush=True)

@@ -1,0 +1,60 @@
+"""A recording as equally spaced readings: lost rows become missing readings, nothing is moved or interpolated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.records import Recording
+from trihedron.records.noise import FloatArray
+from trihedron.units import acceleration_to_si, rate_to_si
+
+AXES = ("x", "y", "z")
+
+
+def readings_of(recording: Recording) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
+    """Readings (n, channels) in SI (counts stay counts), names and units of the channels; NaN where rows are lost."""
+    columns: list[FloatArray] = []
+    names: list[str] = []
+    units: list[str] = []
+    for sensor, readings, unit, factor, si_unit in (
+        (
+            "gyro",
+            recording.gyroscope,
+            recording.gyroscope_unit.value,
+            rate_to_si(recording.gyroscope_unit),
+            "rad/s",
+        ),
+        (
+            "accel",
+            recording.accelerometer,
+            recording.accelerometer_unit.value,
+            acceleration_to_si(recording.accelerometer_unit),
+            "m/s^2",
+        ),
+    ):
+        if readings is None:
+            continue
+        columns.append(readings if factor in (None, 1.0) else readings * factor)
+        names += [f"{sensor} {axis}" for axis in AXES]
+        units += [unit if factor is None else si_unit] * 3
+    together = np.concatenate(columns, axis=1) if len(columns) > 1 else columns[0]
+    return _with_gaps(together, recording), tuple(names), tuple(units)
+
+
+def _with_gaps(readings: FloatArray, recording: Recording) -> FloatArray:
+    steps = np.diff(recording.time_s) * recording.rate_hz
+    late = np.flatnonzero(steps > 1.5)
+    if len(late) == 0:
+        return readings
+    lost = np.round(steps[late]).astype(np.int64) - 1
+    total = len(readings) + int(lost.sum())
+    if total > 4 * len(readings):
+        raise ValueError(
+            f"{recording.source}: {100 - 100 * len(readings) / total:.0f} % of the time has no reading; "
+            "cut the log to the part that was recorded without a break."
+        )
+    place = np.arange(len(readings))
+    place[1:] += np.cumsum(np.bincount(late, weights=lost, minlength=len(readings) - 1)).astype(np.int64)
+    out = np.full((total, readings.shape[1]), np.nan)
+    out[place] = readings
+    return out

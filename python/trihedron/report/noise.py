@@ -1,0 +1,340 @@
+"""Noise as a report: terms in SI and customary units with their certainty, how long to average, the Allan plot."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from trihedron.records import Finding, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
+from trihedron.units import arcsec_from_radians, degrees_from_radians, micro_g_from_m_s2, per_hour, per_root_hour
+
+TERM_WORDS = {
+    TermName.QUANTISATION: "quantisation",
+    TermName.WHITE: "white",
+    TermName.BIAS_INSTABILITY: "bias instability",
+    TermName.RATE_RANDOM_WALK: "rate random walk",
+    TermName.RATE_RAMP: "rate ramp",
+}
+_SI = {
+    TermName.QUANTISATION: "·s",
+    TermName.WHITE: "/√Hz",
+    TermName.BIAS_INSTABILITY: "",
+    TermName.RATE_RANDOM_WALK: "/√s",
+    TermName.RATE_RAMP: "/s",
+}
+
+
+def noise_report(noise: Noise) -> Document:
+    """Lay out the noise of one log."""
+    findings = all_findings(noise)
+    length = noise.curve.n_samples / noise.curve.rate_hz
+    facts = [
+        ("length", f"{duration(length)}, {noise.curve.n_samples} samples at {plain_number(noise.curve.rate_hz, 5)} Hz"),
+    ]
+    if noise.excluded_s:
+        total = sum(stop - start for start, stop in noise.excluded_s)
+        facts.append(("left out", f"{how_many(len(noise.excluded_s), 'piece')}, {duration(total)}"))
+    groups = _groups(noise)
+    tables: list[Block] = [Facts(tuple(facts))]
+    for unit, axes in groups:
+        tables += [_terms_table(axes, unit), _answers_table(axes, unit)]
+    return Document(
+        title="Noise of a static log",
+        subtitle=noise.source,
+        verdict=verdict_of(
+            findings,
+            "Good: the spectrum is a sum of noise terms from end to end.",
+            "Usable",
+            "NOT TO BE TRUSTED",
+        ),
+        is_trustworthy=noise.is_trustworthy,
+        sections=(
+            Section("Result", tuple(tables)),
+            Section("Findings", (findings_block(findings),)),
+            Section("Customary units", tuple(b for unit, axes in groups for b in _customary(axes, unit))),
+            Section("Kalibr", (Facts(tuple(_kalibr_rows(noise).items())),)),
+            Section("Allan deviation", tuple(_picture(noise, unit, axes) for unit, axes in groups)),
+        ),
+    )
+
+
+def all_findings(noise: Noise) -> tuple[Finding, ...]:
+    """Findings of the log, then those of each axis with its name."""
+    named = [
+        Finding(f.code, f.severity, f"{axis.name}: {f.seen}", f.cause, f.action, f.numbers)
+        for axis in noise.axes
+        for f in axis.findings
+    ]
+    return (*noise.findings, *named)
+
+
+def _groups(noise: Noise) -> list[tuple[str, list[NoiseAxis]]]:
+    """Axes by unit, in the order of the log."""
+    groups: dict[tuple[str, str], list[NoiseAxis]] = {}
+    for axis in noise.axes:
+        groups.setdefault((axis.unit, axis.name.split()[0]), []).append(axis)
+    return [(unit, axes) for (unit, _), axes in groups.items()]
+
+
+def _value(term: NoiseTerm, factor: float = 1.0) -> str:
+    if not term.is_present:
+        return f"< {plain_number(factor * term.limit, 2)}"
+    value, sigma = factor * term.value, factor * term.sigma
+    exponent = math.floor(math.log10(value)) if value > 0 else 0
+    if -4 <= exponent <= 4:
+        return with_sigma(value, sigma)
+    return f"({with_sigma(value / 10.0**exponent, sigma / 10.0**exponent)})e{exponent}"
+
+
+def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
+    rows = []
+    for term in TermName:
+        label = f"{term.value}  {TERM_WORDS[term]} [{_unit_of(term, unit)}]"
+        rows.append((label, *(_value(axis.terms[term]) for axis in axes)))
+    if any(axis.gauss_markov for axis in axes):
+        rows.append((f"   Gauss-Markov σ [{unit_in_print(unit)}]", *(_gauss_markov(axis) for axis in axes)))
+        rows.append(("   … correlation time [s]", *(_correlation(axis) for axis in axes)))
+    return Table(("", *(axis.name for axis in axes)), tuple(rows), "Noise terms ± standard error; < is a 95 % limit")
+
+
+def _gauss_markov(axis: NoiseAxis) -> str:
+    process = axis.gauss_markov
+    if process is None:
+        return "–"
+    exponent = math.floor(math.log10(process.sigma_process))
+    if -4 <= exponent <= 4:
+        return with_sigma(process.sigma_process, process.sigma)
+    scale = 10.0**exponent
+    return f"({with_sigma(process.sigma_process / scale, process.sigma / scale)})e{exponent}"
+
+
+def _correlation(axis: NoiseAxis) -> str:
+    return "–" if axis.gauss_markov is None else plain_number(axis.gauss_markov.correlation_time_s, 2)
+
+
+def _unit_of(term: TermName, unit: str) -> str:
+    printed = unit_in_print(unit)
+    if unit == "m/s^2" and term in (TermName.RATE_RAMP, TermName.QUANTISATION):
+        return "m/s³" if term is TermName.RATE_RAMP else "m/s"
+    if unit == "rad/s" and term in (TermName.RATE_RAMP, TermName.QUANTISATION):
+        return "rad/s²" if term is TermName.RATE_RAMP else "rad"
+    return printed + _SI[term]
+
+
+def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
+    def best(axis: NoiseAxis, which: int) -> str:
+        found = axis.optimal_averaging()
+        return (
+            "beyond the log"
+            if found is None and which == 0
+            else "–"
+            if found is None
+            else plain_number(found[which], 3)
+        )
+
+    printed = unit_in_print(unit)
+    rows = (
+        ("best averaging time [s]", *(best(axis, 0) for axis in axes)),
+        (f"bias known then to [{printed}]", *(best(axis, 1) for axis in axes)),
+        *(
+            (
+                f"σ of a mean of {window:g} s [{printed}]",
+                *(plain_number(math.sqrt(a.variance_of_mean(window)), 3) for a in axes),
+            )
+            for window in (1.0, 10.0)
+        ),
+        ("longest averaging time known to 25 % [s]", *(plain_number(axis.longest_tau_s, 3) for axis in axes)),
+        (
+            "described from … to [Hz]",
+            *(f"{plain_number(a.lowest_hz, 2)} … {plain_number(a.highest_hz, 3)}" for a in axes),
+        ),
+    )
+    return Table(("", *(axis.name for axis in axes)), rows, "How long to average")
+
+
+def customary(term: TermName, unit: str) -> tuple[str, str, float] | None:
+    """IEEE 952 name, customary unit and factor from SI of a term; None where the unit of the log is not known."""
+    if unit == "rad/s":
+        deg = degrees_from_radians(1.0)
+        return {
+            TermName.QUANTISATION: ("quantisation noise", "arcsec", arcsec_from_radians(1.0)),
+            TermName.WHITE: ("angle random walk", "°/√h", per_root_hour(deg)),
+            TermName.BIAS_INSTABILITY: ("bias instability", "°/h", per_hour(deg)),
+            TermName.RATE_RANDOM_WALK: ("rate random walk", "°/h/√h", per_hour(per_root_hour(deg))),
+            TermName.RATE_RAMP: ("rate ramp", "°/h/h", per_hour(per_hour(deg))),
+        }[term]
+    if unit == "m/s^2":
+        return {
+            TermName.QUANTISATION: ("quantisation noise", "m/s", 1.0),
+            TermName.WHITE: ("velocity random walk", "m/s/√h", per_root_hour(1.0)),
+            TermName.BIAS_INSTABILITY: ("bias instability", "µg", micro_g_from_m_s2(1.0)),
+            TermName.RATE_RANDOM_WALK: ("acceleration random walk", "µg/√h", per_root_hour(micro_g_from_m_s2(1.0))),
+            TermName.RATE_RAMP: ("acceleration ramp", "µg/h", per_hour(micro_g_from_m_s2(1.0))),
+        }[term]
+    return None
+
+
+def _customary(axes: list[NoiseAxis], unit: str) -> list[Block]:
+    rows = []
+    for term in TermName:
+        found = customary(term, unit)
+        if found is None:
+            return [Paragraph("The unit of the log is not known: calibrate, or say it with --accel-unit, --gyro-unit.")]
+        name, printed, factor = found
+        rows.append((f"{term.value}  {name} [{printed}]", *(_value(axis.terms[term], factor) for axis in axes)))
+        if term is TermName.WHITE and unit == "m/s^2":
+            rows.append(
+                (
+                    f"{term.value}  noise density [µg/√Hz]",
+                    *(_value(a.terms[term], micro_g_from_m_s2(1.0)) for a in axes),
+                )
+            )
+        if term is TermName.BIAS_INSTABILITY:
+            lowest = [_lowest(axis, factor) for axis in axes]
+            rows.append((f"   lowest deviation / 0.664 [{printed}]", *lowest))
+    return [Table(("", *(axis.name for axis in axes)), tuple(rows), "IEEE 952 names")]
+
+
+def _lowest(axis: NoiseAxis, factor: float) -> str:
+    found = axis.optimal_averaging()
+    return "–" if found is None else plain_number(factor * found[1] / math.sqrt(2 * math.log(2) / math.pi), 3)
+
+
+def _kalibr_rows(noise: Noise) -> dict[str, str]:
+    rows: dict[str, str] = {}
+    for unit, sensor, square in (("m/s^2", "accelerometer", "m/s²"), ("rad/s", "gyroscope", "rad/s")):
+        axes = [axis for axis in noise.axes if axis.unit == unit]
+        if not axes:
+            continue
+        for key, term, per in (
+            ("noise_density", TermName.WHITE, "/√Hz"),
+            ("random_walk", TermName.RATE_RANDOM_WALK, "/√s"),
+        ):
+            # One number for three axes: the root mean square; an absent term is stated by its limit.
+            values = [axis.value(term) for axis in axes]
+            if all(axis.terms[term].is_present for axis in axes):
+                words = f"{math.sqrt(float(np.mean(np.square(values)))):.4g}"
+            else:
+                limit = math.sqrt(float(np.mean([max(a.terms[term].limit, a.value(term)) ** 2 for a in axes])))
+                words = f"{limit:.2g}  (upper limit: not seen in every axis)"
+            rows[f"{sensor}_{key}"] = f"{words}  # {square}{per}"
+    rows["update_rate"] = f"{noise.curve.rate_hz:.6g}  # Hz"
+    return rows
+
+
+def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
+    caption = (
+        "Allan deviation with its 95 % interval, fitted terms (thin) and their sum (dashed); "
+        "the cross marks the least deviation of the sum."
+    )
+    return Picture(f"allan-{axes[0].name.split()[0]}", caption, partial(_draw, noise, [(unit, axes)]))
+
+
+def draw_noise(noise: Noise) -> bytes:
+    """All curves of a log in one PNG file, a row for each sensor."""
+    return _draw(noise, _groups(noise))
+
+
+def _draw(noise: Noise, sensors: list[tuple[str, list[NoiseAxis]]]) -> bytes:
+    # Drawing is imported when something is drawn: text and JSON need none of it.
+    from trihedron.report.noise_figures import draw_allan
+
+    return draw_allan(noise.curve, sensors)
+
+
+def noise_record(noise: Noise) -> dict[str, Any]:
+    """The same for machines, values in SI (or the log's own unit) with the unit beside them."""
+    return {
+        "source": noise.source,
+        "rate_hz": noise.curve.rate_hz,
+        "n_samples": noise.curve.n_samples,
+        "excluded_s": [list(stretch) for stretch in noise.excluded_s],
+        "breaks_s": list(noise.breaks_s),
+        "axes": [_axis_record(axis) for axis in noise.axes],
+        "kalibr": {key: words.split()[0] for key, words in _kalibr_rows(noise).items()},
+        "curve": {
+            "kind": noise.curve.kind,
+            "confidence": noise.curve.confidence,
+            "stride": noise.curve.stride,
+            "tau_s": noise.curve.tau_s.tolist(),
+            "cluster": noise.curve.clusters.tolist(),
+            "axes": [
+                {
+                    "name": name,
+                    "unit": noise.curve.units[c],
+                    "deviation": noise.curve.deviation[:, c].tolist(),
+                    "lower": noise.curve.lower[:, c].tolist(),
+                    "upper": noise.curve.upper[:, c].tolist(),
+                    "edf": noise.curve.edf[:, c].tolist(),
+                    "n_terms": noise.curve.n_terms[:, c].tolist(),
+                }
+                for c, name in enumerate(noise.curve.names)
+            ],
+        },
+        "findings": [finding.to_dict() for finding in noise.findings],
+    }
+
+
+def _axis_record(axis: NoiseAxis) -> dict[str, Any]:
+    terms = {}
+    for term in TermName:
+        found = axis.terms[term]
+        entry: dict[str, Any] = {
+            "present": found.is_present,
+            "value": found.value,
+            "sigma": found.sigma,
+            "lower": found.lower,
+            "upper": found.upper,
+            "limit": found.limit,
+            "evidence": found.evidence,
+            "unit": f"{axis.unit}{_SI[term]}",
+        }
+        usual = customary(term, axis.unit)
+        if usual is not None:
+            entry["customary"] = {"name": usual[0], "unit": usual[1], "value": usual[2] * found.value}
+        terms[term.value] = entry
+    best = axis.optimal_averaging()
+    return {
+        "name": axis.name,
+        "unit": axis.unit,
+        "mean": axis.mean,
+        "sample_sigma": axis.sample_sigma,
+        "resolution": axis.resolution,
+        "terms": terms,
+        "gauss_markov": None if axis.gauss_markov is None else dict(vars(axis.gauss_markov)),
+        "lines": [dict(vars(line)) for line in axis.lines],
+        "lowest_hz": axis.lowest_hz,
+        "highest_hz": axis.highest_hz,
+        "optimal_tau_s": None if best is None else best[0],
+        "least_deviation": None if best is None else best[1],
+        "longest_tau_s": axis.longest_tau_s,
+        "covariance_scale": axis.covariance_scale,
+        "findings": [finding.to_dict() for finding in axis.findings],
+    }
+
+
+def curve_csv(noise: Noise) -> str:
+    """The Allan curve as a table: tau, cluster, then deviation, interval and degrees of freedom of every axis."""
+    curve = noise.curve
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    head = ["tau_s", "cluster"]
+    for name, unit in zip(curve.names, curve.units, strict=True):
+        key = name.replace(" ", "_")
+        head += [f"{key}_deviation[{unit}]", f"{key}_lower[{unit}]", f"{key}_upper[{unit}]", f"{key}_edf"]
+    writer.writerow(head)
+    for i, tau in enumerate(curve.tau_s):
+        row = [f"{tau:.9g}", str(int(curve.clusters[i]))]
+        for c in range(curve.n_channels):
+            cells = (curve.deviation[i, c], curve.lower[i, c], curve.upper[i, c], curve.edf[i, c])
+            row += [f"{float(v):.9g}" for v in cells]
+        writer.writerow(row)
+    return out.getvalue()

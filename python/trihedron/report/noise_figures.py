@@ -1,0 +1,90 @@
+"""Figures of noise. Every function returns a PNG file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from trihedron.records import AllanCurve, NoiseAxis, TermName
+from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels, png
+from trihedron.report.numbers import plain_number, unit_in_print
+
+_SLOPES = {
+    TermName.QUANTISATION: (math.sqrt(3.0), -1.0),
+    TermName.WHITE: (1.0, -0.5),
+    TermName.BIAS_INSTABILITY: (math.sqrt(2.0 * math.log(2.0) / math.pi), 0.0),
+    TermName.RATE_RANDOM_WALK: (math.sqrt(1.0 / 3.0), 0.5),
+    TermName.RATE_RAMP: (math.sqrt(0.5), 1.0),
+}
+
+
+def draw_allan(curve: AllanCurve, sensors: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> bytes:
+    """Curves of each sensor in a row on the same scales: interval, fitted terms, their sum, its minimum."""
+    columns = max(len(axes) for _, axes in sensors)
+    figure, places = panels(len(sensors), columns, (3.6 * columns + 0.8, 4.2 * len(sensors)))
+    for row, (unit, axes) in enumerate(sensors):
+        mine = places[row * columns : (row + 1) * columns]
+        for place in mine[len(axes) :]:
+            place.set_axis_off()
+        _row(mine, curve, axes)
+        mine[0].set_ylabel(f"Allan deviation [{unit_in_print(unit)}]")
+    return png(figure)
+
+
+def _row(places: Sequence[Axes], curve: AllanCurve, axes: Sequence[NoiseAxis]) -> None:
+    chosen = [curve.names.index(axis.name) for axis in axes]
+    low = float(np.nanmin(curve.deviation[:, chosen]))
+    high = float(np.nanmax(curve.deviation[:, chosen]))
+    for k, (axis, place, c) in enumerate(zip(axes, places, chosen, strict=False)):
+        place.set_xscale("log")
+        place.set_yscale("log")
+        _curve(place, curve, c, AXIS_COLOURS[k % 3])
+        if axis.sample_sigma > 0:
+            _terms(place, curve, axis)
+        place.set_title(axis.name, fontsize=10, loc="left")
+        if high > low > 0:
+            place.set_ylim(low / 2.5, high * 2.0)
+        place.set_xlim(curve.tau_s[0] / 1.5, curve.tau_s[-1] * 1.5)
+        place.set_xlabel("averaging time τ [s]")
+        place.grid(which="major", color="#E3E7EA", linewidth=0.6)
+        place.set_axisbelow(True)
+        if k:
+            place.tick_params(labelleft=False)
+
+
+def _curve(place: Axes, curve: AllanCurve, c: int, colour: str) -> None:
+    good = np.isfinite(curve.deviation[:, c])
+    tau = curve.tau_s[good]
+    place.fill_between(tau, curve.lower[good, c], curve.upper[good, c], color=SHADE, zorder=1)
+    place.plot(tau, curve.deviation[good, c], color=colour, linewidth=1.6, zorder=3)
+
+
+def _terms(place: Axes, curve: AllanCurve, axis: NoiseAxis) -> None:
+    tau = np.geomspace(curve.tau_s[0], curve.tau_s[-1], 400)
+    for term, (factor, slope) in _SLOPES.items():
+        found = axis.terms[term]
+        if not found.is_present:
+            continue
+        values = factor * found.value * tau**slope
+        place.plot(tau, values, color="#8A949C", linewidth=0.8, zorder=2)
+        # The letter stands where the term is the largest part of the sum.
+        share = values**2 / axis.allan_variance(tau)
+        at = int(np.argmax(share)) if slope not in (-1.0, -0.5) else int(0.06 * len(tau))
+        at = min(max(at, 12), len(tau) - 30)
+        place.annotate(
+            term.value, (tau[at], values[at]), xytext=(0, -11), textcoords="offset points", fontsize=9, color=INK
+        )
+    total = np.sqrt(axis.allan_variance(tau))
+    place.plot(tau, total, color=INK, linewidth=0.9, linestyle="--", zorder=4)
+    best = axis.optimal_averaging()
+    if best is not None:
+        place.plot(*best, "x", color=ACCENT, markersize=8, markeredgewidth=2.0, zorder=5)
+        words = f"{plain_number(best[0], 2)} s"
+        place.annotate(
+            words, best, xytext=(0, -17), textcoords="offset points", fontsize=8.5, color=ACCENT, ha="center"
+        )
+    if axis.longest_tau_s > 0:
+        place.axvspan(axis.longest_tau_s, curve.tau_s[-1] * 1.5, color="#F4F1EA", zorder=0, linewidth=0)
