@@ -162,9 +162,34 @@ const RENEWALS: usize = 8;
 /// Poses that leave a parameter unknown to 2 % of |g| (six faces leave three altogether) would let it run away into any
 /// accident of the readings: all are then held near a sphere through the readings, and `is_anchored` tells.
 ///
+/// A given start that leads nowhere (no convergence, or a triad a hundred times smaller than the sphere through the
+/// readings: the way to `S = 0`) is given up for the ellipsoid.
+///
 /// # Errors
 /// When readings are malformed or all the same, or the fit collapses to `S = 0`.
 pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -> Result<Fit> {
+    let Some(given) = start else {
+        return fit_from(readings, settings, None);
+    };
+    match fit_from(readings, settings, Some(given)) {
+        Ok(found)
+            if found.stop.is_converged() && !is_shrunken(&found.model, readings, settings) =>
+        {
+            Ok(found)
+        }
+        first => fit_from(readings, settings, None).or(first),
+    }
+}
+
+/// Whether a triad is far smaller than the sphere through the readings.
+fn is_shrunken(model: &Model, readings: Readings<'_>, settings: &Settings) -> bool {
+    let stride = readings.values.len().div_ceil(ROWS_KEPT);
+    let few: Vec<Vector3<f64>> = readings.values.iter().step_by(stride).copied().collect();
+    sphere_model(&few, settings)
+        .is_ok_and(|sphere| model.s.determinant().abs() < 1e-2 * sphere.s.determinant().abs())
+}
+
+fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -> Result<Fit> {
     readings.check()?;
     if !settings.gravity.is_finite() || settings.gravity <= 0.0 {
         return Err(Error::bad_input(format!(
