@@ -20,6 +20,8 @@ use crate::error::{Error, Result};
 use crate::poisson::{PreparedMove, RateNoise, Turn, integrate_all};
 use crate::rotation::skew;
 use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Matrix3x2, SMatrix, Vector3};
+use std::cell::RefCell;
+use std::rc::Rc;
 
 pub use stages::{Fit, Settings, fit};
 
@@ -115,8 +117,13 @@ pub fn tangent_plane(direction: &Vector3<f64>) -> Matrix3x2<f64> {
 struct Evaluated {
     model: Model,
     forces: Vec<Vector3<f64>>,
-    turns: Vec<Turn>,
+    turns: Rc<Vec<Turn>>,
 }
+
+/// The rotations integrated last: they depend on the gyro's scale and offset alone, and the solver, the covariance and the
+/// next round all ask for them at the same point.
+#[derive(Default)]
+struct LastTurns(RefCell<Option<(Matrix3<f64>, Vector3<f64>, Rc<Vec<Turn>>)>>);
 
 /// Residual of one move and everything it answers to, in three components.
 struct MoveRow {
@@ -216,27 +223,40 @@ impl Alignment {
         model
     }
 
-    fn evaluate(&self, model: Model) -> Evaluated {
+    fn evaluate(&self, model: Model, last: &LastTurns) -> Evaluated {
         let forces = self
             .holds
             .iter()
             .map(|hold| model.accelerometer_scale * hold.reading + model.accelerometer_bias)
             .collect();
-        let bias = |hold: usize| model.rate_offset - model.gyroscope_scale * self.holds[hold].zero;
-        let before: Vec<_> = self.links.iter().map(|link| bias(link.before)).collect();
-        let after: Vec<_> = self.links.iter().map(|link| bias(link.after)).collect();
-        let turns = integrate_all(
-            &self.moves,
-            &model.gyroscope_scale,
-            &before,
-            &after,
-            &self.noise,
-        );
+        let known = last.0.borrow().as_ref().and_then(|(scale, offset, turns)| {
+            (*scale == model.gyroscope_scale && *offset == model.rate_offset)
+                .then(|| Rc::clone(turns))
+        });
+        let turns = known.unwrap_or_else(|| {
+            let turns = Rc::new(self.integrate(&model));
+            *last.0.borrow_mut() =
+                Some((model.gyroscope_scale, model.rate_offset, Rc::clone(&turns)));
+            turns
+        });
         Evaluated {
             model,
             forces,
             turns,
         }
+    }
+
+    fn integrate(&self, model: &Model) -> Vec<Turn> {
+        let bias = |hold: usize| model.rate_offset - model.gyroscope_scale * self.holds[hold].zero;
+        let before: Vec<_> = self.links.iter().map(|link| bias(link.before)).collect();
+        let after: Vec<_> = self.links.iter().map(|link| bias(link.after)).collect();
+        integrate_all(
+            &self.moves,
+            &model.gyroscope_scale,
+            &before,
+            &after,
+            &self.noise,
+        )
     }
 
     fn move_row(&self, at: &Evaluated, index: usize) -> MoveRow {

@@ -316,6 +316,7 @@ class Moves:
         is_accelerometer_given: bool,
         is_offset_free: bool,
         loss_scale: float | None,
+        is_near: bool = False,
     ) -> AlignmentFit: ...
 
 @final

@@ -1,7 +1,7 @@
 //! The fit: a robust approach from several starts, then generalised least squares with the covariance (5.8).
 
 use super::covariance::{Layout, whole_covariance};
-use super::{Alignment, Evaluated, Model};
+use super::{Alignment, Evaluated, LastTurns, Model};
 use crate::banded::BandedCholesky;
 use crate::error::{Error, Result};
 use crate::gauss_newton::{self, Certainty, Loss, Options, Solution};
@@ -14,6 +14,8 @@ pub struct Settings {
     pub loss: Loss,
     /// Times the covariance is computed anew.
     pub max_rounds: usize,
+    /// The first start is a solution of nearly the same problem: it is not approached, but weighed at once.
+    pub is_near: bool,
 }
 
 impl Default for Settings {
@@ -21,6 +23,7 @@ impl Default for Settings {
         Self {
             loss: Loss::Linear,
             max_rounds: 12,
+            is_near: false,
         }
     }
 }
@@ -79,13 +82,17 @@ pub fn fit(
     settings: &Settings,
 ) -> Result<Fit> {
     problem.check()?;
-    let mut base = approach(problem, starts)?;
+    let turns = LastTurns::default();
+    let mut base = match starts {
+        [near, ..] if settings.is_near => near.clone(),
+        _ => approach(problem, starts, &turns)?,
+    };
     let mut weights = vec![1.0; problem.links.len()];
     let mut iterations = 0;
     let mut settled = false;
     let mut last: Option<Solution> = None;
     for _ in 0..settings.max_rounds.max(1) {
-        let at = problem.evaluate(base.clone());
+        let at = problem.evaluate(base.clone(), &turns);
         let layout = Layout::new(problem, &at);
         let (factor, mahalanobis) = layout.covariance(problem, &at, &weights)?;
         let mut next_weights: Vec<f64> = mahalanobis
@@ -107,7 +114,7 @@ pub fn fit(
             factor
         };
         weights = next_weights;
-        let solution = weigh(problem, &base, &layout, &factor)?;
+        let solution = weigh(problem, &base, &layout, &factor, &turns)?;
         iterations += solution.iterations;
         let start = problem.pack(&base);
         let moved = &solution.parameters - start;
@@ -121,9 +128,10 @@ pub fn fit(
         }
     }
     let solution = last.ok_or_else(|| Error::bad_input("a fit needs at least one round"))?;
+    let at = problem.evaluate(base, &turns);
     finish(
         problem,
-        base,
+        at,
         &weights,
         zero_weights,
         &solution,
@@ -133,7 +141,7 @@ pub fn fit(
 }
 
 /// Least squares on directions with a robust loss, accelerometer fixed, from every start; the cheapest wins.
-fn approach(problem: &Alignment, starts: &[Model]) -> Result<Model> {
+fn approach(problem: &Alignment, starts: &[Model], turns: &LastTurns) -> Result<Model> {
     let mut fixed = problem.clone();
     fixed.accelerometer_basis = DMatrix::zeros(12, 0);
     fixed.is_offset_free = false;
@@ -149,7 +157,7 @@ fn approach(problem: &Alignment, starts: &[Model]) -> Result<Model> {
     let mut best: Option<(f64, Model)> = None;
     for start in starts {
         let rows = |x: &DVector<f64>| {
-            let at = fixed.evaluate(fixed.unpack(start, x));
+            let at = fixed.evaluate(fixed.unpack(start, x), turns);
             let mut residual = DVector::zeros(3 * n_used);
             let mut jacobian = DMatrix::zeros(3 * n_used, 9);
             let mut row = 0;
@@ -186,9 +194,10 @@ fn weigh(
     base: &Model,
     layout: &Layout,
     factor: &BandedCholesky,
+    turns: &LastTurns,
 ) -> Result<Solution> {
     let whitened = |x: &DVector<f64>| {
-        let at = problem.evaluate(problem.unpack(base, x));
+        let at = problem.evaluate(problem.unpack(base, x), turns);
         let (residual, jacobian) = layout.linearise(problem, &at);
         let mut columns = jacobian.insert_column(0, 0.0);
         columns.set_column(0, &residual);
@@ -206,17 +215,15 @@ fn weigh(
     )
 }
 
-#[allow(clippy::too_many_arguments)]
 fn finish(
     problem: &Alignment,
-    model: Model,
+    at: Evaluated,
     weights: &[f64],
     zero_weights: &[Vector3<f64>],
     solution: &Solution,
     iterations: usize,
     settled: bool,
 ) -> Result<Fit> {
-    let at: Evaluated = problem.evaluate(model);
     let layout = Layout::new(problem, &at);
     let (factor, mahalanobis) = layout.covariance(problem, &at, weights)?;
     let (residual, jacobian) = layout.linearise(problem, &at);
@@ -262,7 +269,7 @@ fn finish(
         predicted: problem
             .links
             .iter()
-            .zip(&at.turns)
+            .zip(at.turns.iter())
             .map(|(link, turn)| turn.rotation * at.forces[link.before])
             .collect(),
         model: at.model,

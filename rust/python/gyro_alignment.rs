@@ -137,7 +137,8 @@ impl Moves {
 
     #[pyo3(signature = (*, reading, var_reading, zero, var_zero, zero_weights, used, starts, accelerometer_scale,
         accelerometer_bias, accelerometer_basis, gravity_m_s2, noise_density, sigma_time_s, nominal_step_s,
-        var_zero_walk, is_accelerometer_given, is_offset_free, loss_scale))]
+        var_zero_walk, is_accelerometer_given, is_offset_free, loss_scale,
+        is_near=false))]
     #[allow(clippy::too_many_arguments)]
     fn align(
         &self,
@@ -160,6 +161,7 @@ impl Moves {
         is_accelerometer_given: bool,
         is_offset_free: bool,
         loss_scale: Option<f64>,
+        is_near: bool,
     ) -> PyResult<AlignmentFit> {
         let reading = rows3("reading", &reading)?;
         let var_reading = rows3("var_reading", &var_reading)?;
@@ -225,6 +227,7 @@ impl Moves {
             .collect();
         let settings = Settings {
             loss: loss_scale.map_or(Loss::Linear, |scale| Loss::Cauchy { scale }),
+            is_near,
             ..Settings::default()
         };
         let found = super::run(py, || fit(&problem, &starts, &zero_weights, &settings))?;

@@ -107,8 +107,9 @@ def align(
     starts: FloatArray,
     options: MoveOptions,
     used: BoolArray | None = None,
+    is_near: bool = False,
 ) -> AlignmentFit:
-    """One alignment in the core, robust or not at all."""
+    """One alignment in the core, not robust; ``is_near`` says that the first start solves nearly the same problem."""
     return _core_align(
         measured,
         accelerometer,
@@ -117,6 +118,7 @@ def align(
         options,
         ~measured.is_lost if used is None else used,
         None,
+        is_near,
     )
 
 
@@ -136,6 +138,7 @@ def align_screened(
     if not np.any(used):
         raise ValueError("the gyro met its limit in every move: turn more slowly or set a wider range")
     outliers: tuple[int, ...] = ()
+    is_near = False
     n_parameters = 9 + (3 if options.is_offset_free else 0)
     if options.is_robust and 2 * int(np.count_nonzero(used)) > n_parameters + 2:
         screen = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, CAUCHY_SCALE)
@@ -150,7 +153,8 @@ def align_screened(
             outliers = tuple(int(i) for i in np.flatnonzero(far))
             used = used & ~far
         starts = np.concatenate([np.asarray(screen.gyroscope_scale)[None], starts])
-    fit = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, None)
+        is_near = screen.is_converged
+    fit = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, None, is_near)
     inflation = 1.0
     if fit.dof > 0 and chi2_distribution.sf(fit.chi2, fit.dof) < FALSE_ALARM:
         inflation = fit.chi2 / fit.dof
@@ -165,6 +169,7 @@ def _core_align(
     options: MoveOptions,
     used: BoolArray,
     loss_scale: float | None,
+    is_near: bool = False,
 ) -> AlignmentFit:
     return measured.moves.align(
         reading=measured.reading,
@@ -185,6 +190,7 @@ def _core_align(
         var_zero_walk=measured.var_zero_walk,
         is_offset_free=options.is_offset_free,
         loss_scale=loss_scale,
+        is_near=is_near,
     )
 
 

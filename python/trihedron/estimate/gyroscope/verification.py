@@ -82,7 +82,7 @@ def held_out(
         out = indices[fold::n_folds]
         used = aligned.used.copy()
         used[out] = False
-        fit = align(measured, accelerometer, gravity_m_s2, start, options, used)
+        fit = align(measured, accelerometer, gravity_m_s2, start, options, used, is_near=True)
         if fit.rank < aligned.fit.rank:
             return None
         without = assemble(fit, measured, accelerometer, used, (), aligned.inflation)
