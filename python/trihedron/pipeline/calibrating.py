@@ -148,13 +148,21 @@ def _by_poses(
         if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
             pull = _pull_on_accelerometer(accelerometer, both.accelerometer)
-            if pull <= stats.chi2.isf(FALSE_ALARM, 9):
+            if pull <= _pull_allowed(accelerometer):
                 return replace(both, findings=(*found, *both.findings))
             alone = replace(alone, findings=(*found, _joint_fit_left(pull)))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
     except ValueError as error:
         return _without_gyroscope(alone, str(error))
     return _together(alone, gyroscope, more)
+
+
+def _pull_allowed(alone: SensorCalibration) -> float:
+    """Limit of that rise; where the norms alone exceed their noise, χ² counts in units of that excess (F test)."""
+    quality = alone.quality
+    if quality is None or quality.dof < 1 or stats.chi2.sf(quality.chi2, quality.dof) >= 0.01:
+        return float(stats.chi2.isf(FALSE_ALARM, 9))
+    return float(9.0 * quality.chi2 / quality.dof * stats.f.isf(FALSE_ALARM, 9, quality.dof))
 
 
 def _pull_on_accelerometer(alone: SensorCalibration, joint: SensorCalibration) -> float:
