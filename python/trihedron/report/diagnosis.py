@@ -316,5 +316,7 @@ def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     made: Callable[[], bytes] = draw
     n = len(residuals.before)
     caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'hold' else 'move')}; "
-    caption += "shaded: twice the noise of one number."
+    caption += "bars: twice the noise predicted for one number."
+    if residuals.domain == "dynamics":
+        caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."
     return Picture(f"{residuals.domain}", caption, made)

@@ -45,10 +45,9 @@ def draw_before_after(residuals: DomainResiduals, *, has_effects: bool) -> bytes
 
 
 def _draw(axis: Axes, time_s: FloatArray, value: FloatArray, sigma: FloatArray, channels: tuple[str, ...]) -> None:
-    order = np.argsort(time_s)
-    is_angle = channels == ("angle",)
-    low = np.zeros(len(sigma)) if is_angle else -2.0 * sigma
-    axis.fill_between(time_s[order], low[order], 2.0 * sigma[order], color=SHADE, linewidth=0, zorder=0)
+    # A bar for each: noise differs from pose to pose, and nothing is known between them.
+    low = np.zeros(len(sigma)) if channels == ("angle",) else -2.0 * sigma
+    axis.vlines(time_s, low, 2.0 * sigma, color=SHADE, linewidth=5.0, zorder=0)
     axis.axhline(0.0, color=INK, linewidth=0.8)
     for k, name in enumerate(channels):
         colour = AXIS_COLOURS[k] if len(channels) > 1 else ACCENT
