@@ -23,6 +23,7 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.simulate import (
     Accelerometer,
     Gyroscope,
+    effects_of,
     hand_session,
     profile_by_name,
     simulate,
@@ -286,3 +287,17 @@ def test_every_effect_the_documentation_says_is_taken_off_elsewhere_is_and_no_ot
     named = set(re.findall(r"`([a-z-]+)`", part))
     thermal = {f"{sensor}-thermal-{kind}" for sensor in ("accel", "gyro") for kind in ("bias", "scale")}
     assert named | thermal == {effect.id for effect in catalogue() if effect.applies_elsewhere}
+
+
+@pytest.mark.parametrize(
+    ("effect_id", "key", "size"),
+    [("accel-gyro-time-offset", "offset_s", 5e-3), ("lever-arm", "arm_m", (0.1, -0.05, 0.15))],
+)
+def test_a_simulated_effect_comes_back_from_its_diagnosis_with_its_sign(effect_id, key, size):
+    recording, truth = simulate(with_effect(scenario(), effect_id, **{key: size}), seed=1)
+    diagnosis = trihedron.diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
+    entries = [effect.to_dict() for effect in diagnosis.effects if effect.id == effect_id]
+    made, done, _ = with_diagnosed_effects(scenario(), entries)
+    assert done == (effect_id,)
+    # A mapping with a wrong sign or axis is off by the size itself.
+    assert np.allclose(effects_of(made)[effect_id][key], size, rtol=0.1, atol=0.01 * np.max(np.abs(size)))
