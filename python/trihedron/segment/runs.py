@@ -114,6 +114,12 @@ def turning_blocks(channels: Channels, quiet: BoolArray, gravity: float | None) 
     nearest = [np.abs(second[a:b] - zero).min(axis=0) for a, b in ranges if b - a >= channels.blocks(MIN_HOLD_S)]
     if len(nearest) > 1:
         scatter = np.maximum(scatter, 1.4826 * np.median(nearest, axis=0))
+    # A few short holds hold a few independent seconds: the shortest interval among them flatters. No window is known
+    # better than the white noise of its blocks.
+    steps = [np.diff(reading[a:b], axis=0) for a, b in ranges if b - a >= 2]
+    if steps:
+        white = np.sqrt(np.median([(step**2).mean(axis=0) / 2.0 for step in steps], axis=0) / channels.blocks(1.0))
+        scatter = np.maximum(scatter, white)
     scatter = np.maximum(scatter, channels.quantum[gyro] / np.sqrt(12.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.nan_to_num(np.abs(second - zero) / scatter, nan=0.0)
