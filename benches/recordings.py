@@ -1,7 +1,7 @@
 """Real recordings end to end: ``python benches/recordings.py FOLDER`` (the recordings are not part of the repository).
 
-One line per recording: time warm (reading included), poses, norm residual and held-out gravity prediction; then what was
-published about them (docs/real-recordings.md).
+One line per recording: time warm (reading included), poses, norm residual and held-out gravity prediction; then what
+was published about them (docs/real-recordings.md).
 """
 
 import json
@@ -50,9 +50,8 @@ def against_published(folder: Path) -> None:
         # Lengths of columns do not depend on the frame.
         ratio = np.linalg.norm(sensor.S, axis=0) / np.linalg.norm(theirs, axis=0) - 1.0
         print(f"xsens_mti {name} scale: {100 * np.abs(ratio).max():.3f} % from the published one at most")
-    print(
-        f"xsens_mti accelerometer zero: {np.abs(zero).max():.1f} counts; {1e3 * accelerometer.quality.rms_dof:.2f} mm/s²"
-    )
+    residual = 1e3 * accelerometer.quality.rms_dof
+    print(f"xsens_mti accelerometer zero: {np.abs(zero).max():.1f} counts; residual {residual:.2f} mm/s²")
     for k in range(3):
         arguments, gravity = sessions(folder)[f"mpu9150 imu{k}"]
         quality = trihedron.calibrate(
