@@ -93,7 +93,7 @@ def test_kim_residual_per_degree_of_freedom_is_the_published_one(real_data, run,
     recording = trihedron.read(real_data / "kim" / f"kim_imu_good{run}.txt")
     assert "time-gap" in {finding.code.value for finding in recording.findings}
     segments = trihedron.segment(recording)
-    # Published with every pose weighed alike.
+    # How the published figures weighed the poses is not known; alike is the plainest guess.
     alike = replace(segments, accelerometer_sigma_mean=np.full((segments.n_holds, 3), 1e-3))
     plain = trihedron.calibrate(recording, segments=alike, gravity_m_s2=9.79871, method="separate")
     assert 1e3 * plain.accelerometer.quality.rms_dof == pytest.approx(published_mm_s2, rel=0.3)
