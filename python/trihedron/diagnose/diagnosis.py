@@ -267,7 +267,7 @@ def _accept_next(
     if not leaders:
         return False
     refits = [refit(context, model.distortions, s, prior, model.prediction.log_density) for s in leaders]
-    sound = [r for r in refits if r.bic_gain > MIN_DELTA_BIC and r.held_out_gain > 0.0]
+    sound = [r for r in refits if r.bic_gain > MIN_DELTA_BIC and r.held_out_gain > 0.0 and _is_plausible(r)]
     if not sound:
         return False
     best = max(sound, key=lambda r: r.bic_gain)
@@ -292,6 +292,12 @@ def _accept_next(
         )
     )  # fmt: skip
     return True
+
+
+def _is_plausible(one: Refit) -> bool:
+    k = one.scored.variant.distortion.n_parameters
+    covariance = one.fitted.covariance()[-k:, -k:]
+    return one.scored.effect.is_plausible(one.fitted.twin.effect[-k:], covariance)
 
 
 def _p_adjusted(best: Refit, n_effects: int) -> float:

@@ -212,8 +212,11 @@ def tune_noise(obs: Observations, start: Twin, distortion: Distortion, prior: Pr
     sides = [scaled[walk == w].T @ residual[walk == w] for w in range(3)]
     sums = [float(residual[walk == w] @ residual[walk == w]) for w in range(3)]
     gyro_grid = CORNER_GRID_S if obs.rate_density is not None else (fitted.twin.gyro_corner_s,)
-    for accel_corner in CORNER_GRID_S:
-        for gyro_corner in gyro_grid:
+    # One sensor after the other, and the first again: their walks hardly meet in a row.
+    for is_accel in (True, False, True):
+        _, accel_best, gyro_best = best
+        pairs = [(c, gyro_best) for c in CORNER_GRID_S] if is_accel else [(accel_best, c) for c in gyro_grid]
+        for accel_corner, gyro_corner in pairs:
             factors = (1.0, accel_corner / fitted.twin.accel_corner_s, gyro_corner / fitted.twin.gyro_corner_s)
             normal = sum(f * f * b for f, b in zip(factors, blocks, strict=True))
             side = sum(f * f * s for f, s in zip(factors, sides, strict=True))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -68,6 +69,7 @@ def _averaged_spectrum(pieces: list[tuple[int, FloatArray]], n: int) -> tuple[Fl
     return total / count, count
 
 
+@lru_cache(maxsize=4)
 def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
     """Lines that stand out of the smooth spectrum of the holds, one at most per channel (eq. 8.12)."""
     pieces = hold_pieces(obs)
@@ -197,7 +199,7 @@ def test_within_static(obs: Observations, alpha: float) -> DomainTest:
     # Real noise is not exactly Gaussian or white: a pose must be half as noisy again before its variance counts.
     loud = np.where(scatter.ratio > 1.5, scatter.p_value, 1.0)
     p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0
-    lines = find_lines(obs, p_limit=1.0)
+    lines = find_lines(obs)
     p_line = min((line.p_value for line in lines), default=1.0)
     p = min(1.0, 2.0 * min(p_scatter, p_line))
     dof = float(scatter.dof.sum() * scatter.ratio.shape[1])

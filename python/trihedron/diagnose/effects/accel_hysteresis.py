@@ -41,8 +41,8 @@ class AccelHysteresis(Effect):
         return self._play(context, value) if variant.label == "play" else self._creep(context, value)
 
     def _coarse(self, context: Context) -> tuple[FloatArray, npt.NDArray[np.intp], int]:
-        """The path in steps of a twentieth of a second, and which of them each sample belongs to."""
-        step = max(1, round(0.05 * context.obs.recording.rate_hz))
+        """The path in steps of a tenth of a second, and which of them each sample belongs to."""
+        step = max(1, round(0.1 * context.obs.recording.rate_hz))
         coarse = context.history[::step]
         return coarse, np.minimum(np.arange(len(context.history)) // step, len(coarse) - 1), step
 

@@ -60,6 +60,10 @@ class Effect(ABC):
         """The same variant at another value of its one shape number; ``None`` where the shape is not continuous."""
         return None
 
+    def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+        """Whether the fitted parameters are ones that the mechanism can have."""
+        return True
+
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         """Physical parameters from the linear ones; shape numbers follow without a standard error of their own."""
         sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))

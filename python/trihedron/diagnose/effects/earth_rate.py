@@ -35,6 +35,12 @@ class EarthRate(Effect):
             )
         ]
 
+    def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:
+        # The Earth turns at one rate: a vector of another length is something else that turns with the attitude.
+        size = float(np.linalg.norm(value))
+        sigma = float(np.sqrt(value @ covariance @ value)) / max(size, 1e-30)
+        return abs(size - EARTH_RATE_RAD_S) < 3.0 * sigma
+
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         linear = super().parameters(variant, value, covariance)
         size = float(np.linalg.norm(value))
