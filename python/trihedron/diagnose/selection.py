@@ -145,7 +145,8 @@ def refit(
     start = replace(
         base.twin, effect=np.concatenate([base.twin.effect, np.zeros(scored.variant.distortion.n_parameters)])
     )
-    fitted = tune_noise(context.obs, start, distortion, prior)
+    # The base is at its optimum and effects are small: two steps settle the sum.
+    fitted = tune_noise(context.obs, start, distortion, prior, n_iterations=2)
     n_rows = int((base.system.domain != PRIOR).sum())
     cost = np.log(n_rows) * (scored.rank + len(scored.variant.shape))
     # Marginal likelihoods differ by the flat prior of the new parameters; their own log-determinant is taken out so

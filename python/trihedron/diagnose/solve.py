@@ -198,13 +198,15 @@ def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains:
     return Prediction(chi2, count, log_density, out)
 
 
-def tune_noise(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None) -> Fit:
+def tune_noise(
+    obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None, n_iterations: int = 4
+) -> Fit:
     """Choose the two corner times by marginal likelihood on a grid (eq. 8.6).
 
     Only the rows of the two walks depend on a corner time, each in proportion to it: the linear optimum and its
     evidence follow from the rows already made, without running the motion again.
     """
-    fitted = fit(obs, start, distortion, prior)
+    fitted = fit(obs, start, distortion, prior, n_iterations)
     best = (-np.inf, fitted.twin.accel_corner_s, fitted.twin.gyro_corner_s)
     walk, residual = fitted.system.walk, fitted.system.residual
     scaled = fitted.jacobian / fitted.scale
@@ -229,7 +231,7 @@ def tune_noise(obs: Observations, start: Twin, distortion: Distortion, prior: Pr
             if evidence > best[0]:
                 best = (evidence, accel_corner, gyro_corner)
     tuned = replace(fitted.twin, accel_corner_s=best[1], gyro_corner_s=best[2])
-    return fit(obs, tuned, distortion, prior, n_iterations=2)
+    return fit(obs, tuned, distortion, prior, n_iterations=(n_iterations + 1) // 2)
 
 
 CORNER_GRID_S = (20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 2560.0)
