@@ -1,6 +1,10 @@
 """Shared fixtures: the folder of real recordings, where it is present."""
 
+import os
 from pathlib import Path
+
+# Two test processes on two cores: linear algebra that starts threads of its own only waits for itself.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 

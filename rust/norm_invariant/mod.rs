@@ -177,6 +177,8 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
         {
             Ok(found)
         }
+        // A malformed start is a mistake to be told of, not to be worked around.
+        Err(error @ Error::BadInput(_)) => Err(error),
         first => fit_from(readings, settings, None).or(first),
     }
 }

@@ -57,7 +57,8 @@ def resample(
     between = (alpha > 0) & (alpha < 1)
     out[between] = (1 - weight[between]) * values[left[between]] + weight[between] * values[right[between]]
     out[~usable] = np.nan
-    factor = alpha**2 + (1 - alpha) ** 2
+    inside = np.clip(alpha, 0.0, 1.0)  # far outside two nearly equal stamps alpha has no square
+    factor = inside**2 + (1 - inside) ** 2
     return out, factor
 
 
