@@ -123,7 +123,10 @@ struct Evaluated {
 /// The rotations integrated last: they depend on the gyro's scale and offset alone, and the solver, the covariance and the
 /// next round all ask for them at the same point.
 #[derive(Default)]
-struct LastTurns(RefCell<Option<(Matrix3<f64>, Vector3<f64>, Rc<Vec<Turn>>)>>);
+struct LastTurns(RefCell<Option<TurnsAt>>);
+
+/// Scale and zero of a point, and the turns integrated there.
+type TurnsAt = (Matrix3<f64>, Vector3<f64>, Rc<Vec<Turn>>);
 
 /// Residual of one move and everything it answers to, in three components.
 struct MoveRow {
