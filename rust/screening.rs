@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::allan::prefix::Prefix;
+use crate::allan::readings::Readings;
 use crate::error::{Error, Result};
 
 /// Differences from which a spread is read: its error is 0.8 %, far below that of the limit.
@@ -40,16 +41,16 @@ pub struct Jump {
 ///
 /// # Errors
 /// `BadInput` for a scale that does not fit into the log.
-pub fn jumps<F: Fn(usize) -> f64 + Sync>(n: usize, get: F, scales: &[Scale]) -> Result<Vec<Jump>> {
+pub fn jumps(readings: &impl Readings, scales: &[Scale]) -> Result<Vec<Jump>> {
     if scales
         .iter()
-        .any(|s| s.size == 0 || s.stride == 0 || 2 * s.size > n)
+        .any(|s| s.size == 0 || s.stride == 0 || 2 * s.size > readings.len())
     {
         return Err(Error::bad_input(
             "every scale must hold at least one reading, and the log two of them",
         ));
     }
-    let sums = Prefix::new(n, &get).sums;
+    let sums = Prefix::new(readings).sums;
     Ok(scales
         .par_iter()
         .flat_map_iter(|&scale| at_scale(&sums, scale))

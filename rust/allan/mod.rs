@@ -15,14 +15,17 @@
 //! Memory beside the input: one running sum (8 bytes per reading of one channel). Terms are computed in tiles of the
 //! running sum that stay in the cache while all clusters pass over them; see [`tiles`].
 
+pub mod degrees;
 pub mod edges;
 pub mod prefix;
+pub mod readings;
 pub mod stream;
 pub mod tiles;
 pub mod weighted;
 
 use crate::error::{Error, Result};
 
+pub use readings::{Column, FromFn, Readings};
 pub use stream::Stream;
 
 /// Which variance of the family.
@@ -105,28 +108,36 @@ pub fn check_clusters(n: usize, clusters: &[usize], kind: Kind) -> Result<()> {
     Ok(())
 }
 
-/// Variances of one channel: `get(i)` is reading `i` of `n`; a reading that is not finite is missing.
+/// Variances of one channel; a reading that is not finite is missing.
 ///
 /// Missing readings are never interpolated: see [`weighted`].
 ///
 /// # Errors
 /// `BadInput` for cluster sizes without a term, infinite readings, or missing readings where the kind allows none.
-pub fn variances<F: Fn(usize) -> f64 + Sync>(
-    n: usize,
-    get: F,
+pub fn variances(readings: &impl Readings, clusters: &[usize], kind: Kind) -> Result<Curve> {
+    variances_in(readings, clusters, kind, &mut vec![0.0; readings.len() + 1])
+}
+
+/// As [`variances`], the running sum in memory of the caller's, one longer than the readings.
+///
+/// # Errors
+/// As [`variances`].
+///
+/// # Panics
+/// When `workspace` has another length.
+pub fn variances_in(
+    readings: &impl Readings,
     clusters: &[usize],
     kind: Kind,
+    workspace: &mut [f64],
 ) -> Result<Curve> {
-    check_clusters(n, clusters, kind)?;
-    let prefix = prefix::Prefix::new(n, &get);
-    let Some(present) = prefix.present else {
-        return Ok(from_running_sum(&prefix.sums, clusters, kind));
-    };
-    drop(prefix.sums);
-    if present == 0 {
-        return Err(Error::bad_input("the channel holds no finite reading"));
+    check_clusters(readings.len(), clusters, kind)?;
+    let (centre, present) = prefix::Prefix::write(readings, workspace);
+    match present {
+        None => Ok(from_running_sum(workspace, clusters, kind)),
+        Some(0) => Err(Error::bad_input("the channel holds no finite reading")),
+        Some(_) => weighted::variances(readings, centre, clusters, kind),
     }
-    weighted::variances(n, &get, prefix.centre, clusters, kind)
 }
 
 /// Variances from the running sum `p` (one longer than the readings) of a channel without missing readings.

@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use super::readings::Readings;
+
 /// Readings per block; block starts are summed in twice the working precision, so that no error grows along the log.
 const BLOCK: usize = 4096;
 
@@ -38,16 +40,46 @@ pub fn compensated_sum(values: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 impl Prefix {
-    /// Running sum of `get(0..n)`.
-    pub fn new<F: Fn(usize) -> f64 + Sync>(n: usize, get: &F) -> Self {
+    /// Running sum of the readings.
+    pub fn new(readings: &impl Readings) -> Self {
+        let mut sums = vec![0.0; readings.len() + 1];
+        let (centre, present) = Self::write(readings, &mut sums);
+        Self {
+            sums,
+            centre,
+            present,
+        }
+    }
+
+    /// Write the running sum into `sums`, one longer than the readings; gives the fields `centre` and `present`.
+    ///
+    /// # Panics
+    /// When `sums` has another length.
+    pub fn write(readings: &impl Readings, sums: &mut [f64]) -> (f64, Option<usize>) {
+        let n = readings.len();
+        assert_eq!(
+            sums.len(),
+            n + 1,
+            "a running sum is one longer than its readings"
+        );
         let blocks = n.div_ceil(BLOCK);
         let range = |b: usize| b * BLOCK..((b + 1) * BLOCK).min(n);
         // Around a first reading rather than zero: a bias of 1e4 times the noise would cost its digits.
-        let pivot = (0..n).map(get).find(|v| v.is_finite()).unwrap_or(0.0);
+        let pivot = (0..n)
+            .map(|i| readings.get(i))
+            .find(|v| v.is_finite())
+            .unwrap_or(0.0);
         let partial: Vec<(f64, usize)> = (0..blocks)
             .into_par_iter()
-            .with_min_len(64)
-            .map(|b| block_sum(range(b), get, pivot))
+            .with_min_len(16)
+            .map_init(
+                || vec![0.0; BLOCK],
+                |buffer, b| {
+                    let buffer = &mut buffer[..range(b).len()];
+                    readings.fill(b * BLOCK, buffer);
+                    block_sum(buffer, pivot)
+                },
+            )
             .collect();
         let present: usize = partial.iter().map(|p| p.1).sum();
         let total = compensated_sum(partial.iter().map(|p| p.0));
@@ -57,89 +89,82 @@ impl Prefix {
             total / present as f64
         };
         let centre = pivot + shift;
-
-        let mut sums = vec![0.0; n + 1];
-        let mut local: Vec<f64> = Vec::with_capacity(blocks);
-        sums[1..]
-            .par_chunks_mut(BLOCK)
-            .with_min_len(64)
-            .enumerate()
-            .map(|(b, out)| running(b * BLOCK, out, get, centre))
-            .collect_into_vec(&mut local);
         let (mut high, mut low) = (0.0, 0.0);
-        let starts: Vec<f64> = local
+        let starts: Vec<f64> = partial
             .iter()
-            .map(|sum| {
+            .map(|&(sum, count)| {
                 let start = high + low;
-                let (s, e) = two_sum(high, *sum);
+                let (s, e) = two_sum(high, sum - shift * count as f64);
                 high = s;
                 low += e;
                 start
             })
             .collect();
+        sums[0] = 0.0;
         sums[1..]
             .par_chunks_mut(BLOCK)
-            .with_min_len(64)
-            .zip(&starts)
-            .for_each(|(out, start)| out.iter_mut().for_each(|v| *v += start));
-        Self {
-            sums,
-            centre,
-            present: (present < n).then_some(present),
+            .with_min_len(16)
+            .enumerate()
+            .for_each(|(b, out)| {
+                readings.fill(b * BLOCK, out);
+                running(out, centre, starts[b], partial[b].1 < out.len());
+            });
+        (centre, (present < n).then_some(present))
+    }
+}
+
+/// Sum around `pivot` of the readings present, and their number.
+fn block_sum(values: &[f64], pivot: f64) -> (f64, usize) {
+    const LANES: usize = 16;
+    let mut lanes = [0.0; LANES];
+    let (whole, rest) = values.as_chunks::<LANES>();
+    for chunk in whole {
+        for lane in 0..LANES {
+            lanes[lane] += chunk[lane] - pivot;
         }
     }
-}
-
-fn block_sum<F: Fn(usize) -> f64>(
-    range: std::ops::Range<usize>,
-    get: &F,
-    pivot: f64,
-) -> (f64, usize) {
-    let mut sum = [0.0; 4];
-    let mut count = [0_usize; 4];
-    for (lane, i) in range.enumerate() {
-        let v = get(i) - pivot;
-        let present = v.is_finite();
-        sum[lane & 3] += if present { v } else { 0.0 };
-        count[lane & 3] += usize::from(present);
+    let sum = lanes.iter().sum::<f64>() + rest.iter().map(|v| v - pivot).sum::<f64>();
+    if sum.is_finite() {
+        return (sum, values.len());
     }
-    (sum.iter().sum(), count.iter().sum())
+    let present = values.iter().filter(|v| v.is_finite());
+    (present.clone().map(|v| v - pivot).sum(), present.count())
 }
 
-/// Running sum of one block from zero, four stretches at a time so that additions overlap; returns the block's sum.
-fn running<F: Fn(usize) -> f64>(first: usize, out: &mut [f64], get: &F, centre: f64) -> f64 {
-    let value = |i: usize| {
-        let v = get(first + i) - centre;
-        if v.is_finite() { v } else { 0.0 }
-    };
-    let quarter = out.len() / 4;
-    let mut acc = [0.0; 4];
+/// Readings to running sum, in place; four stretches at a time so that additions overlap.
+fn running(values: &mut [f64], centre: f64, start: f64, has_gaps: bool) {
+    if has_gaps {
+        for v in values.iter_mut() {
+            *v = if v.is_finite() { *v } else { centre };
+        }
+    }
+    let quarter = values.len() / 4;
+    let (a, rest) = values.split_at_mut(quarter);
+    let (b, rest) = rest.split_at_mut(quarter);
+    let (c, d) = rest.split_at_mut(quarter);
+    let mut sums = [0.0; 4];
+    for (((a, b), c), d) in a
+        .iter_mut()
+        .zip(b.iter_mut())
+        .zip(c.iter_mut())
+        .zip(d.iter_mut())
     {
-        let (a, rest) = out.split_at_mut(quarter);
-        let (b, rest) = rest.split_at_mut(quarter);
-        let (c, rest) = rest.split_at_mut(quarter);
-        let d = &mut rest[..quarter];
-        for i in 0..quarter {
-            acc[0] += value(i);
-            acc[1] += value(quarter + i);
-            acc[2] += value(2 * quarter + i);
-            acc[3] += value(3 * quarter + i);
-            a[i] = acc[0];
-            b[i] = acc[1];
-            c[i] = acc[2];
-            d[i] = acc[3];
+        sums[0] += *a - centre;
+        sums[1] += *b - centre;
+        sums[2] += *c - centre;
+        sums[3] += *d - centre;
+        (*a, *b, *c, *d) = (sums[0], sums[1], sums[2], sums[3]);
+    }
+    for v in &mut d[quarter..] {
+        sums[3] += *v - centre;
+        *v = sums[3];
+    }
+    // Local sums are small and exact; the level is added once, so that every value is rounded once.
+    let mut level = start;
+    for (part, sum) in [a, b, c, d].into_iter().zip(sums) {
+        for v in part {
+            *v += level;
         }
+        level += sum;
     }
-    let mut start = acc[0];
-    for (part, own) in acc.iter().enumerate().skip(1) {
-        for v in &mut out[part * quarter..(part + 1) * quarter] {
-            *v += start;
-        }
-        start += own;
-    }
-    for i in 4 * quarter..out.len() {
-        start += value(i);
-        out[i] = start;
-    }
-    start
 }

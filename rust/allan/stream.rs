@@ -8,6 +8,7 @@
 
 use super::Curve;
 use super::prefix::{compensated_sum, two_sum};
+use super::readings::Readings;
 use super::tiles::{self, Difference};
 use crate::error::{Error, Result};
 
@@ -95,35 +96,37 @@ impl Stream {
         self.n == 0
     }
 
-    /// Take the next `n` readings.
+    /// Take the next readings.
     ///
     /// # Errors
     /// `BadInput` naming the first reading that is not finite.
-    pub fn extend<F: Fn(usize) -> f64>(&mut self, n: usize, get: F) -> Result<()> {
-        if n == 0 {
-            return Ok(());
-        }
-        if let Some(bad) = (0..n).find(|&i| !get(i).is_finite()) {
-            return Err(Error::bad_input(format!(
-                "reading {} is missing or infinite: exclude it, or load the log whole, where gaps are weighted",
-                self.n + bad
-            )));
-        }
-        if self.n == 0 {
-            // Close to the mean is enough: a constant drops out of every difference.
-            self.centre = get(0) + compensated_sum((0..n).map(|i| get(i) - get(0))) / n as f64;
-        }
+    pub fn extend(&mut self, readings: &impl Readings) -> Result<()> {
+        let n = readings.len();
         // Pieces bound the window whatever chunk the caller likes.
-        let piece = 4 * FINE;
-        for first in (0..n).step_by(piece) {
-            self.piece(first..(first + piece).min(n), &get);
+        let mut buffer = vec![0.0; n.min(4 * FINE)];
+        for first in (0..n).step_by(4 * FINE) {
+            let piece = &mut buffer[..(n - first).min(4 * FINE)];
+            readings.fill(first, piece);
+            if let Some(bad) = piece.iter().position(|v| !v.is_finite()) {
+                return Err(Error::bad_input(format!(
+                    "reading {} is missing or infinite: exclude it, or load the log whole, where gaps are weighted",
+                    self.n + bad
+                )));
+            }
+            if self.n == 0 {
+                // Close to the mean is enough: a constant drops out of every difference.
+                let pivot = piece[0];
+                self.centre =
+                    pivot + compensated_sum(piece.iter().map(|v| v - pivot)) / piece.len() as f64;
+            }
+            self.take(piece);
         }
         Ok(())
     }
 
-    fn piece<F: Fn(usize) -> f64>(&mut self, range: std::ops::Range<usize>, get: &F) {
-        for i in range {
-            let (s, e) = two_sum(self.total.0, get(i) - self.centre);
+    fn take(&mut self, piece: &[f64]) {
+        for v in piece {
+            let (s, e) = two_sum(self.total.0, v - self.centre);
             self.total = (s, self.total.1 + e);
             let sum = self.total.0 + self.total.1;
             self.window.push(sum);

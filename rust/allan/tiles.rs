@@ -16,8 +16,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::prefix::compensated_sum;
 
-/// Terms per tile: 128 KiB of running sum, a fraction of a second-level cache.
-const TILE: usize = 16384;
+/// Terms per tile: 256 KiB of running sum, a fraction of a second-level cache.
+const TILE: usize = 32768;
 /// Independent partial sums per loop: enough for the longest vectors in use to hide their latency.
 const LANES: usize = 32;
 
@@ -70,10 +70,26 @@ pub fn energies(p: &[f64], lags: &[usize], difference: Difference) -> Vec<f64> {
                     .lock()
                     .unwrap_or_else(std::sync::PoisonError::into_inner);
                 let first = tile * TILE;
-                for &c in &ascending {
-                    let stop = (first + TILE).min(p.len().saturating_sub(order * lags[c]));
-                    if first < stop {
-                        row[c] = kernel.energy(p, first, stop, lags[c], difference);
+                let stop = |c: usize| (first + TILE).min(p.len().saturating_sub(order * lags[c]));
+                let mut next = ascending.as_slice();
+                while let [c, rest @ ..] = next {
+                    match rest {
+                        // Two lags at a time share the near end of their differences.
+                        [d, rest @ ..]
+                            if difference == Difference::Second
+                                && first < stop(*d)
+                                && stop(*c) == stop(*d) =>
+                        {
+                            (row[*c], row[*d]) =
+                                kernel.two_energies(p, first, stop(*c), lags[*c], lags[*d]);
+                            next = rest;
+                        }
+                        _ => {
+                            if first < stop(*c) {
+                                row[*c] = kernel.energy(p, first, stop(*c), lags[*c], difference);
+                            }
+                            next = rest;
+                        }
                     }
                 }
             }
@@ -134,6 +150,28 @@ impl Kernel {
         }
     }
 
+    /// Second differences with two lags.
+    fn two_energies(
+        self,
+        p: &[f64],
+        first: usize,
+        stop: usize,
+        m1: usize,
+        m2: usize,
+    ) -> (f64, f64) {
+        let at = |offset: usize| &p[first + offset..][..stop - first];
+        let (a, b, c, d, e) = (at(0), at(m1), at(2 * m1), at(m2), at(2 * m2));
+        match self {
+            // SAFETY: `detect` saw the instructions on this processor.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => unsafe { two_avx512(a, b, c, d, e) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => unsafe { two_avx2(a, b, c, d, e) },
+            _ => two::<false>(a, b, c, d, e),
+        }
+    }
+
     fn second(self, a: &[f64], b: &[f64], c: &[f64]) -> f64 {
         match self {
             // SAFETY: `detect` saw the instructions on this processor.
@@ -188,6 +226,31 @@ fn second<const FUSED: bool>(a: &[f64], b: &[f64], c: &[f64]) -> f64 {
 }
 
 #[inline(always)]
+fn two<const FUSED: bool>(a: &[f64], b: &[f64], c: &[f64], d: &[f64], e: &[f64]) -> (f64, f64) {
+    const LANES: usize = 16;
+    let (mut near, mut far) = ([0.0; LANES], [0.0; LANES]);
+    let (aa, at) = a.as_chunks::<LANES>();
+    let (bb, bt) = b.as_chunks::<LANES>();
+    let (cc, ct) = c.as_chunks::<LANES>();
+    let (dd, dt) = d.as_chunks::<LANES>();
+    let (ee, et) = e.as_chunks::<LANES>();
+    for ((((a, b), c), d), e) in aa.iter().zip(bb).zip(cc).zip(dd).zip(ee) {
+        for lane in 0..LANES {
+            let one = (c[lane] - b[lane]) - (b[lane] - a[lane]);
+            near[lane] = add_square::<FUSED>(one, near[lane]);
+            let two = (e[lane] - d[lane]) - (d[lane] - a[lane]);
+            far[lane] = add_square::<FUSED>(two, far[lane]);
+        }
+    }
+    let (mut sum, mut other) = (near.iter().sum::<f64>(), far.iter().sum::<f64>());
+    for ((((a, b), c), d), e) in at.iter().zip(bt).zip(ct).zip(dt).zip(et) {
+        sum = add_square::<FUSED>((c - b) - (b - a), sum);
+        other = add_square::<FUSED>((e - d) - (d - a), other);
+    }
+    (sum, other)
+}
+
+#[inline(always)]
 fn third<const FUSED: bool>(a: &[f64], b: &[f64], c: &[f64], d: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
     let (aa, at) = a.as_chunks::<LANES>();
@@ -229,4 +292,16 @@ fn third_avx512(a: &[f64], b: &[f64], c: &[f64], d: &[f64]) -> f64 {
 #[target_feature(enable = "avx2,fma")]
 fn third_avx2(a: &[f64], b: &[f64], c: &[f64], d: &[f64]) -> f64 {
     third::<true>(a, b, c, d)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn two_avx512(a: &[f64], b: &[f64], c: &[f64], d: &[f64], e: &[f64]) -> (f64, f64) {
+    two::<true>(a, b, c, d, e)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn two_avx2(a: &[f64], b: &[f64], c: &[f64], d: &[f64], e: &[f64]) -> (f64, f64) {
+    two::<true>(a, b, c, d, e)
 }

@@ -9,16 +9,16 @@
 use rayon::prelude::*;
 
 use super::prefix::compensated_sum;
+use super::readings::Readings;
 use super::{Curve, Kind};
 use crate::error::{Error, Result};
 
-/// Variances of a channel with missing readings (`get(i)` not finite), centred on `centre`.
+/// Variances of a channel with missing readings (not finite), centred on `centre`.
 ///
 /// # Errors
 /// `BadInput` for a kind that has no weighted form, or when no pair of clusters has a reading on both sides.
-pub fn variances<F: Fn(usize) -> f64 + Sync>(
-    n: usize,
-    get: &F,
+pub fn variances(
+    readings: &impl Readings,
     centre: f64,
     clusters: &[usize],
     kind: Kind,
@@ -30,7 +30,7 @@ pub fn variances<F: Fn(usize) -> f64 + Sync>(
             kind.name()
         )));
     }
-    let (sums, counts) = running(n, get, centre);
+    let (sums, counts) = running(readings, centre);
     let results: Vec<(f64, usize, f64)> = clusters
         .par_iter()
         .with_max_len(1)
@@ -52,14 +52,15 @@ pub fn variances<F: Fn(usize) -> f64 + Sync>(
     Ok(curve)
 }
 
-fn running<F: Fn(usize) -> f64>(n: usize, get: &F, centre: f64) -> (Vec<f64>, Vec<f64>) {
+fn running(readings: &impl Readings, centre: f64) -> (Vec<f64>, Vec<f64>) {
+    let n = readings.len();
     let mut sums = Vec::with_capacity(n + 1);
     let mut counts = Vec::with_capacity(n + 1);
     let (mut high, mut low, mut count) = (0.0, 0.0, 0.0);
     sums.push(0.0);
     counts.push(0.0);
     for i in 0..n {
-        let v = get(i) - centre;
+        let v = readings.get(i) - centre;
         if v.is_finite() {
             let (s, e) = super::prefix::two_sum(high, v);
             high = s;

@@ -6,11 +6,14 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::allan::{self, Curve, Kind, Stream};
+use crate::allan::degrees::{self, NoiseType};
+use crate::allan::{self, Column, Curve, Kind, Stream};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<AllanKind>()?;
     module.add_class::<AllanStream>()?;
+    module.add_class::<AllanNoise>()?;
+    module.add_function(wrap_pyfunction!(allan_degrees, module)?)?;
     module.add_function(wrap_pyfunction!(allan_variance, module)?)?;
     Ok(())
 }
@@ -38,6 +41,41 @@ impl From<AllanKind> for Kind {
     }
 }
 
+/// Type of noise at one averaging time.
+#[pyclass(eq, frozen, from_py_object, module = "trihedron._core")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum AllanNoise {
+    Quantisation,
+    White,
+    Flicker,
+    Walk,
+}
+
+impl From<AllanNoise> for NoiseType {
+    fn from(noise: AllanNoise) -> Self {
+        match noise {
+            AllanNoise::Quantisation => Self::Quantisation,
+            AllanNoise::White => Self::White,
+            AllanNoise::Flicker => Self::Flicker,
+            AllanNoise::Walk => Self::Walk,
+        }
+    }
+}
+
+/// Degrees of freedom of the variance of `n` readings in clusters of `m`.
+#[pyfunction]
+fn allan_degrees(
+    py: Python<'_>,
+    n: usize,
+    m: usize,
+    noise: AllanNoise,
+    kind: AllanKind,
+) -> PyResult<f64> {
+    super::run(py, || {
+        degrees::degrees_of_freedom(n, m, noise.into(), kind.into())
+    })
+}
+
 /// Readings `(n, channels)` in the type they were logged in: counts need not be copied to be read.
 #[derive(FromPyObject)]
 enum Readings<'py> {
@@ -47,35 +85,28 @@ enum Readings<'py> {
     I32(PyReadonlyArray2<'py, i32>),
 }
 
-/// A view that may cross threads: where the readings lie and how far apart, in elements.
+/// A view that may cross threads: where the readings lie, row by row.
 struct View<'a, T> {
     data: &'a [T],
-    n: usize,
     channels: usize,
 }
 
-impl<T: Copy + Into<f64>> View<'_, T> {
-    fn channel(&self, c: usize) -> impl Fn(usize) -> f64 + Sync + '_
-    where
-        T: Sync,
-    {
-        move |i| self.data[i * self.channels + c].into()
+impl<'a, T> View<'a, T> {
+    fn channel(&self, channel: usize) -> Column<'a, T> {
+        Column {
+            data: self.data,
+            channels: self.channels,
+            channel,
+        }
     }
 }
 
 fn view<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<View<'a, T>> {
-    let data = match array.as_slice() {
-        // `as_slice` also succeeds on a Fortran-ordered array, whose memory runs down the columns.
-        Ok(data) if array.is_c_contiguous() => data,
-        _ => {
-            return Err(PyValueError::new_err(
-                "readings must be C-contiguous, one row per sample",
-            ));
-        }
-    };
+    let data = array
+        .as_slice()
+        .map_err(|_| PyValueError::new_err("readings must be C-contiguous, one row per sample"))?;
     Ok(View {
         data,
-        n: array.shape()[0],
         channels: array.shape()[1],
     })
 }
@@ -112,6 +143,15 @@ fn readings<'py>(x: &Bound<'py, PyAny>) -> PyResult<Readings<'py>> {
     })
 }
 
+fn rows(x: &Readings<'_>) -> usize {
+    match x {
+        Readings::F64(array) => array.shape()[0],
+        Readings::F32(array) => array.shape()[0],
+        Readings::I16(array) => array.shape()[0],
+        Readings::I32(array) => array.shape()[0],
+    }
+}
+
 type Curves<'py> = (
     Bound<'py, PyArray2<f64>>,
     Bound<'py, PyArray2<i64>>,
@@ -142,9 +182,13 @@ fn allan_variance<'py>(
     kind: AllanKind,
 ) -> PyResult<Curves<'py>> {
     let x = readings(x)?;
+    // NumPy asks the system for large pages, which halves the time: this is the largest piece of memory here.
+    let workspace = PyArray1::<f64>::zeros(py, rows(&x) + 1, false);
+    let mut workspace = workspace.try_readwrite()?;
+    let workspace = workspace.as_slice_mut()?;
     let found = with_view!(&x, v => super::run(py, || {
         (0..v.channels)
-            .map(|c| allan::variances(v.n, v.channel(c), &clusters, kind.into()))
+            .map(|c| allan::variances_in(&v.channel(c), &clusters, kind.into(), workspace))
             .collect::<crate::Result<Vec<Curve>>>()
     }))?;
     curves(py, &found)
@@ -176,7 +220,7 @@ impl AllanStream {
                 )));
             }
             super::run(py, || {
-                channels.iter_mut().enumerate().try_for_each(|(c, stream)| stream.extend(v.n, v.channel(c)))
+                channels.iter_mut().enumerate().try_for_each(|(c, stream)| stream.extend(&v.channel(c)))
             })
         })
     }

@@ -4,6 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::allan::Column;
 use crate::screening::{self, Scale};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -33,7 +34,16 @@ fn find_jumps(
             limit,
         })
         .collect();
-    let found = super::run(py, || screening::jumps(x.len(), |i| x[i], &scales))?;
+    let found = super::run(py, || {
+        screening::jumps(
+            &Column {
+                data: x,
+                channels: 1,
+                channel: 0,
+            },
+            &scales,
+        )
+    })?;
     Ok(found
         .into_iter()
         .map(|j| (j.score, j.at, j.size, j.difference))

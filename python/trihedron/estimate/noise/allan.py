@@ -9,16 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.estimate.noise.degrees import FLICKER, QUANTISATION, WALK, WHITE, degrees_of_freedom
+from trihedron.estimate.noise.degrees import KINDS, edf_along
 from trihedron.records.noise import AllanCurve, AllanKind, FloatArray
 
-_KINDS = {
-    "overlapping": _core.AllanKind.Overlapping,
-    "non-overlapping": _core.AllanKind.NonOverlapping,
-    "modified": _core.AllanKind.Modified,
-    "hadamard": _core.AllanKind.Hadamard,
-    "total": _core.AllanKind.Total,
-}
 _LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
 
 STREAM_BUDGET_BYTES = 384 << 20
@@ -74,7 +67,7 @@ def allan_deviation(
     if n < _LONGEST[kind]:
         raise ValueError(f"an Allan deviation needs at least {_LONGEST[kind]} readings, got {n}")
     sizes = default_clusters(n, kind) if clusters is None else checked_clusters(clusters)
-    variance, terms, weight = _core.allan_variance(readings, sizes, _KINDS[kind])
+    variance, terms, weight = _core.allan_variance(readings, sizes, KINDS[kind])
     return curve_with_intervals(
         kind, rate_hz, n, np.array(sizes), variance.T, terms.T, weight.T, confidence, tuple(names), tuple(units)
     )
@@ -154,8 +147,8 @@ def check_question(rate_hz: float, kind: str, confidence: float) -> None:
     """
     if not (math.isfinite(rate_hz) and rate_hz > 0):
         raise ValueError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
-    if kind not in _KINDS:
-        raise ValueError(f"kind must be one of {', '.join(_KINDS)}; got {kind!r}")
+    if kind not in KINDS:
+        raise ValueError(f"kind must be one of {', '.join(KINDS)}; got {kind!r}")
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence must lie between 0 and 1, got {confidence}")
 
@@ -192,7 +185,7 @@ def curve_with_intervals(
 ) -> AllanCurve:
     """The curve with its degrees of freedom and chi-square intervals, the noise type read off the local slope."""
     channels = variance.shape[1]
-    edf = np.column_stack([_edf_along(n, clusters, variance[:, c], weight[:, c], kind) for c in range(channels)])
+    edf = np.column_stack([edf_along(n, clusters, variance[:, c], weight[:, c], kind) for c in range(channels)])
     tail = (1.0 - confidence) / 2.0
     high, low = (_core.chi_square_quantile(share, edf.ravel()).reshape(edf.shape) for share in (1.0 - tail, tail))
     return AllanCurve(
@@ -211,39 +204,3 @@ def curve_with_intervals(
         units=units or ("",) * channels,
         stride=stride,
     )
-
-
-def _edf_along(
-    n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, weight: FloatArray, kind: AllanKind
-) -> FloatArray:
-    slopes = local_slopes(n, clusters, variance)
-    out = np.empty(len(clusters))
-    # Slope of the variance: -2 quantisation, -1 white, 0 flicker, 1 walk; between two types 1/edf is interpolated.
-    types = (QUANTISATION, WHITE, FLICKER, WALK)
-    for i, m in enumerate(clusters):
-        place = min(max(slopes[i] + 2.0, 0.0), 3.0)
-        below = min(int(place), 2)
-        share = place - below
-        first, second = (degrees_of_freedom(n, int(m), types[below + step], kind) for step in (0, 1))
-        edf = 1.0 / ((1.0 - share) / first + share / second)
-        full = max(n - (3 if kind in ("hadamard", "modified") else 2) * int(m) + 1, 1)
-        if kind == "non-overlapping":
-            full = max(n // int(m) - 1, 1)
-        # Missing readings take degrees of freedom with them, in proportion.
-        out[i] = max(1.0, edf * min(1.0, weight[i] / full)) if kind not in ("total", "modified") else edf
-    return out
-
-
-def local_slopes(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray) -> FloatArray:
-    """(k,) slopes of log variance against log cluster size, over wider stretches where the curve is less certain."""
-    x = np.log2(np.asarray(clusters, dtype=np.float64))
-    y = np.log2(np.where(variance > 0, variance, np.nan))
-    out = np.full(len(x), -1.0)
-    for i in range(len(x)):
-        # One octave either side while there are hundreds of clusters, towards three octaves back at the end.
-        back = 1.0 + 2.0 / (1.0 + n / (50.0 * 2.0 ** x[i]))
-        near = (x >= x[i] - back) & (x <= x[i] + 1.0) & np.isfinite(y)
-        if np.count_nonzero(near) >= 2 and np.ptp(x[near]) > 0:
-            w = np.sqrt(n / 2.0 ** x[near])
-            out[i] = np.polyfit(x[near] - x[i], y[near], 1, w=w)[0]
-    return out

@@ -1,96 +1,100 @@
-"""Equivalent degrees of freedom of Allan variances by type of noise.
-
-Source: C. A. Greenhall, W. J. Riley, "Uncertainty of stability variances based on finite differences", Proc. 35th PTTI
-Meeting, 2003, pp. 267-280 (all but total); C. A. Greenhall, D. A. Howe, D. B. Percival, "Total variance, an estimator
-of long-term frequency stability", IEEE Trans. UFFC 46 (1999), Table I (total).
-"""
+"""Equivalent degrees of freedom of Allan variances by type of noise, and the types along a curve."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
+import numpy.typing as npt
 
+from trihedron import _core
 from trihedron.records.noise import AllanKind, FloatArray
 
-QUANTISATION, WHITE, FLICKER, WALK = 2, 0, -1, -2
-"""Exponents α of the rate's spectral density f^α."""
-
-_STEPS_PER_CLUSTER = 48
-"""Starts per cluster at which the autocovariance is summed; 48 give the sum over every start to within 0.2 %."""
-
-_TOTAL = {WHITE: (1.5, 0.0), FLICKER: (1.168, 0.222), WALK: (0.927, 0.358)}
+KINDS = {
+    "overlapping": _core.AllanKind.Overlapping,
+    "non-overlapping": _core.AllanKind.NonOverlapping,
+    "modified": _core.AllanKind.Modified,
+    "hadamard": _core.AllanKind.Hadamard,
+    "total": _core.AllanKind.Total,
+}
+TYPES = {
+    2: _core.AllanNoise.Quantisation,
+    0: _core.AllanNoise.White,
+    -1: _core.AllanNoise.Flicker,
+    -2: _core.AllanNoise.Walk,
+}
 
 
 def degrees_of_freedom(n: int, m: int, alpha: int, kind: AllanKind = "overlapping") -> float:
     """Equivalent degrees of freedom of the variance of ``n`` rate readings in clusters of ``m`` (docs/noise.md, eq. 6).
 
-    ``edf = 2 E(V)² / var(V)``; ``alpha`` is one of :data:`QUANTISATION`, :data:`WHITE`, :data:`FLICKER`, :data:`WALK`.
+    ``edf = 2 E(V)² / var(V)`` after Greenhall and Riley (2003); ``alpha`` is the exponent of the rate's density: 2
+    quantisation, 0 white, -1 flicker, -2 random walk.
 
     Raises
     ------
     ValueError
-        When ``n`` readings hold no pair of clusters of ``m``.
+        When ``n`` readings hold no pair of clusters of ``m``, or the exponent is none of these.
     """
-    difference = 3 if kind == "hadamard" else 2
-    span = difference + (1 if kind == "modified" else 0)
-    if m < 1 or n < (2 if kind == "total" else span) * m - (1 if kind == "modified" else 0):
-        raise ValueError(f"{n} readings hold no pair of clusters of {m} readings for the {kind} variance")
-    if kind == "total" and alpha in _TOTAL:
-        slope, offset = _TOTAL[alpha]
-        # The table is for m >> 1; at the smallest clusters nothing is reflected and the overlapping value holds.
-        return max(1.0, min(slope * n / m - offset, _sum_edf(n, m, alpha, 2, False, m) if m < 8 else math.inf))
-    step = 1 if kind == "non-overlapping" else m
-    return _sum_edf(n, m, alpha, difference, kind == "modified", step)
+    if alpha not in TYPES:
+        raise ValueError(f"alpha must be one of 2, 0, -1, -2, got {alpha}")
+    if m < 1:
+        raise ValueError(f"a cluster holds at least one reading, got {m}")
+    return _core.allan_degrees(n, m, TYPES[alpha], KINDS[kind])
 
 
-def _sum_edf(n: int, m: int, alpha: int, difference: int, is_modified: bool, steps: int) -> float:
-    n_phase = n + 1
-    reach = m * difference + (m if is_modified else 1)
-    if alpha == QUANTISATION and not is_modified:
-        return _white_phase_edf(1 + steps * (n_phase - reach) // m, steps, difference)
-    steps = min(steps, _STEPS_PER_CLUSTER)
-    n_terms = max(1, 1 + steps * (n_phase - reach) // m)
-    filtering = 1 if is_modified else (m if m < 100 else None)
-    lags = np.arange(0, min(n_terms, (difference + 1) * steps))
-    correlation = _difference_covariance(lags / steps, filtering, alpha, difference)
-    correlation = correlation / correlation[0]
-    weights = np.where(lags == 0, 1.0, 2.0) * (1.0 - lags / n_terms)
-    return float(max(1.0, n_terms / np.sum(weights * correlation**2)))
-
-
-def _white_phase_edf(n_terms: int, steps: int, difference: int) -> float:
-    # Phase readings are independent: terms correlate only where their readings coincide, whole clusters apart.
-    binomial = [(-1) ** i * math.comb(2 * difference, difference + i) for i in range(difference + 1)]
-    inverse = 1.0
-    for lag in range(1, difference + 1):
-        if lag * steps < n_terms:
-            inverse += 2.0 * (1.0 - lag * steps / n_terms) * (binomial[lag] / binomial[0]) ** 2
-    return max(1.0, n_terms / inverse)
-
-
-_SIGN = {2: -1.0, 1: 1.0, 0: 1.0, -1: -1.0, -2: -1.0, -3: 1.0, -4: 1.0}
-
-
-def _generalised_covariance(t: FloatArray, alpha: int) -> FloatArray:
-    """Generalised autocovariance of noise whose phase has the spectral density ``f^(alpha-2)``, up to a factor."""
-    a = np.abs(t)
-    power = _SIGN[alpha] * a ** (3 - alpha)
-    return np.asarray(power if alpha % 2 == 0 else power * np.log(np.where(a > 0, a, 1.0)))
-
-
-def _filtered_covariance(t: FloatArray, filtering: int | None, alpha: int) -> FloatArray:
-    """The same after averaging the phase; ``filtering`` None is the limit of many readings to a cluster."""
-    if filtering is None:
-        return _generalised_covariance(t, alpha + 2)
-    h = 1.0 / filtering
-    sw = _generalised_covariance
-    return filtering**2 * (2.0 * sw(t, alpha) - sw(t - h, alpha) - sw(t + h, alpha))
-
-
-def _difference_covariance(t: FloatArray, filtering: int | None, alpha: int, difference: int) -> FloatArray:
-    out = np.zeros_like(t)
-    for shift in range(-difference, difference + 1):
-        weight = (-1) ** shift * math.comb(2 * difference, difference + shift)
-        out += weight * _filtered_covariance(t + shift, filtering, alpha)
+def edf_along(
+    n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, weight: FloatArray, kind: AllanKind
+) -> FloatArray:
+    """(k,) degrees of freedom along a curve, the type of noise read off its slopes; between types edf is mixed."""
+    slopes = slopes_along(n, clusters, variance)
+    out = np.empty(len(clusters))
+    types = list(TYPES.values())
+    for i, m in enumerate(clusters.tolist()):
+        # Slope of the variance: -2 quantisation, -1 white, 0 flicker, 1 walk.
+        place = min(max(slopes[i] + 2.0, 0.0), 3.0)
+        below = min(int(place), 2)
+        share = place - below
+        first, second = (_core.allan_degrees(n, m, types[below + step], KINDS[kind]) for step in (0, 1))
+        edf = first ** (1.0 - share) * second**share
+        full = max(1, n // m - 1 if kind == "non-overlapping" else n - (3 if kind == "hadamard" else 2) * m + 1)
+        # Missing readings take degrees of freedom with them, in proportion.
+        lost = weight[i] / full if kind in ("overlapping", "non-overlapping", "hadamard") else 1.0
+        out[i] = max(1.0, edf * min(1.0, lost))
     return out
+
+
+def slopes_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray) -> FloatArray:
+    """(k,) slopes of log variance against log cluster size, never falling.
+
+    A sum of noise terms is convex in these scales, and a curve that bends down at its end does so by chance: believing
+    it would take a low value for quantisation noise, of which a low value is certain.
+    """
+    x = np.log2(clusters.astype(np.float64))
+    good = np.isfinite(variance) & (variance > 0)
+    if np.count_nonzero(good) < 2:
+        return np.full(len(x), -1.0)
+    xs, ys = x[good], np.log2(variance[good])
+    order = np.argsort(xs)
+    xs, ys = xs[order], ys[order]
+    step = np.diff(xs)
+    slope = np.diff(ys) / np.where(step > 0, step, 1.0)
+    # Variance of a slope over one step: two neighbouring values of about n/m degrees of freedom, largely the same.
+    weight = step**2 * n / 2.0 ** (0.5 * (xs[1:] + xs[:-1]))
+    rising = _never_falling(slope, np.maximum(weight, 1e-12))
+    return np.interp(x, 0.5 * (xs[1:] + xs[:-1]), rising)
+
+
+def _never_falling(values: FloatArray, weights: FloatArray) -> FloatArray:
+    """Isotonic regression by pooling adjacent violators."""
+    level: list[float] = []
+    mass: list[float] = []
+    size: list[int] = []
+    for value, weight in zip(values.tolist(), weights.tolist(), strict=True):
+        level.append(value)
+        mass.append(weight)
+        size.append(1)
+        while len(level) > 1 and level[-2] > level[-1]:
+            last, last_mass, last_size = level.pop(), mass.pop(), size.pop()
+            level[-1] = (level[-1] * mass[-1] + last * last_mass) / (mass[-1] + last_mass)
+            mass[-1] += last_mass
+            size[-1] += last_size
+    return np.repeat(level, size)
