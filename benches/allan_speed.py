@@ -92,15 +92,13 @@ def main():
                 assert np.allclose(value, reference, rtol=1e-8), name
     medians = {name: statistics.median(values) for name, values in times.items()}
     for name, seconds in medians.items():
-        per = 1e9 * seconds / n / len(clusters)
-        print(
-            f"{name:20s} {seconds:8.3f} s  {per:6.3f} ns per reading and cluster  {seconds / medians['ours']:6.1f} x ours"
-        )
-    print(f"best of ours {min(times['ours']):.3f} s, {1e9 * min(times['ours']) / n / len(clusters):.3f} ns")
+        per, ratio = 1e9 * seconds / n / len(clusters), seconds / medians["ours"]
+        print(f"{name:20s} {seconds:8.3f} s  {per:6.3f} ns per reading and cluster  {ratio:6.1f} x ours")
+    least = {name: min(values) for name, values in times.items()}
+    print("best of each: " + ", ".join(f"{name} {s:.3f} s ({s / least['ours']:.1f} x)" for name, s in least.items()))
     peak = peak_above(ours, x, clusters)
-    print(
-        f"memory beside the input: {peak / x.nbytes:.2f} x its bytes ({peak / 2**20:.0f} MiB); in all {1 + peak / x.nbytes:.2f} x"
-    )
+    share = peak / x.nbytes
+    print(f"memory beside the input: {share:.2f} x its bytes ({peak / 2**20:.0f} MiB); in all {1 + share:.2f} x")
     print(f"largest resident set of the process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GiB")
 
 

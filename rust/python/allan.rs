@@ -202,6 +202,10 @@ pub(crate) struct AllanStream {
 
 #[pymethods]
 impl AllanStream {
+    /// Fewest running sums per channel that a stream needs.
+    #[classattr]
+    const LEAST_BUDGET: usize = 4 * allan::stream::FINE;
+
     #[new]
     fn new(py: Python<'_>, channels: usize, clusters: Vec<usize>, budget: usize) -> PyResult<Self> {
         let stream = super::run(py, || Stream::new(&clusters, budget))?;

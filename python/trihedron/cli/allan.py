@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, Any, Optional
 
 import typer
 
@@ -32,6 +32,14 @@ def allan(
         Optional[Path],  # noqa: UP045
         typer.Option("--csv", metavar="FILE", help="Write the Allan curve as a table."),
     ] = None,
+    stream: Annotated[
+        bool,
+        typer.Option(
+            "--stream",
+            help="Map or read a .npy or Parquet log in pieces, in bounded memory and without audit: --columns, "
+            "--rate and the units say what it holds.",
+        ),
+    ] = False,
     json: Json = None,
     report: Report = None,
     full: Annotated[bool, typer.Option("--full", help="Print the customary units and Kalibr's names as well.")] = False,
@@ -40,12 +48,27 @@ def allan(
     """Identify the noise terms of a long static log: how large, how certain, how long to average."""
     stretches = [_stretch(text) for text in exclude or []]
     check_outputs(json, csv, plot, force=force, report=report)
-    recording = source.read()
+    options: dict[str, Any] = {"exclude_s": stretches, "automatic": not keep_events}
     from trihedron import pipeline
+
+    if stream:
+        if source.log is None or source.columns is None or source.rate is None:
+            raise typer.BadParameter("--stream needs LOG, --columns (as in gx,gy,gz,ax,ay,az) and --rate")
+        with progress("identifying"):
+            found = pipeline.noise_of_file(
+                source.log,
+                columns=source.columns,
+                rate_hz=source.rate,
+                accelerometer_unit=source.accel_unit,
+                gyroscope_unit=source.gyro_unit,
+                **options,
+            )
+    else:
+        recording = source.read()
+        with progress("identifying"):
+            found = pipeline.noise(recording, **options)
     from trihedron.report.noise import all_findings, curve_csv, noise_record, noise_report
 
-    with progress("identifying"):
-        found = pipeline.noise(recording, exclude_s=stretches, automatic=not keep_events)
     document = noise_report(found)
     machine = noise_record(found) if json is not None or report is not None else {}
     show(document, json, sections=None if full else FIRST_SCREEN)

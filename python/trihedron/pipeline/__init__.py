@@ -1,16 +1,22 @@
 """PIPELINE: the stages composed. Everything that a person asks for is one function here."""
 
-from trihedron.pipeline.applying import apply
-from trihedron.pipeline.calibrating import METHODS, calibrate
-from trihedron.pipeline.checking import check
-from trihedron.pipeline.choices import settle_gravity
-from trihedron.pipeline.diagnosing import diagnose, extend
-from trihedron.pipeline.filtering import KalmanResult, kalman
-from trihedron.pipeline.identifying import noise
-from trihedron.pipeline.reading import read, segment
-from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
-from trihedron.pipeline.simulating import simulate, twin, with_effects
-from trihedron.pipeline.verifying import verify
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from trihedron.pipeline.applying import apply
+    from trihedron.pipeline.calibrating import METHODS, calibrate
+    from trihedron.pipeline.checking import check
+    from trihedron.pipeline.choices import settle_gravity
+    from trihedron.pipeline.diagnosing import diagnose, extend
+    from trihedron.pipeline.filtering import KalmanResult, kalman
+    from trihedron.pipeline.identifying import noise, noise_of_file
+    from trihedron.pipeline.reading import read, segment
+    from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
+    from trihedron.pipeline.simulating import simulate, twin, with_effects
+    from trihedron.pipeline.verifying import verify
 
 __all__ = [
     "METHODS",
@@ -26,6 +32,7 @@ __all__ = [
     "extend",
     "kalman",
     "noise",
+    "noise_of_file",
     "read",
     "segment",
     "settle_gravity",
@@ -34,3 +41,40 @@ __all__ = [
     "verify",
     "with_effects",
 ]
+
+# Fetched when first asked for: a command must not wait for the stages of the others.
+_HOME = {
+    "apply": "trihedron.pipeline.applying",
+    "METHODS": "trihedron.pipeline.calibrating",
+    "calibrate": "trihedron.pipeline.calibrating",
+    "check": "trihedron.pipeline.checking",
+    "settle_gravity": "trihedron.pipeline.choices",
+    "diagnose": "trihedron.pipeline.diagnosing",
+    "extend": "trihedron.pipeline.diagnosing",
+    "KalmanResult": "trihedron.pipeline.filtering",
+    "kalman": "trihedron.pipeline.filtering",
+    "noise": "trihedron.pipeline.identifying",
+    "noise_of_file": "trihedron.pipeline.identifying",
+    "read": "trihedron.pipeline.reading",
+    "segment": "trihedron.pipeline.reading",
+    "CalibrationResult": "trihedron.pipeline.results",
+    "CheckResult": "trihedron.pipeline.results",
+    "DiagnosisResult": "trihedron.pipeline.results",
+    "VerificationResult": "trihedron.pipeline.results",
+    "simulate": "trihedron.pipeline.simulating",
+    "twin": "trihedron.pipeline.simulating",
+    "with_effects": "trihedron.pipeline.simulating",
+    "verify": "trihedron.pipeline.verifying",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'trihedron.pipeline' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

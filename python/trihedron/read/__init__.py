@@ -5,9 +5,10 @@ stated as a finding. A file that cannot become a recording raises :class:`ReadEr
 """
 
 from trihedron.read.axis_noise import read_axis_noise
+from trihedron.read.chunks import ChunkedLog, open_chunks
 from trihedron.read.errors import ReadError
 from trihedron.read.pose_table import read_pose_table
 from trihedron.read.recording import read_recording
 from trihedron.read.table import Progress
 
-__all__ = ["Progress", "ReadError", "read_axis_noise", "read_pose_table", "read_recording"]
+__all__ = ["ChunkedLog", "Progress", "ReadError", "open_chunks", "read_axis_noise", "read_pose_table", "read_recording"]

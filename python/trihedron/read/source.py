@@ -6,9 +6,7 @@ from pathlib import Path
 
 from trihedron.read.archive import read_npy, read_npz
 from trihedron.read.errors import ReadError, check_readable, from_os_error
-from trihedron.read.parquet import read_parquet
 from trihedron.read.table import Progress, Table
-from trihedron.read.text import TextReader, compression_of
 
 _REFUSED = {
     b"\x89HDF": "an HDF5 (or MATLAB 7.3) file",
@@ -43,9 +41,14 @@ def read_table(path: Path, device: int | None = None, progress: Progress | None 
         return read_npz(path, device)
     if device is not None:
         raise ReadError(f"{path}: a device was asked for but this is not an .npz archive; leave --device out.")
+    # Tables bring a large library with them, which arrays do not need.
     if magic.startswith(b"PAR1"):
+        from trihedron.read.parquet import read_parquet
+
         return read_parquet(path)
     for start, kind in _REFUSED.items():
         if magic.startswith(start):
             raise ReadError(f"{path}: this is {kind}, which is not read here; export the log as CSV or Parquet.")
+    from trihedron.read.text import TextReader, compression_of
+
     return TextReader(path, compression_of(magic), size, progress).read()

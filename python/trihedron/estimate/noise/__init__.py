@@ -3,5 +3,16 @@
 from trihedron.estimate.noise.allan import allan_deviation, default_clusters, stream_allan_deviation
 from trihedron.estimate.noise.degrees import degrees_of_freedom
 from trihedron.estimate.noise.identify import identify_noise
+from trihedron.estimate.noise.planning import recording_length_s, relative_sigma
+from trihedron.estimate.noise.streamed import stream_noise
 
-__all__ = ["allan_deviation", "default_clusters", "degrees_of_freedom", "identify_noise", "stream_allan_deviation"]
+__all__ = [
+    "allan_deviation",
+    "default_clusters",
+    "degrees_of_freedom",
+    "identify_noise",
+    "recording_length_s",
+    "relative_sigma",
+    "stream_allan_deviation",
+    "stream_noise",
+]

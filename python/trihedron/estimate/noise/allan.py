@@ -73,6 +73,23 @@ def allan_deviation(
     )
 
 
+def curve_of_columns(
+    columns: Sequence[FloatArray],
+    rate_hz: float,
+    clusters: Sequence[int] | None,
+    names: tuple[str, ...],
+    units: tuple[str, ...],
+) -> AllanCurve:
+    """Overlapping curve of channels (n,) that lie apart in memory."""
+    n = len(columns[0])
+    sizes = default_clusters(n) if clusters is None else checked_clusters(clusters)
+    found = [_core.allan_variance(column[:, np.newaxis], sizes, KINDS["overlapping"]) for column in columns]
+    variance, terms, weight = (np.concatenate([one[k] for one in found]).T for k in range(3))
+    return curve_with_intervals(
+        "overlapping", rate_hz, n, np.array(sizes), variance, terms.astype(np.int64), weight, 0.95, names, units
+    )
+
+
 def stream_allan_deviation(
     chunks: Iterable[npt.ArrayLike],
     rate_hz: float,
@@ -102,7 +119,9 @@ def stream_allan_deviation(
         readings = as_readings(chunk)
         if stream is None:
             channels = readings.shape[1]
-            stream = _core.AllanStream(channels, sizes, max(budget_bytes // (8 * channels), 1 << 18))
+            stream = _core.AllanStream(
+                channels, sizes, max(budget_bytes // (8 * channels), _core.AllanStream.LEAST_BUDGET)
+            )
         stream.extend(readings)
     if stream is None:
         raise ValueError("the log holds no chunk of readings")

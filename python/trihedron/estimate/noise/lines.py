@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -35,10 +35,10 @@ def find_lines(
     bands: Sequence[Ordinates], selection: Selection, step_s: float
 ) -> tuple[list[SpectralLine], list[npt.NDArray[np.bool_]]]:
     """Sinusoids that stand out of the fitted noise, and the ordinates that they spoil."""
-    lines: list[SpectralLine] = []
+    lines: list[tuple[SpectralLine, float, int]] = []
     masks = []
     total = sum(len(band.power) for band in bands)
-    for band in bands:
+    for number, band in enumerate(bands):
         expected = expected_power(band, selection, step_s)
         power = band.power - 2 * selection.fit.slope * band.cross + (selection.fit.slope * band.line) ** 2
         level = smooth_level(band, power / expected) * expected
@@ -53,9 +53,43 @@ def find_lines(
                 continue
             near = _skirt(ratio, int(i))
             mask[near] = True
-            lines.append(_line(band, power[near], level[near], near))
+            lines.append((_line(band, power[near], level[near], near), band.length * band.step_s, number))
         masks.append(mask)
-    return sorted(lines, key=lambda line: line.frequency_hz), masks
+    return _merged(lines), masks
+
+
+def _merged(lines: Sequence[tuple[SpectralLine, float, int]]) -> list[SpectralLine]:
+    """One line for what is one: parts of a resonance add up, the same line in several stretches is averaged."""
+    groups: list[list[tuple[SpectralLine, float, int]]] = []
+    for item in sorted(lines, key=lambda item: item[0].frequency_hz):
+        if groups:
+            last = groups[-1][-1][0]
+            if item[0].frequency_hz - last.frequency_hz < max(
+                0.01 * last.frequency_hz, last.width_hz, item[0].width_hz
+            ):
+                groups[-1].append(item)
+                continue
+        groups.append([item])
+    out = []
+    for group in groups:
+        by_band: dict[int, float] = {}
+        duration: dict[int, float] = {}
+        for line, time_s, number in group:
+            by_band[number] = by_band.get(number, 0.0) + line.amplitude**2
+            duration[number] = time_s
+        power = sum(by_band[b] * duration[b] for b in by_band) / sum(duration.values())
+        strength = np.array([line.amplitude**2 for line, _, _ in group])
+        places = np.array([line.frequency_hz for line, _, _ in group])
+        best = group[int(np.argmax(strength))][0]
+        out.append(
+            replace(
+                best,
+                frequency_hz=float(np.sum(strength * places) / np.sum(strength)),
+                amplitude=math.sqrt(power),
+                width_hz=max(best.width_hz, float(np.ptp(places))),
+            )
+        )
+    return out
 
 
 def _skirt(ratio: FloatArray, peak: int) -> slice:

@@ -12,7 +12,6 @@ from trihedron.records.noise import NoiseAxis, SpectralLine, TermName
 
 if TYPE_CHECKING:
     from trihedron.estimate.noise.screening import Event, Readout
-    from trihedron.estimate.noise.selection import Selection
 
 
 def _finding(
@@ -144,24 +143,21 @@ def dead(readings: Readout, unit: str) -> Finding:
     )
 
 
-def lines(found: Sequence[SpectralLine], unit: str, selection: Selection) -> list[Finding]:
+def lines(found: Sequence[SpectralLine], unit: str) -> Finding:
     """Periodic disturbances, the strongest first."""
-    del selection
     strong = sorted(found, key=lambda line: -line.amplitude)
     told = ", ".join(f"{line.frequency_hz:.4g} Hz ({line.amplitude:.2g} {unit})" for line in strong[:4])
     more = f" and {len(strong) - 4} more" if len(strong) > 4 else ""
-    return [
-        _finding(
-            FindingCode.SPECTRAL_LINE,
-            Severity.NOTE,
-            f"{len(strong)} periodic line{'s' if len(strong) > 1 else ''}: {told}{more}.",
-            "mains, a fan, vibration of the building, or a clock inside the sensor",
-            "A line makes waves in the Allan curve near half its period; its frequencies were left out of the fit.",
-            n_lines=len(strong),
-            frequency_hz=strong[0].frequency_hz,
-            amplitude=strong[0].amplitude,
-        )
-    ]
+    return _finding(
+        FindingCode.SPECTRAL_LINE,
+        Severity.NOTE,
+        f"{len(strong)} periodic line{'s' if len(strong) > 1 else ''}: {told}{more}.",
+        "mains, a fan, vibration of the building, or a clock inside the sensor",
+        "A line makes waves in the Allan curve near half its period; its frequencies were left out of the fit.",
+        n_lines=len(strong),
+        frequency_hz=strong[0].frequency_hz,
+        amplitude=strong[0].amplitude,
+    )
 
 
 def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding:

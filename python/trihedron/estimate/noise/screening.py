@@ -17,6 +17,8 @@ from trihedron.records.noise import FloatArray
 
 FALSE_ALARM = 1e-4
 """Probability that a clean log shows an event of one kind."""
+READOUT_SAMPLE = 200_000
+"""Readings from which resolution, noise and saturation are judged."""
 MOST_EVENTS = 500
 """Events of one axis that are looked at, the strongest first."""
 _MAD_TO_SIGMA = 1.4826
@@ -119,14 +121,18 @@ class Readout:
 
 def readout(x: FloatArray) -> Readout:
     """Resolution, noise and saturation of one channel."""
-    values = x[np.isfinite(x)]
+    # Evenly spread pieces of the log: what holds for them holds for it, at a fraction of the time.
+    pieces = 1 if len(x) <= READOUT_SAMPLE else 16
+    length = len(x) // pieces if pieces == 1 else READOUT_SAMPLE // pieces
+    starts = np.linspace(0, len(x) - length, pieces).astype(int)
+    parts = [part[np.isfinite(part)] for part in (x[s : s + length] for s in starts)]
+    values = np.concatenate(parts)
     if len(values) < 2:
         return Readout(0.0, 0.0, 0.0, 0.0)
-    sample = values if len(values) <= 200_000 else values[:200_000]
-    change = np.abs(np.diff(sample))
-    distinct = np.unique(sample)
+    change = np.abs(np.concatenate([np.diff(part) for part in parts]))
+    distinct = np.unique(values)
     steps = np.diff(distinct)
-    resolution = float(np.quantile(steps, 0.05)) if len(distinct) > 1 and len(distinct) < len(sample) / 4 else 0.0
+    resolution = float(np.quantile(steps, 0.05)) if len(distinct) > 1 and len(distinct) < len(values) / 4 else 0.0
     sigma = float(np.sqrt(0.5 * np.mean(np.square(change))))
     low, high = float(values.min()), float(values.max())
     return Readout(resolution, sigma, float(np.mean(change == 0.0)), _clipped(values, low, high, resolution))

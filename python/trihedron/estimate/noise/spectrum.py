@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +21,8 @@ from trihedron.records.noise import FloatArray
 LONGEST_TRANSFORM = 1 << 17
 """Longest transform; a longer stretch is averaged to block means first."""
 SEGMENT = 1 << 14
-MOST_SEGMENTS = 128
-"""Segments used for the high band of one log: 2 million readings determine white noise to 0.05 %."""
+MOST_SEGMENTS = 64
+"""Segments used for the high band of one log: a million readings determine white noise to 0.07 %."""
 USED_SHARE = 8
 """Of the spectrum of block means the lowest eighth is used: aliasing by the averaging is below 1 % there."""
 
@@ -88,6 +88,20 @@ def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
             f"no stretch of the log is long enough to tell noise terms apart: the longest has "
             f"{max((b - a for a, b in stretches), default=0)} readings; record longer or exclude less"
         )
+    return bands
+
+
+def ordinates_of_means(
+    means: FloatArray, block: int, rate_hz: float, stretches: Sequence[tuple[int, int]], head: FloatArray
+) -> list[Ordinates]:
+    """Bands of a log of which only means of ``block`` readings (k,) and its first readings ``head`` (n,) are known.
+
+    ``stretches`` count means.
+    """
+    step_s = block / rate_hz
+    bands = [_whole(means[a:b], step_s, block, 0.0) for a, b in stretches if b - a >= 32]
+    if block > 1:
+        bands += _segments(head, rate_hz, [(0, len(head))], block)
     return bands
 
 
@@ -195,11 +209,21 @@ def line_coefficients(n: int, order: npt.NDArray[np.int64]) -> FloatArray:
 def cosine_transform(x: FloatArray) -> FloatArray:
     """Orthonormal discrete cosine transform (type II) along the last axis, by one Fourier transform (Makhoul, 1980)."""
     n = x.shape[-1]
-    reordered = np.concatenate([x[..., ::2], x[..., 1::2][..., ::-1]], axis=-1)
+    reordered = np.empty_like(x, dtype=np.float64)
+    even = (n + 1) // 2
+    reordered[..., :even] = x[..., ::2]
+    reordered[..., even:] = x[..., 1::2][..., ::-1]
     half = np.fft.rfft(reordered, axis=-1)
-    turned = half * (np.sqrt(2.0 / n) * np.exp(-0.5j * np.pi * np.arange(half.shape[-1]) / n))
-    out = np.empty_like(x, dtype=np.float64)
-    out[..., : half.shape[-1]] = turned.real
-    out[..., half.shape[-1] :] = -turned.imag[..., 1 : n - half.shape[-1] + 1][..., ::-1]
-    out[..., 0] /= np.sqrt(2.0)
+    half *= _turns(n)
+    out = reordered
+    out[..., : half.shape[-1]] = half.real
+    out[..., half.shape[-1] :] = -half.imag[..., 1 : n - half.shape[-1] + 1][..., ::-1]
     return out
+
+
+@lru_cache(maxsize=2)
+def _turns(n: int) -> npt.NDArray[np.complex128]:
+    turns: npt.NDArray[np.complex128] = np.exp(-0.5j * np.pi * np.arange(n // 2 + 1) / n) * np.sqrt(2.0 / n)
+    turns[0] = np.sqrt(1.0 / n)
+    turns.setflags(write=False)
+    return turns

@@ -1,0 +1,59 @@
+"""A log that does not fit: Allan deviation and noise terms of a thousand million readings in bounded memory.
+
+python benches/allan_stream.py             1e9 readings, about two minutes
+python benches/allan_stream.py 1e8
+"""
+
+import resource
+import sys
+import time
+
+import numpy as np
+
+from trihedron.estimate.noise import allan_deviation, stream_noise
+
+RATE = 1000.0
+N, K = 1e-3, 1e-6
+
+
+def chunks(n, size=1 << 20):
+    """White noise and a random walk in chunks: a million stored variates, started elsewhere in every chunk."""
+    rng = np.random.default_rng(5)
+    stored = rng.normal(size=4 * size).astype(np.float32)
+    level = 0.0
+    for start in range(0, n, size):
+        k = min(size, n - start)
+        at, other = rng.integers(0, 3 * size, 2)
+        walk = level + K / np.sqrt(RATE) * np.cumsum(stored[other : other + k][::-1].astype(np.float64))
+        level = walk[-1]
+        yield 9.81 + N * np.sqrt(RATE) * stored[at : at + k] + walk
+
+
+def main():
+    n = int(float(sys.argv[1])) if len(sys.argv) > 1 else 1_000_000_000
+    began = time.perf_counter()
+    for _ in chunks(n):
+        pass
+    making = time.perf_counter() - began
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began = time.perf_counter()
+    found = stream_noise(chunks(n), RATE, n_samples=n)
+    spent = time.perf_counter() - began - making
+    after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    axis = found.axes[0]
+    print(
+        f"{n:.0e} readings, {len(found.curve.clusters)} clusters, stride {found.curve.stride}: {spent:.1f} s "
+        f"({1e9 * spent / n:.1f} ns per reading; making the readings took {making:.1f} s)"
+    )
+    print(f"largest resident set {after / 2**20:.2f} GiB, of which {before / 2**20:.2f} GiB before the stream began")
+    for symbol, truth in (("N", N), ("K", K)):
+        term = axis.terms[symbol]
+        print(f"  {symbol} {term.value:.4g} ± {term.sigma:.2g}, true {truth:g}")
+    if n <= 100_000_000:
+        whole = allan_deviation(np.concatenate(list(chunks(n))), RATE, found.curve.clusters)
+        difference = np.abs(found.curve.deviation / whole.deviation - 1).max()
+        print(f"  largest relative difference to the whole array: {difference:.1e}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,153 @@
+"""Noise terms of one axis: spectrum, colouring, lines, selection, intervals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from types import MappingProxyType
+
+from trihedron import _core
+from trihedron.estimate.noise import remarks
+from trihedron.estimate.noise.lines import find_lines, misfit_groups, white_limit
+from trihedron.estimate.noise.screening import Event, Readout
+from trihedron.estimate.noise.selection import Selection, select
+from trihedron.estimate.noise.spectrum import Ordinates
+from trihedron.estimate.noise.terms import SYMBOLS
+from trihedron.records.finding import Finding
+from trihedron.records.noise import AllanCurve, GaussMarkov, NoiseAxis, NoiseTerm, TermName
+
+_RISE_95 = 3.841
+"""Rise of the deviance at the ends of a two-sided 95 % interval (chi-square, one degree of freedom)."""
+_RISE_95_ONE_SIDED = 2.706
+_LEAST_EDF = 8.0
+"""Degrees of freedom that give an Allan deviation to 25 %."""
+TOLERANCE = 0.02
+"""Where a filter colours the upper spectrum it bends the rest by up to this: no half octave is believed to better."""
+
+
+def identify_axis(bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurve, channel: int) -> NoiseAxis:
+    """``blank`` with the terms that its spectrum shows, its lines, and what was noticed on the way."""
+    nyquist = blank.rate_hz / 2.0
+    findings: list[Finding] = []
+    highest, at_nyquist = white_limit(bands, nyquist, None)
+    selection = select(bands, highest, tolerance=TOLERANCE if highest < nyquist else 0.0)
+    lines, masks = find_lines(bands, selection, 1.0 / blank.rate_hz)
+    if lines:
+        findings.append(remarks.lines(lines, blank.unit))
+        highest, at_nyquist = white_limit(bands, nyquist, masks)
+        selection = select(bands, highest, masks, tolerance=TOLERANCE if highest < nyquist else 0.0)
+    if highest < nyquist or math.isnan(at_nyquist):
+        findings.append(remarks.coloured(highest, nyquist, at_nyquist))
+    selection, scale, worst = _tempered(selection)
+    if worst is not None:
+        findings.append(remarks.unexplained(*worst))
+    usable = curve.tau_s[curve.edf[:, channel] >= _LEAST_EDF]
+    axis = replace(
+        blank,
+        terms=MappingProxyType(_terms(selection)),
+        gauss_markov=_gauss_markov(selection),
+        lines=tuple(lines),
+        lowest_hz=float(selection.spectrum.frequency_hz[0]),
+        highest_hz=float(highest),
+        longest_tau_s=float(usable[-1]) if len(usable) else 0.0,
+        covariance_scale=scale,
+    )
+    return replace(axis, findings=(*blank.findings, *findings, *remarks.about_terms(axis)))
+
+
+def blank_axis(name: str, unit: str, rate_hz: float, n_samples: int, mean: float, written: Readout) -> NoiseAxis:
+    """An axis of which nothing is known but how it was written."""
+    unknown = {term: NoiseTerm(term, False, 0.0, 0.0, 0.0, math.inf, math.inf, 0.0) for term in TermName}
+    findings = remarks.written(written)
+    if written.sigma == 0.0 or written.is_dead:
+        findings.append(remarks.dead(written, unit))
+    return NoiseAxis(
+        name=name,
+        unit=unit,
+        rate_hz=rate_hz,
+        n_samples=n_samples,
+        duration_s=n_samples / rate_hz,
+        mean=mean,
+        sample_sigma=written.sigma,
+        resolution=written.resolution,
+        terms=MappingProxyType(unknown),
+        findings=tuple(findings),
+    )
+
+
+def stretches_between(n: int, steps: Sequence[Event]) -> list[tuple[int, int]]:
+    """Ranges ``[start, stop)`` of ``n`` readings that hold no step."""
+    edges = [0]
+    for step in steps:
+        edges += [step.start, step.stop]
+    edges.append(n)
+    return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= 64]
+
+
+def _tempered(selection: Selection) -> tuple[Selection, float, tuple[float, float] | None]:
+    """Give bands that the terms miss less weight: no more than their own misfit allows.
+
+    Also the largest factor by which a band's variance was raised, and the worst deviation with its frequency.
+    """
+    groups = misfit_groups(selection)
+    bad = [g for g in groups if abs(g.z) > 4.0]
+    if not bad:
+        return selection, 1.0, None
+    count = selection.spectrum.count.copy()
+    for group in bad:
+        count[group.inside] /= group.z**2
+    spectrum = replace(selection.spectrum, count=count)
+    fit = spectrum.likelihood().fit(selection.active, selection.has_ramp)
+    worst = max(bad, key=lambda g: abs(g.deviation))
+    large = (worst.deviation, worst.frequency_hz) if abs(worst.deviation) > 0.1 else None
+    return replace(selection, fit=fit, spectrum=spectrum), max(g.z**2 for g in bad), large
+
+
+def _terms(selection: Selection) -> dict[TermName, NoiseTerm]:
+    likelihood = selection.spectrum.likelihood()
+    fit = selection.fit
+    out = {}
+    for k, symbol in enumerate(SYMBOLS):
+        term = TermName(symbol)
+        if k in selection.active:
+            low, high = likelihood.interval(selection.active, selection.has_ramp, k, _RISE_95)
+            value = math.sqrt(fit.strength[k])
+            sigma = 0.5 * value * fit.sigma_log[selection.active.index(k)]
+            low, high = math.sqrt(low), math.sqrt(high)
+            out[term] = NoiseTerm(term, True, value, sigma, low, high, high, selection.evidence[k])
+        else:
+            _, high = likelihood.interval(selection.active, selection.has_ramp, k, _RISE_95_ONE_SIDED)
+            limit = math.sqrt(high)
+            out[term] = NoiseTerm(term, False, 0.0, 0.0, 0.0, limit, limit, selection.evidence[k])
+    out[TermName.RATE_RAMP] = _ramp(selection, likelihood)
+    return out
+
+
+def _ramp(selection: Selection, likelihood: _core.SpectralBins) -> NoiseTerm:
+    fit = selection.fit if selection.has_ramp else likelihood.fit(selection.active, True)
+    slope, sigma = fit.slope, fit.sigma_slope
+    limit = abs(slope) + 1.645 * sigma
+    if selection.has_ramp:
+        low, high = abs(slope) - 1.96 * sigma, abs(slope) + 1.96 * sigma
+        return NoiseTerm(
+            TermName.RATE_RAMP, True, abs(slope), sigma, max(low, 0.0), high, high, selection.evidence_ramp
+        )
+    return NoiseTerm(TermName.RATE_RAMP, False, 0.0, 0.0, 0.0, limit, limit, selection.evidence_ramp)
+
+
+def _gauss_markov(selection: Selection) -> GaussMarkov | None:
+    if selection.correlation_time_s is None:
+        return None
+    k = len(SYMBOLS)
+    strength = selection.fit.strength[k]
+    low, high = selection.spectrum.likelihood().interval(selection.active, selection.has_ramp, k, _RISE_95)
+    value = math.sqrt(strength)
+    return GaussMarkov(
+        sigma_process=value,
+        correlation_time_s=selection.correlation_time_s,
+        sigma=0.5 * value * selection.fit.sigma_log[selection.active.index(k)],
+        lower=math.sqrt(low),
+        upper=math.sqrt(high),
+        evidence=selection.evidence_gauss_markov,
+    )
