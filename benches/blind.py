@@ -142,7 +142,15 @@ def make(effect, grade, seed, scale):
             size["lsb"] = float(N / unit * rng.uniform(4, 8) * scale)
         scenario = with_effect(scenario, effect, **size)
     recording, truth = simulate(scenario, seed)
-    return recording, truth.gravity_m_s2, {"effect": effect, "size": size, "grade": grade, "seed": seed}
+    # A brisk move can run a 250 deg/s gyro into the converter's end: then that is what the recording holds.
+    clipped = effect == "healthy" and _runs_at_the_end(recording.gyroscope, scenario.gyroscope.adc)
+    answer = "gyro-saturation" if clipped else effect
+    return recording, truth.gravity_m_s2, {"effect": answer, "size": size, "grade": grade, "seed": seed}
+
+
+def _runs_at_the_end(raw, adc):
+    at_end = (raw <= adc.low) | (raw >= adc.high)
+    return bool((at_end[2:] & at_end[1:-1] & at_end[:-2]).any())
 
 
 def trial(job):

@@ -53,8 +53,10 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
             top = np.array([p.max() for p in pieces])
             codes = np.unique(np.concatenate(pieces))
             step_size = float(np.diff(codes).min()) if len(codes) > 1 else 0.0
-            # On a coarse grid equal readings are the rule, at the top of a peak too.
-            is_fine = step_size < 2.0 * float(sigma[axis])
+            rails = _rails(x, step_size, float(sigma[axis]), axis, sign, ranges)
+            if rails:
+                found += rails
+                continue
             width = BAND_SIGMA * max(float(sigma[axis]), 0.5 * step_size, 1e-300)
             best: list[Plateau] = []
             # The limit is a level many moves end on: try each move's highest plateau as the level.
@@ -69,18 +71,32 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
                         n = last - first
                         if n < MIN_RUN or first < 2 or last > b - a - 2:
                             continue
-                        run = x[a + first : a + last]
-                        is_rail = is_fine and n >= MIN_RUN and bool((run == run[0]).all()) and run[0] == x.max()
                         step = 0.5 * (x[a + first] - x[a + first - 2] + x[a + last - 1] - x[a + last + 1])
                         if step > STEEP * 4.0 * width / n:
-                            runs.append(
-                                Plateau(axis, sign, a + int(first), a + int(last), sign * float(level), is_rail)
-                            )
+                            runs.append(Plateau(axis, sign, a + int(first), a + int(last), sign * float(level)))
                 if len(runs) > len(best):
                     best = runs
             exceeds = (top > (best[0].level * sign if best else np.inf) + 2 * width).any()
-            if (len(best) >= MIN_PLATEAUS or any(r.is_rail for r in best)) and not exceeds:
+            if len(best) >= MIN_PLATEAUS and not exceeds:
                 found += best
+    return found
+
+
+def _rails(
+    x: FloatArray, step_size: float, sigma: float, axis: int, sign: int, ranges: tuple[tuple[int, int], ...]
+) -> list[Plateau]:
+    """Runs of one number, the largest of the recording, where noise should have told neighbours apart."""
+    # On a coarse grid equal readings are the rule, at the top of a peak too.
+    if not 0.0 < step_size < sigma:
+        return []
+    shortest = 4 if step_size < 0.3 * sigma else 6
+    top = np.nanmax(x)
+    found = []
+    for a, b in ranges:
+        edges = np.flatnonzero(np.diff(np.r_[0, (x[a:b] == top).astype(np.int8), 0]))
+        for first, last in edges.reshape(-1, 2):
+            if last - first >= shortest:
+                found.append(Plateau(axis, sign, a + int(first), a + int(last), sign * float(top), True))
     return found
 
 
