@@ -55,7 +55,7 @@ fn parts(c: &mut Criterion) {
     let mut group = c.benchmark_group("allan parts");
     group.throughput(Throughput::Elements(N as u64));
     group.bench_function("running sum", |b| {
-        b.iter(|| Prefix::new(black_box(&column)))
+        b.iter(|| Prefix::new(black_box(&column)));
     });
     for lag in [1, 1000, 100_000] {
         group.bench_function(BenchmarkId::new("one lag", lag), |b| {

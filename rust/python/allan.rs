@@ -102,6 +102,12 @@ impl<'a, T> View<'a, T> {
 }
 
 fn view<'a, T: numpy::Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<View<'a, T>> {
+    // `as_slice` is content with Fortran order too, which would be read down the columns.
+    if !array.is_c_contiguous() {
+        return Err(PyValueError::new_err(
+            "readings must be C-contiguous, one row per sample",
+        ));
+    }
     let data = array
         .as_slice()
         .map_err(|_| PyValueError::new_err("readings must be C-contiguous, one row per sample"))?;
