@@ -7,9 +7,15 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import savgol_filter
 
 from trihedron.diagnose.observations import FloatArray, Observations
 from trihedron.diagnose.solve import Fit
+
+
+VIBRATION_WINDOW_S = 0.25
+"""Stretch over which a parabola follows the motion while vibration is measured in a move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +188,35 @@ class Context:
             values = raw[hold.samples()] @ S.T
             # Differences of neighbours forget slow drift; half their mean square is the fast part's variance.
             out[i] = np.nanvar(values, axis=0)
+        return out
+
+    def vibration_power(self) -> FloatArray:
+        """(points, 3) power of vibration above the quiet floor, SI²: of a hold its variance, in moves a running one.
+
+        In moves the slow motion is taken out by a local parabola; what a parabola takes out of the vibration itself is
+        made good by the ratio that the shaken holds show.
+        """
+        obs = self.obs
+        holds = self.hold_power("accelerometer")
+        floor = np.quantile(holds, 0.1, axis=0)
+        out = np.zeros((self.n_points, 3))
+        out[: obs.n_holds] = np.maximum(holds - floor, 0.0)
+        width = max(round(VIBRATION_WINDOW_S * obs.recording.rate_hz), 7) | 1
+
+        def rough(force: FloatArray) -> FloatArray:
+            if len(force) < width:
+                return np.zeros_like(force)
+            away = force - savgol_filter(force, width, 2, axis=0, mode="nearest")
+            return np.asarray(uniform_filter1d(away**2, width, axis=0, mode="nearest"))
+
+        inside = np.array(
+            [rough(obs.raw_force[hold.start : hold.stop] @ self.fitted.twin.accel_S.T).mean(axis=0)
+             for hold in obs.segments.holds]
+        )  # fmt: skip
+        quiet = np.quantile(inside, 0.1, axis=0)
+        passed = (inside - quiet).sum() / max(float((holds - floor).sum()), 1e-300)
+        for where in self.moves:
+            out[where] = np.maximum(rough(self.force[where]) - quiet, 0.0) / np.clip(passed, 0.1, 1.0)
         return out
 
     def between_holds(self, per_hold: FloatArray) -> FloatArray:

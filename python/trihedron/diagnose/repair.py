@@ -10,6 +10,8 @@ import numpy.typing as npt
 from trihedron.records import Hold, Move, Recording, Segments
 
 FloatArray = npt.NDArray[np.float64]
+RESTING = 1e-3
+"""A mean rate of a thousandth of the moves' rms, five times over, is rest: below 1 °/s after moves of 3 rad/s."""
 
 
 def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:
@@ -170,6 +172,9 @@ def _shaken(
     zero = np.median(segments.gyroscope_mean, axis=0)
     assert segments.gyroscope_sigma is not None
     spread = np.maximum(np.std(segments.gyroscope_mean, axis=0), segments.gyroscope_sigma / np.sqrt(block))
+    # A bias that follows the shaking is no motion: rates far below those of real moves count as none.
+    moving = np.concatenate([recording.gyroscope[m.start : m.stop] for m in segments.moves] or [np.zeros((1, 3))])
+    spread = np.maximum(spread, RESTING * float(np.sqrt(np.nanmean((moving - zero) ** 2))))
     out: list[tuple[int, int]] = []
     for move in segments.moves:
         a, b = move.start, move.stop

@@ -15,6 +15,8 @@ from trihedron.diagnose.observations import FloatArray, Observations
 HALF_WINDOW = 6
 """Samples on either side from which the local motion is learnt."""
 MAX_LOST = 60
+AGREEMENT = 30.0
+"""Chi-square that one sensor may lose by the count both share."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,10 +161,13 @@ def find_losses(context: Context) -> list[Loss]:
             # The gain must also exceed what a trial count wins where the signal is merely rough (shaking, jitter).
             clear = (gains > 40.0) & (gains > 5.0 * usual) & (left < 0.1 * zero[s] + 3.0 * usual)
             # A sensor that sees nothing of it must at least not object; one that sees it must see the same count.
-            silent = (np.abs(gains) <= 40.0) & (left < 2.0 * usual)
+            silent = ~clear & (left < 2.0 * usual)
             good = bool(clear.any() and (clear | silent).all())
+            # A count that suits one sensor much better than the common one is no loss of samples.
             agree = all(
-                abs(int(trial[row, :, c].argmin()) - n) <= max(1, n // 3) for c in range(len(windows)) if clear[c]
+                trial[row, n, c] - trial[row, :, c].min() <= max(AGREEMENT, 0.01 * zero[s, c])
+                for c in range(len(windows))
+                if clear[c]
             )
             if good and agree:
                 losses.append(Loss(int(a + k[s]), m, n, float(gains.sum()), tuple(float(g) for g in gains)))

@@ -22,8 +22,8 @@ MIN_PLATEAUS = 3
 """Smooth peaks differ in height from move to move; three that end on one level within noise do not happen by chance."""
 CONTRADICTION = 4.0
 """Chi-square per row of the moves concerned above which their readings are false."""
-STEEP = 3.0
-"""How much faster than a parabola of the same width the signal must arrive at the plateau."""
+STEEP = 1.5
+"""How much faster than a parabola of the same width the signal must arrive at the plateau, and leave it."""
 
 
 @dataclass(frozen=True)
@@ -57,29 +57,57 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
             if rails:
                 found += rails
                 continue
-            width = BAND_SIGMA * max(float(sigma[axis]), 0.5 * step_size, 1e-300)
+            noise = max(float(sigma[axis]), 0.5 * step_size, 1e-300)
             best: list[Plateau] = []
             # The limit is a level many moves end on: try each move's highest plateau as the level.
+            width = BAND_SIGMA * noise
             for level in np.unique(np.round((top - 2 * sigma[axis]) / width) * width):
-                runs: list[Plateau] = []
-                for (a, b), high in zip(ranges, top, strict=True):
-                    if not level - width <= high <= level + 2 * width:
-                        continue
-                    near = np.abs(x[a:b] - level) <= width
-                    edges = np.flatnonzero(np.diff(np.r_[0, near.astype(np.int8), 0]))
-                    for first, last in edges.reshape(-1, 2):
-                        n = last - first
-                        if n < MIN_RUN or first < 2 or last > b - a - 2:
-                            continue
-                        step = 0.5 * (x[a + first] - x[a + first - 2] + x[a + last - 1] - x[a + last + 1])
-                        if step > STEEP * 4.0 * width / n:
-                            runs.append(Plateau(axis, sign, a + int(first), a + int(last), sign * float(level)))
+                runs = _on_level(x, float(level), noise, axis, sign, ranges)
                 if len(runs) > len(best):
                     best = runs
-            exceeds = (top > (best[0].level * sign if best else np.inf) + 2 * width).any()
-            if len(best) >= MIN_PLATEAUS and not exceeds:
+            # Nothing is read beyond a limit but noise.
+            if len(best) >= MIN_PLATEAUS and float(top.max()) <= best[0].level * sign + BAND_SIGMA * noise:
                 found += best
     return found
+
+
+def _on_level(
+    x: FloatArray, level: float, noise: float, axis: int, sign: int, ranges: tuple[tuple[int, int], ...]
+) -> list[Plateau]:
+    """Runs that arrive steeply at a level, stay flat on it within noise, leave it steeply, and agree about it."""
+    width = BAND_SIGMA * noise
+    runs, means, errors = [], [], []
+    for a, b in ranges:
+        near = np.abs(x[a:b] - level) <= width
+        edges = np.flatnonzero(np.diff(np.r_[0, near.astype(np.int8), 0]))
+        for first, last in edges.reshape(-1, 2):
+            n = last - first
+            if n < MIN_RUN or first < 2 or last > b - a - 2:
+                continue
+            run = x[a + first : a + last]
+            arrival, departure = run[0] - x[a + first - 2], run[-1] - x[a + last + 1]
+            # A parabola that just fills the band falls by 16 widths / n over two samples at its edge.
+            if min(arrival, departure) < STEEP * 16.0 * width / n or not _is_flat(run[1:-1] / noise):
+                continue
+            runs.append(Plateau(axis, sign, a + int(first), a + int(last), 0.0))
+            means.append(float(run[1:-1].mean()))
+            errors.append(noise / np.sqrt(n - 2))
+    if len(runs) < MIN_PLATEAUS:
+        return []
+    # Peaks that merely end in one band differ by more than the error of their means.
+    common = float(np.average(means, weights=1.0 / np.square(errors)))
+    agree = [abs(m - common) < 4.0 * e + 0.5 * noise for m, e in zip(means, errors, strict=True)]
+    return [replace(r, level=sign * common) for r, good in zip(runs, agree, strict=True) if good]
+
+
+def _is_flat(run: FloatArray) -> bool:
+    """Whether a slope and a curvature explain no more of a run (in units of its noise) than chance does."""
+    n = len(run)
+    if n < 4:
+        return float(np.ptp(run)) < 5.0
+    k = np.linspace(-1.0, 1.0, n)
+    basis, _ = np.linalg.qr(np.stack([np.ones(n), k, k * k], axis=1))
+    return bool(float(((basis[:, 1:].T @ run) ** 2).sum()) < 18.0)  # chi-square of 2: one run in ten thousand
 
 
 def _rails(

@@ -23,13 +23,12 @@ class VibrationRectification(Effect):
         return None
 
     def variants(self, context: Context) -> list[Variant]:
-        power = context.hold_power("accelerometer")
-        excess = np.maximum(power - np.quantile(power, 0.1, axis=0), 0.0)
-        own = context.on_accelerometers(context.between_holds(excess))
+        excess = context.vibration_power()
+        own = context.on_accelerometers(excess)
         out = [Variant(force_only(own), per_axis("accel_bias_per_power"), ("1/(m/s^2)",) * 3, label="accelerometer")]
         if context.obs.raw_rate is not None:
             total = excess.sum(axis=1, keepdims=True) * np.ones(3)
-            gyro = context.on_gyros(context.between_holds(total))
+            gyro = context.on_gyros(total)
             units = ("(rad/s)/(m/s^2)^2",) * 3
             out.append(Variant(rate_only(gyro), per_axis("gyro_bias_per_power"), units, label="gyro"))
         return out
