@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scipy.special import ndtr
+
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.observations import FloatArray, Observations
@@ -13,15 +15,29 @@ from trihedron.diagnose.within_static import CHANNELS
 from trihedron.records.diagnosis import EffectParameter, Where
 
 
-@dataclass(frozen=True)
+COARSE = 0.45
+"""Noise below this share of a step leaves readings on two or three codes: their mean sits on a staircase."""
+SIGMA_GRID = np.geomspace(0.03, 2.0, 36)
+"""Noise before the converter that is tried, in steps."""
+
+
+@dataclass(frozen=True, eq=False)
 class Lattice:
-    """The grid of one channel: step in raw units, and the error of a mean that the grid alone makes (rms)."""
+    """The grid of one channel: step in raw units, noise before the converter, and what each hold's mean truly was.
+
+    ``sigma`` in raw units, ``scatter`` the noise that the plain readings seem to have; ``mean_shift`` (holds,) best mean minus plain mean and ``mean_sigma`` (holds,) its error, raw
+    units; ``missing`` codes skipped amid visited ones; ``dead`` half-width of the zone around one code in which nothing
+    moves, raw units.
+    """
 
     channel: int
     step: float
-    sigma_before: float
-    mean_error: float
+    sigma: float
+    scatter: float
+    mean_shift: FloatArray
+    mean_sigma: FloatArray
     missing: int
+    dead: float
 
 
 def lattice(values: FloatArray, sigma: float) -> tuple[float, int] | None:
@@ -49,6 +65,55 @@ def lattice(values: FloatArray, sigma: float) -> tuple[float, int] | None:
     return step, missing
 
 
+def before_converter(holds: list[FloatArray], step: float) -> tuple[float, FloatArray, FloatArray]:
+    """Noise in front of the converter and the true mean of every hold, by likelihood of the codes seen.
+
+    A hold that sits on a code's middle shows no scatter and one on its edge half a step, whatever the noise: the plain
+    scatter says nothing about noise below half a step, the shares of the codes do (interval-censored normal readings).
+
+    Returns sigma in steps, and per hold the posterior mean minus the plain mean and the posterior sigma, in steps.
+    """
+    offsets = np.linspace(-0.75, 0.75, 61)
+    tables = []
+    for values in holds:
+        k = np.round((values - values.min()) / step)
+        codes, counts = np.unique(k, return_counts=True)
+        tables.append((codes, counts, float(k.mean())))
+    evidence = np.zeros(len(SIGMA_GRID))
+    logs = []
+    for j, sigma in enumerate(SIGMA_GRID):
+        rows = []
+        for codes, counts, mean in tables:
+            m = mean + offsets
+            upper = ndtr((codes + 0.5 - m[:, None]) / sigma)
+            lower = ndtr((codes - 0.5 - m[:, None]) / sigma)
+            rows.append(np.log(np.maximum(upper - lower, 1e-15)) @ counts)
+        log_likelihood = np.array(rows)
+        top = log_likelihood.max(axis=1, keepdims=True)
+        evidence[j] = float((top[:, 0] + np.log(np.exp(log_likelihood - top).mean(axis=1))).sum())
+        logs.append(log_likelihood - top)
+    best = int(evidence.argmax())
+    weight = np.exp(logs[best])
+    weight /= weight.sum(axis=1, keepdims=True)
+    shift = weight @ offsets
+    spread = np.sqrt(np.maximum(weight @ offsets**2 - shift**2, 0.0))
+    return float(SIGMA_GRID[best]), shift, spread
+
+
+def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
+    """Half-width of a zone around the commonest still code that no reading of the recording enters, or 0."""
+    codes, counts = np.unique(values, return_counts=True)
+    zero = float(codes[counts.argmax()])
+    if counts.max() < 0.5 * len(values):
+        return 0.0
+    away = np.abs(everything[everything != zero] - zero)
+    nearest = float(away.min()) if len(away) else 0.0
+    # Readings just outside must be common: a gap that the motion merely never stopped in is no zone.
+    beyond = int((away < 2.0 * nearest).sum())
+    fine = float(np.diff(np.unique(np.round(away, 9))).min()) if len(away) > 2 else step
+    return nearest if nearest > 3.5 * fine and beyond >= 20 else 0.0
+
+
 class Quantisation(DirectEffect):
     """Steps so wide against the noise that averaging no longer resolves between them."""
 
@@ -58,54 +123,80 @@ class Quantisation(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs
-        found: list[Lattice] = []
-        pieces = [obs.raw_force] + ([obs.raw_rate] if obs.raw_rate is not None else [])
-        rows = np.concatenate([hold.samples() for hold in obs.segments.holds])
-        errors = np.zeros(6)
-        for c, channel in enumerate(np.hstack(pieces)[rows].T):
-            values = channel[np.isfinite(channel)]
-            sigma = float(np.sqrt(np.median([np.var(np.hstack(pieces)[h.samples(), c]) for h in obs.segments.holds])))
-            grid = lattice(np.round(values, 9), sigma)
-            if grid is None:
-                continue
-            step, missing = grid
-            before = float(np.sqrt(max(sigma**2 - step**2 / 12.0, (0.05 * step) ** 2)))
-            # Mean error of a quantised Gaussian: first Fourier term of the staircase (Widrow), rms over the phase.
-            bias = step / np.pi * float(np.exp(-2.0 * np.pi**2 * (before / step) ** 2)) / np.sqrt(2.0)
-            if sigma < 0.35 * step:
-                bias = step / np.sqrt(12.0)
-            if missing and sigma < 1.5 * step:
-                bias = max(bias, 0.25 * step)  # wider noise averages over a missing code as over any other
-            mean_sigma = obs.hold_force_sigma[:, c] if c < 3 else obs.hold_rate_sigma[:, c - 3]  # type: ignore[index]
-            if bias > 1.0 * float(np.median(mean_sigma)):
-                found.append(Lattice(c, step, before, bias, missing))
-                errors[c] = bias
+        found = [one for c in range(3 if obs.raw_rate is None else 6) if (one := self._channel(obs, c)) is not None]
         if not found:
             return None
         parameters = []
-        for grid_found in found:
-            c = grid_found.channel
-            S = context.fitted.twin.accel_S if c < 3 else context.fitted.twin.gyro_S
-            scale = float(1.0 / np.linalg.norm(np.linalg.inv(S)[c % 3]))
-            unit = "m/s^2" if c < 3 else "rad/s"
-            name = CHANNELS[c]
-            parameters.append(
-                EffectParameter(f"lsb_{name}", grid_found.step * scale, 1e-6 * grid_found.step * scale, unit)
-            )
-            if grid_found.missing:
-                parameters.append(EffectParameter(f"missing_codes_{name}", float(grid_found.missing), 0.0, "1"))
+        for one in found:
+            S = context.fitted.twin.accel_S if one.channel < 3 else context.fitted.twin.gyro_S
+            scale = float(1.0 / np.linalg.norm(np.linalg.inv(S)[one.channel % 3]))
+            unit = "m/s^2" if one.channel < 3 else "rad/s"
+            name = CHANNELS[one.channel]
+            parameters.append(EffectParameter(f"lsb_{name}", one.step * scale, 1e-6 * one.step * scale, unit))
+            if one.missing:
+                parameters.append(EffectParameter(f"missing_codes_{name}", float(one.missing), 0.0, "1"))
+            if one.dead:
+                parameters.append(EffectParameter(f"dead_band_{name}", one.dead * scale, one.step * scale, unit))
 
         def reweigh(old: Observations) -> Observations:
-            force = np.sqrt(old.hold_force_sigma**2 + errors[:3] ** 2)
-            rate = None if old.hold_rate_sigma is None else np.sqrt(old.hold_rate_sigma**2 + errors[3:] ** 2)
-            return replace(old, hold_force_sigma=force, hold_rate_sigma=rate)
+            for one in found:
+                old = _resolved(old, one)
+            return old
 
-        worst = max(found, key=lambda one: one.step / max(one.sigma_before, 1e-300))
-        strength = float(sum((errors[one.channel] / one.step) ** 2 for one in found) * len(rows))
+        worst = max(found, key=lambda one: one.step / one.sigma)
+        strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_holds)
         names = tuple(CHANNELS[one.channel] for one in found)
+        what = (
+            f"do not move within {worst.dead:.4g} raw units of zero"
+            if worst.dead
+            else f"move in steps of {worst.step:.4g} raw units, {worst.step / worst.sigma:.2g} times their noise"
+        )
         return Evidence(
             1e-300, strength, tuple(parameters),
-            f"Readings of {', '.join(names)} move in steps of {worst.step:.4g} raw units, wide against their noise: "
-            "averaging does not resolve between steps.",
+            f"Readings of {', '.join(names)} {what}: averaging does not resolve between steps.",
             "within-static", Where(names), reweigh=reweigh,
         )  # fmt: skip
+
+    def _channel(self, obs: Observations, c: int) -> Lattice | None:
+        raw = obs.raw_force if c < 3 else obs.raw_rate
+        assert raw is not None
+        x = np.round(raw[:, c % 3], 9)
+        holds = [x[hold.samples()] for hold in obs.segments.holds]
+        holds = [values[np.isfinite(values)] for values in holds]
+        if min(len(values) for values in holds) < 4:
+            return None
+        still = np.concatenate(holds)
+        scatter = float(np.sqrt(np.median([np.var(values) for values in holds])))
+        moving = np.concatenate([x[a:b] for a, b in obs.move_ranges]) if obs.move_ranges else still
+        grid = lattice(still, scatter)
+        if grid is None:
+            dead = dead_zone(still, moving[np.isfinite(moving)], float(np.ptp(moving)) or 1.0)
+            if not dead:
+                return None
+            size = np.full(len(holds), dead / np.sqrt(3.0))  # anywhere inside the zone
+            return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(holds)), size, 0, dead)
+        step, missing = grid
+        if scatter > 3.0 * step and not missing:
+            return None
+        sigma, shift, spread = before_converter(holds, step)
+        if missing and scatter < 1.5 * step:
+            return Lattice(c, step, sigma * step, sigma * step, 0.0 * shift, np.full(len(holds), 0.25 * step), missing, 0.0)
+        if sigma > COARSE:
+            return None
+        return Lattice(c, step, sigma * step, scatter, shift * step, spread * step, 0, 0.0)
+
+
+def _resolved(obs: Observations, one: Lattice) -> Observations:
+    """Observations with one channel's hold means and noise as the codes truly tell them."""
+    is_accel = one.channel < 3
+    k = one.channel % 3
+    mean = (obs.hold_force if is_accel else obs.hold_rate).copy()  # type: ignore[union-attr]
+    sigma = (obs.hold_force_sigma if is_accel else obs.hold_rate_sigma).copy()  # type: ignore[union-attr]
+    density = (obs.force_density if is_accel else obs.rate_density).copy()  # type: ignore[union-attr]
+    mean[:, k] += one.mean_shift
+    sigma[:, k] = np.hypot(sigma[:, k] * min(one.sigma / max(one.scatter, 1e-300), 1.0), one.mean_sigma)
+    # In motion the staircase is crossed all the time: its error is white, a twelfth of a step squared per reading.
+    density[k] = np.sqrt((one.sigma**2 + one.step**2 / 12.0) / obs.recording.rate_hz)
+    if is_accel:
+        return replace(obs, hold_force=mean, hold_force_sigma=sigma, force_density=density)
+    return replace(obs, hold_rate=mean, hold_rate_sigma=sigma, rate_density=density)
