@@ -13,7 +13,6 @@ from scipy.signal import savgol_filter
 from trihedron.diagnose.observations import FloatArray, Observations
 from trihedron.diagnose.solve import Fit
 
-
 VIBRATION_WINDOW_S = 0.25
 """Stretch over which a parabola follows the motion while vibration is measured in a move."""
 

@@ -239,6 +239,8 @@ def _accept_direct(
             model.fitted = tune_noise(model.obs, start, distortion, prior)
             model.prediction = predict_held_out(model.fitted, folds_of(model.fitted), N_DOMAINS)
             gain = max(gain, 2.0 * (profile(model.fitted) - profile(base_fit)))
+            if evidence.restate is not None:
+                evidence = replace(evidence, parameters=evidence.restate(Context(model.obs, model.fitted)))
         held = evidence.held_out or _held_out(base_fit, before, model.fitted, model.prediction)
         model.found.append(
             _Found(

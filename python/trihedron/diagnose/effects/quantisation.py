@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
 from scipy.special import ndtr
 
 from trihedron.diagnose.context import Context
@@ -13,7 +12,6 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.observations import FloatArray, Observations
 from trihedron.diagnose.within_static import CHANNELS
 from trihedron.records.diagnosis import EffectParameter, Where
-
 
 COARSE = 0.45
 """Noise below this share of a step leaves readings on two or three codes: their mean sits on a staircase."""
@@ -25,9 +23,9 @@ SIGMA_GRID = np.geomspace(0.03, 2.0, 36)
 class Lattice:
     """The grid of one channel: step in raw units, noise before the converter, and what each hold's mean truly was.
 
-    ``sigma`` in raw units, ``scatter`` the noise that the plain readings seem to have; ``mean_shift`` (holds,) best mean minus plain mean and ``mean_sigma`` (holds,) its error, raw
-    units; ``missing`` codes skipped amid visited ones; ``dead`` half-width of the zone around one code in which nothing
-    moves, raw units.
+    ``sigma`` in raw units, ``scatter`` the noise that the plain readings seem to have; ``mean_shift`` (holds,) best mean
+    minus plain mean and ``mean_sigma`` (holds,) its error, raw units; ``missing`` codes skipped amid visited ones;
+    ``dead`` half-width of the zone around one code in which nothing moves, raw units.
     """
 
     channel: int
@@ -180,7 +178,9 @@ class Quantisation(DirectEffect):
             return None
         sigma, shift, spread = before_converter(holds, step)
         if missing and scatter < 1.5 * step:
-            return Lattice(c, step, sigma * step, sigma * step, 0.0 * shift, np.full(len(holds), 0.25 * step), missing, 0.0)
+            return Lattice(
+                c, step, sigma * step, sigma * step, 0.0 * shift, np.full(len(holds), 0.25 * step), missing, 0.0
+            )
         if sigma > COARSE:
             return None
         return Lattice(c, step, sigma * step, scatter, shift * step, spread * step, 0, 0.0)

@@ -151,23 +151,7 @@ class _Saturation(DirectEffect):
         if not contradicts and not any(run.is_rail for run in runs):
             return None
         n = sum(run.stop - run.start for run in runs)
-        scale = 1.0 / np.linalg.norm(
-            np.linalg.inv(context.fitted.twin.gyro_S if is_gyro else context.fitted.twin.accel_S), axis=1
-        )
-        unit = "rad/s" if is_gyro else "m/s^2"
-        parameters = []
-        for axis in range(3):
-            for sign in (1, -1):
-                levels = [r.level for r in runs if r.axis == axis and r.sign == sign]
-                if levels:
-                    value = levels[0] * scale[axis]  # from the middle of the still readings
-                    parameters.append(
-                        EffectParameter(
-                            f"limit_{AXES[axis]}{'+' if sign > 0 else '-'}", float(value),
-                            float(sigma[axis] * scale[axis]), unit,
-                        )
-                    )  # fmt: skip
-        parameters.append(EffectParameter("samples", float(n), 0.0, "1"))
+        parameters = self._limits(context, runs, sigma)
         t = obs.time_s
         times = tuple((float(t[r.start]), float(t[r.stop - 1])) for r in runs[:8])
         bad = set(touched)
@@ -189,9 +173,27 @@ class _Saturation(DirectEffect):
         if any(run.is_rail for run in runs):
             p = min(p, 1e-30)
         return Evidence(
-            p, -2.0 * np.log(p), tuple(parameters), statement, "moves" if is_gyro else "dynamics",
+            p, -2.0 * np.log(p), parameters, statement, "moves" if is_gyro else "dynamics",
             Where(channels, tuple(f"move {m}" for m in touched[:8]), times), reweigh=reweigh,
+            restate=lambda later: self._limits(later, runs, sigma),  # false moves had bent the scale factors
         )  # fmt: skip
+
+    def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:
+        twin = context.fitted.twin
+        is_gyro = self.sensor == "gyro"
+        scale = 1.0 / np.linalg.norm(np.linalg.inv(twin.gyro_S if is_gyro else twin.accel_S), axis=1)
+        zero = np.zeros(3) if is_gyro else twin.accel_b
+        unit = "rad/s" if is_gyro else "m/s^2"
+        out = []
+        for axis in range(3):
+            for sign in (1, -1):
+                levels = [r.level for r in runs if r.axis == axis and r.sign == sign]
+                if levels:
+                    name = f"limit_{AXES[axis]}{'+' if sign > 0 else '-'}"
+                    value = float(levels[0] * scale[axis] + zero[axis])
+                    out.append(EffectParameter(name, value, float(sigma[axis] * scale[axis]), unit))
+        out.append(EffectParameter("samples", float(sum(run.stop - run.start for run in runs)), 0.0, "1"))
+        return tuple(out)
 
 
 class GyroSaturation(_Saturation):
