@@ -23,7 +23,7 @@ SIGMA_GRID = np.geomspace(0.03, 2.0, 36)
 class Lattice:
     """The grid of one channel: step in raw units, noise before the converter, and what each hold's mean truly was.
 
-    ``sigma`` in raw units, ``scatter`` the noise that the plain readings seem to have; ``mean_shift`` (holds,) best mean
+    ``sigma`` in raw units, ``scatter`` the noise the plain readings seem to have; ``mean_shift`` (holds,) best mean
     minus plain mean and ``mean_sigma`` (holds,) its error, raw units; ``missing`` codes skipped amid visited ones;
     ``dead`` half-width of the zone around one code in which nothing moves, raw units.
     """
