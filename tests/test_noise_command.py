@@ -11,7 +11,8 @@ from noise_series import series
 from trihedron.cli import main
 from trihedron.pipeline import noise as noise_of
 from trihedron.records import Recording
-from trihedron.report.noise import curve_csv, customary, noise_report
+from trihedron.report.noise import customary, noise_report
+from trihedron.report.noise_files import curve_csv
 from trihedron.units import RateUnit
 
 RATE = 50.0
@@ -51,9 +52,66 @@ def test_the_table_names_every_term_and_the_files_hold_the_same(log, tmp_path, c
     assert files["html"].read_text().count("data:image/png;base64,") == 2
 
 
+def test_the_terms_come_back_from_the_written_curve_alone(log, tmp_path, capsys):
+    table = tmp_path / "curve.csv"
+    main(["allan", str(log), "--csv", str(table)])
+    assert main(["allan", str(table), "--curve"]) == 1
+    assert "--samples" in capsys.readouterr().err
+    assert main(["allan", str(table), "--curve", "--samples", "180000", "--json"]) == 0
+    axes = json.loads(capsys.readouterr().out)["axes"]
+    for axis in axes:
+        truth_n, truth_k = (2e-4, 3e-6) if axis["unit"] == "rad/s" else (2e-3, 3e-5)
+        # N to 0.3 %, K to 25 % from an hour: four standard errors.
+        assert axis["terms"]["N"]["value"] == pytest.approx(truth_n, rel=0.012)
+        term = axis["terms"]["K"]
+        assert not term["present"] or term["value"] == pytest.approx(truth_k, abs=4 * term["sigma"])
+
+
+def test_how_long_to_record_is_told_for_the_accuracy_asked(log, capsys):
+    lengths = {}
+    for accuracy in ("2", "1"):
+        assert main(["allan", str(log), "--accuracy", accuracy, "--json"]) == 0
+        terms = json.loads(capsys.readouterr().out)["axes"][0]["terms"]
+        lengths[accuracy] = terms["N"]["recording_length_s"]
+    # Twice the accuracy of white noise takes four times as long.
+    assert lengths["1"] == pytest.approx(4 * lengths["2"], rel=0.1)
+
+
+def test_the_size_of_a_count_gives_a_log_in_counts_its_units(tmp_path, capsys):
+    rng = np.random.default_rng(33)
+    counts = np.round(rng.normal(scale=20.0, size=(20_000, 6))).astype(np.int16)
+    counts[:, 5] += 300
+    path = tmp_path / "counts.npy"
+    np.save(path, counts)
+    said = ["--columns", "gx,gy,gz,ax,ay,az", "--rate", "100", "--gyro-lsb", "0.05 deg/s", "--accel-lsb", "3.33 mg"]
+    for extra in ([], ["--stream"]):
+        assert main(["allan", str(path), *said, "--json", *extra]) == 0
+        axes = json.loads(capsys.readouterr().out)["axes"]
+        assert [axis["unit"] for axis in axes] == ["rad/s"] * 3 + ["m/s^2"] * 3
+        # 20 counts a reading at 100 Hz; 20 000 readings give N to 0.5 %.
+        assert axes[0]["terms"]["N"]["value"] == pytest.approx(np.radians(0.05) * 2.0, rel=0.02)
+        assert axes[5]["terms"]["N"]["value"] == pytest.approx(3.33e-3 * 9.80665 * 2.0, rel=0.02)
+    assert main(["allan", str(path), *said[:-1], "3.33"]) == 1
+    assert "number and a unit" in capsys.readouterr().err
+
+
+def test_what_the_axes_have_in_common_is_said_once(tmp_path, capsys):
+    rng = np.random.default_rng(34)
+    x = rng.normal(size=(60_000, 3))
+    x[1:] = 0.5 * (x[1:] + x[:-1])
+    path = tmp_path / "coloured.npy"
+    np.save(path, x)
+    main(["allan", str(path), "--columns", "gx,gy,gz", "--rate", "100", "--gyro-unit", "rad/s", "--stream"])
+    out, _ = capsys.readouterr()
+    assert out.index("coloured") < out.index("N  white")
+    assert out.count("a low-pass filter in the sensor") == 1
+
+
 def test_excluded_stretches_are_said_and_left_out(log, capsys):
     assert main(["allan", str(log), "--exclude", "100:200", "--exclude", "150:300", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["excluded_s"] == [[100.0, 300.0]]
+    assert main(["allan", str(log), "--exclude", ":60", "--exclude", "3500:", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["excluded_s"] == [[0.0, 60.0], [3500.0, 3600.0]]
 
 
 @pytest.mark.parametrize(

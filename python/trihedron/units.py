@@ -49,6 +49,41 @@ def rate_to_si(unit: RateUnit) -> float | None:
     return _RATE_TO_SI.get(unit)
 
 
+def rate_lsb_to_si(text: str) -> float:
+    """Size of a gyro's count, as in ``0.05 deg/s``, in rad/s.
+
+    Raises
+    ------
+    ValueError
+        When it is not a positive number and a unit.
+    """
+    value, unit = _value_and_unit(text, [u.value for u in _RATE_TO_SI])
+    return value * _RATE_TO_SI[RateUnit(unit)]
+
+
+def acceleration_lsb_to_si(text: str) -> float:
+    """Size of an accelerometer's count, as in ``3.33 mg``, in m/s².
+
+    Raises
+    ------
+    ValueError
+        When it is not a positive number and a unit.
+    """
+    value, unit = _value_and_unit(text, [u.value for u in _ACCELERATION_TO_SI])
+    return value * _ACCELERATION_TO_SI[AccelerationUnit(unit)]
+
+
+def _value_and_unit(text: str, units: list[str]) -> tuple[float, str]:
+    unit = next((u for u in sorted(units, key=len, reverse=True) if text.strip().endswith(u)), "")
+    try:
+        value = float(text.strip().removesuffix(unit)) if unit else math.nan
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise ValueError(f"the size of a count is a number and a unit ({', '.join(units)}), not {text!r}")
+    return value, unit
+
+
 def degrees_from_radians(angle_rad: float) -> float:
     """Angle or rate, rad → deg."""
     return math.degrees(angle_rad)

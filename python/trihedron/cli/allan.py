@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
@@ -11,19 +11,38 @@ from trihedron.cli.options import Force, Json, LogSource, Report, progress, with
 from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
 from trihedron.output_file import write_whole
 
+if TYPE_CHECKING:
+    from trihedron.records import Noise
+
 FIRST_SCREEN = 2
 
 
 @with_options(source=LogSource)
 def allan(
     source: LogSource,
+    gyro_lsb: Annotated[
+        Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+        typer.Option("--gyro-lsb", metavar="SIZE", help="Size of the gyro's count, as in '0.05 deg/s'."),
+    ] = None,
+    accel_lsb: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--accel-lsb", metavar="SIZE", help="Size of the accelerometer's count, as in '3.33 mg'."),
+    ] = None,
     exclude: Annotated[
-        Optional[list[str]],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Option("--exclude", metavar="FROM:TO", help="Leave out this stretch [s]; may be given more than once."),
+        Optional[list[str]],  # noqa: UP045
+        typer.Option(
+            "--exclude",
+            metavar="FROM:TO",
+            help="Leave out this stretch [s]; :TO from the start, FROM: to the end; may be given more than once.",
+        ),
     ] = None,
     keep_events: Annotated[
         bool, typer.Option("--keep-events", help="Leave nothing out by itself: knocks, shaking and steps stay in.")
     ] = False,
+    accuracy: Annotated[
+        float,
+        typer.Option("--accuracy", metavar="PERCENT", help="How long to record to know each term this well; --full."),
+    ] = 10.0,
     plot: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--plot", metavar="FILE.png", help="Draw the Allan curves (the report holds them as well)."),
@@ -31,6 +50,16 @@ def allan(
     csv: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--csv", metavar="FILE", help="Write the Allan curve as a table."),
+    ] = None,
+    curve: Annotated[
+        bool,
+        typer.Option(
+            "--curve", help="LOG is a table of Allan deviations (--csv of another run, or published): terms from it."
+        ),
+    ] = False,
+    samples: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--samples", metavar="N", help="Readings of the log behind --curve, where the table is silent."),
     ] = None,
     stream: Annotated[
         bool,
@@ -42,35 +71,33 @@ def allan(
     ] = False,
     json: Json = None,
     report: Report = None,
-    full: Annotated[bool, typer.Option("--full", help="Print the customary units and Kalibr's names as well.")] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="Print customary units, how long to record and Kalibr's names as well.")
+    ] = False,
     force: Force = False,
 ) -> None:
     """Identify the noise terms of a long static log: how large, how certain, how long to average."""
     stretches = [_stretch(text) for text in exclude or []]
+    if not 0.0 < accuracy < 1000.0:
+        raise typer.BadParameter(f"--accuracy is a positive number of per cent, not {accuracy:g}")
     check_outputs(json, csv, plot, force=force, report=report)
-    options: dict[str, Any] = {"exclude_s": stretches, "automatic": not keep_events}
-    from trihedron import pipeline
-
-    if stream:
-        if source.log is None or source.columns is None or source.rate is None:
-            raise typer.BadParameter("--stream needs LOG, --columns (as in gx,gy,gz,ax,ay,az) and --rate")
-        with progress("identifying"):
-            found = pipeline.noise_of_file(
-                source.log,
-                columns=source.columns,
-                rate_hz=source.rate,
-                accelerometer_unit=source.accel_unit,
-                gyroscope_unit=source.gyro_unit,
-                **options,
-            )
+    if curve:
+        if exclude or stream or keep_events:
+            raise typer.BadParameter("--curve has no log: --exclude, --keep-events and --stream do not go with it")
+        found = _of_curve(source, samples, gyro_lsb, accel_lsb)
     else:
-        recording = source.read()
-        with progress("identifying"):
-            found = pipeline.noise(recording, **options)
-    from trihedron.report.noise import all_findings, curve_csv, noise_record, noise_report
+        options = {"exclude_s": stretches, "automatic": not keep_events}
+        found = _of_log(
+            source, stream=stream, options=options | {"gyroscope_lsb": gyro_lsb, "accelerometer_lsb": accel_lsb}
+        )
+    from trihedron.pipeline import recording_lengths
+    from trihedron.report.noise import all_findings, noise_report
+    from trihedron.report.noise_files import curve_csv, noise_record
 
-    document = noise_report(found)
-    machine = noise_record(found) if json is not None or report is not None else {}
+    wants_all = full or json is not None or report is not None
+    lengths = recording_lengths(found, accuracy / 100.0) if wants_all else None
+    document = noise_report(found, lengths, accuracy / 100.0)
+    machine = noise_record(found, lengths, accuracy / 100.0) if json is not None or report is not None else {}
     show(document, json, sections=None if full else FIRST_SCREEN)
     if csv is not None:
         write_whole(csv, curve_csv(found), overwrite=force)
@@ -83,13 +110,54 @@ def allan(
     write_json(machine, json, force=force)
     write_report(document, machine, report, force=force)
     if not full and report is None:
-        say("Customary units and Kalibr's names: --full; the curves: --plot FILE.png or --report FILE.html.")
+        say("Customary units, how long to record, Kalibr's names: --full; curves: --plot F.png or --report F.html.")
     leave(all_findings(found))
+
+
+def _of_log(source: LogSource, *, stream: bool, options: dict[str, Any]) -> Noise:
+    from trihedron import pipeline
+
+    if not stream:
+        recording = source.read()
+        with progress("identifying"):
+            return pipeline.noise(recording, **options)
+    if source.log is None or source.columns is None or source.rate is None:
+        raise typer.BadParameter("--stream needs LOG, --columns (as in gx,gy,gz,ax,ay,az) and --rate")
+    with progress("identifying"):
+        return pipeline.noise_of_file(
+            source.log,
+            columns=source.columns,
+            rate_hz=source.rate,
+            accelerometer_unit=source.accel_unit,
+            gyroscope_unit=source.gyro_unit,
+            **options,
+        )
+
+
+def _of_curve(source: LogSource, samples: int | None, gyro_lsb: str | None, accel_lsb: str | None) -> Noise:
+    from trihedron import pipeline
+
+    if source.log is None:
+        raise typer.BadParameter("--curve needs the table in the place of LOG")
+    if gyro_lsb or accel_lsb:
+        raise typer.BadParameter("--curve has no counts: say the unit of the deviations with --gyro-unit, --accel-unit")
+    with progress("identifying"):
+        return pipeline.noise_of_curve(
+            source.log,
+            rate_hz=source.rate,
+            n_samples=samples,
+            accelerometer_unit=source.accel_unit,
+            gyroscope_unit=source.gyro_unit,
+        )
 
 
 def _stretch(text: str) -> tuple[float, float]:
     start, colon, stop = text.partition(":")
     try:
-        return float(start), float(stop) if colon else float("nan")
+        if not colon or not (start or stop):
+            raise ValueError
+        return float(start or 0.0), float(stop or "inf")
     except ValueError:
-        raise typer.BadParameter(f"--exclude is FROM:TO in seconds, as in 120:180, not {text!r}") from None
+        raise typer.BadParameter(
+            f"--exclude is FROM:TO in seconds, as in 120:180, 3600: or :60, not {text!r}"
+        ) from None

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.choices import settle_gravity
     from trihedron.pipeline.diagnosing import diagnose, extend
     from trihedron.pipeline.filtering import KalmanResult, kalman
-    from trihedron.pipeline.identifying import noise, noise_of_file
+    from trihedron.pipeline.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
     from trihedron.pipeline.reading import read, segment
     from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
     from trihedron.pipeline.simulating import simulate, twin, with_effects
@@ -32,8 +32,10 @@ __all__ = [
     "extend",
     "kalman",
     "noise",
+    "noise_of_curve",
     "noise_of_file",
     "read",
+    "recording_lengths",
     "segment",
     "settle_gravity",
     "simulate",
@@ -54,7 +56,9 @@ _HOME = {
     "KalmanResult": "trihedron.pipeline.filtering",
     "kalman": "trihedron.pipeline.filtering",
     "noise": "trihedron.pipeline.identifying",
+    "noise_of_curve": "trihedron.pipeline.identifying",
     "noise_of_file": "trihedron.pipeline.identifying",
+    "recording_lengths": "trihedron.pipeline.identifying",
     "read": "trihedron.pipeline.reading",
     "segment": "trihedron.pipeline.reading",
     "CalibrationResult": "trihedron.pipeline.results",

@@ -90,6 +90,8 @@ class FindingCode(str, Enum):
     SPECTRAL_LINE = "spectral-line"
     SPECTRUM_COLOURED = "spectrum-coloured"
     SPECTRUM_UNEXPLAINED = "spectrum-unexplained"
+    CURVE_ALONE = "curve-alone"
+    RAMP_OR_WALK = "ramp-or-walk"
     QUANTISATION_DEAD = "quantisation-dead"
     STRETCHES_EXCLUDED = "stretches-excluded"
     # kalman

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
+from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from trihedron.records import Finding, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.records import Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
 from trihedron.units import arcsec_from_radians, degrees_from_radians, micro_g_from_m_s2, per_hour, per_root_hour
 
+_NO_UNIT = (
+    "The unit of the log is not known: say it with --gyro-unit and --accel-unit, or the size of a count with "
+    "--gyro-lsb and --accel-lsb."
+)
 TERM_WORDS = {
     TermName.QUANTISATION: "quantisation",
     TermName.WHITE: "white",
@@ -23,7 +25,7 @@ TERM_WORDS = {
     TermName.RATE_RANDOM_WALK: "rate random walk",
     TermName.RATE_RAMP: "rate ramp",
 }
-_SI = {
+PER_UNIT = {
     TermName.QUANTISATION: "·s",
     TermName.WHITE: "/√Hz",
     TermName.BIAS_INSTABILITY: "",
@@ -32,9 +34,11 @@ _SI = {
 }
 
 
-def noise_report(noise: Noise) -> Document:
-    """Lay out the noise of one log."""
-    findings = all_findings(noise)
+def noise_report(
+    noise: Noise, lengths: Mapping[str, Mapping[TermName, float | None]] | None = None, accuracy: float = 0.1
+) -> Document:
+    """Lay out the noise of one log; ``lengths`` are seconds of recording per axis and term for ``accuracy``."""
+    findings = told_once(noise)
     length = noise.curve.n_samples / noise.curve.rate_hz
     facts = [
         ("length", f"{duration(length)}, {noise.curve.n_samples} samples at {plain_number(noise.curve.rate_hz, 5)} Hz"),
@@ -42,6 +46,7 @@ def noise_report(noise: Noise) -> Document:
     if noise.excluded_s:
         total = sum(stop - start for start, stop in noise.excluded_s)
         facts.append(("left out", f"{how_many(len(noise.excluded_s), 'piece')}, {duration(total)}"))
+    facts += _coloured(noise)
     groups = _groups(noise)
     tables: list[Block] = [Facts(tuple(facts))]
     for unit, axes in groups:
@@ -60,7 +65,8 @@ def noise_report(noise: Noise) -> Document:
             Section("Result", tuple(tables)),
             Section("Findings", (findings_block(findings),)),
             Section("Customary units", tuple(b for unit, axes in groups for b in _customary(axes, unit))),
-            Section("Kalibr", (Facts(tuple(_kalibr_rows(noise).items())),)),
+            *([Section("How long to record", (_lengths_table(noise, lengths, accuracy),))] if lengths else []),
+            Section("Kalibr", (Facts(tuple(kalibr_rows(noise).items())),)),
             Section("Allan deviation", tuple(_picture(noise, unit, axes) for unit, axes in groups)),
         ),
     )
@@ -74,6 +80,36 @@ def all_findings(noise: Noise) -> tuple[Finding, ...]:
         for f in axis.findings
     ]
     return (*noise.findings, *named)
+
+
+def told_once(noise: Noise) -> tuple[Finding, ...]:
+    """The same: what several axes have in common in one finding, each axis with its own figures."""
+    groups: dict[tuple[str, str, str, str], list[Finding]] = {}
+    for finding in all_findings(noise):
+        key = (finding.code.value, finding.severity.value, finding.cause, finding.action)
+        groups.setdefault(key, []).append(finding)
+    return tuple(
+        Finding(first.code, first.severity, " ".join(_capital(f.seen) for f in same), first.cause, first.action)
+        for first, *_ in groups.values()
+        for same in [groups[first.code.value, first.severity.value, first.cause, first.action]]
+    )
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _coloured(noise: Noise) -> list[tuple[str, str]]:
+    """Up to where the spectrum is that of noise terms, said before any term is."""
+    limits = [
+        f"{axis.name} {plain_number(axis.highest_hz, 3)} Hz"
+        for axis in noise.axes
+        for finding in axis.findings
+        if finding.code is FindingCode.SPECTRUM_COLOURED
+    ]
+    if not limits:
+        return []
+    return [("coloured", f"a filter or resampling shapes what lies above {', '.join(limits)}; all terms are of below.")]
 
 
 def _groups(noise: Noise) -> list[tuple[str, list[NoiseAxis]]]:
@@ -126,7 +162,7 @@ def _unit_of(term: TermName, unit: str) -> str:
         return "m/s³" if term is TermName.RATE_RAMP else "m/s"
     if unit == "rad/s" and term in (TermName.RATE_RAMP, TermName.QUANTISATION):
         return "rad/s²" if term is TermName.RATE_RAMP else "rad"
-    return printed + _SI[term]
+    return printed + PER_UNIT[term]
 
 
 def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
@@ -160,6 +196,22 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
     return Table(("", *(axis.name for axis in axes)), rows, "How long to average")
 
 
+def _lengths_table(noise: Noise, lengths: Mapping[str, Mapping[TermName, float | None]], accuracy: float) -> Table:
+    def cell(axis: NoiseAxis, term: TermName) -> str:
+        if not axis.terms[term].is_present:
+            return "absent"
+        seconds = lengths[axis.name][term]
+        return "over a month" if seconds is None else duration(seconds)
+
+    rows = tuple(
+        (f"{term.value}  {TERM_WORDS[term]}", *(cell(axis, term) for axis in noise.axes))
+        for term in TermName
+        if any(axis.terms[term].is_present for axis in noise.axes)
+    )
+    caption = f"Recording after which a term is known to {100 * accuracy:g} % (1σ)"
+    return Table(("", *(axis.name for axis in noise.axes)), rows, caption)
+
+
 def customary(term: TermName, unit: str) -> tuple[str, str, float] | None:
     """IEEE 952 name, customary unit and factor from SI of a term; None where the unit of the log is not known."""
     if unit == "rad/s":
@@ -187,7 +239,7 @@ def _customary(axes: list[NoiseAxis], unit: str) -> list[Block]:
     for term in TermName:
         found = customary(term, unit)
         if found is None:
-            return [Paragraph("The unit of the log is not known: calibrate, or say it with --accel-unit, --gyro-unit.")]
+            return [Paragraph(_NO_UNIT)]
         name, printed, factor = found
         rows.append((f"{term.value}  {name} [{printed}]", *(_value(axis.terms[term], factor) for axis in axes)))
         if term is TermName.WHITE and unit == "m/s^2":
@@ -208,7 +260,8 @@ def _lowest(axis: NoiseAxis, factor: float) -> str:
     return "–" if found is None else plain_number(factor * found[1] / math.sqrt(2 * math.log(2) / math.pi), 3)
 
 
-def _kalibr_rows(noise: Noise) -> dict[str, str]:
+def kalibr_rows(noise: Noise) -> dict[str, str]:
+    """Kalibr's names with value and unit, one number for the axes of a sensor."""
     rows: dict[str, str] = {}
     for unit, sensor, square in (("m/s^2", "accelerometer", "m/s²"), ("rad/s", "gyroscope", "rad/s")):
         axes = [axis for axis in noise.axes if axis.unit == unit]
@@ -248,93 +301,3 @@ def _draw(noise: Noise, sensors: list[tuple[str, list[NoiseAxis]]]) -> bytes:
     from trihedron.report.noise_figures import draw_allan
 
     return draw_allan(noise.curve, sensors)
-
-
-def noise_record(noise: Noise) -> dict[str, Any]:
-    """The same for machines, values in SI (or the log's own unit) with the unit beside them."""
-    return {
-        "source": noise.source,
-        "rate_hz": noise.curve.rate_hz,
-        "n_samples": noise.curve.n_samples,
-        "excluded_s": [list(stretch) for stretch in noise.excluded_s],
-        "breaks_s": list(noise.breaks_s),
-        "axes": [_axis_record(axis) for axis in noise.axes],
-        "kalibr": {key: words.split()[0] for key, words in _kalibr_rows(noise).items()},
-        "curve": {
-            "kind": noise.curve.kind,
-            "confidence": noise.curve.confidence,
-            "stride": noise.curve.stride,
-            "tau_s": noise.curve.tau_s.tolist(),
-            "cluster": noise.curve.clusters.tolist(),
-            "axes": [
-                {
-                    "name": name,
-                    "unit": noise.curve.units[c],
-                    "deviation": noise.curve.deviation[:, c].tolist(),
-                    "lower": noise.curve.lower[:, c].tolist(),
-                    "upper": noise.curve.upper[:, c].tolist(),
-                    "edf": noise.curve.edf[:, c].tolist(),
-                    "n_terms": noise.curve.n_terms[:, c].tolist(),
-                }
-                for c, name in enumerate(noise.curve.names)
-            ],
-        },
-        "findings": [finding.to_dict() for finding in noise.findings],
-    }
-
-
-def _axis_record(axis: NoiseAxis) -> dict[str, Any]:
-    terms = {}
-    for term in TermName:
-        found = axis.terms[term]
-        entry: dict[str, Any] = {
-            "present": found.is_present,
-            "value": found.value,
-            "sigma": found.sigma,
-            "lower": found.lower,
-            "upper": found.upper,
-            "limit": found.limit,
-            "evidence": found.evidence,
-            "unit": f"{axis.unit}{_SI[term]}",
-        }
-        usual = customary(term, axis.unit)
-        if usual is not None:
-            entry["customary"] = {"name": usual[0], "unit": usual[1], "value": usual[2] * found.value}
-        terms[term.value] = entry
-    best = axis.optimal_averaging()
-    return {
-        "name": axis.name,
-        "unit": axis.unit,
-        "mean": axis.mean,
-        "sample_sigma": axis.sample_sigma,
-        "resolution": axis.resolution,
-        "terms": terms,
-        "gauss_markov": None if axis.gauss_markov is None else dict(vars(axis.gauss_markov)),
-        "lines": [dict(vars(line)) for line in axis.lines],
-        "lowest_hz": axis.lowest_hz,
-        "highest_hz": axis.highest_hz,
-        "optimal_tau_s": None if best is None else best[0],
-        "least_deviation": None if best is None else best[1],
-        "longest_tau_s": axis.longest_tau_s,
-        "covariance_scale": axis.covariance_scale,
-        "findings": [finding.to_dict() for finding in axis.findings],
-    }
-
-
-def curve_csv(noise: Noise) -> str:
-    """The Allan curve as a table: tau, cluster, then deviation, interval and degrees of freedom of every axis."""
-    curve = noise.curve
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    head = ["tau_s", "cluster"]
-    for name, unit in zip(curve.names, curve.units, strict=True):
-        key = name.replace(" ", "_")
-        head += [f"{key}_deviation[{unit}]", f"{key}_lower[{unit}]", f"{key}_upper[{unit}]", f"{key}_edf"]
-    writer.writerow(head)
-    for i, tau in enumerate(curve.tau_s):
-        row = [f"{tau:.9g}", str(int(curve.clusters[i]))]
-        for c in range(curve.n_channels):
-            cells = (curve.deviation[i, c], curve.lower[i, c], curve.upper[i, c], curve.edf[i, c])
-            row += [f"{float(v):.9g}" for v in cells]
-        writer.writerow(row)
-    return out.getvalue()

@@ -2,6 +2,7 @@
 
 from trihedron.estimate.noise.allan import allan_deviation, default_clusters, stream_allan_deviation
 from trihedron.estimate.noise.degrees import degrees_of_freedom
+from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s, relative_sigma
 from trihedron.estimate.noise.streamed import stream_noise
@@ -10,6 +11,7 @@ __all__ = [
     "allan_deviation",
     "default_clusters",
     "degrees_of_freedom",
+    "identify_curve",
     "identify_noise",
     "recording_length_s",
     "relative_sigma",

@@ -20,7 +20,7 @@ from trihedron.records.noise import AllanCurve, GaussMarkov, NoiseAxis, NoiseTer
 _RISE_95 = 3.841
 """Rise of the deviance at the ends of a two-sided 95 % interval (chi-square, one degree of freedom)."""
 _RISE_95_ONE_SIDED = 2.706
-_LEAST_EDF = 8.0
+LEAST_EDF = 8.0
 """Degrees of freedom that give an Allan deviation to 25 %."""
 TOLERANCE = 0.02
 """Where a filter colours the upper spectrum it bends the rest by up to this: no half octave is believed to better."""
@@ -42,7 +42,7 @@ def identify_axis(bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurv
     selection, scale, worst = _tempered(selection)
     if worst is not None:
         findings.append(remarks.unexplained(*worst))
-    usable = curve.tau_s[curve.edf[:, channel] >= _LEAST_EDF]
+    usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
     axis = replace(
         blank,
         terms=MappingProxyType(_terms(selection)),

@@ -15,6 +15,8 @@ KINDS = {
     "hadamard": _core.AllanKind.Hadamard,
     "total": _core.AllanKind.Total,
 }
+FEWEST_CLUSTERS = 32
+"""Clusters in a log from which a slope of its curve is read."""
 TYPES = {
     2: _core.AllanNoise.Quantisation,
     0: _core.AllanNoise.White,
@@ -80,7 +82,19 @@ def slopes_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray) 
     # Variance of a slope over one step: two neighbouring values of about n/m degrees of freedom, largely the same.
     weight = step**2 * n / 2.0 ** (0.5 * (xs[1:] + xs[:-1]))
     rising = _never_falling(slope, np.maximum(weight, 1e-12))
-    return np.interp(x, 0.5 * (xs[1:] + xs[:-1]), rising)
+    middle = 0.5 * (xs[1:] + xs[:-1])
+    return np.interp(x, middle, _held_at_the_end(rising, middle, n))
+
+
+def _held_at_the_end(slope: FloatArray, middle: FloatArray, n: int) -> FloatArray:
+    """Slopes beyond ``n / FEWEST_CLUSTERS`` readings stay what they were there: a handful of clusters bends by chance.
+
+    A low end of the curve that bends by chance would choose its own degrees of freedom, and always the fewer.
+    """
+    reliable = np.flatnonzero(2.0**middle <= n / FEWEST_CLUSTERS)
+    if len(reliable) == 0:
+        return slope
+    return np.asarray(np.minimum(slope, slope[reliable[-1]]))
 
 
 def _never_falling(values: FloatArray, weights: FloatArray) -> FloatArray:

@@ -11,8 +11,18 @@ from trihedron.units import acceleration_to_si, rate_to_si
 AXES = ("x", "y", "z")
 
 
-def readings_of(recording: Recording) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
-    """Readings (n, channels) in SI (counts stay counts), names and units of the channels; NaN where rows are lost."""
+def readings_of(
+    recording: Recording, rad_s_per_count: float | None = None, m_s2_per_count: float | None = None
+) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
+    """Readings (n, channels) in SI (counts stay counts), names and units of the channels; NaN where rows are lost.
+
+    ``rad_s_per_count`` and ``m_s2_per_count`` are the sizes of a count, where they are known.
+
+    Raises
+    ------
+    ValueError
+        When most of the time has no reading.
+    """
     columns: list[FloatArray] = []
     names: list[str] = []
     units: list[str] = []
@@ -21,14 +31,14 @@ def readings_of(recording: Recording) -> tuple[FloatArray, tuple[str, ...], tupl
             "gyro",
             recording.gyroscope,
             recording.gyroscope_unit.value,
-            rate_to_si(recording.gyroscope_unit),
+            rad_s_per_count or rate_to_si(recording.gyroscope_unit),
             "rad/s",
         ),
         (
             "accel",
             recording.accelerometer,
             recording.accelerometer_unit.value,
-            acceleration_to_si(recording.accelerometer_unit),
+            m_s2_per_count or acceleration_to_si(recording.accelerometer_unit),
             "m/s^2",
         ),
     ):

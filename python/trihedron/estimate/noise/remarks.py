@@ -182,11 +182,59 @@ def coloured(highest_hz: float, nyquist_hz: float, at_nyquist: float) -> Finding
         f"Above {highest_hz:.3g} Hz the spectrum leaves the noise terms and {falls} {100 * at_nyquist:.3g} % of them "
         f"at {nyquist_hz:.3g} Hz.",
         cause,
-        f"All terms are quoted from below {highest_hz:.3g} Hz; averaging times under {0.5 / highest_hz:.2g} s show the "
-        "filter, and Q cannot be told from it.",
+        "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
+        "cannot be told from it.",
         highest_hz=highest_hz,
         nyquist_hz=nyquist_hz,
         ratio=at_nyquist,
+    )
+
+
+def curve_alone() -> Finding:
+    """The log behind a curve was not seen."""
+    return _finding(
+        FindingCode.CURVE_ALONE,
+        Severity.NOTE,
+        "The terms come from Allan deviations alone, taken as overlapping ones of an undisturbed log.",
+        "",
+        "Steps, knocks, lines and gaps cannot be told from noise in a curve; identify from the log where there is one.",
+    )
+
+
+def curve_coloured(first_s: float) -> Finding:
+    """The short end of a curve is no sum of terms."""
+    return _finding(
+        FindingCode.SPECTRUM_COLOURED,
+        Severity.WARNING,
+        f"Below {first_s:.3g} s the curve is not a sum of noise terms.",
+        "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance",
+        "All terms are quoted from longer averaging times; a Q may be the tail of what was left out.",
+        first_s=first_s,
+    )
+
+
+def curve_ramp() -> Finding:
+    """A curve shows the square of a drift, not its shape."""
+    return _finding(
+        FindingCode.RAMP_OR_WALK,
+        Severity.WARNING,
+        "R and K are hard to tell apart in a curve: a random walk that happened to go one way has the curve of a ramp.",
+        "the curve keeps the squares of differences and loses their order",
+        "Identify from the log where there is one.",
+    )
+
+
+def curve_unexplained(deviation: float, tau_s: float) -> Finding:
+    """A point that the terms miss by more than chance."""
+    return _finding(
+        FindingCode.SPECTRUM_UNEXPLAINED,
+        Severity.WARNING,
+        f"Near {tau_s:.2g} s the curve lies {100 * abs(deviation):.0f} % "
+        f"{'above' if deviation > 0 else 'below'} the fitted terms.",
+        "a periodic disturbance, temperature, or noise of another shape",
+        "Intervals were widened to allow for it.",
+        deviation=deviation,
+        tau_s=tau_s,
     )
 
 
@@ -226,7 +274,7 @@ def about_terms(axis: NoiseAxis) -> list[Finding]:
             _finding(
                 FindingCode.LOG_TOO_SHORT,
                 Severity.NOTE,
-                f"The curve still falls at the log's end: K is below {limit:.2g} {axis.unit}/√s, more is not known.",
+                f"No minimum before the log's end: K is below {limit:.2g} {axis.unit}/√s, more is not known.",
                 "the log is short compared with the sensor's stability",
                 "Record longer to find the best averaging time.",
                 limit=limit,

@@ -1,0 +1,192 @@
+"""Noise terms from an Allan curve alone: the log is gone, published, or was never given.
+
+Moments in the manner of the generalised method of wavelet moments (S. Guerrier et al., "Wavelet-variance-based
+estimation for composite stochastic processes", JASA 108 (2013)): the logarithms of the curve's points are fitted by
+generalised least squares with the covariance that the terms themselves give them (:mod:`curve_covariance`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import combinations
+
+import numpy as np
+
+from trihedron import _core
+from trihedron.estimate.noise.curve_covariance import CurveCovariance
+from trihedron.estimate.noise.terms import allan_variance_of_terms
+from trihedron.records.noise import FloatArray, TermName
+
+TERMS = tuple(TermName)
+_RAMP = TERMS.index(TermName.RATE_RAMP)
+EVIDENCE = 8.0
+"""Drop of the deviance that a term must earn, as for whole logs."""
+_RISE_95 = 3.841
+_RISE_95_ONE_SIDED = 2.706
+_CONVERGED = 1e-4
+"""Last step of a log square: a thousandth of any standard error that a curve can give."""
+LEAST_EDF = 1.5
+"""Points of fewer degrees of freedom say nothing that their neighbours do not."""
+
+
+@dataclass(frozen=True, eq=False)
+class CurveFit:
+    """Squares (5,) of the terms, zero where absent; deviance; inverse covariance of the log squares of the active."""
+
+    active: tuple[int, ...]
+    squares: FloatArray
+    deviance: float
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePoints:
+    """Points ``clusters`` (k,) readings, ``variance`` (k,) of a log of ``n`` readings, and what they are modelled by.
+
+    ``tolerance`` is the relative standard deviation of a point beyond chance: colouring bends a curve by a little.
+    """
+
+    clusters: FloatArray
+    variance: FloatArray
+    n: int
+    rate_hz: float
+    tolerance: float = 0.0
+
+    @cached_property
+    def tau_s(self) -> FloatArray:
+        """(k,) averaging times, s."""
+        return np.asarray(self.clusters / self.rate_hz)
+
+    @cached_property
+    def design(self) -> FloatArray:
+        """(k, 5) Allan variance of unit terms."""
+        return np.stack([allan_variance_of_terms(self.tau_s, term.value, 1.0) for term in TERMS], axis=1)
+
+    @cached_property
+    def _table(self) -> CurveCovariance:
+        return _tabulated(tuple(int(m) for m in self.clusters), self.n, self.rate_hz)
+
+    def from_point(self, first: int, tolerance: float) -> CurvePoints:
+        """The same without the first points."""
+        return CurvePoints(self.clusters[first:], self.variance[first:], self.n, self.rate_hz, tolerance)
+
+    def residuals(self, squares: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(k,) logarithms of the points over the model's, and their (k, k) covariance.
+
+        The logarithm of a chi-square over its ν degrees of freedom has the mean ψ(ν/2) - ln(ν/2), the variance ψ'(ν/2).
+        """
+        # Loaded here: a command that reads a log must not wait for it.
+        from scipy.special import digamma, polygamma
+
+        mean = self.design @ squares
+        relative = self._table.at(squares) / np.outer(mean, mean)
+        variance = np.diag(relative)
+        half = 1.0 / np.maximum(variance, 1e-12)
+        residual = np.log(self.variance / mean) - (digamma(half) - np.log(half))
+        scale = np.sqrt(polygamma(1, half) / variance)
+        covariance = relative * np.outer(scale, scale)
+        covariance[np.diag_indices_from(covariance)] *= 1.0 + 1e-6
+        covariance[np.diag_indices_from(covariance)] += (2.0 * self.tolerance) ** 2
+        return residual, covariance
+
+    def fit(self, active: Sequence[int], start: FloatArray, held: tuple[int, float] | None = None) -> CurveFit:
+        """Least deviance over the squares of ``active``, from ``start`` (5,); ``held`` fixes one of them."""
+        free = [k for k in active if held is None or k != held[0]]
+        squares = np.zeros(len(TERMS))
+        squares[list(active)] = np.maximum(start[list(active)], 1e-6 * self.alone()[list(active)])
+        if held is not None:
+            squares[held[0]] = held[1]
+        information = np.zeros((len(free), len(free)))
+        for _ in range(30):
+            residual, covariance = self.residuals(squares)
+            if not free:
+                break
+            share = self.design[:, free] * squares[free] / (self.design @ squares)[:, np.newaxis]
+            whitened = np.linalg.solve(covariance, share)
+            information = share.T @ whitened
+            damped = information + 1e-9 * np.eye(len(free)) * max(1e-12, float(np.trace(information)))
+            step = np.clip(np.linalg.solve(damped, whitened.T @ residual), -1.5, 1.5)
+            squares[free] *= np.exp(step)
+            squares[free] = np.maximum(squares[free], 1e-12 * self.alone()[free])
+            if np.max(np.abs(step)) < _CONVERGED:
+                break
+        residual, covariance = self.residuals(squares)
+        _, log_determinant = np.linalg.slogdet(covariance)
+        deviance = float(residual @ np.linalg.solve(covariance, residual) + log_determinant)
+        return CurveFit(tuple(active), squares, deviance, np.asarray(np.linalg.pinv(information)))
+
+    def misfit(self, squares: FloatArray) -> tuple[float, FloatArray]:
+        """χ² of the points about the model, and their deviations (k,) in sigmas."""
+        residual, covariance = self.residuals(squares)
+        chi2 = float(residual @ np.linalg.solve(covariance, residual))
+        return chi2, np.asarray(residual / np.sqrt(np.diag(covariance)))
+
+    def alone(self) -> FloatArray:
+        """(5,) largest square that each term could have: alone it would touch the lowest point."""
+        return np.asarray(np.min(self.variance[:, np.newaxis] / self.design, axis=0))
+
+    def select(self) -> tuple[CurveFit, FloatArray]:
+        """The subset of least deviance plus :data:`EVIDENCE` per term, and what each term earns (5,)."""
+        fits: dict[tuple[int, ...], CurveFit] = {}
+        largest = min(len(TERMS), len(self.clusters) - 1)
+        for size in range(1, largest + 1):
+            for active in combinations(range(len(TERMS)), size):
+                if active == (_RAMP,):  # a ramp alone has no scatter, and no log is without
+                    continue
+                fits[active] = self.fit(active, self.alone())
+        best = min(fits.values(), key=lambda fit: fit.deviance + EVIDENCE * len(fit.active))
+        earned = np.zeros(len(TERMS))
+        for k in range(len(TERMS)):
+            without, with_k = tuple(i for i in best.active if i != k), tuple(sorted({*best.active, k}))
+            if without not in fits:
+                earned[k] = math.inf
+            elif with_k in fits:
+                earned[k] = max(0.0, fits[without].deviance - fits[with_k].deviance)
+        return best, earned
+
+    def interval(self, fit: CurveFit, k: int, scale: float) -> tuple[float, float]:
+        """Squares between which the deviance of term ``k`` stays within the 95 % rise, times ``scale``.
+
+        For an absent term the lower end is zero and the upper one one-sided.
+        """
+        active = tuple(sorted({*fit.active, k}))
+        is_present = k in fit.active
+        least = fit if is_present else self.fit(active, fit.squares)
+        rise = scale * (_RISE_95 if is_present else _RISE_95_ONE_SIDED)
+        limit = min(least.deviance, fit.deviance) + rise
+        best = max(float(least.squares[k]), 1e-9 * float(self.alone()[k]))
+
+        def exceeds(log_ratio: float) -> bool:
+            square = best * math.exp(log_ratio)
+            return self.fit(active, least.squares, (k, square)).deviance > limit
+
+        up = _crossing(exceeds, 1.0)
+        down = _crossing(exceeds, -1.0) if is_present else -math.inf
+        return best * math.exp(down), best * math.exp(up)
+
+
+@lru_cache(maxsize=64)
+def _tabulated(clusters: tuple[int, ...], n: int, rate_hz: float) -> CurveCovariance:
+    """Shared by the channels of a log."""
+    return CurveCovariance.of(np.array(clusters, dtype=np.int64), n, rate_hz)
+
+
+def _crossing(exceeds: Callable[[float], bool], direction: float) -> float:
+    """Log ratio at which ``exceeds`` becomes true, going in ``direction``; to 0.2 %."""
+    inside, outside = 0.0, 0.05 * direction
+    while not exceeds(outside):
+        inside, outside = outside, 2.0 * outside
+        if abs(outside) > 60.0:
+            return outside
+    while abs(outside - inside) > 2e-3 * max(abs(inside), 0.05):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (inside, middle) if exceeds(middle) else (middle, outside)
+    return outside
+
+
+def chi_square_above(value: float, dof: float) -> float:
+    """Probability that a chi-square exceeds ``value``."""
+    return float(_core.chi_square_above(value, dof))

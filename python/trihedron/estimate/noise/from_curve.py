@@ -1,0 +1,189 @@
+"""Noise terms of published or stored Allan curves (docs/noise.md, section 5)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.estimate.noise import remarks
+from trihedron.estimate.noise.allan import check_question, curve_with_intervals
+from trihedron.estimate.noise.axis import LEAST_EDF
+from trihedron.estimate.noise.curve_terms import LEAST_EDF as LEAST_EDF_OF_A_POINT
+from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints, chi_square_above
+from trihedron.records.finding import Finding
+from trihedron.records.noise import AllanCurve, FloatArray, Noise, NoiseAxis, NoiseTerm, TermName
+
+FEWEST_POINTS = 6
+STEP = 1.9
+"""Ratio of neighbouring averaging times that are used: closer ones share nearly all their readings."""
+CHANCE = 1e-4
+"""Probability with which a curve of nothing but noise terms would be called something else."""
+MARGIN = 2
+TOLERANCE = 0.01
+"""Relative deviation that is allowed to every point of a curve that was found coloured somewhere."""
+
+
+def identify_curve(
+    tau_s: npt.ArrayLike,
+    deviation: npt.ArrayLike,
+    rate_hz: float,
+    n_samples: int,
+    *,
+    names: Sequence[str] = (),
+    units: Sequence[str] = (),
+    source: str = "curve",
+) -> Noise:
+    """Noise terms of overlapping Allan deviations of which the log is not at hand.
+
+    Parameters
+    ----------
+    tau_s : (k,)
+        Averaging times, s.
+    deviation : (k,) or (k, channels)
+        Overlapping Allan deviations in any unit; NaN where there is none.
+    rate_hz, n_samples
+        Of the log behind the curve: they decide how certain its points are.
+
+    Raises
+    ------
+    ValueError
+        With fewer than six usable points, or times that no whole number of readings makes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> tau = 0.01 * 2.0 ** np.arange(16)
+    >>> noise = identify_curve(tau, 0.02 / np.sqrt(tau), rate_hz=100.0, n_samples=1_000_000)
+    >>> round(noise.axes[0].value("N"), 4), noise.axes[0].terms["K"].is_present
+    (0.02, False)
+    """
+    check_question(rate_hz, "overlapping", 0.95)
+    tau, sigma = np.asarray(tau_s, dtype=np.float64), np.asarray(deviation, dtype=np.float64)
+    sigma = sigma[:, np.newaxis] if sigma.ndim == 1 else sigma
+    if tau.ndim != 1 or sigma.ndim != 2 or len(tau) != len(sigma):
+        raise ValueError(f"tau_s (k,) and deviation (k, channels) must fit, got {tau.shape} and {sigma.shape}")
+    order = np.argsort(tau)
+    tau, sigma = tau[order], sigma[order]
+    clusters = np.round(tau * rate_hz).astype(np.int64)
+    if np.any(clusters < 1) or np.any(np.abs(clusters / rate_hz - tau) > 0.02 * tau):
+        raise ValueError(
+            f"averaging times are whole numbers of readings: at {rate_hz:g} Hz these are not; check --rate"
+        )
+    kept = np.concatenate([[True], np.diff(clusters) > 0]) & (2 * clusters <= n_samples)
+    tau, sigma, clusters = tau[kept], sigma[kept], clusters[kept]
+    channels = sigma.shape[1]
+    terms = np.repeat((n_samples - 2 * clusters + 1)[:, np.newaxis], channels, axis=1)
+    curve = curve_with_intervals(
+        "overlapping",
+        rate_hz,
+        n_samples,
+        clusters,
+        sigma**2,
+        terms,
+        terms.astype(np.float64),
+        0.95,
+        tuple(names),
+        tuple(units),
+    )
+    return Noise(tuple(_axis(curve, c) for c in range(channels)), curve, source, findings=(remarks.curve_alone(),))
+
+
+def _axis(curve: AllanCurve, channel: int) -> NoiseAxis:
+    points = _usable(curve, channel)
+    found = _screened(points)
+    points, fit, scale = found.points, found.fit, found.scale
+    terms = {}
+    for k, term in enumerate(TERMS):
+        low, high = (math.sqrt(square) for square in points.interval(fit, k, scale))
+        if k in fit.active:
+            value = math.sqrt(fit.squares[k])
+            place = fit.active.index(k)
+            error = 0.5 * value * math.sqrt(scale * fit.covariance[place, place])
+            terms[term] = NoiseTerm(term, True, value, error, low, high, high, found.evidence[k])
+        else:
+            terms[term] = NoiseTerm(term, False, 0.0, 0.0, 0.0, high, high, found.evidence[k])
+    usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
+    first = float(points.tau_s[0])
+    axis = NoiseAxis(
+        name=curve.names[channel],
+        unit=curve.units[channel],
+        rate_hz=curve.rate_hz,
+        n_samples=curve.n_samples,
+        duration_s=curve.n_samples / curve.rate_hz,
+        mean=math.nan,
+        sample_sigma=float(curve.deviation[0, channel]) * math.sqrt(float(curve.clusters[0])),
+        resolution=0.0,
+        terms=MappingProxyType(terms),
+        lowest_hz=0.5 / float(points.tau_s[-1]),
+        highest_hz=0.5 / first,
+        longest_tau_s=float(usable[-1]) if len(usable) else 0.0,
+        covariance_scale=scale,
+    )
+    ramp = [remarks.curve_ramp()] if terms[TermName.RATE_RAMP].is_present else []
+    return replace(axis, findings=(*found.findings, *ramp, *remarks.about_terms(axis)))
+
+
+def _usable(curve: AllanCurve, channel: int) -> CurvePoints:
+    """Points about an octave apart with degrees of freedom to speak of."""
+    good = np.isfinite(curve.deviation[:, channel]) & (curve.deviation[:, channel] > 0.0)
+    good &= curve.edf[:, channel] >= LEAST_EDF_OF_A_POINT
+    chosen: list[int] = []
+    for i in np.flatnonzero(good).tolist():
+        if not chosen or curve.clusters[i] >= STEP * curve.clusters[chosen[-1]]:
+            chosen.append(i)
+    if len(chosen) < FEWEST_POINTS:
+        raise ValueError(
+            f"{curve.names[channel]}: {len(chosen)} points about an octave apart are too few to tell noise terms "
+            f"apart; at least {FEWEST_POINTS} are needed"
+        )
+    return CurvePoints(
+        curve.clusters[chosen].astype(np.float64), curve.variance[chosen, channel], curve.n_samples, curve.rate_hz
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    points: CurvePoints
+    fit: CurveFit
+    evidence: FloatArray
+    scale: float
+    findings: list[Finding]
+
+
+def _screened(points: CurvePoints) -> _Found:
+    """Leave out short averaging times that no sum of terms explains; allow for what else they miss."""
+    findings: list[Finding] = []
+    first, most = 0, len(points.clusters) - FEWEST_POINTS
+    used = points
+    while first < most and _is_unlikely(used):
+        first += 1
+        used = points.from_point(first, TOLERANCE)
+    if _is_unlikely(used) and first == most:
+        # Dropping helped nothing: whatever it is does not sit at the short end.
+        first, used = 0, points.from_point(0, TOLERANCE)
+    if first:
+        # What bends the curve fades by half an octave by octave: two more take it below the tolerance.
+        first = min(first + MARGIN, most)
+        used = points.from_point(first, TOLERANCE)
+        findings.append(remarks.curve_coloured(float(used.tau_s[0])))
+    fit, evidence = used.select()
+    chi2, z = used.misfit(fit.squares)
+    dof = len(used.clusters) - len(fit.active)
+    scale = 1.0
+    if chi_square_above(chi2, dof) < CHANCE:
+        scale = chi2 / dof
+        worst = int(np.argmax(np.abs(z)))
+        share = math.sqrt(used.variance[worst] / float(used.design[worst] @ fit.squares)) - 1.0
+        findings.append(remarks.curve_unexplained(share, float(used.tau_s[worst])))
+    return _Found(used, fit, evidence, scale, findings)
+
+
+def _is_unlikely(points: CurvePoints) -> bool:
+    everything = points.fit(range(len(TERMS)), points.alone())
+    chi2, _ = points.misfit(everything.squares)
+    return chi_square_above(chi2, max(1, len(points.clusters) - len(TERMS))) < CHANCE

@@ -1,0 +1,115 @@
+"""Noise for machines: one JSON record with every number and its unit, and the Allan curve as a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from typing import Any
+
+from trihedron.records import Noise, NoiseAxis, TermName
+from trihedron.report.noise import PER_UNIT, customary, kalibr_rows
+
+Lengths = Mapping[str, Mapping[TermName, float | None]]
+
+
+def noise_record(noise: Noise, lengths: Lengths | None = None, accuracy: float = 0.1) -> dict[str, Any]:
+    """All that the report says, values in SI (or the log's own unit) with the unit beside them.
+
+    ``lengths`` are seconds of recording after which each term of each axis is known to ``accuracy``.
+    """
+    return {
+        "source": noise.source,
+        "rate_hz": noise.curve.rate_hz,
+        "n_samples": noise.curve.n_samples,
+        "excluded_s": [list(stretch) for stretch in noise.excluded_s],
+        "breaks_s": list(noise.breaks_s),
+        "accuracy": accuracy,
+        "axes": [_axis_record(axis, (lengths or {}).get(axis.name, {})) for axis in noise.axes],
+        "kalibr": {key: words.split()[0] for key, words in kalibr_rows(noise).items()},
+        "curve": {
+            "kind": noise.curve.kind,
+            "confidence": noise.curve.confidence,
+            "stride": noise.curve.stride,
+            "tau_s": noise.curve.tau_s.tolist(),
+            "cluster": noise.curve.clusters.tolist(),
+            "axes": [
+                {
+                    "name": name,
+                    "unit": noise.curve.units[c],
+                    "deviation": noise.curve.deviation[:, c].tolist(),
+                    "lower": noise.curve.lower[:, c].tolist(),
+                    "upper": noise.curve.upper[:, c].tolist(),
+                    "edf": noise.curve.edf[:, c].tolist(),
+                    "n_terms": noise.curve.n_terms[:, c].tolist(),
+                }
+                for c, name in enumerate(noise.curve.names)
+            ],
+        },
+        "findings": [finding.to_dict() for finding in noise.findings],
+    }
+
+
+def _axis_record(axis: NoiseAxis, lengths: Mapping[TermName, float | None]) -> dict[str, Any]:
+    terms = {}
+    for term in TermName:
+        found = axis.terms[term]
+        entry: dict[str, Any] = {
+            "present": found.is_present,
+            "value": found.value,
+            "sigma": found.sigma,
+            "lower": found.lower,
+            "upper": found.upper,
+            "limit": found.limit,
+            "evidence": found.evidence,
+            "unit": f"{axis.unit}{PER_UNIT[term]}",
+        }
+        usual = customary(term, axis.unit)
+        if usual is not None:
+            entry["customary"] = {"name": usual[0], "unit": usual[1], "value": usual[2] * found.value}
+        if term in lengths:
+            entry["recording_length_s"] = lengths[term]
+        terms[term.value] = entry
+    best = axis.optimal_averaging()
+    return {
+        "name": axis.name,
+        "unit": axis.unit,
+        "mean": axis.mean,
+        "sample_sigma": axis.sample_sigma,
+        "resolution": axis.resolution,
+        "terms": terms,
+        "gauss_markov": None if axis.gauss_markov is None else dict(vars(axis.gauss_markov)),
+        "lines": [dict(vars(line)) for line in axis.lines],
+        "lowest_hz": axis.lowest_hz,
+        "highest_hz": axis.highest_hz,
+        "optimal_tau_s": None if best is None else best[0],
+        "least_deviation": None if best is None else best[1],
+        "longest_tau_s": axis.longest_tau_s,
+        "covariance_scale": axis.covariance_scale,
+        "findings": [finding.to_dict() for finding in axis.findings],
+    }
+
+
+def curve_csv(noise: Noise) -> str:
+    """The Allan curve as a table: tau, cluster, then deviation, interval, degrees of freedom, terms of every axis."""
+    curve = noise.curve
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    head = ["tau_s", "cluster"]
+    for name, unit in zip(curve.names, curve.units, strict=True):
+        key = name.replace(" ", "_")
+        head += [
+            f"{key}_deviation[{unit}]",
+            f"{key}_lower[{unit}]",
+            f"{key}_upper[{unit}]",
+            f"{key}_edf",
+            f"{key}_terms",
+        ]
+    writer.writerow(head)
+    for i, tau in enumerate(curve.tau_s):
+        row = [f"{tau:.9g}", str(int(curve.clusters[i]))]
+        for c in range(curve.n_channels):
+            cells = (curve.deviation[i, c], curve.lower[i, c], curve.upper[i, c], curve.edf[i, c])
+            row += [*(f"{float(v):.9g}" for v in cells), str(int(curve.n_terms[i, c]))]
+        writer.writerow(row)
+    return out.getvalue()
