@@ -21,6 +21,8 @@ READOUT_SAMPLE = 200_000
 """Readings from which resolution, noise and saturation are judged."""
 MOST_EVENTS = 500
 """Events of one axis that are looked at, the strongest first."""
+STEP_REACHES = (4, 16, 64)
+"""Over how many of its own widths a step must hold its level on either side."""
 _MAD_TO_SIGMA = 1.4826
 
 
@@ -56,18 +58,24 @@ def steps_and_knocks(x: FloatArray) -> tuple[list[Event], list[Event]]:
         if any(a - 2 * width <= at <= b + 2 * width for a, b in taken):
             continue
         reach = 4 * width
-        before = _mean(x[max(0, at - reach) : max(1, at - width // 4)])
-        after = _mean(x[min(n - 1, at + width + width // 4) : min(n, at + reach + width)])
+        levels = [_level_change(x, at, width, times * width) for times in STEP_REACHES if times * width < n // 4]
         slack = max(width // 4, 2)
-        # A step keeps at least half of what it jumped; a knock comes back.
-        if abs(after - before) > 0.5 * abs(jump) and at + reach < n and at > reach:
-            steps.append(Event(max(0, at - slack), min(n, at + slack), float(after - before), score_ratio))
+        # A step keeps at least half of what it jumped, for long; a knock comes back, be it after a while.
+        if at + reach < n and at > reach and all(change / jump > 0.5 for change in levels):
+            steps.append(Event(max(0, at - slack), min(n, at + slack), levels[0], score_ratio))
             taken.append((at - 2 * width, at + 2 * width))
         else:
             start, stop = max(0, at - width - slack), min(n, at + 2 * width + slack)
             knocks.append(Event(start, stop, jump, score_ratio))
             taken.append((start, stop))
     return sorted(steps, key=lambda e: e.start), sorted(knocks, key=lambda e: e.start)
+
+
+def _level_change(x: FloatArray, at: int, width: int, reach: int) -> float:
+    """Mean of the ``reach`` readings after the jump at ``at``, itself ``width`` wide, less that of those before."""
+    before = _mean(x[max(0, at - reach) : max(1, at - width // 4)])
+    after = _mean(x[min(len(x) - 1, at + width + width // 4) : min(len(x), at + reach + width)])
+    return after - before
 
 
 def shaken(x: FloatArray, rate_hz: float) -> list[Event]:
