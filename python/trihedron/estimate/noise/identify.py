@@ -134,6 +134,8 @@ def _screen(
         for knock in knocks:
             calm[knock.start : knock.stop] = np.nan
         shocks = shaken(calm, rate_hz)
+        # What jumps while it is shaken is shaking.
+        steps = [s for s in steps if not any(e.start <= s.start and s.stop <= e.stop for e in shocks)]
         findings += remarks.events(steps, knocks, shocks, rate_hz, unit)
         cuts = merged([(e.start, e.stop) for e in (*shocks, *knocks)])
         share = sum(stop - start for start, stop in cuts) / len(column)
