@@ -45,7 +45,7 @@ _PHASE: tuple[Callable[[FloatArray], FloatArray], ...] = (_wiener, _flicker, _in
 
 @dataclass(frozen=True, eq=False)
 class CurveCovariance:
-    """Covariance per product of squares: ``pairs`` (4, 4, k, k) of Q, N, B, K; ``with_ramp`` (4, k, k) of R with each."""
+    """Covariance per product of squares, ``pairs`` (4, 4, k, k) of Q, N, B, K and ``with_ramp`` (4, k, k) of R."""
 
     pairs: FloatArray
     with_ramp: FloatArray
