@@ -29,7 +29,7 @@ from trihedron.diagnose.selection import (
     score_all,
 )
 from trihedron.diagnose.solve import Fit, Prediction, predict_held_out, tune_noise
-from trihedron.diagnose.starting_point import linear_model, prior_of, start_twin
+from trihedron.diagnose.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
 from trihedron.diagnose.timing import test_timing
 from trihedron.diagnose.twin import NO_DISTORTION, PRIOR, Distortion, Prior, Twin, stacked
 from trihedron.diagnose.within_static import test_within_static
@@ -112,6 +112,8 @@ def diagnose_recording(
     obs = observe(recording, segments)
     start = start_twin(obs, calibration)
     prior = prior_of(obs, calibration) if calibration_is_given else None
+    if prior is None and is_open(calibration):
+        start, prior = nominal_start(obs, calibration)
     run = _run(obs, start, prior, alpha, lambda done, text: tell(0.6 * done, text))
     widened = _widened(obs, run.remaining)
     if widened is not obs:

@@ -26,10 +26,14 @@ N_ACCEL, N_GYRO, N_HOLD = 9, 9, 8
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """A given calibration: values the fit is pulled to with their covariance (18 unknowns, centred model)."""
+    """Values the fit is pulled to with their covariance (18 unknowns, centred model).
+
+    A given calibration, which the recording may contradict, or, if ``is_weak``, what holds for any such instrument.
+    """
 
     mean: FloatArray
     covariance: FloatArray
+    is_weak: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,7 +367,8 @@ class Linearisation:
             rows_r.append(W @ (current - self.prior.mean))
             rows_j.append(J)
             # Where a given calibration is contradicted, its sensor's own domain says so.
-            label += [(STATIC_ACCEL, 0, k % 3, 3) for k in range(9)] + [(MOVES, 0, k % 3, 3) for k in range(9)]
+            blamed = (PRIOR, PRIOR) if self.prior.is_weak else (STATIC_ACCEL, MOVES)
+            label += [(blamed[0], 0, k % 3, 3) for k in range(9)] + [(blamed[1], 0, k % 3, 3) for k in range(9)]
         labels = np.array(label)
         jacobian = np.vstack(rows_j)
         return System(

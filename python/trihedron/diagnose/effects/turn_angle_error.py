@@ -7,7 +7,8 @@ from scipy.special import chdtrc
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.table_turns import NEAR_DEG, meant_as_multiples, table_turns
+from trihedron.diagnose.effects.table_turns import NEAR_DEG, TableTurn, meant_as_multiples, table_turns
+from trihedron.diagnose.observations import FloatArray
 from trihedron.records.diagnosis import EffectParameter, Where
 
 
@@ -25,18 +26,8 @@ class TurnAngleError(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         turns = table_turns(context)
-        cov = context.fitted.covariance()[9:18, 9:18]
-        raw_scale = np.linalg.norm(np.linalg.inv(context.fitted.twin.gyro_S), axis=1).mean()
-        scale_sigma = float(np.sqrt(np.mean(np.diag(cov)[[0, 4, 8]])) * raw_scale)
-        noise = context.noise_floor[1].mean() / np.sqrt(context.obs.recording.rate_hz)
-        errors, sigmas = [], []
-        for turn in turns:
-            where = context.moves[turn.move]
-            duration = float(context.time_s[where.stop - 1] - context.time_s[where.start])
-            errors.append(turn.error_rad)
-            # A common scale error of up to a few sigma cannot pass for wrong turns: it grows with the angle.
-            sigmas.append(float(np.hypot(3.0 * scale_sigma * abs(turn.angle_rad), noise * np.sqrt(duration))) + 1e-3)
-        z = np.array(errors) / np.array(sigmas)
+        errors, sigmas = _without_common_scale(context, turns)
+        z = errors / sigmas
         chi2 = float((z**2).sum())
         p = float(chdtrc(len(z), chi2))
         bad = np.flatnonzero(np.abs(z) > 4.0)
@@ -56,3 +47,31 @@ class TurnAngleError(DirectEffect):
             f"{max(abs(np.degrees(errors[k])) for k in bad):.1f}°, others within {NEAR_DEG:.0f}°).",
             "moves", Where(("gx", "gy", "gz"), tuple(f"move {turns[k].move}" for k in bad), spans),
         )  # fmt: skip
+
+
+def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[FloatArray, FloatArray]:
+    """Errors of the turns with what one wrong scale per body axis would make of them taken out, and their noise [rad].
+
+    A scale error grows with the angle and is the same for every turn about an axis; the median of error over angle is
+    not bent by single wrong turns.
+    """
+    noise = context.noise_floor[1].mean() / np.sqrt(context.obs.recording.rate_hz)
+    axes = np.array(
+        [int(np.abs(context.fitted.twin.up[context.obs.move_holds[turn.move][0]]).argmax()) for turn in turns]
+    )
+    errors, angles = np.array([turn.error_rad for turn in turns]), np.array([turn.angle_rad for turn in turns])
+    sigmas = np.zeros(len(turns))
+    for k, turn in enumerate(turns):
+        where = context.moves[turn.move]
+        duration = float(context.time_s[where.stop - 1] - context.time_s[where.start])
+        sigmas[k] = np.hypot(noise * np.sqrt(duration), 1e-3)
+    for axis in range(3):
+        rows = axes == axis
+        if rows.sum() < 3:
+            continue
+        ratio, weight = errors[rows] / angles[rows], np.abs(angles[rows])
+        order = np.argsort(ratio)
+        heavy = np.cumsum(weight[order])
+        common = float(ratio[order][np.searchsorted(heavy, 0.5 * heavy[-1])])
+        errors[rows] -= common * angles[rows]
+    return errors, sigmas
