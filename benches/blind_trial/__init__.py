@@ -1,0 +1,1 @@
+"""Blind trial of the diagnosis: recordings with a sealed flaw (draw, foreign), and how answers are scored."""
