@@ -96,7 +96,7 @@ def scale_by_force(truth: Truth, along: FloatArray, noise: float, rng: np.random
     out = np.zeros_like(along)
     moving = np.abs(along[:, k]) > 0.2
     typical = float(np.sqrt(np.mean((f * along[:, k])[moving] ** 2)))
-    out[:, k] = rng.choice((-1.0, 1.0)) * rng.uniform(20, 40) * noise / typical * f * along[:, k]
+    out[:, k] = rng.choice((-1.0, 1.0)) * rng.uniform(60, 120) * noise / typical * f * along[:, k]
     return out
 
 
