@@ -1,0 +1,134 @@
+"""Tempting wrong answers: the recording holds A and B would almost do. Right is A, or both with what separates them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.simulate import (
+    Environment,
+    Scenario,
+    Temperature,
+    hand_session,
+    profile_by_name,
+    simulate,
+    with_effect,
+)
+
+WARMING = Environment(temperature=Temperature(warm_up_k=12.0, warm_up_tau_s=120.0, logged=True))
+
+
+def session(grade="mpu", seed=1, n_poses=20, hold_s=3.5, move_s=2.0):
+    profile = profile_by_name(grade)
+    accelerometer, gyroscope = profile.unit(seed)
+    if grade == "mpu":
+        # The ±500 °/s range: no move runs into its end by accident.
+        wide = tuple(tuple(2.0 * v for v in row) for row in gyroscope.S)
+        gyroscope = replace(gyroscope, S=wide)
+    motion = hand_session(n_poses, hold_s=hold_s, move_s=move_s, first_hold_s=10.0, layout=seed)
+    return Scenario(motion, "session", accelerometer, gyroscope, profile.clock)
+
+
+def diagnosed(scenario, seed=1, **how):
+    recording, truth = simulate(scenario, seed)
+    return trihedron.diagnose(recording, gravity_m_s2=truth.gravity_m_s2, **how)
+
+
+def assert_not_taken_in(diagnosis, right):
+    """The first answer is ``right``, or names it beside itself together with an experiment."""
+    assert diagnosis.verdict == "missing-physics"
+    first = diagnosis.effects[0]
+    if first.id != right:
+        assert right in first.confounded_with, f"said {first.id}, confounded with {first.confounded_with}"
+        assert first.separating_experiment
+
+
+# Name → (grade, environment, what the recording holds, its size). The one that would almost do is in the name.
+MECHANISMS = {
+    "bias with the temperature, not with time": (
+        "mpu", WARMING, "accel-thermal-bias", {"per_k": (0.009, -0.008, 0.01), "warm_up_tau_s": 120.0},
+    ),
+    "drift in time, not with a temperature of another course": (
+        "mpu", WARMING, "accel-hidden-drift", {"amplitude": (0.06, -0.05, 0.06), "tau_s": 35.0},
+    ),
+    "drift in time with the very course of the temperature": (
+        "mpu", WARMING, "accel-hidden-drift", {"amplitude": (0.06, -0.05, 0.06), "tau_s": 120.0},
+    ),
+    "gyro bias with the temperature, not with time": (
+        "mpu", WARMING, "gyro-thermal-bias", {"per_k": (5e-4, -4e-4, 6e-4), "warm_up_tau_s": 120.0},
+    ),
+    "a square, not a modulus": ("mpu", None, "accel-quadratic", {"k2": (3e-4, -2.5e-4, 2.5e-4)}),
+    "a modulus, not a square": ("mpu", None, "accel-scale-asymmetry", {"asymmetry": (1.5e-3, -2e-3, 1.5e-3)}),
+    "a cube, not a range limit": ("mpu", None, "accel-cubic", {"k3": (3e-5, 4e-5, 3e-5)}),
+    "the Earth, not force on the gyro": ("tactical", None, "earth-rate", {"latitude_deg": 65.0, "heading_deg": 40.0}),
+    "force on the gyro, not the Earth": (
+        "tactical", None, "gyro-g-sensitivity",
+        {"matrix": ((7e-6, 0.0, 2e-6), (0.0, -7e-6, 0.0), (-3e-6, 0.0, 7e-6))},
+    ),
+    # Equal on all axes, this is a rate along the vertical: the Earth seen from its pole.
+    "force on the gyro that is exactly a vertical Earth rate": (
+        "tactical", None, "gyro-g-sensitivity",
+        {"matrix": ((7.436e-6, 0.0, 0.0), (0.0, 7.436e-6, 0.0), (0.0, 0.0, 7.436e-6))},
+    ),
+    "a range limit, not a bent scale": ("mpu", None, "gyro-saturation", {"limit": 2.6}),
+    "a bent scale, not a range limit": ("mpu", None, "gyro-scale-nonlinearity", {"c3": (1.2e-3, 1e-3, 1.3e-3)}),
+    "lost samples, not a scale": ("mpu", None, "dropped-samples", {}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_it_is(name):
+    grade, environment, effect, size = MECHANISMS[name]
+    scenario = session(grade)
+    if environment is not None:
+        scenario = replace(scenario, environment=environment)
+    if effect == "dropped-samples":
+        # Lost while nothing moves, samples leave no trace: the loss is put into the middle of a move.
+        move = next(s for s in simulate(scenario, 1)[1].segments if s.kind == "move" and s.start_s > 40.0)
+        size = {"losses": [(0.5 * (move.start_s + move.stop_s), 14)]}
+    assert_not_taken_in(diagnosed(with_effect(scenario, effect, **size)), effect)
+
+
+@pytest.mark.parametrize(
+    ("variant", "size"),
+    [
+        ("play", {"offset_m_s2": (0.015, 0.02, 0.015), "width_m_s2": 2.0}),
+        ("creep", {"creep_fraction": (4e-3, 5e-3, 4e-3), "creep_tau_s": 6.0}),
+    ],
+)
+def test_play_and_creep_are_told_apart(variant, size):
+    scenario = with_effect(session(hold_s=6.0), "accel-hysteresis", **size)
+    first = diagnosed(scenario).effects[0]
+    assert first.id == "accel-hysteresis"
+    assert first.model["variant"] == variant
+
+
+def test_a_wrong_scale_is_not_lost_samples():
+    scenario = session()
+    known = trihedron.calibrate(simulate(scenario, 1)[0], gravity_m_s2=9.80665).calibration
+    # A part whose gyro scale has moved by half a per cent since it was calibrated: every fast turn ends too far.
+    wrong = replace(known, gyroscope=replace(known.gyroscope, S=1.005 * known.gyroscope.S))
+    found = diagnosed(scenario, seed=2, calibration=wrong)
+    assert found.verdict != "consistent"
+    assert not {"dropped-samples", "timing-jitter"} & {effect.id for effect in found.effects}
+
+
+def test_one_bad_pose_is_one_bad_pose():
+    scenario = session()
+    recording, truth = simulate(scenario, 1)
+    hold = [s for s in truth.segments if s.kind == "hold"][9]
+    # A steady push in one pose, eight times the noise of its mean, seen by no gyro.
+    push = np.zeros_like(recording.accelerometer)
+    push[hold.start : hold.stop] = np.linalg.solve(truth.accelerometer_S, (0.03, -0.05, 0.04))
+    found = trihedron.diagnose(
+        replace(recording, accelerometer=recording.accelerometer + np.round(push)), gravity_m_s2=truth.gravity_m_s2
+    )
+    assert_not_taken_in(found, "disturbed-pose")
+    poses = [p.value for e in found.effects if e.id == "disturbed-pose" for p in e.parameters if p.name == "pose"]
+    assert poses == [9.0]
+
+
+def test_a_pushed_pose_is_not_a_bent_sensor():
+    pushed = with_effect(session("adis"), "disturbed-pose", poses=[7], tilt_deg=1.5, shift_m=0.002)
+    assert_not_taken_in(diagnosed(pushed), "disturbed-pose")
