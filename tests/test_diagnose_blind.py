@@ -1,0 +1,105 @@
+"""The blind trial in small: healthy sessions pass, a handful of drawn flaws is named, the bench itself is sound."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
+
+import trihedron
+from blind_trial.draw import GRADES, Job, make
+from blind_trial.foreign import FOREIGN
+from blind_trial.score import scored, trial, wilson
+from blind_trial.sizes import SIZES, may_be_paired
+from blind_trial.visibility import ideal_sigma, is_visible
+from trihedron.diagnose.effects import catalogue
+from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
+
+
+def test_healthy_sessions_are_consistent_at_the_stated_rate():
+    wrong = 0
+    for k in range(12):
+        profile = profile_by_name(GRADES[k % 3])
+        motion = hand_session(18, hold_s=3.0, move_s=2.2, first_hold_s=8.0, layout=k)
+        recording, truth = simulate(Scenario(motion, "healthy", *profile.unit(k), profile.clock), k)
+        wrong += trihedron.diagnose(recording, gravity_m_s2=truth.gravity_m_s2).verdict != "consistent"
+    # At the promised 3 % more than this many of 12 come up once in 500 runs.
+    assert wrong <= binom.ppf(0.998, 12, 0.03)
+
+
+@pytest.mark.parametrize(
+    ("effect", "grade", "seed"),
+    [
+        ("accel-thermal-scale", "adis", 1),
+        ("gyro-thermal-bias", "tactical", 2),
+        ("accel-hysteresis", "mpu", 3),
+        ("lever-arm", "adis", 4),
+    ],
+)
+def test_a_drawn_flaw_is_named_with_its_size(effect, grade, seed):
+    result = trial(Job((effect,), grade, seed))
+    assert result["score"] == "right"
+    # Up to six numbers with honest errors: 4 sigma is passed by chance once in 2600.
+    assert max(abs(z) for _, z in result["z"]) < 4.0
+
+
+def test_every_effect_of_the_catalogue_is_drawn():
+    # What a user adds for himself has no mechanism in the simulator.
+    assert set(SIZES) <= {effect.id for effect in catalogue()}
+    assert {effect.id for effect in catalogue()} - set(SIZES) == set()
+
+
+@pytest.mark.parametrize("effect", SIZES)
+def test_a_draw_repeats_and_its_answer_is_sealed_in_the_names_of_the_diagnosis(effect):
+    recording, _, answer = make(Job((effect,), "mpu", 7))
+    again, _, _ = make(Job((effect,), "mpu", 7))
+    assert np.array_equal(recording.accelerometer, again.accelerometer)
+    assert all(np.isfinite(value) for value in answer["parameters"][effect].values())
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_foreign_mechanism_changes_its_own_sensor_only(name):
+    flawed, _, answer = make(Job((), "mpu", 3, 1.0, name))
+    healthy, _, _ = make(Job((), "mpu", 3, 0.0, name))
+    other = {"accelerometer": "gyroscope", "gyroscope": "accelerometer"}[FOREIGN[name].sensor]
+    assert np.array_equal(getattr(flawed, other), getattr(healthy, other))
+    assert not np.array_equal(getattr(flawed, FOREIGN[name].sensor), getattr(healthy, FOREIGN[name].sensor))
+    assert answer["expected_domains"]
+
+
+def test_the_earth_is_hidden_from_an_industrial_gyro_and_plain_to_a_tactical_one():
+    visible = {}
+    for grade in ("adis", "tactical"):
+        profile = profile_by_name(grade)
+        healthy = Scenario(hand_session(24), "healthy", *profile.unit(1), profile.clock)
+        sigma = ideal_sigma("earth-rate", healthy, {"latitude_deg": 55.0, "heading_deg": 10.0}, 1)
+        visible[grade] = is_visible("earth-rate", sigma)
+    assert visible == {"adis": False, "tactical": True}
+
+
+def test_pairs_have_signatures_of_their_own():
+    assert not may_be_paired("accel-quadratic", "accel-scale-asymmetry")
+    assert not may_be_paired("quantisation", "accel-cubic")
+    assert may_be_paired("accel-cubic", "gyro-g-sensitivity")
+
+
+def test_an_answer_behind_a_saturation_that_is_true_is_right_and_behind_another_it_is_not():
+    result = {
+        "effects": ["accel-cubic"], "foreign": "", "ideal": {"accel-cubic": 40.0}, "verdict": "missing-physics",
+        "found": ["gyro-saturation", "accel-cubic"], "confounded": [[], []], "also": ["gyro-saturation"],
+    }  # fmt: skip
+    assert scored(result) == "right"
+    assert scored(result | {"also": []}) == "second"
+    assert scored(result | {"found": ["accel-quadratic"], "confounded": [["accel-cubic"]]}) == "confounded"
+    assert scored(result | {"found": ["accel-quadratic"], "confounded": [[]]}) == "wrong"
+    assert scored(result | {"found": [], "confounded": []}) == "missed"
+    assert scored(result | {"found": [], "confounded": [], "ideal": {"accel-cubic": 3.0}}) == "hidden"
+
+
+def test_the_interval_of_a_share_is_wilsons():
+    # Wilson (1927) as tabulated by Brown, Cai and DasGupta (2001): 0 of 10 and 5 of 10 at 95 %.
+    assert np.allclose(wilson(0, 10), (0.0, 27.75), atol=0.01)
+    assert np.allclose(wilson(5, 10), (23.66, 76.34), atol=0.01)
