@@ -67,7 +67,7 @@ def _without_common_scale(context: Context, turns: list[TableTurn]) -> tuple[Flo
         sigmas[k] = np.hypot(noise * np.sqrt(duration), 1e-3)
     for axis in range(3):
         rows = axes == axis
-        if rows.sum() < 3:
+        if rows.sum() < 2:
             continue
         ratio, weight = errors[rows] / angles[rows], np.abs(angles[rows])
         order = np.argsort(ratio)
