@@ -2,9 +2,11 @@
 
 python benches/allan_stream.py             1e9 readings, about two minutes
 python benches/allan_stream.py 1e8
+python benches/allan_stream.py 1e9 FILE.npy    through a file of that name (8 GB), as `trihedron allan --stream` reads it
 """
 
 import resource
+import subprocess
 import sys
 import time
 
@@ -29,8 +31,28 @@ def chunks(n, size=1 << 20):
         yield 9.81 + N * np.sqrt(RATE) * stored[at : at + k] + walk
 
 
+def through_file(n, path):
+    """The same log as a .npy file, by the command, in a process of its own."""
+    log = np.lib.format.open_memmap(path, mode="w+", dtype=np.float64, shape=(n, 1))
+    at = 0
+    for part in chunks(n):
+        log[at : at + len(part), 0] = part
+        at += len(part)
+    del log
+    command = "import sys; from trihedron.cli import main; sys.exit(main(sys.argv[1:]))"
+    said = ["--stream", "--columns", "az", "--rate", str(RATE), "--accel-unit", "m/s^2"]
+    began = time.perf_counter()
+    subprocess.run([sys.executable, "-c", command, "allan", path, *said], check=True)
+    spent = time.perf_counter() - began
+    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
+    print(f"{n:.0e} readings from {path}: {spent:.1f} s, largest resident set of the command {peak:.2f} GiB")
+
+
 def main():
     n = int(float(sys.argv[1])) if len(sys.argv) > 1 else 1_000_000_000
+    if len(sys.argv) > 2:
+        through_file(n, sys.argv[2])
+        return
     began = time.perf_counter()
     for _ in chunks(n):
         pass

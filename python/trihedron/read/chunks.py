@@ -30,8 +30,7 @@ class ChunkedLog:
         picked = list(self.columns)
         if self.array is not None:
             everything = picked == list(range(self.array.shape[1]))
-            for start in range(0, self.n_rows, rows):
-                part = self.array[start : start + rows]
+            for part in _pieces(self.path, self.array, rows):
                 yield np.ascontiguousarray(part if everything else part[:, picked])
             return
         import polars
@@ -47,6 +46,23 @@ class ChunkedLog:
         if self.array is not None and list(self.columns) == list(range(self.array.shape[1])):
             return self.array
         return np.concatenate(list(self.chunks()))
+
+
+def _pieces(path: Path, array: npt.NDArray[np.float64], rows: int) -> Iterator[npt.NDArray[np.float64]]:
+    """Rows of a mapped array, read rather than mapped: pages once mapped would count as memory until the end."""
+    if not (isinstance(array, np.memmap) and array.flags.c_contiguous):
+        for start in range(0, len(array), rows):
+            yield array[start : start + rows]
+        return
+    width = array.shape[1]
+    with path.open("rb") as stream:
+        stream.seek(array.offset)
+        for start in range(0, len(array), rows):
+            count = min(rows, len(array) - start)
+            part = np.fromfile(stream, dtype=array.dtype, count=count * width)
+            if len(part) < count * width:
+                raise ReadError(f"{path}: the file became shorter while it was read; copy it again.")
+            yield part.reshape(count, width)
 
 
 def open_chunks(path: Path, columns: str) -> ChunkedLog:

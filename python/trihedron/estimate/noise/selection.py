@@ -164,11 +164,15 @@ def select(
 
 
 def _cornered(bands: Sequence[Ordinates], strength: Sequence[float]) -> list[npt.NDArray[np.bool_]]:
-    """Ordinates in which the unpaired first and last phase of quantisation weigh: all share two random numbers."""
+    """Ordinates in which the unpaired first and last phase of quantisation weigh: all share two random numbers.
+
+    The first ordinate of a band stays: alone it shares them with none, and it is where a ramp shows.
+    """
     out = []
     for band in bands:
         expectation = np.asarray(strength) @ band.basis
-        out.append(strength[0] * band.corner_floor > 0.05 * expectation)
+        # Two numbers shared by hundreds of ordinates add up like a signal: a ramp, of all signals.
+        out.append((strength[0] * band.corner_floor > 0.002 * expectation) & (band.order > 1))
     return out
 
 
