@@ -2,7 +2,7 @@
 
 python benches/allan_stream.py             1e9 readings, about two minutes
 python benches/allan_stream.py 1e8
-python benches/allan_stream.py 1e9 FILE.npy    through a file of that name (8 GB), as `trihedron allan --stream` reads it
+python benches/allan_stream.py 1e9 FILE.npy    through a file of that name (8 GB), by `trihedron allan --stream`
 """
 
 import resource

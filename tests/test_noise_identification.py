@@ -9,6 +9,7 @@ from noise_series import fractional, series
 from trihedron import _core
 from trihedron.estimate.noise import identify_noise
 from trihedron.estimate.noise.spectrum import cosine_transform, line_coefficients, ordinates
+from trihedron.estimate.noise.terms import gauss_markov_density
 from trihedron.records.finding import FindingCode, Severity
 from trihedron.records.noise import TermName
 
@@ -104,6 +105,13 @@ def test_a_gauss_markov_process_is_told_from_flicker_and_walk():
     assert present(axis) == {"N", "G"}
     assert 4.0 < axis.gauss_markov.correlation_time_s < 25.0
     assert axis.gauss_markov.sigma_process == pytest.approx(sigma, rel=0.25)
+
+
+def test_the_density_of_a_gauss_markov_process_keeps_its_digits_at_long_times():
+    step, time = 1e-3, 1e5
+    f = np.array([1e-6, 1e-3, 1.0])
+    # Far below Nyquist it is the continuous Lorentzian: relative error (step/time)² and (π f step)²/3.
+    assert gauss_markov_density(f, step, time) == pytest.approx(2 * time / (1 + (2 * np.pi * f * time) ** 2), rel=1e-5)
 
 
 @pytest.fixture(scope="module")

@@ -14,9 +14,11 @@ SYMBOLS = ("Q", "N", "B", "K")
 
 def gauss_markov_density(frequency_hz: FloatArray, step_s: float, correlation_time_s: float) -> FloatArray:
     """Two-sided density of a Gauss-Markov process of unit variance, sampled in steps of ``step_s``."""
-    decay = math.exp(-step_s / correlation_time_s)
-    cosine = np.cos(2.0 * np.pi * frequency_hz * step_s)
-    return np.asarray(step_s * (1.0 - decay**2) / (1.0 - 2.0 * decay * cosine + decay**2))
+    ratio = step_s / correlation_time_s
+    decay = math.exp(-ratio)
+    # 1 - 2 d cos + d² loses its digits where time constant and period are a million steps.
+    denominator = math.expm1(-ratio) ** 2 + 4.0 * decay * np.sin(np.pi * frequency_hz * step_s) ** 2
+    return np.asarray(-step_s * math.expm1(-2.0 * ratio) / denominator)
 
 
 def allan_variance_of_terms(tau_s: FloatArray, symbol: str, value: float) -> FloatArray:
