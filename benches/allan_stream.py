@@ -19,16 +19,25 @@ N, K = 1e-3, 1e-6
 
 
 def chunks(n, size=1 << 20):
-    """White noise and a random walk in chunks: a million stored variates, started elsewhere in every chunk."""
+    """White noise and a random walk in chunks."""
     rng = np.random.default_rng(5)
-    stored = rng.normal(size=4 * size).astype(np.float32)
     level = 0.0
     for start in range(0, n, size):
         k = min(size, n - start)
-        at, other = rng.integers(0, 3 * size, 2)
-        walk = level + K / np.sqrt(RATE) * np.cumsum(stored[other : other + k][::-1].astype(np.float64))
+        walk = level + K / np.sqrt(RATE) * np.cumsum(rng.standard_normal(k, dtype=np.float32).astype(np.float64))
         level = walk[-1]
-        yield 9.81 + N * np.sqrt(RATE) * stored[at : at + k] + walk
+        yield 9.81 + N * np.sqrt(RATE) * rng.standard_normal(k, dtype=np.float32) + walk
+
+
+# What the process itself used: the operating system's own maximum counts pages of the process that started it.
+COMMAND = """
+import sys
+from pathlib import Path
+from trihedron.cli import main
+status = main(sys.argv[1:])
+print(next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM")))
+sys.exit(status)
+"""
 
 
 def through_file(n, path):
@@ -39,12 +48,12 @@ def through_file(n, path):
         log[at : at + len(part), 0] = part
         at += len(part)
     del log
-    command = "import sys; from trihedron.cli import main; sys.exit(main(sys.argv[1:]))"
     said = ["--stream", "--columns", "az", "--rate", str(RATE), "--accel-unit", "m/s^2"]
     began = time.perf_counter()
-    subprocess.run([sys.executable, "-c", command, "allan", path, *said], check=True)
+    done = subprocess.run([sys.executable, "-c", COMMAND, "allan", path, *said], capture_output=True, text=True)
     spent = time.perf_counter() - began
-    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 2**20
+    print(done.stdout, done.stderr)
+    peak = int(done.stdout.split()[-2]) / 2**20
     print(f"{n:.0e} readings from {path}: {spent:.1f} s, largest resident set of the command {peak:.2f} GiB")
 
 

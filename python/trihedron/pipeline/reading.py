@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 from trihedron.read import read_recording
 from trihedron.records import Recording, Segments
-from trihedron.segment import segment_recording
 from trihedron.units import AccelerationUnit, RateUnit
 
 Progress = Callable[[float, str], None]
@@ -49,4 +48,7 @@ def read(
 
 def segment(recording: Recording, *, progress: Progress | None = None) -> Segments:
     """Still poses and the moves between them, told apart by the sensor's own noise: nothing to set."""
+    # Loaded when it is needed: half of what a command that only reads would wait for.
+    from trihedron.segment import segment_recording
+
     return segment_recording(recording, progress=progress)
