@@ -270,8 +270,8 @@ def _accept_next(
     leaders = [s for s in scored[:N_REFITS] if s.p_value * n_effects < alpha / 2.0]
     if not leaders:
         return False
-    refits = [refit(context, model.distortions, s, prior, model.prediction.log_density) for s in leaders]
-    sound = [r for r in refits if r.bic_gain > MIN_DELTA_BIC and r.held_out_gain > 0.0 and _is_plausible(r)]
+    refits = [refit(context, model.distortions, s, prior, model.prediction) for s in leaders]
+    sound = [r for r in refits if r.bic_gain > MIN_DELTA_BIC and r.predicts and _is_plausible(r)]
     if not sound:
         return False
     best = max(sound, key=lambda r: r.bic_gain)
@@ -286,7 +286,7 @@ def _accept_next(
     best = refined(context, model.distortions, best, prior)
     before_fit, before = model.fitted, model.prediction
     model.fitted = best.fitted
-    model.prediction = predict_held_out(best.fitted, folds_of(best.fitted), N_DOMAINS)
+    model.prediction = best.prediction
     model.distortions.append(best.scored.variant.distortion)
     model.found.append(
         _Found(

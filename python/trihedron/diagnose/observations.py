@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.diagnose.repair import split_holds
+from trihedron.diagnose.unresolved import unresolved_variance
 from trihedron.records import Recording, Segments
 
 FloatArray = npt.NDArray[np.float64]
@@ -24,6 +26,8 @@ class Observations:
     neighbouring still samples bracket the whole motion; ``move_holds`` (m, 2) their holds. ``force_density`` and
     ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about
     their stamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
+    ``unresolved`` maps a move's two holds to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
+    by motion faster than the samples.
     The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
     """
 
@@ -45,6 +49,7 @@ class Observations:
     rate_density: FloatArray | None
     jitter_s: float = 0.0
     bumped_s: tuple[tuple[float, float], ...] = ()
+    unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
     moves_inflation: float = 1.0
     dynamics_inflation: float = 1.0
 
@@ -98,6 +103,11 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         if finite and stop - start >= 3:
             ranges.append((start, stop))
             holds.append((move.hold_before, move.hold_after))
+    spans = [(hold.start, hold.stop) for hold in segments.holds]
+    variances = np.zeros((len(ranges), 2, 3))
+    for k, values in enumerate((recording.accelerometer, recording.gyroscope)):
+        if values is not None:
+            variances[:, k] = unresolved_variance(values, tuple(ranges), spans, step_s)
     return Observations(
         recording=recording,
         segments=segments,
@@ -116,4 +126,5 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         force_density=segments.accelerometer_sigma * np.sqrt(step_s),
         rate_density=rate_density,
         bumped_s=bumped,
+        unresolved=dict(zip(holds, variances, strict=True)),
     )

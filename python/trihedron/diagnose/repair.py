@@ -139,7 +139,8 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
                 blocks = np.array_split(values[a:b], 8)
                 scatter = np.nanstd([np.nanmean(block, axis=0) for block in blocks], axis=0, ddof=1) / np.sqrt(8.0)
                 floor = np.maximum(colour, 1.0) * sigma / np.sqrt(n)
-                error[k] = np.maximum(floor, scatter) if source < 0 else floor
+                # Eight blocks tell a pose that goes on settling (several times the noise), not 20 % of its noise.
+                error[k] = np.maximum(floor, scatter if source < 0 else np.where(scatter > 2.0 * floor, scatter, 0.0))
         return mean, error
 
     accel_mean, accel_error = statistics(
@@ -161,6 +162,10 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
     )
 
 
+MAX_TURNING = 0.05
+"""Scatter of the rate in a shaken pose, as a share of the fastest rate of the recording."""
+
+
 def _shaken(
     recording: Recording, segments: Segments, block_s: float = 0.25, shortest_s: float = 1.5
 ) -> list[tuple[int, int]]:
@@ -175,6 +180,7 @@ def _shaken(
     # A bias that follows the shaking is no motion: rates far below those of real moves count as none.
     moving = np.concatenate([recording.gyroscope[m.start : m.stop] for m in segments.moves] or [np.zeros((1, 3))])
     spread = np.maximum(spread, RESTING * float(np.sqrt(np.nanmean((moving - zero) ** 2))))
+    fastest = float(np.nanmax(np.abs(recording.gyroscope - zero)))
     out: list[tuple[int, int]] = []
     for move in segments.moves:
         a, b = move.start, move.stop
@@ -192,7 +198,9 @@ def _shaken(
         step = np.abs(np.diff(force_mean, axis=0, prepend=force_mean[:1]))
         calm = (step < 4.0 * np.sqrt(2.0 / block) * np.maximum(force_own, segments.accelerometer_sigma)).all(axis=1)
         shaking = (force_own > 3.0 * segments.accelerometer_sigma).any(axis=1)
-        good = still & calm & shaking
+        # A hand that swings back and forth is no pose: what only shakes turns slowly beside the session's moves.
+        turning = (np.nanstd(gyro, axis=1) > MAX_TURNING * fastest).any(axis=1)
+        good = still & calm & shaking & ~turning
         edges = np.flatnonzero(np.diff(np.r_[0, good.astype(np.int8), 0])).reshape(-1, 2)
         for first, last in edges:
             start, stop = a + first * block + block, a + last * block - block

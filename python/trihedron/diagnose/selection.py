@@ -8,17 +8,28 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import chdtrc
 
-from trihedron.diagnose.agreement import ROW_DOMAINS
+from trihedron.diagnose.agreement import ROW_DOMAINS, physical_rms
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import Effect, catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.observations import FloatArray
-from trihedron.diagnose.solve import Fit, leverage, predict_held_out, reduce, score, tune_noise
+from trihedron.diagnose.solve import (
+    Fit,
+    Prediction,
+    held_out_gain,
+    leverage,
+    predict_held_out,
+    reduce,
+    score,
+    tune_noise,
+)
 from trihedron.diagnose.twin import DYNAMICS, MOVES, PRIOR, STATIC_ACCEL, STATIC_GYRO, Distortion, Prior, stacked
 
 N_DOMAINS = len(ROW_DOMAINS)
 MAX_EFFECTS = 4
 """Effects accepted at most: a recording of one session does not carry evidence for more."""
+VISIBLE = 0.98
+"""An effect must lower the held-out misfit of some domain by at least this factor to be worth a name."""
 MIN_DELTA_BIC = 10.0
 """Kass and Raftery's bound for very strong evidence."""
 CONFOUNDED_DELTA_BIC = 6.0
@@ -130,16 +141,32 @@ class Refit:
     """A candidate fitted jointly with everything accepted before."""
 
     scored: Scored
+    base_fit: Fit
     fitted: Fit
     bic_gain: float
-    held_out_gain: float
-    base_density: float
+    prediction: Prediction
+    base: Prediction
+
+    @property
+    def predicts(self) -> bool:
+        """Whether poses and moves that were held out are predicted better: on the whole, not by one block alone, and
+        visibly in some domain.
+        """
+        gain = held_out_gain(self.base, self.prediction)
+        if gain.sum() <= 0.0 or (gain.sum() - gain.max() <= 0.0 and not self.scored.effect.is_local):
+            return False
+        before, after = self.base.per_row, self.prediction.per_row
+        if (after < VISIBLE * before).any():
+            return True
+        rms_before, _ = physical_rms(self.base_fit, self.base.residual)
+        rms_after, _ = physical_rms(self.fitted, self.prediction.residual)
+        return any(rms_after[d] < VISIBLE * rms_before[d] for d in rms_after if d in rms_before)
 
 
 def refit(
-    context: Context, accepted: list[Distortion], scored: Scored, prior: Prior | None, base_density: float
+    context: Context, accepted: list[Distortion], scored: Scored, prior: Prior | None, base_prediction: Prediction
 ) -> Refit:
-    """Joint fit of a candidate: BIC and held-out log density against the model without it."""
+    """Joint fit of a candidate: BIC and held-out prediction against the model without it."""
     base = context.fitted
     distortion = stacked([*accepted, scored.variant.distortion])
     start = replace(
@@ -152,8 +179,17 @@ def refit(
     # Marginal likelihoods differ by the flat prior of the new parameters; their own log-determinant is taken out so
     # that the difference is that of the profile likelihoods with noise tuned on either side.
     gain = 2.0 * (profile(fitted) - profile(base))
-    density = predict_held_out(fitted, folds_of(fitted), N_DOMAINS).log_density
-    return Refit(scored, fitted, gain - cost, density - base_density, base_density)
+    # What stays unexplained is noise to the candidate: it must beat that, not the sensor's noise alone.
+    stays = dispersion(fitted.system.residual, fitted, leverage(fitted))
+    drop = _domain_chi2(base) - _domain_chi2(fitted)
+    gain = min(gain, gain - float((drop * (1.0 - 1.0 / stays)).sum()))
+    prediction = predict_held_out(fitted, folds_of(fitted), N_DOMAINS)
+    return Refit(scored, base, fitted, gain - cost, prediction, base_prediction)
+
+
+def _domain_chi2(fitted: Fit) -> FloatArray:
+    squared = fitted.system.residual**2
+    return np.array([squared[fitted.system.domain == d].sum() for d in range(N_DOMAINS)])
 
 
 def profile(fitted: Fit) -> float:
@@ -204,5 +240,5 @@ def refined(context: Context, accepted: list[Distortion], best: Refit, prior: Pr
     made = effect.reshaped(context, variant, value)
     assert made is not None
     final = replace(made, shape={name: (value, unit)}, shape_sigma=float(value * min(sigma_log, 10.0)))
-    again = refit(context, accepted, replace(best.scored, variant=final), prior, best.base_density)
+    again = refit(context, accepted, replace(best.scored, variant=final), prior, best.base)
     return again if again.bic_gain >= best.bic_gain else best

@@ -62,28 +62,70 @@ def _with_effects(line: Linearisation) -> tuple[System, FloatArray]:
 def fit(
     obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None = None, n_iterations: int = 4
 ) -> Fit:
-    """Gauss-Newton on every row; the model is close to linear, so a few full steps converge (eq. 8.5)."""
+    """Gauss-Newton on every row, damped where a full step would not help (eq. 8.5).
+
+    The model is close to linear, so a few full steps converge; a move whose readings are false, or a start that is far
+    off, may throw them: a step that raises the misfit is taken back and tried shorter (Levenberg-Marquardt).
+    """
     twin = start
     if len(twin.effect) != distortion.n_parameters:
         twin = replace(twin, effect=np.zeros(distortion.n_parameters))
+    state = _State.at(obs, twin, distortion, prior)
+    damping = 0.0
     for _ in range(n_iterations):
+        scaled = state.jacobian / state.scale
+        for _ in range(MAX_RETRIES):
+            normal = state.normal.copy()
+            normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE + damping
+            step = -cho_solve(cho_factor(normal), scaled.T @ state.system.residual)
+            tried = _State.at(obs, state.twin.advanced(step / state.scale), distortion, prior)
+            if tried.chi2 <= state.chi2 * (1.0 + MAY_RISE) + 1.0:
+                damping = 0.0 if damping < MIN_DAMPING else 0.1 * damping
+                break
+            damping = max(10.0 * damping, MIN_DAMPING)
+        else:
+            break
+        moved = float(np.linalg.norm(scaled @ step))
+        state = tried
+        if moved < 1e-3:  # the whitened rows move by less than a thousandth of sigma
+            break
+    log_det = 2.0 * float(np.log(np.diag(cholesky(state.regular()))).sum()) + 2.0 * float(np.log(state.scale).sum())
+    return Fit(
+        state.twin, state.line, state.system, state.jacobian, state.scale, state.chi2,
+        -0.5 * state.chi2 - 0.5 * log_det + state.system.log_weight,
+    )  # fmt: skip
+
+
+MAX_RETRIES = 8
+MIN_DAMPING = 1e-4
+MAY_RISE = 1e-3
+"""Noise follows the scale by a little, so that a good step may raise the misfit by this share."""
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """One linearisation with its normal equations, columns scaled to unit length."""
+
+    twin: Twin
+    line: Linearisation
+    system: System
+    jacobian: FloatArray
+    scale: FloatArray
+    normal: FloatArray
+    chi2: float
+
+    @staticmethod
+    def at(obs: Observations, twin: Twin, distortion: Distortion, prior: Prior | None) -> _State:
         line = Linearisation(obs, twin, distortion, prior)
         system, jacobian = _with_effects(line)
         scaled, scale = _scaled(jacobian)
-        normal = scaled.T @ scaled
-        normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE
-        step = -cho_solve(cho_factor(normal), scaled.T @ system.residual) / scale
-        twin = twin.advanced(step)
-        if np.linalg.norm(scaled @ (step * scale)) < 1e-3:  # the whitened rows move by less than a thousandth of sigma
-            break
-    line = Linearisation(obs, twin, distortion, prior)
-    system, jacobian = _with_effects(line)
-    scaled, scale = _scaled(jacobian)
-    normal = scaled.T @ scaled
-    normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE
-    chi2 = float(system.residual @ system.residual)
-    log_det = 2.0 * float(np.log(np.diag(cholesky(normal))).sum()) + 2.0 * float(np.log(scale).sum())
-    return Fit(twin, line, system, jacobian, scale, chi2, -0.5 * chi2 - 0.5 * log_det + system.log_weight)
+        chi2 = float(system.residual @ system.residual)
+        return _State(twin, line, system, jacobian, scale, scaled.T @ scaled, chi2 if np.isfinite(chi2) else np.inf)
+
+    def regular(self) -> FloatArray:
+        out = self.normal.copy()
+        out[np.diag_indices_from(out)] += RELATIVE_RIDGE
+        return out
 
 
 def leverage(fitted: Fit) -> FloatArray:
@@ -151,12 +193,39 @@ def score(reduced: Reduced, columns: FloatArray) -> Score:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Held-out prediction of rows: innovation chi-square per domain, and log predictive density."""
+    """Held-out prediction of rows: innovation chi-square per fold and domain, its volume, and the innovations.
 
-    chi2: npt.NDArray[np.float64]
-    n_rows: npt.NDArray[np.float64]
-    log_density: float
+    ``fold_chi2`` (folds, domains), ``fold_log_det`` (folds,) log-determinant of the predicted covariance, ``n_rows``
+    (domains,), ``residual`` (rows,) whitened innovations.
+    """
+
+    fold_chi2: FloatArray
+    fold_log_det: FloatArray
+    n_rows: FloatArray
     residual: FloatArray
+
+    @property
+    def chi2(self) -> FloatArray:
+        """(domains,) innovation chi-square."""
+        out: FloatArray = self.fold_chi2.sum(axis=0)
+        return out
+
+    @property
+    def per_row(self) -> FloatArray:
+        """(domains,) innovation chi-square per row."""
+        out: FloatArray = self.chi2 / np.maximum(self.n_rows, 1e-9)
+        return out
+
+
+def held_out_gain(before: Prediction, after: Prediction) -> FloatArray:
+    """(folds,) gain in log predictive density, each domain's chi-square over what remains in it (eq. 8.9).
+
+    Noise that is larger than predicted makes every difference of chi-square larger too; divided by the dispersion that
+    stays after the effect (at least 1), a gain counts as it would in a recording without the unexplained rest.
+    """
+    stays = np.maximum(after.per_row, 1.0)
+    gain: FloatArray = 0.5 * ((before.fold_chi2 - after.fold_chi2) / stays).sum(axis=1)
+    return gain + 0.5 * (before.fold_log_det - after.fold_log_det)
 
 
 def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains: int) -> Prediction:
@@ -170,11 +239,11 @@ def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains:
     # The state at the optimum of all rows: the training optimum is one linear step away.
     normal = scaled.T @ scaled
     ridge = 1e-6
-    chi2 = np.zeros(n_domains)
+    chi2 = np.zeros((len(folds), n_domains))
+    log_det = np.zeros(len(folds))
     count = np.zeros(n_domains)
-    log_density = 0.0
     out = np.zeros_like(residual)
-    for held in folds:
+    for fold, held in enumerate(folds):
         rows = scaled[held]
         train = normal - rows.T @ rows
         train[np.diag_indices_from(train)] += ridge
@@ -187,15 +256,15 @@ def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains:
         value, vector = eigh(spread)
         along = vector.T @ innovation
         known = value < 1e4
-        log_density += float(-0.5 * (along[known] ** 2 / value[known]).sum() - 0.5 * np.log(value[known]).sum())
+        log_det[fold] = float(np.log(value[known]).sum())
         whitened = vector[:, known] @ (along[known] / np.sqrt(value[known]))
         share = (vector[:, known] ** 2).sum(axis=1)
         out[held] = whitened
         domain = fitted.system.domain[held]
         for d in range(n_domains):
-            chi2[d] += float((whitened[domain == d] ** 2).sum())
+            chi2[fold, d] = float((whitened[domain == d] ** 2).sum())
             count[d] += float(share[domain == d].sum())
-    return Prediction(chi2, count, log_density, out)
+    return Prediction(chi2, log_det, count, out)
 
 
 def tune_noise(

@@ -225,6 +225,10 @@ class Linearisation:
         q = np.einsum("ij,j->i", twin.gyro_S**2, obs.rate_density**2).mean()
         qa = np.einsum("ij,j->i", twin.accel_S**2, obs.force_density**2).mean()
         A = lever @ _skew(twin.up[before])
+        fast = obs.unresolved.get((int(before), int(after)))
+        if fast is not None:
+            qa += float((twin.accel_S**2 @ fast[0]).mean()) / duration
+            q += float((twin.gyro_S**2 @ fast[1]).mean()) / duration
         if obs.jitter_s:
             # A sample taken δ late reads δ·derivative more: white over samples, stronger where the motion is quick.
             step = duration / max(len(t) - 1, 1)

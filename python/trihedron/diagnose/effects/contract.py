@@ -48,6 +48,9 @@ class Effect(ABC):
     repeatable: ClassVar[bool] = False
     """Whether it may be accepted more than once (another pose, another line)."""
 
+    is_local: ClassVar[bool] = False
+    """Whether it concerns one pose or move only: its gain may then come from one block of held-out data."""
+
     def unavailable(self, context: Context) -> str | None:  # noqa: ARG002
         """Why this recording cannot show the effect; ``None`` when it can."""
         return None

@@ -51,6 +51,7 @@ class DisturbedPose(DirectEffect):
     mechanism = "one pose was not still or was pushed"
     experiment = "repeat that pose"
     repeatable = True
+    is_local = True
 
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs
