@@ -20,15 +20,14 @@ from trihedron.diagnose.selection import (
     CONFOUNDED_DELTA_BIC,
     MAX_EFFECTS,
     MIN_DELTA_BIC,
-    N_DOMAINS,
     Refit,
-    folds_of,
+    mends,
     profile,
     refined,
     refit,
     score_all,
 )
-from trihedron.diagnose.solve import Fit, Prediction, predict_held_out, tune_noise
+from trihedron.diagnose.solve import N_DOMAINS, Fit, Prediction, folds_of, predict_held_out, tune_noise
 from trihedron.diagnose.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
 from trihedron.diagnose.timing import test_timing
 from trihedron.diagnose.twin import NO_DISTORTION, PRIOR, Distortion, Prior, Twin, stacked
@@ -229,17 +228,19 @@ def _accept_direct(
     for effect, evidence in sorted(found, key=lambda pair: ("saturation" not in pair[0].id, -pair[1].strength)):
         before = model.prediction
         base_fit = model.fitted
-        if evidence.reweigh is not None:
-            model.obs = evidence.reweigh(model.obs)
-        if evidence.variant is not None:
-            model.distortions.append(evidence.variant.distortion)
         gain = evidence.strength
         if evidence.reweigh is not None or evidence.variant is not None:
-            distortion = stacked(model.distortions)
-            n_new = 0 if evidence.variant is None else evidence.variant.distortion.n_parameters
+            obs = model.obs if evidence.reweigh is None else evidence.reweigh(model.obs)
+            added = [] if evidence.variant is None else [evidence.variant.distortion]
+            distortion = stacked([*model.distortions, *added])
+            n_new = sum(d.n_parameters for d in added)
             start = replace(base_fit.twin, effect=np.concatenate([base_fit.twin.effect, np.zeros(n_new)]))
-            model.fitted = tune_noise(model.obs, start, distortion, prior)
-            model.prediction = predict_held_out(model.fitted, folds_of(model.fitted), N_DOMAINS)
+            fitted = tune_noise(obs, start, distortion, prior)
+            prediction = predict_held_out(fitted, folds_of(fitted), N_DOMAINS)
+            if not effect.is_proof and not mends(before, prediction):
+                continue
+            model.obs, model.fitted, model.prediction = obs, fitted, prediction
+            model.distortions += added
             gain = max(gain, 2.0 * (profile(model.fitted) - profile(base_fit)))
             if evidence.restate is not None:
                 evidence = replace(evidence, parameters=evidence.restate(Context(model.obs, model.fitted)))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.diagnose.repair import split_holds
+from trihedron.diagnose.repair import split_holds, unsplit
 from trihedron.diagnose.unresolved import unresolved_variance
 from trihedron.records import Recording, Segments
 
@@ -19,6 +19,7 @@ FloatArray = npt.NDArray[np.float64]
 class Observations:
     """Raw readings of one recording, centred, with the layout of its holds and moves.
 
+    ``segments`` has its poses cut at bumps, ``whole`` as they were found.
     ``raw_force`` (n, 3), ``raw_rate`` (n, 3) are raw readings minus ``force_origin`` / ``rate_origin`` (the mean over
     the holds): counts around 32768 would cost the normal equations ten digits. ``hold_force``, ``hold_rate`` (h, 3) are
     the centred hold means, ``hold_force_sigma``, ``hold_rate_sigma`` (h, 3) their standard errors. ``move_ranges`` are
@@ -33,6 +34,7 @@ class Observations:
 
     recording: Recording
     segments: Segments
+    whole: Segments
     time_s: FloatArray
     raw_force: FloatArray
     raw_rate: FloatArray | None
@@ -64,8 +66,10 @@ class Observations:
         return len(self.move_ranges)
 
 
-def observe(recording: Recording, segments: Segments) -> Observations:
+def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True) -> Observations:
     """Arrange a segmented recording for the twin.
+
+    Without ``cuts_bumps`` every pose is averaged over whatever happened in it, as if nobody had noticed.
 
     Raises
     ------
@@ -80,7 +84,8 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         )
     t = recording.time_s
     bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in segments.holds for a, b in hold.disturbed)
-    segments, _ = split_holds(recording, segments)
+    whole = segments
+    segments = split_holds(recording, segments)[0] if cuts_bumps else unsplit(recording, segments)
     assert segments.accelerometer_sigma is not None
     assert segments.accelerometer_mean is not None
     assert segments.accelerometer_sigma_mean is not None
@@ -111,6 +116,7 @@ def observe(recording: Recording, segments: Segments) -> Observations:
     return Observations(
         recording=recording,
         segments=segments,
+        whole=whole,
         time_s=recording.time_s,
         raw_force=recording.accelerometer - force_origin,
         raw_rate=raw_rate,

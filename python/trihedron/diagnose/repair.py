@@ -116,6 +116,11 @@ def split_holds(recording: Recording, segments: Segments, shortest_s: float = 0.
     return _segments_of(recording, segments, merged), tuple(bumped)
 
 
+def unsplit(recording: Recording, segments: Segments) -> Segments:
+    """The poses as they were found, averaged over all of their samples."""
+    return _segments_of(recording, segments, [(hold.start, hold.stop, i) for i, hold in enumerate(segments.holds)])
+
+
 def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int, int, int]]) -> Segments:
     def is_unsteady(source: int) -> bool:
         return source < 0 or segments.holds[source].is_unsteady

@@ -8,14 +8,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import chdtrc
 
-from trihedron.diagnose.agreement import ROW_DOMAINS, physical_rms
+from trihedron.diagnose.agreement import physical_rms
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import Effect, catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.observations import FloatArray
 from trihedron.diagnose.solve import (
+    N_DOMAINS,
     Fit,
     Prediction,
+    folds_of,
     held_out_gain,
     leverage,
     predict_held_out,
@@ -23,9 +25,8 @@ from trihedron.diagnose.solve import (
     score,
     tune_noise,
 )
-from trihedron.diagnose.twin import DYNAMICS, MOVES, PRIOR, STATIC_ACCEL, STATIC_GYRO, Distortion, Prior, stacked
+from trihedron.diagnose.twin import PRIOR, Distortion, Prior, stacked
 
-N_DOMAINS = len(ROW_DOMAINS)
 MAX_EFFECTS = 4
 """Effects accepted at most: a recording of one session does not carry evidence for more."""
 VISIBLE = 0.98
@@ -49,6 +50,13 @@ class Scored:
     merits: tuple[float, ...] = ()
 
 
+def mends(before: Prediction, after: Prediction) -> bool:
+    """Whether readings that were changed (samples put back, stamps made even) are predicted better when held out."""
+    stays = np.maximum(after.per_row, 1.0)
+    gain = float(((before.per_row - after.per_row) * after.n_rows / stays).sum())
+    return gain > 0.0 and bool((after.per_row < VISIBLE * before.per_row).any())
+
+
 @dataclass(frozen=True, eq=False)
 class Accepted:
     """An effect in the model, with the variant that won and how the model stood before."""
@@ -58,19 +66,6 @@ class Accepted:
     p_adjusted: float
     delta_bic: float
     rivals: tuple[str, ...]
-
-
-def folds_of(fitted: Fit, n_folds: int = 8) -> list[npt.NDArray[np.bool_]]:
-    """Blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
-    system, obs = fitted.system, fitted.line.obs
-    direct = system.walk == 0
-    out = []
-    for labels, count in (((STATIC_ACCEL, STATIC_GYRO), obs.n_holds), ((MOVES, DYNAMICS), obs.n_moves)):
-        for block in np.array_split(np.arange(count), min(n_folds, max(count // 2, 1))):
-            held = np.isin(system.domain, labels) & direct & np.isin(system.segment, block)
-            if held.any():
-                out.append(held)
-    return out
 
 
 def dispersion(residual: FloatArray, fitted: Fit, used: FloatArray) -> FloatArray:

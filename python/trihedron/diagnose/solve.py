@@ -9,8 +9,20 @@ import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, cholesky, eigh, solve_triangular
 
 from trihedron.diagnose.observations import FloatArray, Observations
-from trihedron.diagnose.twin import Distortion, Linearisation, Prior, System, Twin
+from trihedron.diagnose.twin import (
+    DYNAMICS,
+    MOVES,
+    STATIC_ACCEL,
+    STATIC_GYRO,
+    Distortion,
+    Linearisation,
+    Prior,
+    System,
+    Twin,
+)
 
+N_DOMAINS = 4
+"""Domains of residual rows: the first four labels."""
 RELATIVE_RIDGE = 1e-12
 """Added to the diagonal of the scaled normal matrix: directions the recording does not see stay finite."""
 
@@ -228,7 +240,20 @@ def held_out_gain(before: Prediction, after: Prediction) -> FloatArray:
     return gain + 0.5 * (before.fold_log_det - after.fold_log_det)
 
 
-def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains: int) -> Prediction:
+def folds_of(fitted: Fit, n_folds: int = 8) -> list[npt.NDArray[np.bool_]]:
+    """Blocks of neighbouring poses, then of neighbouring moves, whose rows are held out together."""
+    system, obs = fitted.system, fitted.line.obs
+    direct = system.walk == 0
+    out = []
+    for labels, count in (((STATIC_ACCEL, STATIC_GYRO), obs.n_holds), ((MOVES, DYNAMICS), obs.n_moves)):
+        for block in np.array_split(np.arange(count), min(n_folds, max(count // 2, 1))):
+            held = np.isin(system.domain, labels) & direct & np.isin(system.segment, block)
+            if held.any():
+                out.append(held)
+    return out
+
+
+def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains: int = N_DOMAINS) -> Prediction:
     """Predict every fold's rows from the others (blocked cross-validation, eq. 8.8).
 
     The held-out hold's own vertical and biases are unknown to the training rows; a weak prior (its column scale) keeps

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
@@ -39,6 +40,9 @@ class Evidence:
 
 class DirectEffect(Effect):
     """An effect with a test of its own."""
+
+    is_proof: ClassVar[bool] = False
+    """Whether the samples alone prove it (a range that ends): else mending it must predict held-out moves better."""
 
     @abstractmethod
     def find(self, context: Context) -> Evidence | None:

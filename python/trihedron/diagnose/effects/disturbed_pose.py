@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from trihedron.diagnose.agreement import ROW_DOMAINS, physical_rms
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.observations import Observations
+from trihedron.diagnose.observations import Observations, observe
+from trihedron.diagnose.solve import fit, folds_of, predict_held_out
+from trihedron.diagnose.twin import NO_DISTORTION
 from trihedron.diagnose.within_static import hold_scatter
-from trihedron.records.diagnosis import EffectParameter, Where
+from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
 
 MOST = 0.25
 """If more than a quarter of the poses are restless it is not a pose that was disturbed but the place that shakes."""
 
 
+LOUD = 4.0
+"""A restless pose has this many times the variance of the others: twice their noise."""
+MIN_GAIN = 15.0
+"""Chi-square that cutting the poses at their bumps must win in held-out data of one domain, and the share that may stay."""
+MUST_FALL = 0.9
 BUMP_SIGMA = 7.0
 """A tenth of a second must leave the line through its surroundings by this much: drift inside a hold does not."""
 
 
-def _is_bump(obs: Observations, span: tuple[float, float]) -> bool:
-    """Whether the readings of a stretch leave the straight line from before to after it."""
+def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
+    """How far the readings of a stretch leave the straight line that the pose before and after it predicts.
+
+    ``None`` when by less than 7 sigma. Chi-square per tenth of a second and channel, then that of the surroundings.
+    """
     rate = obs.recording.rate_hz
     a, b = (int(k) for k in np.searchsorted(obs.time_s, span))
     side = max(int(0.5 * rate), 5)
@@ -29,19 +42,75 @@ def _is_bump(obs: Observations, span: tuple[float, float]) -> bool:
     pairs = [(obs.raw_force, obs.force_density)]
     if obs.raw_rate is not None and obs.rate_density is not None:
         pairs.append((obs.raw_rate, obs.rate_density))
+    n = (last - first) // block
+    if n < 4:
+        return None
+    k = np.arange(n)
+    outer = (k < max(side // block, 2)) | (k >= n - max(side // block, 2))
+    inside, outside = [], []
     for values, density in pairs:
-        x = values[first:last]
-        n = len(x) // block
-        if n < 4:
-            return True
-        means = x[: n * block].reshape(n, block, 3).mean(axis=1)
-        k = np.arange(n)
-        outer = (k < max(side // block, 2)) | (k >= n - max(side // block, 2))
+        means = values[first : first + n * block].reshape(n, block, 3).mean(axis=1)
         line = np.polynomial.polynomial.polyfit(k[outer], means[outer], 1)
-        away = means - (line[0] + np.outer(k, line[1]))
-        if (np.abs(away) > BUMP_SIGMA * density * np.sqrt(rate / block)).any():
-            return True
-    return False
+        away = (means - (line[0] + np.outer(k, line[1]))) / (density * np.sqrt(rate / block))
+        inside.append(away)
+        outside.append(away[outer])
+    worst = np.sort(np.abs(np.hstack(inside)).max(axis=1))[::-1]
+    if worst[0] <= BUMP_SIGMA:
+        return None
+    middle = np.hstack(inside)[~outer] if (~outer).any() else np.hstack(inside)
+    before, after = float(np.mean(middle**2)), float(np.mean(np.hstack(outside) ** 2))
+    return HeldOut("within-static", before, after, float(np.sqrt(before)), float(np.sqrt(after)), "sigma")
+
+
+def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
+    """Held-out prediction with every pose averaged over its bumps, against the poses cut there; empty if no better."""
+    obs, twin = context.obs, context.fitted.twin
+    if len(twin.effect):
+        return ()
+    whole = observe(obs.recording, obs.whole, cuts_bumps=False)
+    force = whole.hold_force @ twin.accel_S.T + twin.accel_b
+    n = whole.n_holds
+    start = replace(
+        twin,
+        up=force / np.linalg.norm(force, axis=1, keepdims=True),
+        gyro_bias=np.zeros((n, 3)) if whole.hold_rate is None else whole.hold_rate @ twin.gyro_S.T,
+        accel_bias=np.zeros((n, 3)),
+    )
+    fits = (fit(whole, start, NO_DISTORTION, context.fitted.line.prior, n_iterations=2), context.fitted)
+    before, after = (predict_held_out(one, folds_of(one)) for one in fits)
+    gain = (before.per_row - after.per_row) * after.n_rows / np.maximum(after.per_row, 1.0)
+    if gain.max() < MIN_GAIN or not (after.per_row < MUST_FALL * before.per_row)[gain.argmax()]:
+        return ()
+    rms_before, unit = physical_rms(fits[0], before.residual)
+    rms_after, _ = physical_rms(fits[1], after.residual)
+    return tuple(
+        HeldOut(
+            ROW_DOMAINS[d], float(before.per_row[d]), float(after.per_row[d]), rms_before[d], rms_after[d], unit[d]
+        )
+        for d in np.argsort(-gain)
+        if d in rms_before and d in rms_after
+    )
+
+
+def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
+    """Poses that shake throughout: the level of one half, not that of the other poses, predicts the other half."""
+    scatter = hold_scatter(obs)
+    own = np.array([not hold.is_unsteady for hold in obs.segments.holds])
+    loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < 1e-6)
+    x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
+    found, before, after = [], [], []
+    for i in np.flatnonzero(loud.any(axis=1)):
+        hold = obs.segments.holds[i]
+        steps = np.diff(x[hold.start : hold.stop][:, loud[i]], axis=0)
+        early, late = (np.nanvar(half, axis=0) for half in np.array_split(steps, 2))
+        usual = np.nanvar(steps, axis=0) / scatter.ratio[i, loud[i]]
+        if (np.minimum(early, late) > 0.5 * LOUD * usual).any():
+            found.append(int(i))
+            before.append(float(np.mean(late / usual)))
+            after.append(float(np.mean(late / early)))
+    if not found:
+        return [], None
+    return found, HeldOut("within-static", float(np.mean(before)), float(np.mean(after)), 0.0, 0.0, "")
 
 
 class DisturbedPose(DirectEffect):
@@ -55,14 +124,18 @@ class DisturbedPose(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs
-        scatter = hold_scatter(obs)
-        own = np.array([not hold.is_unsteady for hold in obs.segments.holds])
-        loud = own[:, None] & (scatter.ratio > 2.0) & (scatter.p_value * scatter.p_value.size < 1e-6)
-        restless = sorted(set(np.flatnonzero(loud.any(axis=1)).tolist()))
-        bumped = [span for span in obs.bumped_s if _is_bump(obs, span)]
-        if not bumped and not restless:
-            return None
+        seen = {span: _bump(obs, span) for span in obs.bumped_s}
+        bumps = {span: bump for span, bump in seen.items() if bump is not None and bump.chi2_per_dof_after < bump.chi2_per_dof_before}
+        bumped = list(bumps)
+        held = _gained_by_cutting(context) if bumped else ()
+        if bumped:
+            held = (*held, max(bumps.values(), key=lambda bump: bump.chi2_per_dof_before))
+        restless, predicted = _restless(obs)
         if len(restless) > MOST * obs.n_holds:
+            restless = []
+        if restless and predicted is not None:
+            held = (*held, predicted)
+        if not bumped and not restless:
             return None
         t = obs.time_s
         holds = obs.segments.holds
@@ -77,7 +150,7 @@ class DisturbedPose(DirectEffect):
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])
         return Evidence(
             1e-30, strength, parameters, f"Not every pose was still ({'; '.join(parts)}).", "within-static",
-            Where((), tuple(f"hold {i}" for i in restless), spans),
+            Where((), tuple(f"hold {i}" for i in restless), spans), held,
         )  # fmt: skip
 
     def variants(self, context: Context) -> list[Variant]:

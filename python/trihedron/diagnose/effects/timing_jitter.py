@@ -10,7 +10,8 @@ from scipy.special import ndtr
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.sample_steps import StepErrors, step_errors
-from trihedron.diagnose.observations import Observations
+from trihedron.diagnose.effects.stamp_errors import CLEAR, stamp_errors
+from trihedron.diagnose.observations import Observations, observe
 from trihedron.records.diagnosis import EffectParameter
 
 STEP_FACTOR = 5.0
@@ -53,6 +54,37 @@ class TimingJitter(DirectEffect):
         return "the log has no moves with a gyro" if not context.moves else None
 
     def find(self, context: Context) -> Evidence | None:
+        return self._wrong_stamps(context) or self._uneven_samples(context)
+
+    def _wrong_stamps(self, context: Context) -> Evidence | None:
+        stamps = stamp_errors(context.obs)
+        if stamps is None or stamps.sigma > CLEAR or abs(stamps.followed) > 0.1 + 3.0 * stamps.sigma:
+            return None
+        even = stamps.even_s
+
+        def reweigh(obs: Observations) -> Observations:
+            if len(even) != len(obs.time_s):
+                return obs  # samples were put in since
+            again = observe(replace(obs.recording, time_s=even), obs.whole)
+            return replace(
+                again,
+                move_ranges=obs.move_ranges,
+                move_holds=obs.move_holds,
+                jitter_s=obs.jitter_s,
+                bumped_s=obs.bumped_s,
+                moves_inflation=obs.moves_inflation,
+                dynamics_inflation=obs.dynamics_inflation,
+            )
+
+        return Evidence(
+            float(max(ndtr((stamps.followed - 1.0) / max(stamps.sigma, 1e-3)), 1e-300)), max(stamps.gain, 1.0),
+            (EffectParameter("stamp_error", stamps.rms_s, stamps.rms_s * max(stamps.sigma, 1e-3), "s"),),
+            f"The time stamps scatter by {1e3 * stamps.rms_s:.2g} ms about an even clock, but the readings do not follow "
+            f"them (share {stamps.followed:.2f} ± {stamps.sigma:.1g}): the samples were taken evenly.",
+            "timing", reweigh=reweigh,
+        )  # fmt: skip
+
+    def _uneven_samples(self, context: Context) -> Evidence | None:
         step_s = 1.0 / context.obs.recording.rate_hz
         value, spread, n = common_time_error(step_errors(context), step_s)
         if n < 50 or value <= 0.0:
