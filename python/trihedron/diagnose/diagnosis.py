@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -60,6 +60,7 @@ class _Model:
     prediction: Prediction
     distortions: list[Distortion] = field(default_factory=list)
     found: list[_Found] = field(default_factory=list)
+    refused: set[str] = field(default_factory=set)
 
 
 @dataclass
@@ -170,19 +171,19 @@ class _Run:
 def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
     tell(0.05, "fitting the twin")
     base = tune_noise(obs, start, NO_DISTORTION, prior)
-    domains = _all_domains(obs, base, alpha)
     model = _Model(obs, base, predict_held_out(base, folds_of(base), N_DOMAINS))
     tell(0.2, "looking at the samples")
     candidates: dict[str, Candidate] = {}
     _accept_direct(model, Context(obs, base), candidates, alpha, prior)
+    domains = _all_domains(obs, base, alpha, model.refused)
     for step in range(MAX_EFFECTS):
         tell(0.3 + 0.15 * step, "letting effects compete")
         if not _accept_next(model, candidates, alpha, prior, first=step == 0):
             break
     tell(0.9, "checking what remains")
-    remaining = _all_domains(model.obs, model.fitted, alpha)
+    remaining = _all_domains(model.obs, model.fitted, alpha, model.refused)
     if _drop_hollow(model, domains, remaining, prior):
-        remaining = _all_domains(model.obs, model.fitted, alpha)
+        remaining = _all_domains(model.obs, model.fitted, alpha, model.refused)
     return _Run(base, model, domains, _settle_direct(model, remaining), candidates)
 
 
@@ -198,11 +199,11 @@ def _widened(obs: Observations, remaining: tuple[DomainTest, ...]) -> Observatio
     return replace(obs, moves_inflation=np.sqrt(max(moves, 1.0)), dynamics_inflation=np.sqrt(max(dynamics, 1.0)))
 
 
-def _all_domains(obs: Observations, fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
+def _all_domains(obs: Observations, fitted: Fit, alpha: float, refused: Collection[str] = ()) -> tuple[DomainTest, ...]:
     return (
         *test_rows(fitted, alpha),
         test_within_static(obs, alpha),
-        test_timing(Context(obs, fitted), alpha),
+        test_timing(Context(obs, fitted), alpha, refused),
     )
 
 
@@ -238,6 +239,7 @@ def _accept_direct(
             fitted = tune_noise(obs, start, distortion, prior)
             prediction = predict_held_out(fitted, folds_of(fitted), N_DOMAINS)
             if not effect.is_proof and not mends(before, prediction):
+                model.refused.add(effect.id)
                 continue
             model.obs, model.fitted, model.prediction = obs, fitted, prediction
             model.distortions += added
@@ -275,9 +277,12 @@ def _accept_next(
     sound = [r for r in refits if r.bic_gain > MIN_DELTA_BIC and r.predicts and _is_plausible(r)]
     if not sound:
         return False
-    best = max(sound, key=lambda r: r.bic_gain)
+    # Rivals are compared against one rest, that of the best explained: else its small differences weigh large gains.
+    rest = np.min([r.stays for r in sound], axis=0)
+    best = max(sound, key=lambda r: r.bic_gain_at(rest))
     # What another mechanism explains as well: by its joint fit, or, for all of its shapes, by the score test.
-    close = [r.scored.effect.id for r in refits if r is not best and r.bic_gain > best.bic_gain - CONFOUNDED_DELTA_BIC]
+    enough = best.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
+    close = [r.scored.effect.id for r in refits if r is not best and r.bic_gain_at(rest) > enough]
     close += [
         s.effect.id
         for s in scored

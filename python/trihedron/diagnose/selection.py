@@ -138,9 +138,20 @@ class Refit:
     scored: Scored
     base_fit: Fit
     fitted: Fit
-    bic_gain: float
+    likelihood_gain: float
+    drop: FloatArray
+    stays: FloatArray
     prediction: Prediction
     base: Prediction
+
+    @property
+    def bic_gain(self) -> float:
+        """ΔBIC against what stays unexplained after this candidate."""
+        return self.bic_gain_at(self.stays)
+
+    def bic_gain_at(self, stays: FloatArray) -> float:
+        """ΔBIC with each domain's drop of chi-square over the dispersion ``stays`` (at least 1)."""
+        return min(self.likelihood_gain, self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum()))
 
     @property
     def predicts(self) -> bool:
@@ -177,9 +188,8 @@ def refit(
     # What stays unexplained is noise to the candidate: it must beat that, not the sensor's noise alone.
     stays = dispersion(fitted.system.residual, fitted, leverage(fitted))
     drop = _domain_chi2(base) - _domain_chi2(fitted)
-    gain = min(gain, gain - float((drop * (1.0 - 1.0 / stays)).sum()))
     prediction = predict_held_out(fitted, folds_of(fitted), N_DOMAINS)
-    return Refit(scored, base, fitted, gain - cost, prediction, base_prediction)
+    return Refit(scored, base, fitted, gain - cost, drop, stays, prediction, base_prediction)
 
 
 def _domain_chi2(fitted: Fit) -> FloatArray:

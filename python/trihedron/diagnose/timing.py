@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from scipy.special import ndtr
 
@@ -12,14 +14,18 @@ from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_e
 from trihedron.records.diagnosis import DomainTest, Where
 
 
-def test_timing(context: Context, alpha: float) -> DomainTest:
-    """Chi-square: squared z of the common time error, plus what lost samples explain; p of the sharper look."""
+def test_timing(context: Context, alpha: float, refused: Collection[str] = ()) -> DomainTest:
+    """Chi-square: squared z of the common time error, plus what lost samples explain; p of the sharper look.
+
+    ``refused`` are ids of effects whose mending did not predict held-out moves any better: jolts look like lost samples.
+    """
     step_s = 1.0 / context.obs.recording.rate_hz
     value, spread, n = common_time_error(step_errors(context), step_s)
     if n < 50:
         return DomainTest("timing", 1.0, float(n), 1.0, False, rms=0.0, unit="s")
     z = value / spread
-    found = [e for e in (DroppedSamples().find(context), TimingJitter().find(context)) if e is not None]
+    looks = [effect for effect in (DroppedSamples(), TimingJitter()) if effect.id not in refused]
+    found = [e for e in (look.find(context) for look in looks) if e is not None]
     p = min([min(1.0, 2.0 * e.p_value) for e in found], default=float(min(1.0, max(2.0 * ndtr(-z), 0.05))))
     where = Where()
     for evidence in found:

@@ -16,6 +16,10 @@ from trihedron.records.diagnosis import DomainTest, Where
 CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 
 
+MIN_LINE_SHARE = 0.01
+"""Long holds resolve lines far below the noise; a hundredth of its variance changes nothing that the model says."""
+
+
 @dataclass(frozen=True)
 class Line:
     """A spectral line of one channel; powers are relative to the noise around it, amplitude in raw units."""
@@ -32,6 +36,11 @@ class Line:
     power_after: float
     rms_before: float
     rms_after: float
+
+    @property
+    def share(self) -> float:
+        """Variance of the line over that of the readings at rest."""
+        return 0.5 * self.amplitude**2 / max(self.rms_before, 1e-300) ** 2
 
 
 def hold_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
@@ -199,7 +208,7 @@ def test_within_static(obs: Observations, alpha: float) -> DomainTest:
     # Real noise is not exactly Gaussian or white: a pose must be half as noisy again before its variance counts.
     loud = np.where(scatter.ratio > 1.5, scatter.p_value, 1.0)
     p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0
-    lines = find_lines(obs)
+    lines = [line for line in find_lines(obs) if line.share > MIN_LINE_SHARE]
     p_line = min((line.p_value for line in lines), default=1.0)
     p = min(1.0, 2.0 * min(p_scatter, p_line))
     dof = float(scatter.dof.sum() * scatter.ratio.shape[1])

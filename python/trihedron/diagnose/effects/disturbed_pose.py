@@ -84,9 +84,7 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
     rms_before, unit = physical_rms(fits[0], before.residual)
     rms_after, _ = physical_rms(fits[1], after.residual)
     return tuple(
-        HeldOut(
-            ROW_DOMAINS[d], float(before.per_row[d]), float(after.per_row[d]), rms_before[d], rms_after[d], unit[d]
-        )
+        HeldOut(ROW_DOMAINS[d], float(before.per_row[d]), float(after.per_row[d]), rms_before[d], rms_after[d], unit[d])
         for d in np.argsort(-gain)
         if d in rms_before and d in rms_after
     )
@@ -125,7 +123,11 @@ class DisturbedPose(DirectEffect):
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs
         seen = {span: _bump(obs, span) for span in obs.bumped_s}
-        bumps = {span: bump for span, bump in seen.items() if bump is not None and bump.chi2_per_dof_after < bump.chi2_per_dof_before}
+        bumps = {
+            span: bump
+            for span, bump in seen.items()
+            if bump is not None and bump.chi2_per_dof_after < bump.chi2_per_dof_before
+        }
         bumped = list(bumps)
         held = _gained_by_cutting(context) if bumped else ()
         if bumped:
