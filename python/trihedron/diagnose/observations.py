@@ -110,9 +110,9 @@ def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True
             holds.append((move.hold_before, move.hold_after))
     spans = [(hold.start, hold.stop) for hold in segments.holds]
     variances = np.zeros((len(ranges), 2, 3))
-    for k, values in enumerate((recording.accelerometer, recording.gyroscope)):
-        if values is not None:
-            variances[:, k] = unresolved_variance(values, tuple(ranges), spans, step_s)
+    for k, readings in enumerate((recording.accelerometer, recording.gyroscope)):
+        if readings is not None:
+            variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s)
     return Observations(
         recording=recording,
         segments=segments,

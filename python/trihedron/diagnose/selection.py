@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtrc
 
 from trihedron.diagnose.agreement import physical_rms
@@ -55,17 +54,6 @@ def mends(before: Prediction, after: Prediction) -> bool:
     stays = np.maximum(after.per_row, 1.0)
     gain = float(((before.per_row - after.per_row) * after.n_rows / stays).sum())
     return gain > 0.0 and bool((after.per_row < VISIBLE * before.per_row).any())
-
-
-@dataclass(frozen=True, eq=False)
-class Accepted:
-    """An effect in the model, with the variant that won and how the model stood before."""
-
-    effect: Effect
-    variant: Variant
-    p_adjusted: float
-    delta_bic: float
-    rivals: tuple[str, ...]
 
 
 def dispersion(residual: FloatArray, fitted: Fit, used: FloatArray) -> FloatArray:

@@ -14,10 +14,10 @@ from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_e
 from trihedron.records.diagnosis import DomainTest, Where
 
 
-def test_timing(context: Context, alpha: float, refused: Collection[str] = ()) -> DomainTest:
+def test_timing(context: Context, alpha: float, refused: Collection[str]) -> DomainTest:
     """Chi-square: squared z of the common time error, plus what lost samples explain; p of the sharper look.
 
-    ``refused`` are ids of effects whose mending did not predict held-out moves any better: jolts look like lost samples.
+    ``refused`` are ids of effects that did not predict held-out moves any better: jolts look like lost samples.
     """
     step_s = 1.0 / context.obs.recording.rate_hz
     value, spread, n = common_time_error(step_errors(context), step_s)

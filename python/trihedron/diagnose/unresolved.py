@@ -52,7 +52,7 @@ def unresolved_variance(
         return out
 
     at_half, at_quarter = excess(half), excess(quarter)
-    # The fall from band to band is the sensor's filter and the hand's manner: that of the usual move, not of the wildest.
+    # The fall from band to band is the sensor's filter and the hand's manner: that of the usual move, not the wildest.
     total = at_quarter.sum(axis=1)
     falls = at_half.sum(axis=1)[total > 0] / total[total > 0]
     fall = min(float(np.median(falls)), 1.0) if len(falls) else 1.0

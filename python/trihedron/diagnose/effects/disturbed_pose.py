@@ -23,7 +23,7 @@ MOST = 0.25
 LOUD = 4.0
 """A restless pose has this many times the variance of the others: twice their noise."""
 MIN_GAIN = 15.0
-"""Chi-square that cutting the poses at their bumps must win in held-out data of one domain, and the share that may stay."""
+"""Chi-square that cutting poses at their bumps must win in held-out data of one domain; the share that may stay."""
 MUST_FALL = 0.9
 BUMP_SIGMA = 7.0
 """A tenth of a second must leave the line through its surroundings by this much: drift inside a hold does not."""

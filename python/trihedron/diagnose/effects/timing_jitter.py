@@ -79,8 +79,8 @@ class TimingJitter(DirectEffect):
         return Evidence(
             float(max(ndtr((stamps.followed - 1.0) / max(stamps.sigma, 1e-3)), 1e-300)), max(stamps.gain, 1.0),
             (EffectParameter("stamp_error", stamps.rms_s, stamps.rms_s * max(stamps.sigma, 1e-3), "s"),),
-            f"The time stamps scatter by {1e3 * stamps.rms_s:.2g} ms about an even clock, but the readings do not follow "
-            f"them (share {stamps.followed:.2f} ± {stamps.sigma:.1g}): the samples were taken evenly.",
+            f"The time stamps scatter by {1e3 * stamps.rms_s:.2g} ms about an even clock, but the readings do not "
+            f"follow them (share {stamps.followed:.2f} ± {stamps.sigma:.1g}): the samples were taken evenly.",
             "timing", reweigh=reweigh,
         )  # fmt: skip
 
