@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.diagnose import diagnose_recording
+from trihedron.diagnose.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
@@ -89,7 +90,8 @@ def diagnose(
     else:
         used = replace(known, gravity_m_s2=gravity)
     recording_used, segments_used = recording, segments
-    if recording.gyroscope is not None and used.gyroscope is None:
+    # Where the poses leave the model open the twin starts from nominal values, for the gyro too.
+    if recording.gyroscope is not None and used.gyroscope is None and not (known is None and is_open(used)):
         findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [_gyroscope_left_out()]
         recording_used, segments_used = _accelerometer_only(recording, segments)
     found = diagnose_recording(

@@ -12,6 +12,8 @@ from trihedron.diagnose.observations import FloatArray
 
 NEAR_DEG = 12.0
 """A turn meant to be a multiple of 90° lands within this; hand moves land anywhere."""
+MOST_SWING_DEG = 8.0
+"""On a table tilted by 4° a half turn swings the vertical in the body by twice that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +33,7 @@ def table_turns(context: Context) -> list[TableTurn]:
     for m, where in enumerate(context.moves):
         before, after = context.obs.move_holds[m]
         up = twin.up[before]
-        if up @ twin.up[after] < np.cos(np.radians(3.0)):
+        if up @ twin.up[after] < np.cos(np.radians(MOST_SWING_DEG)):
             continue
         t = context.time_s[where]
         about_up = context.rate[where] @ up
