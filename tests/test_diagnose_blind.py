@@ -35,7 +35,6 @@ def test_healthy_sessions_are_consistent_at_the_stated_rate():
     [
         ("accel-thermal-scale", "adis", 1),
         ("gyro-thermal-bias", "tactical", 2),
-        ("accel-hysteresis", "mpu", 3),
         ("lever-arm", "adis", 4),
     ],
 )
@@ -52,11 +51,12 @@ def test_every_effect_of_the_catalogue_is_drawn():
     assert {effect.id for effect in catalogue()} - set(SIZES) == set()
 
 
-@pytest.mark.parametrize("effect", SIZES)
-def test_a_draw_repeats_and_its_answer_is_sealed_in_the_names_of_the_diagnosis(effect):
+@pytest.mark.parametrize("effect", ["accel-size-effect", "dropped-samples", "vibration-rectification"])
+def test_a_draw_repeats_and_its_answer_is_sealed_in_numbers(effect):
     recording, _, answer = make(Job((effect,), "mpu", 7))
     again, _, _ = make(Job((effect,), "mpu", 7))
     assert np.array_equal(recording.accelerometer, again.accelerometer)
+    assert answer["parameters"][effect]
     assert all(np.isfinite(value) for value in answer["parameters"][effect].values())
 
 

@@ -75,6 +75,8 @@ def scored(result: Result) -> str:
         return "right" if is_clean else "wrong"
     if len(effects) == 2:
         named = set(found).union(*map(set, result["confounded"])) if found else set()
+        if any(e not in named and not is_visible(e, result["ideal"][e]) for e in effects):
+            return "hidden"
         return ("none", "one", "both")[sum(e in named for e in effects)]
     (effect,) = effects
     if first is None:
@@ -182,7 +184,11 @@ def summary(results: list[Result]) -> str:
         ]
     if pairs:
         count = Counter(r["score"] for r in pairs)
-        out.append(f"pairs: both found {share(count['both'], len(pairs))}; one {count['one']}, none {count['none']}")
+        n = len(pairs) - count["hidden"]
+        out.append(
+            f"pairs: both found {share(count['both'], n)}; one {count['one']}, none {count['none']}; "
+            f"with one that the noise hides {count['hidden']}"
+        )
     if foreign:
         count = Counter(r["score"] for r in foreign)
         out.append(f"outside the catalogue: unexplained, in the right domain {share(count['right'], len(foreign))}")
