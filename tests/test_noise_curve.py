@@ -37,13 +37,7 @@ def test_the_covariance_of_the_points_is_that_of_simulated_curves(terms):
 
 @pytest.mark.parametrize(
     "truth",
-    [
-        {"N": 1e-2},
-        {"N": 1e-2, "K": 2e-3},
-        {"N": 1e-2, "B": 1e-2},
-        {"Q": 5e-4, "N": 1e-2, "K": 3e-3},
-        {"N": 1e-2, "R": 6e-4},
-    ],
+    [{"N": 1e-2, "B": 1e-2}, {"Q": 5e-4, "N": 1e-2, "K": 3e-3}, {"N": 1e-2, "R": 6e-4}],
     ids=lambda terms: "".join(terms),
 )
 def test_the_terms_of_a_curve_are_found_and_their_intervals_hold(truth):

@@ -159,6 +159,11 @@ class NoiseAxis:
         """Value of a term, 0 when it is absent."""
         return self.terms[TermName(symbol)].value
 
+    @property
+    def shortest_described_s(self) -> float:
+        """Shortest averaging time that the terms describe, s: a reading, or half the period of ``highest_hz``."""
+        return max(1.0 / self.rate_hz, 0.5 / self.highest_hz if self.highest_hz > 0.0 else 0.0)
+
     def allan_variance(self, tau_s: npt.ArrayLike) -> FloatArray:
         """(k,) Allan variance of all terms found, at averaging times ``tau_s`` (docs/noise.md, eq. 7)."""
         tau = np.atleast_1d(np.asarray(tau_s, dtype=np.float64))
@@ -198,7 +203,8 @@ class NoiseAxis:
         The minimum is that of the fitted terms, not of the scattered curve. It is not the bias instability: white noise
         and random walk make a minimum of their own.
         """
-        tau = np.geomspace(1.0 / self.rate_hz, max(self.duration_s / 2.0, 2.0 / self.rate_hz), 2000)
+        shortest = self.shortest_described_s
+        tau = np.geomspace(shortest, max(self.duration_s / 2.0, 2.0 * shortest), 2000)
         # Sinusoids make minima at their periods that hold for no other purpose than theirs.
         variance = NoiseAxis(**{**self.__dict__, "lines": ()}).allan_variance(tau)
         place = int(np.argmin(variance))

@@ -183,7 +183,10 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
         *(
             (
                 f"σ of a mean of {window:g} s [{printed}]",
-                *(plain_number(math.sqrt(a.variance_of_mean(window)), 3) for a in axes),
+                *(
+                    plain_number(math.sqrt(a.variance_of_mean(window)), 3) if window >= a.shortest_described_s else "–"
+                    for a in axes
+                ),
             )
             for window in (1.0, 10.0)
         ),

@@ -61,11 +61,15 @@ class CurveCovariance:
                 pairs[:, :, j, i], with_ramp[:, j, i] = pairs[:, :, i, j], with_ramp[:, i, j]
         return cls(pairs, with_ramp)
 
+    def from_point(self, first: int) -> CurveCovariance:
+        """The same without the first points."""
+        return CurveCovariance(self.pairs[:, :, first:, first:], self.with_ramp[:, first:, first:])
+
     def at(self, squares: FloatArray) -> FloatArray:
         """(k, k) covariance for ``squares`` (5,) of Q, N, B, K, R."""
         random = squares[:4]
-        both = np.einsum("s,t,stij->ij", random, random, self.pairs)
-        return np.asarray(both + squares[4] * np.einsum("s,sij->ij", random, self.with_ramp))
+        both = np.tensordot(np.outer(random, random), self.pairs, axes=2)
+        return np.asarray(both + squares[4] * np.tensordot(random, self.with_ramp, axes=1))
 
 
 def _pair(m_i: int, m_j: int, n: int, step_s: float) -> tuple[FloatArray, FloatArray]:

@@ -26,8 +26,8 @@ EVIDENCE = 8.0
 """Drop of the deviance that a term must earn, as for whole logs."""
 _RISE_95 = 3.841
 _RISE_95_ONE_SIDED = 2.706
-_CONVERGED = 1e-4
-"""Last step of a log square: a thousandth of any standard error that a curve can give."""
+_CONVERGED = 3e-4
+"""Last step of a log square: a tenth of the least standard error that a curve of millions of readings gives."""
 LEAST_EDF = 1.5
 """Points of fewer degrees of freedom say nothing that their neighbours do not."""
 
@@ -44,16 +44,21 @@ class CurveFit:
 
 @dataclass(frozen=True, eq=False)
 class CurvePoints:
-    """Points ``clusters`` (k,) readings, ``variance`` (k,) of a log of ``n`` readings, and what they are modelled by.
+    """Points ``clusters`` (k,) readings, ``variance`` (k,), and how the terms make them vary together.
 
     ``tolerance`` is the relative standard deviation of a point beyond chance: colouring bends a curve by a little.
     """
 
     clusters: FloatArray
     variance: FloatArray
-    n: int
     rate_hz: float
+    covariance: CurveCovariance
     tolerance: float = 0.0
+
+    @classmethod
+    def of(cls, clusters: FloatArray, variance: FloatArray, n: int, rate_hz: float) -> CurvePoints:
+        """Points with the covariance table of their cluster sizes."""
+        return cls(clusters, variance, rate_hz, _tabulated(tuple(int(m) for m in clusters), n, rate_hz))
 
     @cached_property
     def tau_s(self) -> FloatArray:
@@ -65,13 +70,11 @@ class CurvePoints:
         """(k, 5) Allan variance of unit terms."""
         return np.stack([allan_variance_of_terms(self.tau_s, term.value, 1.0) for term in TERMS], axis=1)
 
-    @cached_property
-    def _table(self) -> CurveCovariance:
-        return _tabulated(tuple(int(m) for m in self.clusters), self.n, self.rate_hz)
-
     def from_point(self, first: int, tolerance: float) -> CurvePoints:
         """The same without the first points."""
-        return CurvePoints(self.clusters[first:], self.variance[first:], self.n, self.rate_hz, tolerance)
+        return CurvePoints(
+            self.clusters[first:], self.variance[first:], self.rate_hz, self.covariance.from_point(first), tolerance
+        )
 
     def residuals(self, squares: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(k,) logarithms of the points over the model's, and their (k, k) covariance.
@@ -82,7 +85,7 @@ class CurvePoints:
         from scipy.special import digamma, polygamma
 
         mean = self.design @ squares
-        relative = self._table.at(squares) / np.outer(mean, mean)
+        relative = self.covariance.at(squares) / np.outer(mean, mean)
         variance = np.diag(relative)
         half = 1.0 / np.maximum(variance, 1e-12)
         residual = np.log(self.variance / mean) - (digamma(half) - np.log(half))
@@ -159,12 +162,15 @@ class CurvePoints:
         limit = min(least.deviance, fit.deviance) + rise
         best = max(float(least.squares[k]), 1e-9 * float(self.alone()[k]))
 
-        def exceeds(log_ratio: float) -> bool:
+        def excess(log_ratio: float) -> float:
             square = best * math.exp(log_ratio)
-            return self.fit(active, least.squares, (k, square)).deviance > limit
+            return self.fit(active, least.squares, (k, square)).deviance - limit
 
-        up = _crossing(exceeds, 1.0)
-        down = _crossing(exceeds, -1.0) if is_present else -math.inf
+        wald = 0.3
+        if is_present and fit.covariance.size:
+            wald = 1.96 * math.sqrt(scale * float(fit.covariance[fit.active.index(k), fit.active.index(k)]))
+        up = _crossing(excess, min(max(wald, 1e-4), 2.0))
+        down = _crossing(excess, -min(max(wald, 1e-4), 2.0)) if is_present else -math.inf
         return best * math.exp(down), best * math.exp(up)
 
 
@@ -174,16 +180,27 @@ def _tabulated(clusters: tuple[int, ...], n: int, rate_hz: float) -> CurveCovari
     return CurveCovariance.of(np.array(clusters, dtype=np.int64), n, rate_hz)
 
 
-def _crossing(exceeds: Callable[[float], bool], direction: float) -> float:
-    """Log ratio at which ``exceeds`` becomes true, going in ``direction``; to 0.2 %."""
-    inside, outside = 0.0, 0.05 * direction
-    while not exceeds(outside):
-        inside, outside = outside, 2.0 * outside
+def _crossing(excess: Callable[[float], float], first: float) -> float:
+    """Log ratio beyond zero, on the side of ``first``, at which ``excess`` rises through zero; to 1 %."""
+    inside, below = 0.0, excess(0.0)
+    outside, above = first, excess(first)
+    while above < 0.0:
+        inside, below = outside, above
+        outside *= 2.0
         if abs(outside) > 60.0:
             return outside
-    while abs(outside - inside) > 2e-3 * max(abs(inside), 0.05):
-        middle = 0.5 * (inside + outside)
-        inside, outside = (inside, middle) if exceeds(middle) else (middle, outside)
+        above = excess(outside)
+    for _ in range(30):
+        # Where a chord would creep, halve.
+        share = min(0.9, max(0.1, below / (below - above))) if below < 0.0 else 0.5
+        middle = inside + share * (outside - inside)
+        value = excess(middle)
+        if value < 0.0:
+            inside, below = middle, value
+        else:
+            outside, above = middle, value
+        if abs(outside - inside) < 0.01 * abs(outside) or abs(value) < 0.02:
+            return middle
     return outside
 
 

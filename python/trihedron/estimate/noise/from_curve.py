@@ -141,7 +141,7 @@ def _usable(curve: AllanCurve, channel: int) -> CurvePoints:
             f"{curve.names[channel]}: {len(chosen)} points about an octave apart are too few to tell noise terms "
             f"apart; at least {FEWEST_POINTS} are needed"
         )
-    return CurvePoints(
+    return CurvePoints.of(
         curve.clusters[chosen].astype(np.float64), curve.variance[chosen, channel], curve.n_samples, curve.rate_hz
     )
 

@@ -1,0 +1,63 @@
+"""Noise of real static logs and published curves; each skips where the recordings are absent."""
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.pipeline import noise, noise_of_curve
+from trihedron.records.finding import FindingCode
+from trihedron.records.noise import TermName
+
+
+def codes(axis):
+    return {finding.code for finding in axis.findings}
+
+
+@pytest.fixture(scope="module")
+def adis(real_data):
+    recording = trihedron.read(real_data / "adis16405" / "adis16405_imu1.npz")
+    return noise(recording, gyroscope_lsb="0.05 deg/s", accelerometer_lsb="3.33 mg")
+
+
+def test_the_white_noise_of_the_adis16405_is_the_published_one(adis):
+    for axis, published in zip(adis.axes[:3], (0.041, 0.043, 0.039), strict=True):
+        assert np.degrees(axis.value("N")) == pytest.approx(published, rel=0.05)
+        assert np.degrees(np.sqrt(axis.allan_variance(1.0)[0])) == pytest.approx(published, rel=0.05)
+
+
+def test_what_else_the_adis16405_log_holds_is_found(adis):
+    for axis in adis.axes:
+        # Its own filter takes half the power at Nyquist; Q is never quoted through it.
+        assert FindingCode.SPECTRUM_COLOURED in codes(axis)
+        assert axis.highest_hz < 25.0
+        assert axis.terms[TermName.BIAS_INSTABILITY].is_present
+    for axis in adis.axes[3:]:
+        assert any(abs(line.frequency_hz - 0.564) < 0.002 for line in axis.lines)
+
+
+def test_colouring_of_the_phone_log_is_recognised_and_terms_come_from_below(real_data):
+    recording = trihedron.read(real_data / "galaxy_s5" / "samsung_galaxy_s5.csv.gz", rate_hz=10.0)
+    found = noise(recording)
+    assert FindingCode.REPEATED_ROWS in {finding.code for finding in found.findings}
+    for axis in found.axes:
+        assert FindingCode.SPECTRUM_COLOURED in codes(axis)
+        # The spectrum falls to 0.4 % by 5 Hz and is flat below 0.15 Hz.
+        assert axis.highest_hz < 0.2
+        assert not axis.terms[TermName.QUANTISATION].is_present
+
+
+def test_terms_of_the_published_curve_agree_with_those_of_the_log(adis, real_data):
+    curve = noise_of_curve(real_data / "allan_curves" / "adis_av.csv", gyroscope_unit="deg/s", accelerometer_unit="g")
+    for axis, logged in zip(curve.axes[:3], adis.axes[:3], strict=True):
+        # The filter still takes 1 % where the curve is believed.
+        assert axis.value("N") == pytest.approx(logged.value("N"), rel=0.02)
+        mine, theirs = axis.terms[TermName.BIAS_INSTABILITY], logged.terms[TermName.BIAS_INSTABILITY]
+        assert abs(mine.value - theirs.value) < 3.0 * np.hypot(mine.sigma, theirs.sigma)
+
+
+def test_a_tactical_grade_unit_shows_white_noise_only(real_data):
+    curve = noise_of_curve(real_data / "allan_curves" / "ln200_av.csv")
+    assert [axis.name for axis in curve.axes][:3] == ["Gyro. X", "Gyro. Y", "Gyro. Z"]
+    for axis in curve.axes[:3]:
+        assert axis.value("N") == pytest.approx(1.15e-5, rel=0.07)
+        assert not axis.terms[TermName.BIAS_INSTABILITY].is_present
