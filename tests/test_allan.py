@@ -143,6 +143,7 @@ def test_a_stream_beyond_its_memory_thins_only_the_long_clusters():
     whole = allan_deviation(x, 100.0, streamed.clusters)
     assert streamed.stride == 8
     assert streamed.deviation[:3] == pytest.approx(whole.deviation[:3], rel=1e-11)
+    assert streamed.edf == pytest.approx(whole.edf, rel=1e-2)
     # Every eighth start of 1e5: the information is the same, the sum is not.
     assert streamed.deviation == pytest.approx(whole.deviation, rel=1e-3)
 

@@ -11,8 +11,9 @@ from noise_series import series
 from trihedron.cli import main
 from trihedron.pipeline import noise as noise_of
 from trihedron.records import Recording
-from trihedron.report.noise import customary, noise_report
+from trihedron.report.noise import noise_report
 from trihedron.report.noise_files import curve_csv
+from trihedron.report.noise_units import customary
 from trihedron.units import RateUnit
 
 RATE = 50.0

@@ -11,27 +11,14 @@ import numpy as np
 from trihedron.records import Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.noise_units import TERM_WORDS, customary, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
-from trihedron.units import arcsec_from_radians, degrees_from_radians, micro_g_from_m_s2, per_hour, per_root_hour
+from trihedron.units import micro_g_from_m_s2
 
 _NO_UNIT = (
     "The unit of the log is not known: say it with --gyro-unit and --accel-unit, or the size of a count with "
     "--gyro-lsb and --accel-lsb."
 )
-TERM_WORDS = {
-    TermName.QUANTISATION: "quantisation",
-    TermName.WHITE: "white",
-    TermName.BIAS_INSTABILITY: "bias instability",
-    TermName.RATE_RANDOM_WALK: "rate random walk",
-    TermName.RATE_RAMP: "rate ramp",
-}
-PER_UNIT = {
-    TermName.QUANTISATION: "·s",
-    TermName.WHITE: "/√Hz",
-    TermName.BIAS_INSTABILITY: "",
-    TermName.RATE_RANDOM_WALK: "/√s",
-    TermName.RATE_RAMP: "/s",
-}
 
 
 def noise_report(
@@ -133,7 +120,7 @@ def _value(term: NoiseTerm, factor: float = 1.0) -> str:
 def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
     rows = []
     for term in TermName:
-        label = f"{term.value}  {TERM_WORDS[term]} [{_unit_of(term, unit)}]"
+        label = f"{term.value}  {TERM_WORDS[term]} [{unit_of(term, unit)}]"
         rows.append((label, *(_value(axis.terms[term]) for axis in axes)))
     if any(axis.gauss_markov for axis in axes):
         rows.append((f"   Gauss-Markov σ [{unit_in_print(unit)}]", *(_gauss_markov(axis) for axis in axes)))
@@ -154,15 +141,6 @@ def _gauss_markov(axis: NoiseAxis) -> str:
 
 def _correlation(axis: NoiseAxis) -> str:
     return "–" if axis.gauss_markov is None else plain_number(axis.gauss_markov.correlation_time_s, 2)
-
-
-def _unit_of(term: TermName, unit: str) -> str:
-    printed = unit_in_print(unit)
-    if unit == "m/s^2" and term in (TermName.RATE_RAMP, TermName.QUANTISATION):
-        return "m/s³" if term is TermName.RATE_RAMP else "m/s"
-    if unit == "rad/s" and term in (TermName.RATE_RAMP, TermName.QUANTISATION):
-        return "rad/s²" if term is TermName.RATE_RAMP else "rad"
-    return printed + PER_UNIT[term]
 
 
 def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
@@ -213,28 +191,6 @@ def _lengths_table(noise: Noise, lengths: Mapping[str, Mapping[TermName, float |
     )
     caption = f"Recording after which a term is known to {100 * accuracy:g} % (1σ)"
     return Table(("", *(axis.name for axis in noise.axes)), rows, caption)
-
-
-def customary(term: TermName, unit: str) -> tuple[str, str, float] | None:
-    """IEEE 952 name, customary unit and factor from SI of a term; None where the unit of the log is not known."""
-    if unit == "rad/s":
-        deg = degrees_from_radians(1.0)
-        return {
-            TermName.QUANTISATION: ("quantisation noise", "arcsec", arcsec_from_radians(1.0)),
-            TermName.WHITE: ("angle random walk", "°/√h", per_root_hour(deg)),
-            TermName.BIAS_INSTABILITY: ("bias instability", "°/h", per_hour(deg)),
-            TermName.RATE_RANDOM_WALK: ("rate random walk", "°/h/√h", per_hour(per_root_hour(deg))),
-            TermName.RATE_RAMP: ("rate ramp", "°/h/h", per_hour(per_hour(deg))),
-        }[term]
-    if unit == "m/s^2":
-        return {
-            TermName.QUANTISATION: ("quantisation noise", "m/s", 1.0),
-            TermName.WHITE: ("velocity random walk", "m/s/√h", per_root_hour(1.0)),
-            TermName.BIAS_INSTABILITY: ("bias instability", "µg", micro_g_from_m_s2(1.0)),
-            TermName.RATE_RANDOM_WALK: ("acceleration random walk", "µg/√h", per_root_hour(micro_g_from_m_s2(1.0))),
-            TermName.RATE_RAMP: ("acceleration ramp", "µg/h", per_hour(micro_g_from_m_s2(1.0))),
-        }[term]
-    return None
 
 
 def _customary(axes: list[NoiseAxis], unit: str) -> list[Block]:

@@ -83,8 +83,6 @@ def _terms(place: Axes, curve: AllanCurve, axis: NoiseAxis) -> None:
     if best is not None:
         place.plot(*best, "x", color=ACCENT, markersize=8, markeredgewidth=2.0, zorder=5)
         words = f"{plain_number(best[0], 2)} s"
-        place.annotate(
-            words, best, xytext=(0, -17), textcoords="offset points", fontsize=8.5, color=ACCENT, ha="center"
-        )
+        place.annotate(words, best, xytext=(0, 9), textcoords="offset points", fontsize=8.5, color=ACCENT, ha="center")
     if axis.longest_tau_s > 0:
         place.axvspan(axis.longest_tau_s, curve.tau_s[-1] * 1.5, color="#F4F1EA", zorder=0, linewidth=0)

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from trihedron.records import Noise, NoiseAxis, TermName
-from trihedron.report.noise import PER_UNIT, customary, kalibr_rows
+from trihedron.report.noise import kalibr_rows
+from trihedron.report.noise_units import PER_UNIT, customary
 
 Lengths = Mapping[str, Mapping[TermName, float | None]]
 

@@ -125,19 +125,22 @@ def stream_allan_deviation(
         stream.extend(readings)
     if stream is None:
         raise ValueError("the log holds no chunk of readings")
+    return streamed_curve(stream, rate_hz, confidence, tuple(names), tuple(units))
+
+
+def streamed_curve(
+    stream: _core.AllanStream, rate_hz: float, confidence: float, names: tuple[str, ...], units: tuple[str, ...]
+) -> AllanCurve:
+    """The curve of all that a stream was given.
+
+    Longer clusters start at every ``stride``-th reading only, at least 64 times in a cluster: they hold the information
+    of every start, and have its degrees of freedom.
+    """
     found, variance, terms, stride, n, _ = stream.finish()
+    clusters = np.array(found)
+    starts = np.repeat((n - 2.0 * clusters + 1.0)[:, np.newaxis], len(variance), axis=1)
     return curve_with_intervals(
-        "overlapping",
-        rate_hz,
-        n,
-        np.array(found),
-        variance.T,
-        terms.T,
-        terms.T.astype(np.float64),
-        confidence,
-        tuple(names),
-        tuple(units),
-        stride,
+        "overlapping", rate_hz, n, clusters, variance.T, terms.T, starts, confidence, names, units, stride
     )
 
 

@@ -15,8 +15,8 @@ from trihedron.estimate.noise.allan import (
     as_readings,
     check_question,
     checked_clusters,
-    curve_with_intervals,
     default_clusters,
+    streamed_curve,
 )
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
 from trihedron.estimate.noise.screening import readout, steps_and_knocks
@@ -65,23 +65,10 @@ def stream_noise(
             kept += len(head[-1])
     if stream is None:
         raise ValueError("the log holds no chunk of readings")
-    found, variance, terms, stride, n, means = stream.finish()
-    channels = variance.shape[0]
+    *_, n, means = stream.finish()
+    channels = len(means)
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
-    units = tuple(units) or ("",) * channels
-    curve = curve_with_intervals(
-        "overlapping",
-        rate_hz,
-        n,
-        np.array(found),
-        variance.T,
-        terms.T,
-        terms.T.astype(np.float64),
-        0.95,
-        names,
-        units,
-        stride,
-    )
+    curve = streamed_curve(stream, rate_hz, 0.95, names, tuple(units) or ("",) * channels)
     first = np.concatenate(head)
     block = -(-n // LONGEST_TRANSFORM)
     axes = [

@@ -1,0 +1,54 @@
+"""Names and units of noise terms: SI, and those of IEEE 952 that data sheets use."""
+
+from __future__ import annotations
+
+from trihedron.records import TermName
+from trihedron.report.numbers import unit_in_print
+from trihedron.units import arcsec_from_radians, degrees_from_radians, micro_g_from_m_s2, per_hour, per_root_hour
+
+TERM_WORDS = {
+    TermName.QUANTISATION: "quantisation",
+    TermName.WHITE: "white",
+    TermName.BIAS_INSTABILITY: "bias instability",
+    TermName.RATE_RANDOM_WALK: "rate random walk",
+    TermName.RATE_RAMP: "rate ramp",
+}
+PER_UNIT = {
+    TermName.QUANTISATION: "·s",
+    TermName.WHITE: "/√Hz",
+    TermName.BIAS_INSTABILITY: "",
+    TermName.RATE_RANDOM_WALK: "/√s",
+    TermName.RATE_RAMP: "/s",
+}
+
+
+def unit_of(term: TermName, unit: str) -> str:
+    """Printed unit of a term of a log in ``unit``."""
+    printed = unit_in_print(unit)
+    if unit == "m/s^2" and term in (TermName.RATE_RAMP, TermName.QUANTISATION):
+        return "m/s³" if term is TermName.RATE_RAMP else "m/s"
+    if unit == "rad/s" and term in (TermName.RATE_RAMP, TermName.QUANTISATION):
+        return "rad/s²" if term is TermName.RATE_RAMP else "rad"
+    return printed + PER_UNIT[term]
+
+
+def customary(term: TermName, unit: str) -> tuple[str, str, float] | None:
+    """IEEE 952 name, customary unit and factor from SI of a term; None where the unit of the log is not known."""
+    if unit == "rad/s":
+        deg = degrees_from_radians(1.0)
+        return {
+            TermName.QUANTISATION: ("quantisation noise", "arcsec", arcsec_from_radians(1.0)),
+            TermName.WHITE: ("angle random walk", "°/√h", per_root_hour(deg)),
+            TermName.BIAS_INSTABILITY: ("bias instability", "°/h", per_hour(deg)),
+            TermName.RATE_RANDOM_WALK: ("rate random walk", "°/h/√h", per_hour(per_root_hour(deg))),
+            TermName.RATE_RAMP: ("rate ramp", "°/h/h", per_hour(per_hour(deg))),
+        }[term]
+    if unit == "m/s^2":
+        return {
+            TermName.QUANTISATION: ("quantisation noise", "m/s", 1.0),
+            TermName.WHITE: ("velocity random walk", "m/s/√h", per_root_hour(1.0)),
+            TermName.BIAS_INSTABILITY: ("bias instability", "µg", micro_g_from_m_s2(1.0)),
+            TermName.RATE_RANDOM_WALK: ("acceleration random walk", "µg/√h", per_root_hour(micro_g_from_m_s2(1.0))),
+            TermName.RATE_RAMP: ("acceleration ramp", "µg/h", per_hour(micro_g_from_m_s2(1.0))),
+        }[term]
+    return None
