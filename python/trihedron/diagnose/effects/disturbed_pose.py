@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from trihedron.diagnose.agreement import ROW_DOMAINS, physical_rms
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.observations import Observations, observe
-from trihedron.diagnose.solve import fit, folds_of, predict_held_out
-from trihedron.diagnose.twin import NO_DISTORTION
+from trihedron.diagnose.solve import fit, folds_of, leverage, predict_held_out
+from trihedron.diagnose.twin import NO_DISTORTION, STATIC_ACCEL
 from trihedron.diagnose.within_static import hold_scatter
 from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
 
@@ -25,6 +26,8 @@ LOUD = 4.0
 MIN_GAIN = 15.0
 """Chi-square that cutting poses at their bumps must win in held-out data of one domain; the share that may stay."""
 MUST_FALL = 0.9
+OWN_SIGMA = 4.0
+"""How far a pose's own readings must be off before a push of it is considered."""
 BUMP_SIGMA = 7.0
 """A tenth of a second must leave the line through its surroundings by this much: drift inside a hold does not."""
 
@@ -111,6 +114,32 @@ def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
     return found, HeldOut("within-static", float(np.mean(before)), float(np.mean(after)), 0.0, 0.0, "")
 
 
+def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
+    """(holds,) whether a pose's own readings tell of a disturbance: its norm, or its first half against its second.
+
+    Moves that disagree on both sides of a pose are no sign of it: whatever else is missing in moves does the same.
+    """
+    obs, fitted = context.obs, context.fitted
+    rows = (fitted.system.domain == STATIC_ACCEL) & (fitted.system.walk == 0)
+    used = leverage(fitted)
+    out = np.zeros(obs.n_holds, dtype=bool)
+    for i, hold in enumerate(obs.segments.holds):
+        own = rows & (fitted.system.segment == i)
+        chi2, dof = float((fitted.system.residual[own] ** 2).sum()), float((1.0 - used[own]).sum())
+        if chi2 > OWN_SIGMA**2 * max(dof, 0.1):
+            out[i] = True
+            continue
+        for values, sigma in ((obs.raw_force, obs.hold_force_sigma), (obs.raw_rate, obs.hold_rate_sigma)):
+            if values is None or sigma is None:
+                continue
+            early, late = np.array_split(values[hold.start : hold.stop], 2)
+            # Each half's mean has twice the variance of the whole's, their difference four times.
+            away = np.abs(np.nanmean(late, axis=0) - np.nanmean(early, axis=0)) / (2.0 * sigma[i])
+            if (away > OWN_SIGMA).any():
+                out[i] = True
+    return out
+
+
 class DisturbedPose(DirectEffect):
     """A bump seen inside the hold, or one pose with an acceleration of its own."""
 
@@ -157,7 +186,7 @@ class DisturbedPose(DirectEffect):
 
     def variants(self, context: Context) -> list[Variant]:
         out = []
-        for i in range(context.obs.n_holds):
+        for i in np.flatnonzero(_shows_itself(context)):
             columns = np.zeros((context.n_points, 3, 3))
             columns[i] = np.eye(3)
             shape = {"pose": (float(i), "index")}

@@ -126,11 +126,12 @@ class Quantisation(DirectEffect):
             return None
         parameters = []
         for one in found:
-            S = context.fitted.twin.accel_S if one.channel < 3 else context.fitted.twin.gyro_S
-            scale = float(1.0 / np.linalg.norm(np.linalg.inv(S)[one.channel % 3]))
+            scale, relative = _scale_of(context, one.channel)
             unit = "m/s^2" if one.channel < 3 else "rad/s"
             name = CHANNELS[one.channel]
-            parameters.append(EffectParameter(f"lsb_{name}", one.step * scale, 1e-6 * one.step * scale, unit))
+            # The step is exact in raw units; in SI it is as good as the channel's scale factor.
+            sigma = max(relative, 1e-6) * one.step * scale
+            parameters.append(EffectParameter(f"lsb_{name}", one.step * scale, sigma, unit))
             if one.missing:
                 parameters.append(EffectParameter(f"missing_codes_{name}", float(one.missing), 0.0, "1"))
             if one.dead:
@@ -184,6 +185,15 @@ class Quantisation(DirectEffect):
         if sigma > COARSE:
             return None
         return Lattice(c, step, sigma * step, scatter, shift * step, spread * step, 0, 0.0)
+
+
+def _scale_of(context: Context, channel: int) -> tuple[float, float]:
+    """SI per raw unit along one channel's axis, and its relative standard error."""
+    is_accel, k = channel < 3, channel % 3
+    S = context.fitted.twin.accel_S if is_accel else context.fitted.twin.gyro_S
+    place = (0, 2, 5)[k] if is_accel else 9 + 4 * k  # S is lower triangular for the accelerometer
+    sigma = float(np.sqrt(max(context.fitted.covariance()[place, place], 0.0)))
+    return float(1.0 / np.linalg.norm(np.linalg.inv(S)[k])), sigma / abs(float(S[k, k]))
 
 
 def _resolved(obs: Observations, one: Lattice) -> Observations:

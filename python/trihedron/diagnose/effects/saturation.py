@@ -15,15 +15,25 @@ from trihedron.diagnose.repair import without_moves
 from trihedron.diagnose.twin import DYNAMICS, MOVES
 from trihedron.records.diagnosis import EffectParameter, Where
 
-BAND_SIGMA = 5.0
-"""A plateau is a run of samples within five standard deviations of the limit."""
+BAND_SIGMA = 4.0
+"""A plateau is a run of samples within four standard deviations of the limit."""
+REACH = 4
+"""Samples before and behind a plateau from which the slope of arrival and departure is taken."""
 MIN_RUN = 4
 MIN_PLATEAUS = 3
 """Smooth peaks differ in height from move to move; three that end on one level within noise do not happen by chance."""
+LONG_RUN, HIGH = 8, 15.0
+"""One plateau is enough if it is this long and the parabola cut off by it would reach this many sigma higher."""
+NEAR_LIMIT = 0.97
+"""Moves that come this close to a known limit on any axis are left out: the limit is the sensor's, not one axis's."""
+CLEARLY = 5.0
+"""How much worse than the other moves those at a limit must contradict gravity and rest."""
+MEDIAN_CHI2 = 0.455
+"""Median of a chi-square of one degree of freedom."""
 CONTRADICTION = 4.0
 """Chi-square per row of the moves concerned above which their readings are false."""
-STEEP = 1.5
-"""How much faster than a parabola of the same width the signal must arrive at the plateau, and leave it."""
+STEEP = 6.0
+"""Height in sigma that a parabola with the slopes at both ends of a plateau would reach: it would not look flat."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +76,7 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
                 if len(runs) > len(best):
                     best = runs
             # Nothing is read beyond a limit but noise.
-            if len(best) >= MIN_PLATEAUS and float(top.max()) <= best[0].level * sign + BAND_SIGMA * noise:
+            if best and float(top.max()) <= best[0].level * sign + BAND_SIGMA * noise:
                 found += best
     return found
 
@@ -76,28 +86,32 @@ def _on_level(
 ) -> list[Plateau]:
     """Runs that arrive steeply at a level, stay flat on it within noise, leave it steeply, and agree about it."""
     width = BAND_SIGMA * noise
-    runs, means, errors = [], [], []
+    runs, means, errors, clear = [], [], [], []
     for a, b in ranges:
         near = np.abs(x[a:b] - level) <= width
         edges = np.flatnonzero(np.diff(np.r_[0, near.astype(np.int8), 0]))
         for first, last in edges.reshape(-1, 2):
             n = last - first
-            if n < MIN_RUN or first < 2 or last > b - a - 2:
+            if n < MIN_RUN or first < REACH or last > b - a - REACH:
                 continue
             run = x[a + first : a + last]
-            arrival, departure = run[0] - x[a + first - 2], run[-1] - x[a + last + 1]
-            # A parabola that just fills the band falls by 16 widths / n over two samples at its edge.
-            if min(arrival, departure) < STEEP * 16.0 * width / n or not _is_flat(run[1:-1] / noise):
+            arrival = (run[0] - x[a + first - REACH]) / REACH
+            departure = (run[-1] - x[a + last - 1 + REACH]) / REACH
+            # A parabola with these slopes at its edges would rise this high above them.
+            if min(arrival, departure) * n / 4.0 < STEEP * noise or not _is_flat(run[1:-1] / noise):
                 continue
+            height = min(arrival, departure) * n / 4.0 / noise
             runs.append(Plateau(axis, sign, a + int(first), a + int(last), 0.0))
+            clear.append(n >= LONG_RUN and height > HIGH)
             means.append(float(run[1:-1].mean()))
             errors.append(noise / np.sqrt(n - 2))
-    if len(runs) < MIN_PLATEAUS:
+    if len(runs) < MIN_PLATEAUS and not any(clear):
         return []
     # Peaks that merely end in one band differ by more than the error of their means.
     common = float(np.average(means, weights=1.0 / np.square(errors)))
     agree = [abs(m - common) < 4.0 * e + 0.5 * noise for m, e in zip(means, errors, strict=True)]
-    return [replace(r, level=sign * common) for r, good in zip(runs, agree, strict=True) if good]
+    kept = [replace(r, level=sign * common) for r, good in zip(runs, agree, strict=True) if good]
+    return kept if len(kept) >= MIN_PLATEAUS or any(c and g for c, g in zip(clear, agree, strict=True)) else []
 
 
 def _is_flat(run: FloatArray) -> bool:
@@ -145,12 +159,18 @@ class _Saturation(DirectEffect):
         if not runs:
             return None
         touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})
-        # Turns at one steady speed share a level too. A false reading contradicts gravity or rest after the move.
+        # Turns at one steady speed share a level too. A false reading contradicts gravity or rest after the move, and
+        # does so more than moves that stay within the range.
         system = context.fitted.system
-        rows = np.isin(system.domain, (MOVES, DYNAMICS)) & np.isin(system.segment, touched) & (system.walk == 0)
-        contradicts = float(np.mean(system.residual[rows] ** 2)) > CONTRADICTION
+        move_rows = np.isin(system.domain, (MOVES, DYNAMICS)) & (system.walk == 0)
+        at_limit = np.isin(system.segment, touched)
+        misfit = float(np.mean(system.residual[move_rows & at_limit] ** 2))
+        others = system.residual[move_rows & ~at_limit] ** 2
+        usual = float(np.median(others) / MEDIAN_CHI2) if len(others) >= 10 else 0.0
+        contradicts = misfit > CONTRADICTION and misfit > CLEARLY * usual
         if not contradicts and not any(run.is_rail for run in runs):
             return None
+        touched = self._near_limit(context, runs, touched)
         n = sum(run.stop - run.start for run in runs)
         parameters = self._limits(context, runs, sigma)
         t = obs.time_s
@@ -178,6 +198,20 @@ class _Saturation(DirectEffect):
             Where(channels, tuple(f"move {m}" for m in touched[:8]), times), reweigh=reweigh,
             restate=lambda later: self._limits(later, runs, sigma),  # false moves had bent the scale factors
         )  # fmt: skip
+
+    def _near_limit(self, context: Context, runs: list[Plateau], touched: list[int]) -> list[int]:
+        """Moves with a plateau and those that come close to the same limit on any axis and side."""
+        twin, obs = context.fitted.twin, context.obs
+        is_gyro = self.sensor == "gyro"
+        raw = obs.raw_rate if is_gyro else obs.raw_force
+        assert raw is not None
+        scale = 1.0 / np.linalg.norm(np.linalg.inv(twin.gyro_S if is_gyro else twin.accel_S), axis=1)
+        zero = np.zeros(3) if is_gyro else twin.accel_b
+        limit = min(abs(run.level * scale[run.axis] + zero[run.axis]) for run in runs)
+        close = {m for m, (a, b) in enumerate(obs.move_ranges)
+                 if (np.abs(raw[a:b] * scale + zero).max(axis=0) > NEAR_LIMIT * limit).any()}  # fmt: skip
+        # An accelerometer that ends at little more than 1 g comes close in every pose: then only plateaus count.
+        return sorted(close | set(touched)) if is_gyro or limit > 1.2 * twin.gravity else touched
 
     def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:
         twin = context.fitted.twin
