@@ -14,6 +14,20 @@ RESTING = 1e-3
 """A mean rate of a thousandth of the moves' rms, five times over, is rest: below 1 °/s after moves of 3 rad/s."""
 
 
+def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
+    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic Hermite through the two samples on either side."""
+    if k < 1 or k + 2 >= len(values):
+        return np.repeat(values[k : k + 1], n, axis=0)
+    a, b = values[k], values[k + 1]
+    da, db = values[k] - values[k - 1], values[k + 2] - values[k + 1]
+    x = (np.arange(1, n + 1) / (n + 1)).reshape(-1, *([1] * (values.ndim - 1)))
+    width = n + 1
+    h00, h10 = 2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x
+    h01, h11 = -2 * x**3 + 3 * x**2, x**3 - x**2
+    out: FloatArray = h00 * a + h10 * width * da + h01 * b + h11 * width * db
+    return out
+
+
 def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:
     """Put ``n`` samples behind sample ``k`` for every ``k: n``, on a cubic through the two samples on either side.
 
@@ -39,17 +53,7 @@ def insert_samples(recording: Recording, segments: Segments, losses: dict[int, i
         out = np.full((total, *values.shape[1:]), np.nan)
         out[new_index] = values
         for k, n in losses.items():
-            if k < 1 or k + 2 >= n_old:
-                out[k + shift[k] + 1 : k + shift[k] + 1 + n] = values[k]
-                continue
-            a, b = values[k], values[k + 1]
-            da, db = values[k] - values[k - 1], values[k + 2] - values[k + 1]
-            x = (np.arange(1, n + 1) / (n + 1)).reshape(-1, *([1] * (values.ndim - 1)))
-            width = n + 1
-            h00, h10 = 2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x
-            h01, h11 = -2 * x**3 + 3 * x**2, x**3 - x**2
-            first = k + shift[k] + 1
-            out[first : first + n] = h00 * a + h10 * width * da + h01 * b + h11 * width * db
+            out[k + shift[k] + 1 : k + shift[k] + 1 + n] = bridge(values, k, n)
         return out
 
     mended = replace(

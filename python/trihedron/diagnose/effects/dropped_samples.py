@@ -3,49 +3,91 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.sample_steps import Loss, find_losses
+from trihedron.diagnose.effects.sample_steps import MAX_LOST, Loss, find_losses
 from trihedron.diagnose.observations import Observations, observe
-from trihedron.diagnose.repair import insert_samples
+from trihedron.diagnose.repair import bridge, insert_samples, without_moves
 from trihedron.diagnose.solve import fit
-from trihedron.diagnose.twin import NO_DISTORTION
+from trihedron.diagnose.twin import DYNAMICS, MOVES, NO_DISTORTION, Linearisation, Twin
 from trihedron.records.diagnosis import EffectParameter, Where
 
-MAX_COUNTED = 4
-"""Losses whose number is settled by gravity; each costs a few fits."""
+UNSETTLED = 0.15
+"""Relative error of a count that only the joint of the two sides tells."""
+_KNOWN: WeakKeyDictionary[Observations, tuple[list[Loss], dict[int, float]]] = WeakKeyDictionary()
 
 
-def counted_by_gravity(context: Context, losses: list[Loss]) -> dict[int, int]:
-    """The number of samples lost at each place with which the twin predicts gravity and rest after the move best.
+def counted_losses(context: Context) -> tuple[list[Loss], dict[int, float]]:
+    """Losses with their counts, and the standard error of each count by its sample.
 
-    The joint of the two sides tells where and roughly how many; a turn whose middle is missing tells exactly.
+    The joint of the two sides tells where and roughly how many; gravity and rest after the move tell how many exactly:
+    a turn whose middle is missing ends elsewhere. The twin is fitted without the moves concerned, so that a loss cannot
+    bend what it is judged by. Searched once per set of observations.
     """
+    if context.obs not in _KNOWN:
+        losses = find_losses(context)
+        counts, sigmas = _by_gravity(context, losses)
+        _KNOWN[context.obs] = ([replace(one, count=counts[one.sample]) for one in losses], sigmas)
+    return _KNOWN[context.obs]
+
+
+def _by_gravity(context: Context, losses: list[Loss]) -> tuple[dict[int, int], dict[int, float]]:
     counts = {loss.sample: loss.count for loss in losses}
-    if len(losses) > MAX_COUNTED:
-        return counts
-    obs = context.obs
-    twin = context.fitted.twin
-    if len(twin.effect):
-        return counts
+    sigmas = {loss.sample: 0.5 + UNSETTLED * loss.count for loss in losses}
+    obs, twin = context.obs, context.fitted.twin
+    ranges, holds = without_moves(obs.move_ranges, obs.move_holds, {loss.move for loss in losses})
+    if not losses or len(ranges) < 3 or len(twin.effect):
+        return counts, sigmas
+    clean = fit(replace(obs, move_ranges=ranges, move_holds=holds), twin, NO_DISTORTION, context.fitted.line.prior).twin
+    for m in sorted({loss.move for loss in losses}):
+        own = sorted((loss for loss in losses if loss.move == m), key=lambda one: -one.gain)
+        trial = {loss.sample: loss.count for loss in own}
+        best = _misfit(obs, clean, m, trial)
+        for _ in range(2 if len(own) > 1 else 1):  # losses in one move are counted in turn
+            for loss in own:
+                for direction in (-1, 1):
+                    while 1 <= trial[loss.sample] + direction <= MAX_LOST:
+                        moved = trial | {loss.sample: trial[loss.sample] + direction}
+                        value = _misfit(obs, clean, m, moved)
+                        if value >= best:
+                            break
+                        best, trial = value, moved
+        for loss in own:
+            n = trial[loss.sample]
+            beside = [_misfit(obs, clean, m, trial | {loss.sample: k}) - best for k in (n - 1, n + 1) if k >= 1]
+            # Misfit grows by one at one sigma; noise that a move shows beyond its own widens it.
+            counts[loss.sample] = n
+            sigmas[loss.sample] = float(max(0.3, np.sqrt(max(best / 5.0, 1.0) / max(float(np.mean(beside)), 1e-3))))
+    return counts, sigmas
 
-    def misfit(trial: dict[int, int]) -> float:
-        recording, segments = insert_samples(obs.recording, obs.segments, {k: n for k, n in trial.items() if n})
-        return fit(observe(recording, segments), twin, NO_DISTORTION, context.fitted.line.prior, n_iterations=2).chi2
 
-    best = misfit(counts)
-    for loss in sorted(losses, key=lambda one: -one.gain):
-        for direction in (-1, 1):
-            while 0 < counts[loss.sample] + direction <= 2 * loss.count + 2:
-                trial = counts | {loss.sample: counts[loss.sample] + direction}
-                value = misfit(trial)
-                if value >= best:
-                    break
-                best, counts = value, trial
-    return counts
+def _misfit(obs: Observations, twin: Twin, m: int, losses: dict[int, int]) -> float:
+    """Chi-square of gravity and velocity after one move with samples put back behind those named."""
+    a, b = obs.move_ranges[m]
+    assert obs.raw_rate is not None
+    force, rate, time = obs.raw_force[a:b], obs.raw_rate[a:b], obs.time_s[a:b]
+    step = 1.0 / obs.recording.rate_hz
+    for k, n in sorted(losses.items(), reverse=True):
+        i = k - a
+        force = np.concatenate([force[: i + 1], bridge(force, i, n), force[i + 1 :]])
+        rate = np.concatenate([rate[: i + 1], bridge(rate, i, n), rate[i + 1 :]])
+        put = time[i] + step * np.arange(1, n + 1)
+        time = np.concatenate([time[: i + 1], put, time[i + 1 :] + n * step])
+    one = replace(
+        obs,
+        time_s=time,
+        raw_force=force,
+        raw_rate=rate,
+        move_ranges=((0, len(time)),),
+        move_holds=obs.move_holds[m : m + 1],
+    )
+    system = Linearisation(one, twin, NO_DISTORTION).system()
+    own = np.isin(system.domain, (MOVES, DYNAMICS)) & (system.walk == 0)
+    return float((system.residual[own] ** 2).sum())
 
 
 class DroppedSamples(DirectEffect):
@@ -59,23 +101,23 @@ class DroppedSamples(DirectEffect):
         return "the log has no moves with a gyro" if not context.moves else None
 
     def find(self, context: Context) -> Evidence | None:
-        losses = find_losses(context)
+        losses, sigmas = counted_losses(context)
         if not losses:
             return None
         obs = context.obs
         n_intervals = sum(b - a for a, b in obs.move_ranges)
         if len(losses) > 0.02 * n_intervals:
             return None  # everywhere is not a loss here and there
-        counts = counted_by_gravity(context, losses)
-        losses = [replace(loss, count=counts[loss.sample]) for loss in losses if counts[loss.sample] > 0]
-        if not losses:
-            return None
         counts = {loss.sample: loss.count for loss in losses}
         t = obs.time_s
+        total = float(np.sqrt(sum(sigmas[loss.sample] ** 2 for loss in losses)))
         parameters = (
             EffectParameter("events", float(len(losses)), 0.0, "1"),
-            EffectParameter("samples_lost", float(sum(loss.count for loss in losses)), 0.5 * np.sqrt(len(losses)), "1"),
-            *(EffectParameter(f"lost_at_{t[loss.sample]:.2f}s", float(loss.count), 0.5, "samples") for loss in losses),
+            EffectParameter("samples_lost", float(sum(loss.count for loss in losses)), total, "1"),
+            *(
+                EffectParameter(f"lost_at_{t[one.sample]:.2f}s", float(one.count), sigmas[one.sample], "samples")
+                for one in losses
+            ),
         )
         places = ", ".join(f"{loss.count} at {t[loss.sample]:.2f} s" for loss in losses[:4])
         more = f" and {len(losses) - 4} more" if len(losses) > 4 else ""

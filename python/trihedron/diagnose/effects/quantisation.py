@@ -118,6 +118,7 @@ class Quantisation(DirectEffect):
     id = "quantisation"
     mechanism = "the resolution is too coarse for the noise: means of still poses sit on steps"
     experiment = "choose a finer range, or add a little motion or noise (dither) while averaging"
+    is_proof = True
 
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs

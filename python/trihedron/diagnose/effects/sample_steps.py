@@ -110,6 +110,16 @@ class Loss:
     per_sensor: tuple[float, ...]
 
 
+def _joints(w: int, order: int) -> FloatArray:
+    """(counts, 2w, 2w) projectors onto what no polynomial of so many coefficients joins across n missing samples."""
+    projectors = []
+    for n in range(MAX_LOST + 1):
+        t = np.r_[np.arange(-w, 0) + 0.5, np.arange(w) + 0.5 + n] / (w + n / 2)
+        q, _ = np.linalg.qr(np.vander(t - t.mean(), order))
+        projectors.append(np.eye(2 * w) - q @ q.T)
+    return np.stack(projectors)
+
+
 def find_losses(context: Context) -> list[Loss]:
     """Intervals where the motion on either side joins smoothly only if samples are put between (eq. 8.12).
 
@@ -120,13 +130,7 @@ def find_losses(context: Context) -> list[Loss]:
     sensors = _whitened(obs)
     clipped = clipped_samples(obs)
     w = HALF_WINDOW
-    projectors = []
-    for n in range(MAX_LOST + 1):
-        t = np.r_[np.arange(-w, 0) + 0.5, np.arange(w) + 0.5 + n] / (w + n / 2)
-        t = t - t.mean()
-        q, _ = np.linalg.qr(np.vander(t, 4))
-        projectors.append(np.eye(2 * w) - q @ q.T)
-    stack = np.stack(projectors)
+    stack, stiffer = _joints(w, 4), _joints(w, 6)
     losses: list[Loss] = []
     for m, (a, b) in enumerate(obs.move_ranges):
         if b - a < 2 * w + 2:
@@ -149,8 +153,16 @@ def find_losses(context: Context) -> list[Loss]:
         trial = np.stack(
             [np.einsum("kic,nij,kjc->kn", v[suspect], stack, v[suspect], optimize=True) for v in windows], axis=2
         )
+        # Quick motion over a wide gap is no cubic: a quintic where the cubic leaves too much.
+        quick = (trial.min(axis=1) > 3.0 * np.maximum(ordinary[suspect], dof)).any(axis=1)
+        if quick.any():
+            rows = suspect[quick]
+            trial[quick] = np.stack(
+                [np.einsum("kic,nij,kjc->kn", v[rows], stiffer, v[rows], optimize=True) for v in windows], axis=2
+            )
         total = trial.sum(axis=2)
-        best = total.argmin(axis=1)
+        # Where the minimum is flat the smallest count that joins as well: gravity after the move tells more exactly.
+        best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)
         for row, s in enumerate(suspect):
             n = int(best[row])
             if n == 0 or n == MAX_LOST:

@@ -70,8 +70,7 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
             noise = max(float(sigma[axis]), 0.5 * step_size, 1e-300)
             best: list[Plateau] = []
             # The limit is a level many moves end on: try each move's highest plateau as the level.
-            width = BAND_SIGMA * noise
-            for level in np.unique(np.round((top - 2 * sigma[axis]) / width) * width):
+            for level in np.unique(np.round((top - 2 * sigma[axis]) / noise) * noise):
                 runs = _on_level(x, float(level), noise, axis, sign, ranges)
                 if len(runs) > len(best):
                     best = runs
@@ -98,13 +97,13 @@ def _on_level(
             arrival = (run[0] - x[a + first - REACH]) / REACH
             departure = (run[-1] - x[a + last - 1 + REACH]) / REACH
             # A parabola with these slopes at its edges would rise this high above them.
-            if min(arrival, departure) * n / 4.0 < STEEP * noise or not _is_flat(run[1:-1] / noise):
+            if min(arrival, departure) * n / 4.0 < STEEP * noise or not _is_flat(_middle(run) / noise):
                 continue
             height = min(arrival, departure) * n / 4.0 / noise
             runs.append(Plateau(axis, sign, a + int(first), a + int(last), 0.0))
             clear.append(n >= LONG_RUN and height > HIGH)
-            means.append(float(run[1:-1].mean()))
-            errors.append(noise / np.sqrt(n - 2))
+            means.append(float(_middle(run).mean()))
+            errors.append(noise / np.sqrt(len(_middle(run))))
     if len(runs) < MIN_PLATEAUS and not any(clear):
         return []
     # Peaks that merely end in one band differ by more than the error of their means.
@@ -112,6 +111,12 @@ def _on_level(
     agree = [abs(m - common) < 4.0 * e + 0.5 * noise for m, e in zip(means, errors, strict=True)]
     kept = [replace(r, level=sign * common) for r, good in zip(runs, agree, strict=True) if good]
     return kept if len(kept) >= MIN_PLATEAUS or any(c and g for c, g in zip(clear, agree, strict=True)) else []
+
+
+def _middle(run: FloatArray) -> FloatArray:
+    """A run without the ends that still arrive and already leave."""
+    cut = max(len(run) // 6, 1)
+    return run[cut:-cut]
 
 
 def _is_flat(run: FloatArray) -> bool:
