@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -49,6 +49,8 @@ N_REFITS = 4
 """Candidates fitted jointly at each step: the leaders of the score test."""
 KEPT_EXCESS = 0.5
 """An effect whose domain keeps more than half of its misfit after everything is accepted explains nothing."""
+KEPT_NATURAL = 0.3
+"""Nor does an effect of one sensor if the domains of that sensor together keep this share."""
 
 
 @dataclass
@@ -361,6 +363,7 @@ def _drop_hollow(
         excess_after = after[name].chi2_per_dof - 1.0
         if excess_before > 0 and excess_after > KEPT_EXCESS * excess_before:
             hollow.append(found)
+    hollow += [f for f in model.found if f not in hollow and _keeps_misfit(f, before, after)]
     if not hollow:
         return False
     model.found = [f for f in model.found if f not in hollow]
@@ -369,6 +372,21 @@ def _drop_hollow(
     model.fitted = tune_noise(model.obs, start, stacked(model.distortions), prior)
     model.prediction = predict_held_out(model.fitted, folds_of(model.fitted), N_DOMAINS)
     return True
+
+
+def _keeps_misfit(found: _Found, before: Mapping[Domain, DomainTest], after: Mapping[Domain, DomainTest]) -> bool:
+    """Whether the domains where an effect of one sensor must show keep much of their misfit after everything."""
+    if found.evidence is not None or found.variant is None:
+        return False
+    distortion = found.variant.distortion
+    if (distortion.force is None) == (distortion.rate is None):
+        return False
+    natural: tuple[Domain, ...] = ("static-gyro", "moves") if distortion.force is None else ("static-accel", "dynamics")
+    pairs = [(before[name], after[name]) for name in natural if name in before and name in after]
+    if not any(b.disagrees and a.disagrees for b, a in pairs):
+        return False
+    excess = [sum(max(t[k].chi2_per_dof - 1.0, 0.0) * t[k].dof for t in pairs) for k in (0, 1)]
+    return bool(excess[1] > KEPT_NATURAL * excess[0])
 
 
 def _settle_direct(model: _Model, remaining: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
