@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -172,7 +173,10 @@ class _Saturation(DirectEffect):
         misfit = float(np.mean(system.residual[move_rows & at_limit] ** 2))
         others = system.residual[move_rows & ~at_limit] ** 2
         usual = float(np.median(others) / MEDIAN_CHI2) if len(others) >= 10 else 0.0
-        contradicts = misfit > CONTRADICTION and misfit > CLEARLY * usual
+        # Plateaus on one level time and again need no such comparison: where most moves are clipped, all disagree.
+        sides = Counter((run.axis, run.sign) for run in runs)
+        repeats = max(sides.values()) >= MIN_PLATEAUS
+        contradicts = misfit > CONTRADICTION and (repeats or misfit > CLEARLY * usual)
         if not contradicts and not any(run.is_rail for run in runs):
             return None
         touched = self._near_limit(context, runs, touched)
