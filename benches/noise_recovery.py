@@ -136,7 +136,7 @@ def decimation(runs=100):
     )
 
 
-def intervals(runs=600):
+def intervals(runs=2000):
     """Chi-square intervals of the Allan deviation, pure noise of four types."""
     rng = np.random.default_rng(104)
     n = 4096
