@@ -1,7 +1,8 @@
-"""Noise terms recovered from simulated logs of known truth; figures of docs/noise.md, section 5.
+"""Noise terms recovered from simulated logs of known truth; figures of docs/noise.md, section 7.
 
-python benches/noise_recovery.py            all of it, about ten minutes on one core
-python benches/noise_recovery.py published  one part: published, coverage, subsets, decimation, intervals
+python benches/noise_recovery.py            all of it, about half an hour on one core
+python benches/noise_recovery.py published  one part: published, coverage, subsets, decimation, intervals,
+                                            curves
 """
 
 import sys
@@ -14,7 +15,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from noise_series import fractional, series
-from trihedron.estimate.noise import allan_deviation, identify_noise
+from trihedron.estimate.noise import allan_deviation, identify_curve, identify_noise
 from trihedron.records.noise import TermName
 
 PUBLISHED = {"accelerometer": (2.502e-3, 6.972e-5), "gyroscope": (1.888e-4, 2.5565e-6)}
@@ -162,7 +163,32 @@ def intervals(runs=2000):
         )
 
 
-PARTS = (published, coverage, subsets, decimation, intervals)
+def curves(runs=40):
+    """Terms from Allan deviations alone, a point an octave, 65 536 readings at 100 Hz."""
+    rng = np.random.default_rng(105)
+    n, rate, clusters = 1 << 16, 100.0, 2 ** np.arange(15)
+    for terms in (
+        {"N": 1e-2},
+        {"N": 1e-2, "K": 2e-3},
+        {"N": 1e-2, "B": 1e-2},
+        {"Q": 5e-4, "N": 1e-2, "K": 3e-3},
+        {"N": 1e-2, "R": 6e-4},
+    ):
+        axes = []
+        for _ in range(runs):
+            curve = allan_deviation(series(rng, n, rate, **terms), rate, clusters)
+            axes.append(identify_curve(curve.tau_s, curve.deviation, rate, n).axes[0])
+        right = [axis for axis in axes if set(present(axis)) == set(terms)]
+        said = []
+        for s, truth in terms.items():
+            found = [axis.terms[TermName(s)] for axis in right]
+            ratio = np.array([term.value for term in found]) / truth
+            inside = np.mean([term.lower <= truth <= term.upper for term in found])
+            said.append(f"{s} mean {ratio.mean():.3f}, sd {100 * ratio.std():.1f} %, covered {100 * inside:.0f} %")
+        print(f"  {''.join(terms):4s} right {len(right)}/{runs}: {'; '.join(said)}", flush=True)
+
+
+PARTS = (published, coverage, subsets, decimation, intervals, curves)
 
 if __name__ == "__main__":
     for part in PARTS:
