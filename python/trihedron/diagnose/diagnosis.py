@@ -47,6 +47,8 @@ from trihedron.records.diagnosis import (
 Progress = Callable[[float, str], None]
 N_REFITS = 4
 """Candidates fitted jointly at each step: the leaders of the score test."""
+FAR_AHEAD = 4.0
+"""A sound candidate whose score is this many times another's is not caught up by a joint fit."""
 KEPT_EXCESS = 0.5
 """An effect whose domain keeps more than half of its misfit after everything is accepted explains nothing."""
 KEPT_NATURAL = 0.3
@@ -180,7 +182,7 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
     domains = _all_domains(obs, base, alpha, model.refused)
     for step in range(MAX_EFFECTS):
         tell(0.3 + 0.15 * step, "letting effects compete")
-        if not _accept_next(model, candidates, alpha, prior, first=step == 0):
+        if not _accept_next(model, candidates, alpha, first=step == 0):
             break
     tell(0.9, "checking what remains")
     remaining = _all_domains(model.obs, model.fitted, alpha, model.refused)
@@ -258,9 +260,7 @@ def _accept_direct(
 
 
 # -- the competition ------------------------------------------------------------
-def _accept_next(
-    model: _Model, candidates: dict[str, Candidate], alpha: float, prior: Prior | None, *, first: bool
-) -> bool:
+def _accept_next(model: _Model, candidates: dict[str, Candidate], alpha: float, *, first: bool) -> bool:
     context = Context(model.obs, model.fitted)
     taken = {f.effect.id for f in model.found if not f.effect.repeatable}
     scored, missing = score_all(context, taken)
@@ -275,8 +275,14 @@ def _accept_next(
     leaders = [s for s in scored[:N_REFITS] if s.p_value * n_effects < alpha / 2.0]
     if not leaders:
         return False
-    refits = [refit(context, model.distortions, s, prior, model.prediction) for s in leaders]
-    sound = [r for r in refits if r.bic_gain > MIN_DELTA_BIC and r.predicts and _is_plausible(r)]
+    refits: list[Refit] = []
+    sound: list[Refit] = []
+    for s in leaders:
+        if any(r.scored.merit > FAR_AHEAD * s.merit for r in sound):
+            break
+        refits.append(refit(context, model.distortions, s, model.prediction))
+        if refits[-1].bic_gain > MIN_DELTA_BIC and refits[-1].predicts and _is_plausible(refits[-1]):
+            sound.append(refits[-1])
     if not sound:
         return False
     # Rivals are compared against one rest, that of the best explained: else its small differences weigh large gains.
@@ -291,7 +297,7 @@ def _accept_next(
         if s.effect is not best.scored.effect and max(s.merits) > best.scored.merit - CONFOUNDED_DELTA_BIC
     ]
     rivals = tuple(dict.fromkeys(close))
-    best = refined(context, model.distortions, best, prior)
+    best = refined(context, model.distortions, best)
     before_fit, before = model.fitted, model.prediction
     model.fitted = best.fitted
     model.prediction = best.prediction

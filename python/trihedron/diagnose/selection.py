@@ -16,15 +16,15 @@ from trihedron.diagnose.solve import (
     N_DOMAINS,
     Fit,
     Prediction,
+    extend,
     folds_of,
     held_out_gain,
     leverage,
     predict_held_out,
     reduce,
     score,
-    tune_noise,
 )
-from trihedron.diagnose.twin import PRIOR, Distortion, Prior, stacked
+from trihedron.diagnose.twin import PRIOR, Distortion, stacked
 
 MAX_EFFECTS = 4
 """Effects accepted at most: a recording of one session does not carry evidence for more."""
@@ -157,17 +157,11 @@ class Refit:
         return any(rms_after[d] < VISIBLE * rms_before[d] for d in rms_after if d in rms_before)
 
 
-def refit(
-    context: Context, accepted: list[Distortion], scored: Scored, prior: Prior | None, base_prediction: Prediction
-) -> Refit:
+def refit(context: Context, accepted: list[Distortion], scored: Scored, base_prediction: Prediction) -> Refit:
     """Joint fit of a candidate: BIC and held-out prediction against the model without it."""
     base = context.fitted
-    distortion = stacked([*accepted, scored.variant.distortion])
-    start = replace(
-        base.twin, effect=np.concatenate([base.twin.effect, np.zeros(scored.variant.distortion.n_parameters)])
-    )
     # The base is at its optimum and effects are small: two steps settle the sum.
-    fitted = tune_noise(context.obs, start, distortion, prior, n_iterations=2)
+    fitted = extend(base, stacked(accepted), scored.variant.distortion)
     n_rows = int((base.system.domain != PRIOR).sum())
     cost = np.log(n_rows) * (scored.rank + len(scored.variant.shape))
     # Marginal likelihoods differ by the flat prior of the new parameters; their own log-determinant is taken out so
@@ -198,7 +192,7 @@ def profile(fitted: Fit) -> float:
     return -0.5 * fitted.chi2 - 0.5 * log_det + fitted.system.log_weight
 
 
-def refined(context: Context, accepted: list[Distortion], best: Refit, prior: Prior | None) -> Refit:
+def refined(context: Context, accepted: list[Distortion], best: Refit) -> Refit:
     """The shape number at the top of the profile likelihood, with the standard error its curvature gives.
 
     A parabola through log-spaced values around the grid's best; done twice so that a far optimum is reached.
@@ -233,5 +227,5 @@ def refined(context: Context, accepted: list[Distortion], best: Refit, prior: Pr
     made = effect.reshaped(context, variant, value)
     assert made is not None
     final = replace(made, shape={name: (value, unit)}, shape_sigma=float(value * min(sigma_log, 10.0)))
-    again = refit(context, accepted, replace(best.scored, variant=final), prior, best.base)
+    again = refit(context, accepted, replace(best.scored, variant=final), best.base)
     return again if again.bic_gain >= best.bic_gain else best

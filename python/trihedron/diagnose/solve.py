@@ -19,6 +19,7 @@ from trihedron.diagnose.twin import (
     Prior,
     System,
     Twin,
+    stacked,
 )
 
 N_DOMAINS = 4
@@ -82,7 +83,11 @@ def fit(
     twin = start
     if len(twin.effect) != distortion.n_parameters:
         twin = replace(twin, effect=np.zeros(distortion.n_parameters))
-    state = _State.at(obs, twin, distortion, prior)
+    return _fit_of(_descend(_State.at(obs, twin, distortion, prior), n_iterations))
+
+
+def _descend(state: _State, n_iterations: int) -> _State:
+    line = state.line
     damping = 0.0
     for _ in range(n_iterations):
         scaled = state.jacobian / state.scale
@@ -90,7 +95,7 @@ def fit(
             normal = state.normal.copy()
             normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE + damping
             step = -cho_solve(cho_factor(normal), scaled.T @ state.system.residual)
-            tried = _State.at(obs, state.twin.advanced(step / state.scale), distortion, prior)
+            tried = _State.at(line.obs, state.twin.advanced(step / state.scale), line.distortion, line.prior)
             if tried.chi2 <= state.chi2 * (1.0 + MAY_RISE) + 1.0:
                 damping = 0.0 if damping < MIN_DAMPING else 0.1 * damping
                 break
@@ -101,6 +106,10 @@ def fit(
         state = tried
         if moved < 1e-3:  # the whitened rows move by less than a thousandth of sigma
             break
+    return state
+
+
+def _fit_of(state: _State) -> Fit:
     log_det = 2.0 * float(np.log(np.diag(cholesky(state.regular()))).sum()) + 2.0 * float(np.log(state.scale).sum())
     return Fit(
         state.twin, state.line, state.system, state.jacobian, state.scale, state.chi2,
@@ -129,10 +138,31 @@ class _State:
     @staticmethod
     def at(obs: Observations, twin: Twin, distortion: Distortion, prior: Prior | None) -> _State:
         line = Linearisation(obs, twin, distortion, prior)
-        system, jacobian = _with_effects(line)
+        return _State.of(twin, line, *_with_effects(line))
+
+    @staticmethod
+    def of(twin: Twin, line: Linearisation, system: System, jacobian: FloatArray) -> _State:
         scaled, scale = _scaled(jacobian)
         chi2 = float(system.residual @ system.residual)
         return _State(twin, line, system, jacobian, scale, scaled.T @ scaled, chi2 if np.isfinite(chi2) else np.inf)
+
+    def with_corners(self, accel_corner_s: float, gyro_corner_s: float) -> _State:
+        """The same point with other noise corners: only the rows of the walks change, in proportion."""
+        factors = np.array([1.0, accel_corner_s / self.twin.accel_corner_s, gyro_corner_s / self.twin.gyro_corner_s])
+        if (factors == 1.0).all():
+            return self
+        row = factors[self.system.walk.clip(0, 2)]
+        row[self.system.walk > 2] = 1.0
+        jacobian = self.jacobian * row[:, None]
+        n = self.system.jacobian.shape[1]
+        system = replace(
+            self.system,
+            residual=self.system.residual * row,
+            jacobian=jacobian[:, :n],
+            log_weight=self.system.log_weight + float(np.log(row).sum()),
+        )
+        twin = replace(self.twin, accel_corner_s=accel_corner_s, gyro_corner_s=gyro_corner_s)
+        return _State.of(twin, self.line.at_twin(twin, self.line.distortion), system, jacobian)
 
     def regular(self) -> FloatArray:
         out = self.normal.copy()
@@ -300,7 +330,22 @@ def tune_noise(
     Only the rows of the two walks depend on a corner time, each in proportion to it: the linear optimum and its
     evidence follow from the rows already made, without running the motion again.
     """
-    fitted = fit(obs, start, distortion, prior, n_iterations)
+    if len(start.effect) != distortion.n_parameters:
+        start = replace(start, effect=np.zeros(distortion.n_parameters))
+    return _tuned(_State.at(obs, start, distortion, prior), n_iterations)
+
+
+def extend(base: Fit, accepted: Distortion, added: Distortion, n_iterations: int = 2) -> Fit:
+    """The fit with further effect columns, from where it stands: the motion there is known already."""
+    both = stacked([accepted, added])
+    twin = replace(base.twin, effect=np.concatenate([base.twin.effect, np.zeros(added.n_parameters)]))
+    jacobian = np.hstack([base.jacobian, base.line.columns(added)])
+    return _tuned(_State.of(twin, base.line.at_twin(twin, both), base.system, jacobian), n_iterations)
+
+
+def _tuned(state: _State, n_iterations: int) -> Fit:
+    obs = state.line.obs
+    fitted = _descend(state, n_iterations)
     best = (-np.inf, fitted.twin.accel_corner_s, fitted.twin.gyro_corner_s)
     walk, residual = fitted.system.walk, fitted.system.residual
     scaled = fitted.jacobian / fitted.scale
@@ -324,8 +369,7 @@ def tune_noise(
             evidence = -0.5 * chi2 - float(np.log(np.diag(half)).sum()) + weight
             if evidence > best[0]:
                 best = (evidence, accel_corner, gyro_corner)
-    tuned = replace(fitted.twin, accel_corner_s=best[1], gyro_corner_s=best[2])
-    return fit(obs, tuned, distortion, prior, n_iterations=(n_iterations + 1) // 2)
+    return _fit_of(_descend(fitted.with_corners(best[1], best[2]), (n_iterations + 1) // 2))
 
 
 CORNER_GRID_S = (20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 2560.0)

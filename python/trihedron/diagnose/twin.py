@@ -8,6 +8,7 @@ healthy recording gives rows of standard normal numbers.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -201,6 +202,12 @@ class Linearisation:
             cov = np.einsum("ij,nj,kj->nik", twin.gyro_S, obs.hold_rate_sigma**2, twin.gyro_S)
             self._gyro_white = np.linalg.inv(np.linalg.cholesky(cov))
 
+    def at_twin(self, twin: Twin, distortion: Distortion) -> Linearisation:
+        """The same linearisation for a twin at the same point (noise corners or idle effects may differ)."""
+        out = copy(self)
+        out.twin, out.distortion = twin, distortion
+        return out
+
     # -- one move -------------------------------------------------------------------------------------------------
     def _move(self, m: int) -> dict[str, FloatArray]:
         obs, twin, path = self.obs, self.twin, self.path
@@ -243,11 +250,15 @@ class Linearisation:
         tail_skew = np.zeros((len(t), 3, 3))
         tail_skew[:, [0, 1, 2], [1, 2, 0]] = -(weight[:, None] * tail)[:, [2, 0, 1]]
         tail_skew[:, [1, 2, 0], [0, 1, 2]] = (weight[:, None] * tail)[:, [2, 0, 1]]
-        Ct = np.ascontiguousarray(C.transpose(0, 2, 1))
+        weighted_Ct = (weight[:, None, None] * C.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(3, -1)
+        tail_Ct = (tail_skew @ C.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(3, -1)
+        # ψ(t) = ∫ Cᵀ δω: its end moves the predicted vertical, its product with the force the velocity. Written as sums
+        # over samples with the force still to come, so that one product gives the rows of many columns.
+        by_rate = np.vstack([A @ weighted_Ct, -tail_Ct])
         widened = np.r_[np.full(2, obs.moves_inflation), np.full(3, obs.dynamics_inflation)]
         cov *= np.outer(widened, widened)
         return {
-            "Ct": Ct, "weighted_Ct": weight[:, None, None] * Ct, "tail_skew": tail_skew,
+            "by_rate": by_rate, "by_force": weighted_Ct,
             "t": t, "weight": weight, "dt": dt, "C": C, "lifted": lifted, "lever": lever,
             "residual": np.concatenate([residual_m, residual_v]),
             "white": np.linalg.inv(np.linalg.cholesky(cov)), "duration": np.array(duration),
@@ -259,15 +270,10 @@ class Linearisation:
         given = rate if rate is not None else force
         assert given is not None
         out = np.zeros((5, given.shape[2]))
-        before = self.obs.move_holds[m, 0]
         if rate is not None:
-            # ψ(t) = ∫ Cᵀ δω: its end moves the predicted vertical, its product with the force the velocity. Written as
-            # sums over samples with the force still to come, so that no running integral per column is stored.
-            lifted = one["Ct"] @ rate
-            out[:2] = one["lever"] @ _skew(self.twin.up[before]) @ np.tensordot(one["weight"], lifted, 1)
-            out[2:] = -np.tensordot(one["tail_skew"], lifted, ((0, 2), (0, 1)))
+            out += one["by_rate"] @ rate.reshape(-1, rate.shape[2])
         if force is not None:
-            out[2:] += np.tensordot(one["weighted_Ct"], force, ((0, 2), (0, 1)))
+            out[2:] += one["by_force"] @ force.reshape(-1, force.shape[2])
         return out
 
     # -- everything -----------------------------------------------------------------------------------------------
@@ -282,9 +288,9 @@ class Linearisation:
             rate = distortion.rate
             parts.append(np.zeros((3 * h, k)) if rate is None else -(self._gyro_white @ rate[:h]).reshape(3 * h, k))
         for m, where in enumerate(self.path.move_slices):
-            rate_part = None if distortion.rate is None else -distortion.rate[where]
-            force_part = None if force is None else -force[where]
-            parts.append(self._moves[m]["white"] @ self._move_rows(m, rate_part, force_part))
+            rate_part = None if distortion.rate is None else distortion.rate[where]
+            force_part = None if force is None else force[where]
+            parts.append(-self._moves[m]["white"] @ self._move_rows(m, rate_part, force_part))
         parts.append(np.zeros((self._n_prior_rows(), k)))
         return np.vstack(parts)
 

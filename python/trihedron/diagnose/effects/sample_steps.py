@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +41,7 @@ def _whitened(obs: Observations) -> list[FloatArray]:
     return out
 
 
+@lru_cache(maxsize=8)
 def clipped_samples(obs: Observations) -> npt.NDArray[np.bool_]:
     """Samples on or next to a plateau at the end of the range: their steps say nothing about time."""
     mask = np.zeros(len(obs.time_s), dtype=bool)
@@ -54,12 +56,17 @@ def clipped_samples(obs: Observations) -> npt.NDArray[np.bool_]:
 
 
 def step_errors(context: Context) -> StepErrors:
+    """The step errors of the recording as it is now observed, found once."""
+    return _step_errors(context.obs)
+
+
+@lru_cache(maxsize=8)
+def _step_errors(obs: Observations) -> StepErrors:
     """A step against the slope of a line through the samples around it (the two of the step left out), eq. 8.11.
 
     The slope comes from a wide window, so that shaking does not pass for motion; each sensor is judged for itself, so
     that only what both see at once is time.
     """
-    obs = context.obs
     sensors = _whitened(obs)
     clipped = clipped_samples(obs)
     w = HALF_WINDOW
@@ -121,12 +128,17 @@ def _joints(w: int, order: int) -> FloatArray:
 
 
 def find_losses(context: Context) -> list[Loss]:
+    """The losses of the recording as it is now observed, found once."""
+    return list(_losses(context.obs))
+
+
+@lru_cache(maxsize=8)
+def _losses(obs: Observations) -> list[Loss]:
     """Intervals where the motion on either side joins smoothly only if samples are put between (eq. 8.12).
 
     For a trial count n one cubic is laid through six samples before and six after, those after moved by n steps. The
     count that joins all channels best is taken if no sensor objects and what is left is ordinary.
     """
-    obs = context.obs
     sensors = _whitened(obs)
     clipped = clipped_samples(obs)
     w = HALF_WINDOW
