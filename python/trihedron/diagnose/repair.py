@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -113,11 +114,58 @@ def split_holds(recording: Recording, segments: Segments, shortest_s: float = 0.
         if not kept:
             kept = [(hold.start, hold.stop)]
         spans += [(a, b, i) for a, b in kept]
-    shaken = _shaken(recording, segments)
-    if len(spans) == segments.n_holds and not shaken and not bumped:
+    shaken = [*_shaken(recording, segments), *_drifting(recording, segments)]
+    merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in shaken)]))
+    if len(merged) == segments.n_holds and not shaken and not bumped:
         return segments, ()
-    merged = sorted([*spans, *((a, b, -1) for a, b in shaken)])
     return _segments_of(recording, segments, merged), tuple(bumped)
+
+
+LONG_S = 1800.0
+"""A pose that lasts longer is cut into pieces: its bias has time to drift, and one mean would hide it."""
+MOST_PIECES = 40
+
+
+def _in_pieces(recording: Recording, spans: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
+    """Long poses cut into pieces, two samples apart so that the twin knows nothing turned between them."""
+    rate = recording.rate_hz
+    total_s = sum((b - a) / rate for a, b, _ in spans if (b - a) / rate > LONG_S)
+    piece_s = max(LONG_S / 2.0, total_s / MOST_PIECES)
+    out = []
+    for a, b, source in spans:
+        n = round((b - a) / rate / piece_s) if (b - a) / rate > LONG_S else 1
+        edges = np.linspace(a, b, max(n, 1) + 1).astype(int)
+        out += [(int(p), int(q) - (2 if q < b else 0), source) for p, q in pairwise(edges)]
+    return out
+
+
+def _drifting(recording: Recording, segments: Segments, block_s: float = 60.0) -> list[tuple[int, int]]:
+    """Hours between poses in which nothing moves but the readings drift: block after block as quiet as a pose."""
+    if recording.accelerometer is None:
+        return []
+    assert segments.accelerometer_sigma is not None
+    block = max(round(block_s * recording.rate_hz), 8)
+    out: list[tuple[int, int]] = []
+    for move in segments.moves:
+        n = (move.stop - move.start) // block
+        if n * block < LONG_S * recording.rate_hz:
+            continue
+        quiet = np.ones(n, dtype=bool)
+        pairs = (
+            (recording.accelerometer, segments.accelerometer_sigma),
+            (recording.gyroscope, segments.gyroscope_sigma),
+        )
+        for values, sigma in pairs:
+            if values is None or sigma is None:
+                continue
+            steps = np.diff(values[move.start : move.start + n * block].reshape(n, block, 3), axis=1)
+            quiet &= (np.nanvar(steps, axis=1) < 2.0 * 2.0 * sigma**2).all(axis=1)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], quiet.astype(np.int8), [0]]))).reshape(-1, 2)
+        for first, last in edges:
+            start, stop = move.start + (first + 1) * block, move.start + (last - 1) * block
+            if stop - start >= 0.5 * LONG_S * recording.rate_hz:
+                out.append((int(start), int(stop)))
+    return out
 
 
 def unsplit(recording: Recording, segments: Segments) -> Segments:
@@ -145,8 +193,9 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
                 mean[k] = np.nanmean(values[a:b], axis=0)
                 error[k] = old[source]
             else:
-                blocks = np.array_split(values[a:b], 8)
-                scatter = np.nanstd([np.nanmean(block, axis=0) for block in blocks], axis=0, ddof=1) / np.sqrt(8.0)
+                part = values[a:b][np.isfinite(values[a:b]).all(axis=1)]
+                blocks = np.array_split(part, 8) if len(part) >= 8 else [np.zeros((1, 3))] * 8
+                scatter = np.std([block.mean(axis=0) for block in blocks], axis=0, ddof=1) / np.sqrt(8.0)
                 floor = np.maximum(colour, 1.0) * sigma / np.sqrt(n)
                 # Eight blocks tell a pose that goes on settling (several times the noise), not 20 % of its noise.
                 error[k] = np.maximum(floor, scatter if source < 0 else np.where(scatter > 2.0 * floor, scatter, 0.0))

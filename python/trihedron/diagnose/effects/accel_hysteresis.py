@@ -17,11 +17,14 @@ CREEP_TIMES_S = (5.0, 20.0, 60.0)
 def play(path: FloatArray, half_width: float) -> FloatArray:
     """Play operator: follows the path with slack; output over half-width is in [-1, 1] and holds the last direction."""
     out = np.empty_like(path)
-    follower = path[0].copy()
-    # Only extremes move the follower: the running clip is sequential by nature, but cheap on decimated input.
-    for k in range(len(path)):
-        np.clip(follower, path[k] - half_width, path[k] + half_width, out=follower)
-        out[k] = follower
+    # Only extremes move the follower: the running clip is sequential by nature; plain numbers are the quickest way.
+    for axis in range(path.shape[1]):
+        follower = float(path[0, axis])
+        column = []
+        for value in path[:, axis].tolist():
+            follower = min(max(follower, value - half_width), value + half_width)
+            column.append(follower)
+        out[:, axis] = column
     return (path - out) / half_width
 
 

@@ -1,0 +1,75 @@
+"""What the diagnosis says of real recordings, causes withheld (docs/diagnosis-real.md)."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trihedron.diagnose import diagnose_recording
+from trihedron.diagnose.effects.stamp_errors import stamp_errors
+from trihedron.diagnose.observations import observe
+from trihedron.diagnose.unresolved import unresolved_variance
+from trihedron.estimate.accelerometer import calibrate_norm
+from trihedron.estimate.joint import calibrate_joint
+from trihedron.read import read_recording
+from trihedron.segment import segment_recording
+
+
+def diagnosed(gravity: float, **arguments: object):
+    recording = read_recording(**arguments)
+    segments = segment_recording(recording)
+    accelerometer, _ = calibrate_norm(
+        segments.accelerometer_mean, segments.accelerometer_sigma_mean, gravity, raw_unit=recording.accelerometer_unit
+    )
+    return diagnose_recording(recording, segments, calibrate_joint(recording, segments, accelerometer, gravity, "test"))
+
+
+def test_xsens_holds_g_sensitivity_and_gravity_after_moves_gains_threefold(real_data: Path) -> None:
+    folder = real_data / "xsens_mti"
+    d = diagnosed(9.81744, accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")
+    assert d.verdict == "missing-physics"
+    first = d.effects[0]
+    assert first.id == "gyro-g-sensitivity"
+    matrix = {p.name: p.value for p in first.parameters}
+    assert abs(matrix["G_yx"]) * 9.80665 == pytest.approx(np.radians(0.16), rel=0.1)  # deg/s per g
+    moves = next(h for h in first.held_out if h.domain == "moves")
+    assert moves.rms_before > 3.0 * moves.rms_after
+    assert moves.chi2_per_dof_before > 3.0 * moves.chi2_per_dof_after
+
+
+def test_a_session_with_wild_rotation_at_its_end_is_healthy_but_for_the_range(real_data: Path) -> None:
+    d = diagnosed(9.8184, path=real_data / "mimu4444/exp_2.npz", device=1)
+    assert [e.id for e in d.effects] == ["gyro-saturation"]
+    agree = {t.domain: t.chi2_per_dof for t in d.remaining if not t.disagrees}
+    assert {"static-accel", "static-gyro", "moves", "dynamics"} <= set(agree)
+
+
+def test_stamps_on_a_coarse_grid_are_not_when_the_samples_were_taken(real_data: Path) -> None:
+    recording = read_recording(real_data / "kim/kim_imu_good1.txt")
+    observed = observe(recording, segment_recording(recording))
+    found = stamp_errors(observed)
+    assert found is not None
+    # Stamps on a grid of 5.12 ms scatter by its twelfth root, 1.48 ms; the readings do not follow them at all.
+    assert found.rms_s == pytest.approx(5.12e-3 / np.sqrt(12.0), rel=0.05)
+    assert abs(found.followed) < 0.1
+    assert stamp_errors(replace(observed, time_s=found.even_s)) is None
+
+
+def test_motion_above_half_the_rate_is_counted_and_smooth_motion_is_not() -> None:
+    rng = np.random.default_rng(3)
+    n, step = 4000, 0.01
+    t = np.arange(n) * step
+    smooth = 5.0 * np.sin(2 * np.pi * 0.7 * t)[:, None] * np.ones(3)
+    noise = 0.05 * rng.standard_normal((n, 3))
+    moves, holds = ((500, 900), (1500, 1900)), [(2000, 2400), (2500, 2900), (3000, 3400)]
+    noise[2000:] -= smooth[2000:]
+    quiet = unresolved_variance(smooth + noise, moves, holds, step)
+    white = 0.05**2 * 400 * step**2
+    assert (quiet < 0.2 * white).all()
+    struck = smooth + noise
+    struck[700] += (8.0, -4.0, 2.0)  # one sample of a jolt
+    found = unresolved_variance(struck, moves, holds, step)
+    # Its area times the share that a flat spectrum has at the sampling frequency: all of it.
+    assert np.sqrt(found[0]) == pytest.approx(np.array([8.0, 4.0, 2.0]) * step, rel=0.2)
+    assert (found[1] < 0.2 * white).all()
