@@ -71,9 +71,7 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
             noise = max(float(sigma[axis]), 0.5 * step_size, 1e-300)
             best: list[Plateau] = []
             # The limit is a level many moves end on: try each move's highest plateau as the level.
-            levels = np.unique(np.round((top - 2 * sigma[axis]) / noise) * noise)
-            # A limit has next to nothing beyond it: lower levels need no look.
-            for level in levels[levels > top.max() - 3.0 * BAND_SIGMA * noise]:
+            for level in np.unique(np.round((top - 2 * sigma[axis]) / noise) * noise):
                 runs = _on_level(x, float(level), noise, axis, sign, ranges)
                 if len(runs) > len(best):
                     best = runs
