@@ -264,6 +264,12 @@ class Linearisation:
             "white": np.linalg.inv(np.linalg.cholesky(cov)), "duration": np.array(duration),
         }  # fmt: skip
 
+    def move_residual(self, m: int) -> FloatArray:
+        """(5,) whitened residuals of one move: gravity in its end pose (2), velocity over it (3)."""
+        one = self._moves[m]
+        out: FloatArray = one["white"] @ one["residual"]
+        return out
+
     def _move_rows(self, m: int, rate: FloatArray | None, force: FloatArray | None) -> FloatArray:
         """(5, K) change of a move's residuals when true rate and force change by (samples, 3, K)."""
         one = self._moves[m]

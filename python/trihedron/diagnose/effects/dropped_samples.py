@@ -13,7 +13,7 @@ from trihedron.diagnose.effects.sample_steps import MAX_LOST, Loss, find_losses
 from trihedron.diagnose.observations import Observations, observe
 from trihedron.diagnose.repair import bridge, insert_samples, without_moves
 from trihedron.diagnose.solve import fit
-from trihedron.diagnose.twin import DYNAMICS, MOVES, NO_DISTORTION, Linearisation, Twin
+from trihedron.diagnose.twin import NO_DISTORTION, Linearisation, Twin
 from trihedron.records.diagnosis import EffectParameter, Where
 
 UNSETTLED = 0.15
@@ -85,9 +85,8 @@ def _misfit(obs: Observations, twin: Twin, m: int, losses: dict[int, int]) -> fl
         move_ranges=((0, len(time)),),
         move_holds=obs.move_holds[m : m + 1],
     )
-    system = Linearisation(one, twin, NO_DISTORTION).system()
-    own = np.isin(system.domain, (MOVES, DYNAMICS)) & (system.walk == 0)
-    return float((system.residual[own] ** 2).sum())
+    residual = Linearisation(one, twin, NO_DISTORTION).move_residual(0)
+    return float(residual @ residual)
 
 
 class DroppedSamples(DirectEffect):

@@ -176,7 +176,8 @@ class Quantisation(DirectEffect):
             size = np.full(len(holds), dead / np.sqrt(3.0))  # anywhere inside the zone
             return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(holds)), size, 0, dead)
         step, missing = grid
-        if scatter > 3.0 * step and not missing:
+        # Scatter holds a twelfth of a step squared besides the noise: this much is noise enough.
+        if scatter > 0.75 * step and not (missing and scatter < 1.5 * step):
             return None
         sigma, shift, spread = before_converter(holds, step)
         if missing and scatter < 1.5 * step:

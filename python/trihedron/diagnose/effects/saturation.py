@@ -70,8 +70,9 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
                 continue
             noise = max(float(sigma[axis]), 0.5 * step_size, 1e-300)
             best: list[Plateau] = []
-            # The limit is a level many moves end on: try each move's highest plateau as the level.
-            for level in np.unique(np.round((top - 2 * sigma[axis]) / noise) * noise):
+            # The limit is a level that moves end on and that nothing exceeds but noise.
+            ends = np.round((top[top > top.max() - 2.0 * BAND_SIGMA * noise] - 2.0 * noise) / noise) * noise
+            for level in np.unique(ends):
                 runs = _on_level(x, float(level), noise, axis, sign, ranges)
                 if len(runs) > len(best):
                     best = runs
