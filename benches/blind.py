@@ -73,6 +73,21 @@ def line(result: Result) -> str:
     )
 
 
+def tried(options: argparse.Namespace) -> list[Result]:
+    """Run the trials, print what went wrong as it comes, store every result."""
+    if not (options.each or options.pairs or options.foreign or options.healthy):
+        options.each = 2
+    jobs = [job for job in drawn(options) if options.only_seed in (None, job.seed)]
+    results: list[Result] = []
+    for result in run(jobs, options.jobs):
+        results.append(result)
+        if options.verbose or result["score"] not in ("right", "confounded", "both", "hidden"):
+            print(line(result), flush=True)
+        if options.json:
+            options.json.write_text(json.dumps(results))
+    return results
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--each", type=int, default=0, help="recordings of every effect, grades in turn")
@@ -87,18 +102,13 @@ def main() -> None:
     parser.add_argument("--only-seed", type=int, help="repeat only the recording of this seed")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--json", type=Path, help="write every result here")
+    parser.add_argument("--show", type=Path, action="append", help="print the tables of stored results instead")
     parser.add_argument("--verbose", action="store_true", help="print every trial")
     options = parser.parse_args()
-    if not (options.each or options.pairs or options.foreign or options.healthy):
-        options.each = 2
-    jobs = [job for job in drawn(options) if options.only_seed in (None, job.seed)]
-    results: list[Result] = []
-    for result in run(jobs, options.jobs):
-        results.append(result)
-        if options.verbose or result["score"] not in ("right", "confounded", "both", "hidden"):
-            print(line(result), flush=True)
-        if options.json:
-            options.json.write_text(json.dumps(results))
+    if options.show:
+        results = [result for path in options.show for result in json.loads(path.read_text())]
+    else:
+        results = tried(options)
     print()
     print(confusion([r for r in results if len(r["effects"]) < 2 and r["label"] != "healthy"]))
     print()

@@ -10,12 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 import trihedron
 from blind_trial.draw import Job, make
 from blind_trial.visibility import is_visible
 
 Result = dict[str, Any]
+HELD_OUT = 1.3
+"""Chi-square per degree of freedom on unseen poses and moves that an explained recording should stay below."""
 COLUMNS = ("right", "confounded", "second", "missed", "wrong", "hidden")
 
 
@@ -38,6 +41,7 @@ def trial(job: Job) -> Result:
         **sealed, "verdict": said["verdict"], "crash": crash, "seconds": seconds,
         "found": [e["id"] for e in effects], "confounded": [e["confounded_with"] for e in effects],
         "disagrees": [d["domain"] for d in said["domains"] if d["disagrees"]],
+        "dof": {d["domain"]: d["dof"] for d in said["domains"]},
         "remaining": [d["domain"] for d in said["remaining"] if d["disagrees"]],
         "answers": [
             {
@@ -131,6 +135,14 @@ def _held_after(result: Result) -> float | None:
     return None if held is None else held["chi2_per_dof_after"]
 
 
+def _chance_to_pass(result: Result) -> float:
+    """How often a model without any fault has a chi-square per degree of freedom below the bound, by noise alone."""
+    first = _first(result)
+    domain = "" if first is None else result["answers"][first]["heldout"]["domain"]
+    dof = result.get("dof", {}).get(domain, np.nan)
+    return float(chi2.cdf(HELD_OUT * dof, dof))
+
+
 def confusion(results: list[Result]) -> str:
     """Effect by effect: how the answers fell, shares of parameters within two sigma, held-out fit afterwards."""
     by_effect: dict[str, list[Result]] = defaultdict(list)
@@ -145,7 +157,7 @@ def confusion(results: list[Result]) -> str:
         other = Counter(_said(r) for r in rows if r["score"] not in ("right",))
         lines.append(
             f"{effect:25s} {len(rows):3d} " + " ".join(f"{counts[c]:10d}" for c in COLUMNS)
-            + f"  {_percent(np.array(z) <= 2.0)}  {_percent(np.array(held) <= 1.3):>9s}  "
+            + f"  {_percent(np.array(z) <= 2.0)}  {_percent(np.array(held) <= HELD_OUT):>9s}  "
             + ", ".join(f"{k} {v}" for k, v in other.most_common(3))
         )  # fmt: skip
     return "\n".join(lines)
@@ -175,12 +187,14 @@ def summary(results: list[Result]) -> str:
         answered = [r for r in visible if r["score"] in ("right", "confounded")]
         held = np.array([h for r in answered if (h := _held_after(r)) is not None])
         named = count["right"] + count["confounded"]
+        perfect = [_chance_to_pass(r) for r in answered if _held_after(r) is not None]
         out += [
             f"right {share(count['right'], n)}; right or named as confounded {share(named, n)}",
             f"first answer wrong and the truth not named beside it {share(count['wrong'] + count['second'], n)}",
             f"missed {share(count['missed'], n)}; hidden by the noise and not claimed: {len(single) - n}",
             f"parameters within two sigma {share(int((z <= 2).sum()), len(z))}",
-            f"held out afterwards at most 1.3 {share(int((held <= 1.3).sum()), len(held))}",
+            f"held out afterwards at most {HELD_OUT} {share(int((held <= HELD_OUT).sum()), len(held))}; "
+            f"noise alone leaves that to {100 * float(np.mean(perfect or [np.nan])):.0f} % of perfect models",
         ]
     if pairs:
         count = Counter(r["score"] for r in pairs)
