@@ -83,7 +83,7 @@ def make(job: Job) -> tuple[Recording, float, dict[str, Any]]:
         least, hold = (30 if job.foreign == "accel-cross-product" else 20), float(rng.uniform(3.5, 8.0))
         n = int(rng.integers(least, least + 13))
         # Only a brisk hand takes an accelerometer beyond 1 g.
-        travel = 0.3 if "accel-saturation" in job.effects else 0.1
+        travel = 0.6 if "accel-saturation" in job.effects else 0.1
         motion = hand_session(n, hold_s=hold, layout=layout, move_s=float(rng.uniform(1.6, 2.6)), travel_m=travel)
     healthy = Scenario(motion, "blind", accelerometer, gyroscope, profile.clock)
     session = Session(profile, accelerometer, moves_of(motion))
