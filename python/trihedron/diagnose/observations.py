@@ -13,6 +13,8 @@ from trihedron.diagnose.unresolved import unresolved_variance
 from trihedron.records import Recording, Segments
 
 FloatArray = npt.NDArray[np.float64]
+LONGEST_MOVE_S = 180.0
+"""A hand move takes seconds, a careful change of fixture minutes; over longer the bias decides what is integrated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +107,9 @@ def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True
         start, stop = max(move.start - 1, 0), min(move.stop + 1, recording.n_samples)
         values = recording.accelerometer[start:stop]
         finite = np.isfinite(values).all() and (raw_rate is None or np.isfinite(raw_rate[start:stop]).all())
-        if finite and stop - start >= 3:
+        # Hours between two poses are no move whose angle or velocity could be followed.
+        is_short = recording.time_s[stop - 1] - recording.time_s[start] <= LONGEST_MOVE_S
+        if finite and is_short and stop - start >= 3:
             ranges.append((start, stop))
             holds.append((move.hold_before, move.hold_after))
     spans = [(hold.start, hold.stop) for hold in segments.holds]

@@ -95,7 +95,11 @@ def _descend(state: _State, n_iterations: int) -> _State:
             normal = state.normal.copy()
             normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE + damping
             step = -cho_solve(cho_factor(normal), scaled.T @ state.system.residual)
-            tried = _State.at(line.obs, state.twin.advanced(step / state.scale), line.distortion, line.prior)
+            try:
+                tried = _State.at(line.obs, state.twin.advanced(step / state.scale), line.distortion, line.prior)
+            except np.linalg.LinAlgError:  # so long a step that a triad collapsed: no noise can be carried through it
+                damping = max(10.0 * damping, MIN_DAMPING)
+                continue
             if tried.chi2 <= state.chi2 * (1.0 + MAY_RISE) + 1.0:
                 damping = 0.0 if damping < MIN_DAMPING else 0.1 * damping
                 break
