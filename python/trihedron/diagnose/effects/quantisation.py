@@ -15,6 +15,8 @@ from trihedron.records.diagnosis import EffectParameter, Where
 
 COARSE = 0.45
 """Noise below this share of a step leaves readings on two or three codes: their mean sits on a staircase."""
+MISSED = 25.0
+"""Readings that a code never read was to have: chance leaves it empty once in 10¹¹."""
 SIGMA_GRID = np.geomspace(0.03, 2.0, 36)
 """Noise before the converter that is tried, in steps."""
 
@@ -38,9 +40,10 @@ class Lattice:
     dead: float
 
 
-def lattice(values: FloatArray, sigma: float) -> tuple[float, int] | None:
+def lattice(holds: list[FloatArray], sigma: float) -> tuple[float, int] | None:
     """Step of the grid on which all values lie and the number of codes skipped amid visited ones, or ``None``."""
-    codes, counts = np.unique(values, return_counts=True)
+    values = np.concatenate(holds)
+    codes = np.unique(values)
     if len(codes) < 3 or len(codes) > 0.2 * len(values):
         return None
     gaps = np.diff(codes)
@@ -52,14 +55,17 @@ def lattice(values: FloatArray, sigma: float) -> tuple[float, int] | None:
     ratio = gaps / step
     if np.mean(np.abs(ratio - np.round(ratio)) < 0.02) < 0.98:
         return None
-    # A code is missing where both neighbours are visited so often that its absence is no accident.
-    index = np.round((codes - codes[0]) / step).astype(int)
-    visited = dict(zip(index.tolist(), counts.tolist(), strict=True))
-    missing = 0
-    if sigma > 0.5 * step:
-        for k in range(1, index[-1]):
-            if k not in visited and min(visited.get(k - 1, 0), visited.get(k + 1, 0)) > 20:
-                missing += 1
+    # A code is missing where a pose's own readings lie on both sides of it: noise has one summit, so at least the
+    # geometric mean of its neighbours' counts was to be expected there.
+    expected: dict[int, float] = {}
+    visited = set(np.round((codes - codes[0]) / step).astype(int).tolist())
+    for one in holds if sigma > 0.5 * step else []:
+        own, seen = np.unique(np.round((one - codes[0]) / step).astype(int), return_counts=True)
+        count = dict(zip(own.tolist(), seen.tolist(), strict=True))
+        for k in own.tolist():
+            if k + 1 not in visited and k + 2 in count:
+                expected[k + 1] = expected.get(k + 1, 0.0) + float(np.sqrt(count[k] * count[k + 2]))
+    missing = sum(value > MISSED for value in expected.values())
     return step, missing
 
 
@@ -168,7 +174,7 @@ class Quantisation(DirectEffect):
         still = np.concatenate(holds)
         scatter = float(np.sqrt(np.median([np.var(values) for values in holds])))
         moving = np.concatenate([x[a:b] for a, b in obs.move_ranges]) if obs.move_ranges else still
-        grid = lattice(still, scatter)
+        grid = lattice(holds, scatter)
         if grid is None:
             dead = dead_zone(still, moving[np.isfinite(moving)], float(np.ptp(moving)) or 1.0)
             if not dead:
