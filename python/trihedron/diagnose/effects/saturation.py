@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from scipy.special import chdtrc
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES
@@ -171,8 +172,11 @@ class _Saturation(DirectEffect):
         system = context.fitted.system
         move_rows = np.isin(system.domain, (MOVES, DYNAMICS)) & (system.walk == 0)
         at_limit = np.isin(system.segment, touched)
-        misfit = float(np.mean(system.residual[move_rows & at_limit] ** 2))
-        others = system.residual[move_rows & ~at_limit] ** 2
+        # In the noise of the parts, not in one that was widened for what nothing had explained.
+        widened = np.where(system.domain == MOVES, obs.moves_inflation, obs.dynamics_inflation)
+        squared = (system.residual * widened) ** 2
+        misfit = float(np.mean(squared[move_rows & at_limit]))
+        others = squared[move_rows & ~at_limit]
         usual = float(np.median(others) / MEDIAN_CHI2) if len(others) >= 10 else 0.0
         # Plateaus on one level time and again need no such comparison: where most moves are clipped, all disagree.
         sides = Counter((run.axis, run.sign) for run in runs)
@@ -197,10 +201,12 @@ class _Saturation(DirectEffect):
             f"The {self.sensor} reaches the end of its range: {len(runs)} plateaus, {n} samples, in "
             f"{len(touched)} of {obs.n_moves} moves; what those moves read is false and is left out of the fit."
         )
-        # Chance that smooth peaks of different moves end within one noise band of each other.
-        p = float(
-            np.clip((2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1), 1e-300, 1.0)
-        )
+        # Chance that smooth peaks of different moves end within one noise band of each other, times the chance that
+        # sound moves disagree so much more than the others.
+        p = (2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1)
+        n_rows = int((move_rows & at_limit).sum())
+        p *= float(chdtrc(n_rows, misfit * n_rows / max(usual, 1.0)))
+        p = float(np.clip(p, 1e-300, 1.0))
         if any(run.is_rail for run in runs):
             p = min(p, 1e-30)
         return Evidence(
