@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -12,8 +12,9 @@ from scipy.special import chdtrc
 from trihedron.diagnose.agreement import ROW_DOMAINS, physical_rms, test_rows
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.growing import Found, GrowingModel
+from trihedron.diagnose.hollow import drop_hollow, settle_direct
 from trihedron.diagnose.observations import Observations, observe
 from trihedron.diagnose.pictures import residuals_before_after, with_covariance
 from trihedron.diagnose.selection import (
@@ -30,16 +31,14 @@ from trihedron.diagnose.selection import (
 from trihedron.diagnose.solve import N_DOMAINS, Fit, Prediction, folds_of, predict_held_out, tune_noise
 from trihedron.diagnose.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
 from trihedron.diagnose.timing import test_timing
-from trihedron.diagnose.twin import NO_DISTORTION, PRIOR, Distortion, Prior, Twin, stacked
+from trihedron.diagnose.twin import NO_DISTORTION, PRIOR, Prior, Twin, stacked
 from trihedron.diagnose.within_static import test_within_static
+from trihedron.diagnose.wording import worded
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import (
-    AcceptedEffect,
     Candidate,
     Diagnosis,
-    Domain,
     DomainTest,
-    EffectParameter,
     HeldOut,
     Verdict,
 )
@@ -49,37 +48,6 @@ N_REFITS = 4
 """Candidates fitted jointly at each step: the leaders of the score test."""
 FAR_AHEAD = 4.0
 """A sound candidate whose score is this many times another's is not caught up by a joint fit."""
-KEPT_EXCESS = 0.5
-"""An effect whose domain keeps more than half of its misfit after everything is accepted explains nothing."""
-KEPT_NATURAL = 0.3
-"""Nor does an effect of one sensor if the domains of that sensor together keep this share."""
-
-
-@dataclass
-class _Model:
-    """The model as it grows."""
-
-    obs: Observations
-    fitted: Fit
-    prediction: Prediction
-    distortions: list[Distortion] = field(default_factory=list)
-    found: list[_Found] = field(default_factory=list)
-    refused: set[str] = field(default_factory=set)
-
-
-@dataclass
-class _Found:
-    """One accepted effect, before it is put into words."""
-
-    effect: Effect
-    variant: Variant | None
-    evidence: Evidence | None
-    p_adjusted: float
-    delta_bic: float
-    held_out: tuple[HeldOut, ...]
-    primary: int
-    rivals: tuple[str, ...]
-    order: int
 
 
 def diagnose_recording(
@@ -133,7 +101,7 @@ def diagnose_recording(
     result = Diagnosis(
         verdict=verdict,
         domains=domains,
-        effects=_worded(model),
+        effects=worded(model),
         remaining=remaining,
         candidates=tuple(candidates[key] for key in sorted(candidates)),
         baseline=with_covariance(linear_model(base), base),
@@ -166,7 +134,7 @@ class _Run:
     """One pass: the twin before any effect, the model after all, and the domains of both."""
 
     base: Fit
-    model: _Model
+    model: GrowingModel
     domains: tuple[DomainTest, ...]
     remaining: tuple[DomainTest, ...]
     candidates: dict[str, Candidate]
@@ -175,7 +143,7 @@ class _Run:
 def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
     tell(0.05, "fitting the twin")
     base = tune_noise(obs, start, NO_DISTORTION, prior)
-    model = _Model(obs, base, predict_held_out(base, folds_of(base), N_DOMAINS))
+    model = GrowingModel(obs, base, predict_held_out(base, folds_of(base), N_DOMAINS))
     tell(0.2, "looking at the samples")
     candidates: dict[str, Candidate] = {}
     _accept_direct(model, Context(obs, base), candidates, alpha, prior)
@@ -186,9 +154,9 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
             break
     tell(0.9, "checking what remains")
     remaining = _all_domains(model.obs, model.fitted, alpha, model.refused)
-    if _drop_hollow(model, domains, remaining, prior):
+    if drop_hollow(model, domains, remaining, prior):
         remaining = _all_domains(model.obs, model.fitted, alpha, model.refused)
-    return _Run(base, model, domains, _settle_direct(model, remaining), candidates)
+    return _Run(base, model, domains, settle_direct(model, remaining), candidates)
 
 
 UNEXPLAINED = 3.0
@@ -213,7 +181,7 @@ def _all_domains(obs: Observations, fitted: Fit, alpha: float, refused: Collecti
 
 # -- direct evidence ------------------------------------------------------------
 def _accept_direct(
-    model: _Model, context: Context, candidates: dict[str, Candidate], alpha: float, prior: Prior | None
+    model: GrowingModel, context: Context, candidates: dict[str, Candidate], alpha: float, prior: Prior | None
 ) -> None:
     n_effects = len(catalogue())
     found: list[tuple[DirectEffect, Evidence]] = []
@@ -252,7 +220,7 @@ def _accept_direct(
                 evidence = replace(evidence, parameters=evidence.restate(Context(model.obs, model.fitted)))
         held = evidence.held_out or _held_out(base_fit, before, model.fitted, model.prediction)
         model.found.append(
-            _Found(
+            Found(
                 effect, evidence.variant, evidence, min(1.0, evidence.p_value * n_effects), float(gain), held, -1,
                 evidence.confounded_with, len(model.found),
             )
@@ -260,7 +228,7 @@ def _accept_direct(
 
 
 # -- the competition ------------------------------------------------------------
-def _accept_next(model: _Model, candidates: dict[str, Candidate], alpha: float, *, first: bool) -> bool:
+def _accept_next(model: GrowingModel, candidates: dict[str, Candidate], alpha: float, *, first: bool) -> bool:
     context = Context(model.obs, model.fitted)
     taken = {f.effect.id for f in model.found if not f.effect.repeatable}
     scored, missing = score_all(context, taken)
@@ -303,7 +271,7 @@ def _accept_next(model: _Model, candidates: dict[str, Candidate], alpha: float, 
     model.prediction = best.prediction
     model.distortions.append(best.scored.variant.distortion)
     model.found.append(
-        _Found(
+        Found(
             best.scored.effect, best.scored.variant, None, _p_adjusted(best, n_effects), best.bic_gain,
             _held_out(before_fit, before, model.fitted, model.prediction), _primary(before_fit, model.fitted), rivals,
             len(model.found),
@@ -350,115 +318,3 @@ def _held_out(before_fit: Fit, before: Prediction, after_fit: Fit, after: Predic
             )
         )  # fmt: skip
     return tuple(h for _, h in sorted(out, key=lambda pair: -pair[0]))
-
-
-def _drop_hollow(
-    model: _Model, domains: tuple[DomainTest, ...], remaining: tuple[DomainTest, ...], prior: Prior | None
-) -> bool:
-    """Take out effects whose domain still carries most of its misfit: a least bad guess is not an answer."""
-    before = {d.domain: d for d in domains}
-    after = {d.domain: d for d in remaining}
-    hollow = []
-    for found in model.found:
-        if found.evidence is not None or found.primary < 0:
-            continue
-        name: Domain = ROW_DOMAINS[found.primary]
-        if name not in before or name not in after or not after[name].disagrees:
-            continue
-        excess_before = before[name].chi2_per_dof - 1.0
-        excess_after = after[name].chi2_per_dof - 1.0
-        if excess_before > 0 and excess_after > KEPT_EXCESS * excess_before:
-            hollow.append(found)
-    hollow += [f for f in model.found if f not in hollow and _keeps_misfit(f, before, after)]
-    if not hollow:
-        return False
-    model.found = [f for f in model.found if f not in hollow]
-    model.distortions = [f.variant.distortion for f in model.found if f.variant is not None]
-    start = replace(model.fitted.twin, effect=np.zeros(sum(d.n_parameters for d in model.distortions)))
-    model.fitted = tune_noise(model.obs, start, stacked(model.distortions), prior)
-    model.prediction = predict_held_out(model.fitted, folds_of(model.fitted), N_DOMAINS)
-    return True
-
-
-def _keeps_misfit(found: _Found, before: Mapping[Domain, DomainTest], after: Mapping[Domain, DomainTest]) -> bool:
-    """Whether the domains where an effect of one sensor must show keep much of their misfit after everything."""
-    if found.evidence is not None or found.variant is None:
-        return False
-    distortion = found.variant.distortion
-    if (distortion.force is None) == (distortion.rate is None):
-        return False
-    natural: tuple[Domain, ...] = ("static-gyro", "moves") if distortion.force is None else ("static-accel", "dynamics")
-    pairs = [(before[name], after[name]) for name in natural if name in before and name in after]
-    if not any(b.disagrees and a.disagrees for b, a in pairs):
-        return False
-    excess = [sum(max(t[k].chi2_per_dof - 1.0, 0.0) * t[k].dof for t in pairs) for k in (0, 1)]
-    return bool(excess[1] > KEPT_NATURAL * excess[0])
-
-
-def _settle_direct(model: _Model, remaining: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
-    """Sample-level domains whose disagreement an accepted direct effect accounts for agree afterwards."""
-    explained = {f.evidence.domain for f in model.found if f.evidence is not None}
-    if any(f.effect.id == "vibration-rectification" for f in model.found):
-        explained.add("within-static")  # the shaking that the effect follows is the disagreement seen there
-    return tuple(
-        replace(d, disagrees=False) if d.domain in explained and d.domain in ("within-static", "timing") else d
-        for d in remaining
-    )
-
-
-# -- words ------------------------------------------------------------
-def _worded(model: _Model) -> tuple[AcceptedEffect, ...]:
-    covariance = model.fitted.covariance()
-    n = model.fitted.n_effect
-    effect_cov = covariance[len(covariance) - n :, len(covariance) - n :]
-    first = 0
-    spans: dict[int, slice] = {}
-    for k, found in enumerate(model.found):
-        if found.variant is not None:
-            k_parameters = found.variant.distortion.n_parameters
-            spans[k] = slice(first, first + k_parameters)
-            first += k_parameters
-    out = []
-    for k, found in enumerate(model.found):
-        values = model.fitted.twin.effect[spans[k]] if k in spans else np.zeros(0)
-        cov = effect_cov[spans[k], spans[k]] if k in spans else np.zeros((0, 0))
-        if found.evidence is not None:
-            parameters = found.evidence.parameters
-            statement = found.evidence.statement
-        else:
-            assert found.variant is not None
-            parameters = found.effect.parameters(found.variant, values, cov)
-            statement = found.effect.statement(parameters)
-        out.append((found, values, parameters, statement))
-    # What the recording gains most by comes first; a range that ends is no matter of degree.
-    out.sort(key=lambda item: ("saturation" not in item[0].effect.id, -item[0].delta_bic))
-    return tuple(_accepted(*item) for item in out)
-
-
-def _accepted(
-    found: _Found, values: np.ndarray, parameters: tuple[EffectParameter, ...], statement: str
-) -> AcceptedEffect:
-    shape = {} if found.variant is None else {name: v for name, (v, _) in found.variant.shape.items()}
-    by_id = {effect.id: effect for effect in catalogue()}
-    experiment = by_id[found.rivals[0]].experiment if found.rivals else ""
-    experiment = " / ".join(
-        dict.fromkeys(e for e in (found.effect.experiment if found.rivals else "", experiment) if e)
-    )
-    return AcceptedEffect(
-        id=found.effect.id,
-        statement=statement,
-        parameters=parameters,
-        p_adjusted=found.p_adjusted,
-        delta_bic=found.delta_bic,
-        held_out=found.held_out,
-        confounded_with=found.rivals,
-        separating_experiment=experiment,
-        model=MappingProxyType(
-            {
-                "variant": "" if found.variant is None else found.variant.label,
-                "shape": shape,
-                "values": [float(v) for v in values],
-                "applies_to_other_recordings": found.effect.applies_elsewhere,
-            }
-        ),
-    )
