@@ -16,6 +16,8 @@ from trihedron.diagnose.solve import fit
 from trihedron.diagnose.twin import NO_DISTORTION, Linearisation, Twin
 from trihedron.records.diagnosis import EffectParameter, Where
 
+CLEAR_COUNT = 3.0
+"""Standard errors by which a count must differ from none."""
 UNSETTLED = 0.15
 """Relative error of a count that only the joint of the two sides tells."""
 _KNOWN: WeakKeyDictionary[Observations, tuple[list[Loss], dict[int, float]]] = WeakKeyDictionary()
@@ -101,6 +103,8 @@ class DroppedSamples(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         losses, sigmas = counted_losses(context)
+        # A jolt looks like a loss; gravity then finds nothing missing, or cannot say how much.
+        losses = [loss for loss in losses if loss.count > CLEAR_COUNT * sigmas[loss.sample]]
         if not losses:
             return None
         obs = context.obs
