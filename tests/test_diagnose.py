@@ -10,7 +10,7 @@ from trihedron.estimate.joint import calibrate_joint
 from trihedron.segment import segment_recording
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
-from trihedron.simulate.library import _of
+from trihedron.simulate.named import _of
 from trihedron.simulate.profiles import profile_by_name
 
 
@@ -101,3 +101,24 @@ def test_ids_of_the_catalogue_are_unique_and_published():
         "axis-handedness",
     ]
     assert set(published) <= set(ids)
+
+
+def test_missing_codes_are_counted_and_lost_ones_by_chance_are_not():
+    # Every fourth code of 20 to 60 visited per axis is missing; healthy adis has codes that chance left empty.
+    diagnosis = diagnosed("quantisation", seed=5, grade="adis", sensor="accelerometer", missing_every=4)
+    assert diagnosis.effects[0].id == "quantisation"
+    missing = [p.value for p in diagnosis.effects[0].parameters if p.name.startswith("missing_codes")]
+    assert len(missing) == 3
+    assert min(missing) >= 5
+    assert all(e.id != "quantisation" for e in diagnosed(seed=5, grade="adis").effects)
+
+
+def test_a_dead_band_is_measured():
+    # Gyro readings within 60 counts of zero do not move; half-width to one count of 60.
+    diagnosis = diagnosed("quantisation", seed=6, sensor="gyroscope", dead_band=60.0)
+    assert diagnosis.effects[0].id == "quantisation"
+    scale = np.abs(np.diag(np.array(diagnosis.extended.gyroscope["S"])))
+    for axis, name in enumerate("xyz"):
+        found = [p.value for p in diagnosis.effects[0].parameters if p.name == f"dead_band_g{name}"]
+        assert found
+        assert abs(found[0] / scale[axis] - 60.0) < 2.0

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2, ncx2
 
 from trihedron.records import Recording
@@ -67,9 +68,8 @@ def is_visible(effect: str, sigma: float | None, power: float = 0.95) -> bool:
 
 def _noncentrality(force: FloatArray, rate: FloatArray, truth: Truth, scenario: Scenario) -> float:
     g = truth.gravity_m_s2
-    w, x, y, z = truth.attitude.T
-    up = np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z], axis=1)
-    to_level = _matrices(truth.attitude)
+    to_level = Rotation.from_quat(truth.attitude[:, [1, 2, 3, 0]]).as_matrix()  # scalar last
+    up = to_level[:, 2]
     t = truth.accelerometer_time_s
     noise_f, noise_w = scenario.accelerometer.noise, scenario.gyroscope.noise
     lengths, rates, rows_f, weight_f, weight_w = [], [], [], [], []
@@ -114,13 +114,3 @@ def _left(values: FloatArray, columns: FloatArray, weights: FloatArray) -> float
     a, b = columns * weights[:, None], values * weights
     fitted, *_ = np.linalg.lstsq(a, b, rcond=None)
     return float(((b - a @ fitted) ** 2).sum())
-
-
-def _matrices(q: FloatArray) -> FloatArray:
-    w, x, y, z = q.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=1) for row in rows], axis=1)

@@ -189,6 +189,13 @@ class Context:
             out[i] = np.nanvar(values, axis=0)
         return out
 
+    def si_per_raw(self, sensor: str) -> FloatArray:
+        """(3,) size of one raw unit along each axis of the ``"accelerometer"`` or ``"gyroscope"``, SI."""
+        twin = self.fitted.twin
+        S = twin.accel_S if sensor == "accelerometer" else twin.gyro_S
+        out: FloatArray = 1.0 / np.linalg.norm(np.linalg.inv(S), axis=1)
+        return out
+
     def vibration_power(self) -> FloatArray:
         """(points, 3) power of vibration above the quiet floor, SI²: of a hold its variance, in moves a running one.
 

@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 from scipy.special import chdtrc
+from threadpoolctl import threadpool_limits
 
 from trihedron.diagnose.agreement import ROW_DOMAINS, physical_rms, test_rows
 from trihedron.diagnose.context import Context
@@ -86,11 +87,13 @@ def diagnose_recording(
     prior = prior_of(obs, calibration) if calibration_is_given else None
     if prior is None and is_open(calibration):
         start, prior = nominal_start(obs, calibration)
-    run = _run(obs, start, prior, alpha, lambda done, text: tell(0.6 * done, text))
-    widened = _widened(obs, run.remaining)
-    if widened is not obs:
-        # Moves that nothing explains would bend everything fitted beside them: once more, with their noise as it is.
-        run = _run(widened, start, prior, alpha, lambda done, text: tell(0.6 + 0.4 * done, text))
+    # Matrices of a few hundred columns: threads of the linear algebra would wait for each other longer than they work.
+    with threadpool_limits(limits=1, user_api="blas"):
+        run = _run(obs, start, prior, alpha, lambda done, text: tell(0.6 * done, text))
+        widened = _widened(obs, run.remaining)
+        if widened is not obs:
+            # Moves that nothing explains would bend all that is fitted beside them: once more, with their noise as it is.
+            run = _run(widened, start, prior, alpha, lambda done, text: tell(0.6 + 0.4 * done, text))
     model, base, domains, remaining, candidates = run.model, run.base, run.domains, run.remaining, run.candidates
     verdict: Verdict = "consistent"
     if model.found:

@@ -9,7 +9,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.starting_point import is_open
@@ -95,16 +94,14 @@ def diagnose(
     if recording.gyroscope is not None and used.gyroscope is None and not (known is None and is_open(used)):
         findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [_gyroscope_left_out()]
         recording_used, segments_used = _accelerometer_only(recording, segments)
-    # Matrices of a few hundred columns: threads of the linear algebra would wait for each other longer than they work.
-    with threadpool_limits(limits=1, user_api="blas"):
-        found = diagnose_recording(
-            recording_used,
-            segments_used,
-            used,
-            calibration_is_given=known is not None,
-            alpha=alpha,
-            progress=lambda fraction, text: tell(0.1 + 0.9 * fraction, text),
-        )
+    found = diagnose_recording(
+        recording_used,
+        segments_used,
+        used,
+        calibration_is_given=known is not None,
+        alpha=alpha,
+        progress=lambda fraction, text: tell(0.1 + 0.9 * fraction, text),
+    )
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(
         **values,

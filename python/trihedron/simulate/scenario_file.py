@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.simulate.effects import with_effect
-from trihedron.simulate.library import SESSIONS
 from trihedron.simulate.motion import LEVEL, Disturb, Hold, Motion, MoveTo, Oscillate, Turn, Vibrate, attitude_with_up
+from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.profiles import profile_by_name
 from trihedron.simulate.scenario import Environment, Scenario
 

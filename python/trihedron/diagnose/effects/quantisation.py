@@ -104,17 +104,19 @@ def before_converter(holds: list[FloatArray], step: float) -> tuple[float, Float
     return float(SIGMA_GRID[best]), shift, spread
 
 
-def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
+def dead_zone(values: FloatArray, everything: FloatArray) -> float:
     """Half-width of a zone around the commonest still code that no reading of the recording enters, or 0."""
     codes, counts = np.unique(values, return_counts=True)
     zero = float(codes[counts.argmax()])
     if counts.max() < 0.5 * len(values):
         return 0.0
     away = np.abs(everything[everything != zero] - zero)
-    nearest = float(away.min()) if len(away) else 0.0
+    if len(np.unique(away)) < 3:
+        return 0.0
+    nearest = float(away.min())
     # Readings just outside must be common: a gap that the motion merely never stopped in is no zone.
     beyond = int((away < 2.0 * nearest).sum())
-    fine = float(np.diff(np.unique(np.round(away, 9))).min()) if len(away) > 2 else step
+    fine = float(np.diff(np.unique(away)).min())
     return nearest if nearest > 3.5 * fine and beyond >= 20 else 0.0
 
 
@@ -176,7 +178,7 @@ class Quantisation(DirectEffect):
         moving = np.concatenate([x[a:b] for a, b in obs.move_ranges]) if obs.move_ranges else still
         grid = lattice(holds, scatter)
         if grid is None:
-            dead = dead_zone(still, moving[np.isfinite(moving)], float(np.ptp(moving)) or 1.0)
+            dead = dead_zone(still, moving[np.isfinite(moving)])
             if not dead:
                 return None
             size = np.full(len(holds), dead / np.sqrt(3.0))  # anywhere inside the zone
@@ -201,7 +203,8 @@ def _scale_of(context: Context, channel: int) -> tuple[float, float]:
     S = context.fitted.twin.accel_S if is_accel else context.fitted.twin.gyro_S
     place = (0, 2, 5)[k] if is_accel else 9 + 4 * k  # S is lower triangular for the accelerometer
     sigma = float(np.sqrt(max(context.fitted.covariance()[place, place], 0.0)))
-    return float(1.0 / np.linalg.norm(np.linalg.inv(S)[k])), sigma / abs(float(S[k, k]))
+    scale = context.si_per_raw("accelerometer" if is_accel else "gyroscope")[k]
+    return float(scale), sigma / abs(float(S[k, k]))
 
 
 def _resolved(obs: Observations, one: Lattice) -> Observations:

@@ -215,14 +215,19 @@ class _Saturation(DirectEffect):
             restate=lambda later: self._limits(later, runs, sigma),  # false moves had bent the scale factors
         )  # fmt: skip
 
+    def _scale_and_zero(self, context: Context) -> tuple[FloatArray, FloatArray]:
+        """SI per raw unit along each axis, and what a centred raw reading of zero means in SI."""
+        if self.sensor == "gyro":
+            return context.si_per_raw("gyroscope"), np.zeros(3)
+        return context.si_per_raw("accelerometer"), context.fitted.twin.accel_b
+
     def _near_limit(self, context: Context, runs: list[Plateau], touched: list[int]) -> list[int]:
         """Moves with a plateau and those that come close to the same limit on any axis and side."""
         twin, obs = context.fitted.twin, context.obs
         is_gyro = self.sensor == "gyro"
         raw = obs.raw_rate if is_gyro else obs.raw_force
         assert raw is not None
-        scale = 1.0 / np.linalg.norm(np.linalg.inv(twin.gyro_S if is_gyro else twin.accel_S), axis=1)
-        zero = np.zeros(3) if is_gyro else twin.accel_b
+        scale, zero = self._scale_and_zero(context)
         limit = min(abs(run.level * scale[run.axis] + zero[run.axis]) for run in runs)
         close = {m for m, (a, b) in enumerate(obs.move_ranges)
                  if (np.abs(raw[a:b] * scale + zero).max(axis=0) > NEAR_LIMIT * limit).any()}  # fmt: skip
@@ -230,11 +235,8 @@ class _Saturation(DirectEffect):
         return sorted(close | set(touched)) if is_gyro or limit > 1.2 * twin.gravity else touched
 
     def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:
-        twin = context.fitted.twin
-        is_gyro = self.sensor == "gyro"
-        scale = 1.0 / np.linalg.norm(np.linalg.inv(twin.gyro_S if is_gyro else twin.accel_S), axis=1)
-        zero = np.zeros(3) if is_gyro else twin.accel_b
-        unit = "rad/s" if is_gyro else "m/s^2"
+        scale, zero = self._scale_and_zero(context)
+        unit = "rad/s" if self.sensor == "gyro" else "m/s^2"
         out = []
         for axis in range(3):
             for sign in (1, -1):
