@@ -92,7 +92,7 @@ def diagnose_recording(
         run = _run(obs, start, prior, alpha, lambda done, text: tell(0.6 * done, text))
         widened = _widened(obs, run.remaining)
         if widened is not obs:
-            # Moves that nothing explains would bend all that is fitted beside them: once more, with their noise as it is.
+            # Moves that nothing explains would bend everything beside them: once more, with their noise as it is.
             run = _run(widened, start, prior, alpha, lambda done, text: tell(0.6 + 0.4 * done, text))
     model, base, domains, remaining, candidates = run.model, run.base, run.domains, run.remaining, run.candidates
     verdict: Verdict = "consistent"
