@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from trihedron import calibrate
-from trihedron.output_file import write_whole
+from trihedron.files.output import write_whole
 from trihedron.report.body import draw_body_poses
 from trihedron.report.figures import draw_poses, draw_signals
 from trihedron.simulate import hand_session, scenario_by_name, simulate, six_faces

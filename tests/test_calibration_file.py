@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from trihedron import calibrate
-from trihedron.calibration_file import (
+from trihedron.files.calibration import (
     CalibrationFileError,
     calibration_document,
     calibration_from_document,
@@ -15,7 +15,7 @@ from trihedron.calibration_file import (
     schema,
     write_calibration,
 )
-from trihedron.output_file import OutputError
+from trihedron.files.output import OutputError
 from trihedron.pipeline import apply
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import AccelerationUnit

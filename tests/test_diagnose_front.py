@@ -16,8 +16,8 @@ import trihedron
 from trihedron.cli import main
 from trihedron.diagnose import take_off
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnosis_file import complaint_about, read_diagnosis, schema
-from trihedron.log_file import write_recording
+from trihedron.files.diagnosis import complaint_about, read_diagnosis, schema
+from trihedron.files.log import write_recording
 from trihedron.records import FindingCode
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.simulate import (

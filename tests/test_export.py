@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trihedron.export import TARGETS, export_calibration, upper_frame
+from trihedron.files.export import TARGETS, export_calibration, upper_frame
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.sensor_model import in_frame
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from trihedron.cli import main
-from trihedron.log_file import write_recording
-from trihedron.output_file import OutputError
+from trihedron.files.log import write_recording
+from trihedron.files.output import OutputError
+from trihedron.files.truth import read_truth, write_truth
 from trihedron.pipeline import read
 from trihedron.simulate import (
     Hold,
@@ -17,7 +18,6 @@ from trihedron.simulate import (
     simulate,
     with_effect,
 )
-from trihedron.truth_file import read_truth, write_truth
 
 EXAMPLE = """
 name = "bench"

@@ -42,8 +42,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from trihedron.calibration_file import read_calibration, write_calibration
     from trihedron.estimate.noise import allan_deviation, identify_noise
+    from trihedron.files.calibration import read_calibration, write_calibration
     from trihedron.pipeline import apply, calibrate, check, diagnose, kalman, noise, read, segment, verify
     from trihedron.records import Calibration, Finding, Recording, Segments
     from trihedron.records.diagnosis import Diagnosis
@@ -73,7 +73,7 @@ _VERBS = ("apply", "calibrate", "check", "diagnose", "kalman", "noise", "read", 
 _HOME = dict.fromkeys(_VERBS, "trihedron.pipeline")
 _HOME |= {"Diagnosis": "trihedron.records.diagnosis"}
 _HOME |= dict.fromkeys(("allan_deviation", "identify_noise"), "trihedron.estimate.noise")
-_HOME |= dict.fromkeys(("read_calibration", "write_calibration"), "trihedron.calibration_file")
+_HOME |= dict.fromkeys(("read_calibration", "write_calibration"), "trihedron.files.calibration")
 _HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")
 
 

@@ -9,7 +9,7 @@ import typer
 
 from trihedron.cli.options import Force, Json, LogSource, Report, progress, with_options
 from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
-from trihedron.output_file import write_whole
+from trihedron.files.output import write_whole
 
 if TYPE_CHECKING:
     from trihedron.records import Noise

@@ -26,8 +26,8 @@ def apply(
 ) -> None:
     """Apply a calibration to a log: time [s], specific force [m/s^2], angular rate [rad/s]."""
     check_outputs(output, json, force=force)
-    from trihedron.calibration_file import read_calibration
-    from trihedron.recording_file import check_format, write_recording
+    from trihedron.files.calibration import read_calibration
+    from trihedron.files.recording import check_format, write_recording
 
     check_format(output)
     known = read_calibration(calibration)

@@ -65,7 +65,7 @@ def calibrate(
     choices = _choices(method, frame, faces, turns, axis_signs, loss)
     recording = source.read()
     from trihedron import pipeline
-    from trihedron.calibration_file import write_calibration
+    from trihedron.files.calibration import write_calibration
     from trihedron.report import calibration_report
     from trihedron.report.machine import calibration_record
 

@@ -39,12 +39,12 @@ def diagnose(
     if not 0.0 < alpha < 0.5:
         raise typer.BadParameter(f"--alpha is a small probability such as 0.01, not {alpha:g}")
     check_outputs(json, force=force, report=report)
-    from trihedron.calibration_file import read_calibration
+    from trihedron.files.calibration import read_calibration
 
     known = None if calibration is None else read_calibration(calibration)
     recording = source.read()
     from trihedron import pipeline
-    from trihedron.diagnosis_file import diagnosis_document
+    from trihedron.files.diagnosis import diagnosis_document
     from trihedron.report import diagnosis_report
     from trihedron.report.diagnosis import FIRST_SCREEN
 

@@ -21,9 +21,9 @@ def export(
 ) -> None:
     """Write a calibration in another program's convention, with its equation stated."""
     check_outputs(output, force=force)
-    from trihedron.calibration_file import read_calibration
-    from trihedron.export import export_calibration
-    from trihedron.output_file import write_whole
+    from trihedron.files.calibration import read_calibration
+    from trihedron.files.export import export_calibration
+    from trihedron.files.output import write_whole
 
     known = read_calibration(calibration)
     text = export_calibration(known, to)

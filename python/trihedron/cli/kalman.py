@@ -53,7 +53,7 @@ def kalman(
     check_outputs(output, json, force=force, report=report)
     recording = source.read()
     from trihedron import pipeline
-    from trihedron.calibration_file import write_calibration
+    from trihedron.files.calibration import write_calibration
     from trihedron.report import kalman_report
     from trihedron.report.kalman import kalman_record
 

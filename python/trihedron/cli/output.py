@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from trihedron.output_file import OutputError, check_free, write_whole
+from trihedron.files.output import OutputError, check_free, write_whole
 
 if TYPE_CHECKING:
     from trihedron.records import Finding
@@ -25,7 +25,7 @@ def check_outputs(*paths: Path | None, force: bool, report: Path | None = None) 
     Raises
     ------
     OutputError
-        As :func:`trihedron.output_file.check_free`, or when a report has an ending that names no format.
+        As :func:`trihedron.files.output.check_free`, or when a report has an ending that names no format.
     """
     if report is not None and report.suffix.lower() not in REPORT_KINDS:
         raise OutputError(f"{report}: the ending tells the format of a report; give .html, .txt or .json.")
@@ -64,7 +64,7 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool) -> 
 
 def json_text(machine: dict[str, Any]) -> str:
     """Strict JSON: what is not a finite number is ``null``."""
-    from trihedron.calibration_file import plain
+    from trihedron.files.calibration import plain
 
     return json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 

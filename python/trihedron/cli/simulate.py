@@ -54,11 +54,11 @@ def simulate(
         raise typer.BadParameter("--with-effects belongs to a SCENARIO; a twin repeats its recording as it is")
     if output is None:
         raise typer.BadParameter("say where the log goes with -o LOG")
-    from trihedron.log_file import LOG_SUFFIXES, write_recording
-    from trihedron.output_file import OutputError, check_free
+    from trihedron.files.log import LOG_SUFFIXES, write_recording
+    from trihedron.files.output import OutputError, check_free
+    from trihedron.files.truth import write_truth
     from trihedron.pipeline import read, twin
     from trihedron.pipeline import simulate as run
-    from trihedron.truth_file import write_truth
 
     if output.suffix.lower() not in LOG_SUFFIXES:
         raise OutputError(f"{output}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
@@ -66,7 +66,7 @@ def simulate(
         raise OutputError(f"{truth}: truth is written as .npz (everything) or .json (no samples).")
     check_free([output, truth], overwrite=force)
     if like is not None and calibration is not None:
-        from trihedron.calibration_file import read_calibration
+        from trihedron.files.calibration import read_calibration
 
         recording, known = twin(read(like), read_calibration(calibration), seed)
     else:
@@ -84,7 +84,7 @@ def _scenario(name: str, diagnosis: Path | None) -> Any:
     if diagnosis is None:
         return name
     from trihedron.cli.output import say
-    from trihedron.diagnosis_file import read_diagnosis
+    from trihedron.files.diagnosis import read_diagnosis
     from trihedron.pipeline import with_effects
 
     made = with_effects(name, read_diagnosis(diagnosis)["effects"])

@@ -35,7 +35,7 @@ def verify(
 ) -> None:
     """Test a calibration on another recording."""
     check_outputs(json, force=force, report=report)
-    from trihedron.calibration_file import read_calibration
+    from trihedron.files.calibration import read_calibration
 
     known = read_calibration(calibration)
     recording = source.read()

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.calibration_file import read_calibration
+from trihedron.files.calibration import read_calibration
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
 from trihedron.sensor_model import correct

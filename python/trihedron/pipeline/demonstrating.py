@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.calibration_file import plain, write_calibration
+from trihedron.files.calibration import plain, write_calibration
+from trihedron.files.output import write_whole
 from trihedron.gravity import normal_gravity
-from trihedron.output_file import write_whole
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.reading import read, segment
 from trihedron.pipeline.results import CalibrationResult, VerificationResult

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.calibration_file import calibration_document
+from trihedron.files.calibration import calibration_document
 from trihedron.records import (
     CONSTANT_NAMES,
     AxisKalmanResult,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from trihedron.calibration_file import calibration_document
+from trihedron.files.calibration import calibration_document
 from trihedron.records import Calibration, Finding, Recording, Segments, Verification
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.output_file import OutputError, write_whole
+from trihedron.files.output import OutputError, write_whole
 from trihedron.records.truth import TrueSegment, Truth
 
 _ARRAYS = (

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.output_file import write_whole
+from trihedron.files.output import write_whole
 from trihedron.records import (
     PARAMETER_NAMES,
     Calibration,
@@ -173,7 +173,7 @@ def calibration_from_document(document: object, source: str = "document") -> Cal
 
 def schema() -> dict[str, Any]:
     """The JSON schema (draft 2020-12) that every calibration file follows."""
-    text = files("trihedron").joinpath("schema", "calibration.schema.json").read_text(encoding="utf-8")
+    text = files("trihedron.files").joinpath("schema", "calibration.schema.json").read_text(encoding="utf-8")
     loaded: dict[str, Any] = json.loads(text)
     return loaded
 

@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from trihedron.calibration_file import plain
+from trihedron.files.calibration import plain
 from trihedron.records.diagnosis import SCHEMA_VERSION, Diagnosis
 
 
@@ -69,7 +69,7 @@ def read_diagnosis(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 def schema() -> dict[str, Any]:
     """The JSON schema (draft 2020-12) that every diagnosis follows."""
-    text = files("trihedron").joinpath("schema", "diagnosis.schema.json").read_text(encoding="utf-8")
+    text = files("trihedron.files").joinpath("schema", "diagnosis.schema.json").read_text(encoding="utf-8")
     loaded: dict[str, Any] = json.loads(text)
     return loaded
 

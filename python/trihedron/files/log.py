@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from trihedron.output_file import OutputError, write_whole
+from trihedron.files.output import OutputError, write_whole
 from trihedron.records.recording import FloatArray, Recording
 
 LOG_SUFFIXES = (".csv", ".npz", ".parquet")

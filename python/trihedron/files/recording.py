@@ -7,7 +7,7 @@ import os
 import sys
 from pathlib import Path
 
-from trihedron.output_file import OutputError, write_whole
+from trihedron.files.output import OutputError, write_whole
 from trihedron.records import Recording
 
 ACCELEROMETER_NAMES = ("acc_x", "acc_y", "acc_z")
@@ -33,7 +33,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str], *, overw
     Raises
     ------
     OutputError
-        When the ending names no format, or as :func:`trihedron.output_file.write_whole`.
+        When the ending names no format, or as :func:`trihedron.files.output.write_whole`.
     """
     check_format(path)
     # Imported here: it costs more than the rest of a short run.
