@@ -8,7 +8,7 @@ import pytest
 
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.effects.stamp_errors import stamp_errors
-from trihedron.diagnose.observations import observe
+from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.unresolved import unresolved_variance
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint

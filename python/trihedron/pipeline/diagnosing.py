@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.starting_point import is_open
+from trihedron.diagnose.session.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity

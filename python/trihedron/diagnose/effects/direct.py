@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
-from trihedron.diagnose.observations import Observations
+from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import Domain, EffectParameter, HeldOut, Where
 
 NOWHERE = Where()

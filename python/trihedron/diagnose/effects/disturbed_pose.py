@@ -11,9 +11,9 @@ from trihedron.diagnose.agreement import ROW_DOMAINS, physical_rms
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.observations import Observations, observe
-from trihedron.diagnose.solve import fit, folds_of, leverage, predict_held_out
-from trihedron.diagnose.twin import NO_DISTORTION, STATIC_ACCEL
+from trihedron.diagnose.session.observations import Observations, observe
+from trihedron.diagnose.session.solve import fit, folds_of, leverage, predict_held_out
+from trihedron.diagnose.session.twin import NO_DISTORTION, STATIC_ACCEL
 from trihedron.diagnose.within_static import hold_scatter
 from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
 

@@ -9,7 +9,7 @@ from scipy.special import ndtr
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.observations import FloatArray, Observations
+from trihedron.diagnose.session.observations import FloatArray, Observations
 from trihedron.diagnose.within_static import CHANNELS
 from trihedron.records.diagnosis import EffectParameter, Where
 

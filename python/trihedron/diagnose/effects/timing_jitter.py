@@ -11,7 +11,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.sample_steps import StepErrors, step_errors
 from trihedron.diagnose.effects.stamp_errors import CLEAR, stamp_errors
-from trihedron.diagnose.observations import Observations, observe
+from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.records.diagnosis import EffectParameter
 
 STEP_FACTOR = 5.0

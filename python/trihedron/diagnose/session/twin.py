@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.diagnose.observations import FloatArray, Observations
+from trihedron.diagnose.session.observations import FloatArray, Observations
 
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 """Labels of residual rows; ``PRIOR`` rows keep flat directions finite and belong to no domain."""
