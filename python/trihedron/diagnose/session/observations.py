@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -68,6 +68,22 @@ class Observations:
         return len(self.move_ranges)
 
 
+def spread_stamps(time_s: FloatArray) -> FloatArray:
+    """(n,) stamps in which samples that share one are spread evenly to the next: arrival times come in bursts.
+
+    A step of no duration carries no turn and has no derivative; what shares a stamp was taken after it, in order.
+    """
+    if len(time_s) < 2 or (np.diff(time_s) > 0.0).all():
+        return time_s
+    first = np.flatnonzero(np.concatenate([[True], np.diff(time_s) > 0.0]))
+    count = np.diff(np.append(first, len(time_s)))
+    usual = float(np.median(np.diff(time_s[first]))) if len(first) > 1 else 1.0
+    until = np.append(np.diff(time_s[first]), usual)
+    place = np.arange(len(time_s)) - np.repeat(first, count)
+    out: FloatArray = np.repeat(time_s[first], count) + np.repeat(until / count, count) * place
+    return out
+
+
 def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True) -> Observations:
     """Arrange a segmented recording for the twin.
 
@@ -85,6 +101,7 @@ def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True
             f"a diagnosis needs still poses to hold the model against: {segments.n_holds} found, at least 2 are needed"
         )
     t = recording.time_s
+    recording = replace(recording, time_s=spread_stamps(recording.time_s))
     bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in segments.holds for a, b in hold.disturbed)
     whole = segments
     segments = split_holds(recording, segments)[0] if cuts_bumps else unsplit(recording, segments)
