@@ -1,6 +1,7 @@
 """The joint model of a session: whitening, derivatives, zeros that differ from pose to pose, stamps that repeat."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,7 @@ def scattered(recording, segments, sigma_raw, rng):
     """The recording with a zero of its own in every pose, carried from pose to pose in the middle of each move."""
     offset = np.zeros_like(recording.gyroscope)
     edges = [0, *((move.start + move.stop) // 2 for move in segments.moves), recording.n_samples]
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in pairwise(edges):
         offset[start:stop] = sigma_raw * rng.standard_normal(3)
     return replace(recording, gyroscope=recording.gyroscope + offset)
 
