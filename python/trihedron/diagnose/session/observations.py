@@ -94,6 +94,7 @@ def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True
     ValueError
         When the recording has no accelerometer or fewer than two still poses: there is nothing to hold a twin against.
     """
+    recording = replace(recording, time_s=spread_stamps(recording.time_s))
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise ValueError("a diagnosis needs accelerometer readings: this recording has none")
     if segments.n_holds < 2:
@@ -101,7 +102,6 @@ def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True
             f"a diagnosis needs still poses to hold the model against: {segments.n_holds} found, at least 2 are needed"
         )
     t = recording.time_s
-    recording = replace(recording, time_s=spread_stamps(recording.time_s))
     bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in segments.holds for a, b in hold.disturbed)
     whole = segments
     segments = split_holds(recording, segments)[0] if cuts_bumps else unsplit(recording, segments)

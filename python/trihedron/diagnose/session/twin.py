@@ -20,7 +20,7 @@ from trihedron.diagnose.session.observations import FloatArray, Observations
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 """Labels of residual rows; ``PRIOR`` rows keep flat directions finite and belong to no domain."""
 
-_LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
+_LOWER: tuple[tuple[int, int], ...] = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
 _FULL = tuple((i, j) for i in range(3) for j in range(3))
 N_ACCEL, N_GYRO, N_HOLD = 9, 9, 8
 """Unknowns: accelerometer, gyro, and per hold (2 tilt, 3 gyro bias, 3 accelerometer bias)."""
