@@ -25,6 +25,7 @@ class Evidence:
     ``p_value`` before payment for the search over effects; ``held_out`` the effect's own before/after on data its
     parameters were not fitted to; ``variant`` columns that join the model, or None; ``reweigh`` changes what the
     observations claim (noise, excluded moves), or None; ``strength`` is the gain in 2 log-likelihood, for ranking.
+    ``share`` is the part of its domain's misfit that it explains, where that is not a matter of poses and moves.
     ``restate`` gives the parameters once more from the twin that was fitted with the evidence taken into account.
     """
 
@@ -39,6 +40,7 @@ class Evidence:
     reweigh: Callable[[Observations], Observations] | None = None
     confounded_with: tuple[str, ...] = ()
     restate: Callable[[Context], tuple[EffectParameter, ...]] | None = None
+    share: float | None = None
 
 
 class DirectEffect(Effect):
