@@ -55,11 +55,41 @@ def own_domains(distortion: Distortion) -> tuple[int, ...]:
     return tuple(dict.fromkeys(own))
 
 
-def mends(before: Prediction, after: Prediction) -> bool:
-    """Whether readings that were changed (samples put back, stamps made even) are predicted better when held out."""
+def mends(
+    before_fit: Fit, before: Prediction, after_fit: Fit, after: Prediction, touched: tuple[int, ...] | None = None
+) -> bool:
+    """Whether readings that were changed (samples put back, stamps made even) are predicted better when held out.
+
+    Where only some moves were ``touched``, gravity and rest after those very moves must say so, in the dispersion that
+    the others have: a jolt that looks like a loss leaves them as they were.
+    """
     stays = np.maximum(after.per_row, 1.0)
     gain = float(((before.per_row - after.per_row) * after.n_rows / stays).sum())
-    return gain > 0.0 and bool((after.per_row < VISIBLE * before.per_row).any())
+    if gain <= 0.0 or not (after.per_row < VISIBLE * before.per_row).any():
+        return False
+    if touched is None:
+        return True
+    (there, others), (there_after, _) = (
+        _of_moves(fitted, prediction, touched) for fitted, prediction in ((before_fit, before), (after_fit, after))
+    )
+    usual = max(float(np.mean(others)) if len(others) else 1.0, 1.0)
+    fall = float(there.sum() - there_after.sum())
+    return fall > MIN_FALL * usual and float(there_after.mean()) < MUST_HALVE * float(there.mean())
+
+
+MIN_FALL = 15.0
+"""Chi-square that moves must gain by samples put back: as one of two numbers (place and count) paid for by a search."""
+MUST_HALVE = 0.5
+"""Share of the misfit of such moves that may stay: a loss explains its move, a jolt does not."""
+
+
+def _of_moves(fitted: Fit, prediction: Prediction, moves: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+    """Squared held-out residuals of the rows of some moves, and those of all other moves."""
+    system = fitted.system
+    rows = np.isin(system.domain, (MOVES, DYNAMICS)) & (system.walk == 0)
+    named = np.isin(system.segment, moves)
+    squared = prediction.residual**2
+    return squared[rows & named], squared[rows & ~named]
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,7 +57,9 @@ def _with_one(model: StepwiseModel, effect: DirectEffect, evidence: Evidence) ->
         start = replace(model.fitted.twin, effect=np.concatenate([model.fitted.twin.effect, np.zeros(n_new)]))
         fitted = tune_noise(obs, start, distortion, model.prior)
         after = replace(model, obs=obs, fitted=fitted, prediction=held_out(fitted))
-        if not effect.is_proof and not mends(model.prediction, after.prediction):
+        if not effect.is_proof and not mends(
+            model.fitted, model.prediction, fitted, after.prediction, evidence.touched
+        ):
             return model.refusing(effect.id)
         gain = max(gain, excess(model.fitted) - excess(fitted))
         if evidence.restate is not None:

@@ -51,7 +51,9 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
     if one.reobserves:
         assert one.evidence is not None
         gain = max(excess(without.fitted) - excess(model.fitted), 0.0)
-        stands = getattr(one.effect, "is_proof", False) or mends(without.prediction, model.prediction)
+        stands = getattr(one.effect, "is_proof", False) or mends(
+            without.fitted, without.prediction, model.fitted, model.prediction, one.evidence.touched
+        )
         return replace(one, gain=gain, held_out=one.evidence.held_out or held), stands
     assert one.variant is not None
     first = sum(o.variant.distortion.n_parameters for o in model.accepted[:k] if o.variant is not None)
