@@ -84,6 +84,7 @@ def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True
         raise ValueError(
             f"a diagnosis needs still poses to hold the model against: {segments.n_holds} found, at least 2 are needed"
         )
+    recording = recording.with_distinct_stamps()
     t = recording.time_s
     bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in segments.holds for a, b in hold.disturbed)
     whole = segments

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -24,6 +24,23 @@ def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) ->
         wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ")"
         raise ValueError(f"{name} must have shape {wanted}, got {out.shape}")
     out.setflags(write=False)
+    return out
+
+
+def spread_stamps(time_s: FloatArray, step_s: float) -> FloatArray:
+    """Strictly increasing stamps (n,) from non-decreasing ones: those that are shared, spread back from the stamp."""
+    first = np.flatnonzero(np.diff(time_s, prepend=-np.inf) > 0)
+    size = np.diff(first, append=len(time_s))
+    stamp = time_s[first]
+    # Before the first stamp there is room for what it shares.
+    width = np.diff(stamp, prepend=stamp[0] - step_s * size[0])
+    own = np.minimum(width / size, step_s)
+    behind = np.repeat(first + size, size) - 1 - np.arange(len(time_s))
+    out = np.repeat(stamp, size) - behind * np.repeat(own, size)
+    out = np.asarray(out - out[0], dtype=np.float64)
+    # Stamps a rounding apart leave no room for what they share: the smallest number apart will do.
+    while np.any(np.diff(out) <= 0):
+        out = np.maximum.accumulate(np.concatenate([out[:1], np.fmax(out[1:], np.nextafter(out[:-1], np.inf))]))
     return out
 
 
@@ -91,6 +108,17 @@ class Recording:
             raise ValueError(f"rate_hz must be a positive number, got {self.rate_hz}")
         object.__setattr__(self, "accelerometer_unit", AccelerationUnit(self.accelerometer_unit))
         object.__setattr__(self, "gyroscope_unit", RateUnit(self.gyroscope_unit))
+
+    def with_distinct_stamps(self) -> Recording:
+        """This recording with no two samples at one instant: those that share a stamp are spread back from it.
+
+        Samples stamped together were taken before they were stamped: evenly over the time since the stamp before, but
+        no further apart than a sampling step. Unchanged where no stamp is shared.
+        """
+        shared = np.flatnonzero(np.diff(self.time_s) == 0)
+        if not len(shared):
+            return self
+        return replace(self, time_s=spread_stamps(self.time_s, 1.0 / self.rate_hz))
 
     @property
     def n_samples(self) -> int:
