@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.diagnose.repair import split_holds, unsplit
-from trihedron.diagnose.unresolved import unresolved_variance
+from trihedron.diagnose.residuals.aliasing import unresolved_variance
 from trihedron.records import Recording, Segments
 
 FloatArray = npt.NDArray[np.float64]
@@ -68,16 +67,31 @@ class Observations:
         return len(self.move_ranges)
 
 
-def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True) -> Observations:
-    """Arrange a segmented recording for the twin.
+def spread_stamps(time_s: FloatArray) -> FloatArray:
+    """(n,) stamps in which samples that share one are spread evenly to the next: arrival times come in bursts.
 
-    Without ``cuts_bumps`` every pose is averaged over whatever happened in it, as if nobody had noticed.
+    A step of no duration carries no turn and has no derivative; what shares a stamp was taken after it, in order.
+    """
+    if len(time_s) < 2 or (np.diff(time_s) > 0.0).all():
+        return time_s
+    first = np.flatnonzero(np.concatenate([[True], np.diff(time_s) > 0.0]))
+    count = np.diff(np.append(first, len(time_s)))
+    usual = float(np.median(np.diff(time_s[first]))) if len(first) > 1 else 1.0
+    until = np.append(np.diff(time_s[first]), usual)
+    place = np.arange(len(time_s)) - np.repeat(first, count)
+    out: FloatArray = np.repeat(time_s[first], count) + np.repeat(until / count, count) * place
+    return out
+
+
+def observe(recording: Recording, segments: Segments) -> Observations:
+    """Arrange a segmented recording for the twin.
 
     Raises
     ------
     ValueError
         When the recording has no accelerometer or fewer than two still poses: there is nothing to hold a twin against.
     """
+    recording = replace(recording, time_s=spread_stamps(recording.time_s))
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise ValueError("a diagnosis needs accelerometer readings: this recording has none")
     if segments.n_holds < 2:
@@ -86,9 +100,8 @@ def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True
         )
     recording = recording.with_distinct_stamps()
     t = recording.time_s
-    bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in segments.holds for a, b in hold.disturbed)
-    whole = segments
-    segments = split_holds(recording, segments)[0] if cuts_bumps else unsplit(recording, segments)
+    whole = segments if segments.whole is None else segments.whole
+    bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in whole.holds for a, b in hold.disturbed)
     assert segments.accelerometer_sigma is not None
     assert segments.accelerometer_mean is not None
     assert segments.accelerometer_sigma_mean is not None
@@ -131,7 +144,7 @@ def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True
         hold_rate=hold_rate,
         hold_force_sigma=segments.accelerometer_sigma_mean,
         hold_rate_sigma=hold_rate_sigma,
-        hold_time_s=segments.time_mid_s,
+        hold_time_s=np.array([0.5 * (t[hold.start] + t[hold.stop - 1]) for hold in segments.holds]),
         move_ranges=tuple(ranges) if raw_rate is not None else (),
         move_holds=np.array(holds if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
         force_density=segments.accelerometer_sigma * np.sqrt(step_s),
