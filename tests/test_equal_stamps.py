@@ -36,16 +36,16 @@ def test_two_samples_with_one_stamp_do_not_crash_the_diagnosis(session, law):
     assert result.verdict
 
 
-def test_spread_stamps_increase_stay_before_their_stamp_and_keep_single_ones():
+@pytest.mark.parametrize("side", ["before", "behind"])
+def test_spread_stamps_increase_on_the_side_with_room_and_keep_single_ones(side):
     rng = np.random.default_rng(4)
     for step in (1e-3, 0.01, 1.0):
-        t = np.repeat(np.cumsum(rng.exponential(step, 400)), rng.integers(1, 5, 400))
-        t -= t[0]
-        out = spread_stamps(t, step)
-        assert np.all(np.diff(out) > 0)
-        shift = (out - out[-1]) - (t - t[-1])
-        # One rounding of numbers up to 400 steps.
-        assert np.all(shift <= 1e-12 * 400 * step)
-        last = np.append(np.diff(t) > 0, True)
-        np.testing.assert_allclose(shift[last], 0.0, atol=1e-12 * 400 * step)
+        size = rng.integers(1, 5, 400)
+        stamp = np.cumsum(step * size) if side == "before" else np.cumsum(np.append(0, step * size[:-1]))
+        t = np.repeat(stamp, size)
+        out = spread_stamps(t - t[0], step)
+        # An even clock batched to one side comes back even: one rounding of numbers up to 1000 steps.
+        np.testing.assert_allclose(np.diff(out), step, atol=1e-12 * 1000 * step)
     np.testing.assert_allclose(spread_stamps(np.zeros(5), 0.01), 0.01 * np.arange(5), atol=1e-15)
+    lone = np.array([0.0, 1.0, 2.0, 4.0, 4.0, 5.0])
+    np.testing.assert_allclose(spread_stamps(lone, 1.0), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0], atol=1e-15)
