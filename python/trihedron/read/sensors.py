@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.clock import Clock, build_clock, mean_rate_hz
+from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
@@ -20,6 +20,7 @@ from trihedron.read.table import FloatArray, Progress, Table
 from trihedron.records import Finding, FindingCode, Severity
 
 ASSUMED_RATE_HZ = 100.0
+WITNESS_ROWS = 200_000
 _RATE_KEYS = frozenset(
     f"{a}{b}"
     for a in ("fs", "rate", "sampling rate", "sample rate", "sampling frequency", "frequency", "update rate")
@@ -228,7 +229,19 @@ def _is_gyro_first(first: FloatArray, second: FloatArray, rate_hz: float, findin
     return is_first is False
 
 
+def _witness(table: Table, chosen: Columns) -> Witness:
+    """Readings that limit how long a row can have lasted, in the order of the file (a first part of a long one)."""
+    triad, temperature = chosen.accelerometer, chosen.temperature
+    if triad is None or any(len(table.columns[c]) == 0 for c in triad):
+        readings = None
+    else:
+        readings = np.stack([table.columns[c][:WITNESS_ROWS] for c in triad], axis=1)
+    return Witness(readings, None if temperature is None else table.columns[temperature])
+
+
 def _stated_rate(table: Table) -> float | None:
+    if table.clock.rate_hz is not None:
+        return table.clock.rate_hz
     for key, text in table.metadata.items():
         if key.strip().lower().replace("_", " ") in _RATE_KEYS:
             try:
@@ -242,10 +255,10 @@ def _stated_rate(table: Table) -> float | None:
 
 def _time_base(table: Table, chosen: Columns, options: Options, findings: list[Finding]) -> tuple[Clock, float]:
     if chosen.time is not None:
-        named = table.time_unit or chosen.time_unit
-        if named == "100us":
+        named = chosen.time_unit
+        if named == "100us" and not table.clock.unit:
             named = _sample_time_fine(table, chosen.time, findings)
-        clock = build_clock(table, chosen.time, named, options.time_unit, chosen.nanoseconds)
+        clock = build_clock(table, chosen.time, named, options.time_unit, chosen.nanoseconds, _witness(table, chosen))
         findings += _with_rows_left_out(clock, table.n_rows)
         rate = mean_rate_hz(clock.time_s)
         told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)

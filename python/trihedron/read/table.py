@@ -21,6 +21,20 @@ BYTES_PER_CELL_AT_PEAK = 24
 """Columns (8 bytes), the sensors' own (n, 3) arrays (8) and one pass of the audit (at most 8)."""
 
 
+@dataclass(frozen=True)
+class StatedClock:
+    """What a format itself says of its clock; what it leaves open is found from the numbers.
+
+    ``time``: column of the stamps; ``unit``: theirs (``s``, ``ms``, ``us``, ``ns`` or ``100us``); ``counter``: column
+    that counts samples, lost ones included; ``rate_hz``: the nominal rate, used where there are no stamps.
+    """
+
+    time: int | None = None
+    unit: str = ""
+    counter: int | None = None
+    rate_hz: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Table:
     """Columns (n,) float64 in file order, empty where a column holds words; ``names`` is None without a header.
@@ -29,7 +43,7 @@ class Table:
     break; both are zero/None for binary formats, where places are counted in rows. ``metadata`` holds key and value of
     preamble lines. ``words`` gives an example cell of each column of words, ``labels`` its different words and the word
     (n,) of each row where these are few. What a format knows of itself: ``sensor`` says whose ``x y z`` the columns
-    are, ``time_unit`` in what its time column counts. ``rows_in_file`` counts what the file holds, left-out rows
+    are, ``clock`` what it states of its stamps. ``rows_in_file`` counts what the file holds, left-out rows
     included (0: as many as there are here); every row that is not here is in a finding's ``rows_left_out``.
     """
 
@@ -44,7 +58,7 @@ class Table:
     words: dict[int, str] = field(default_factory=dict)
     labels: dict[int, tuple[tuple[str, ...], npt.NDArray[np.int64]]] = field(default_factory=dict)
     sensor: Literal["accelerometer", "gyroscope"] | None = None
-    time_unit: str = ""
+    clock: StatedClock = field(default_factory=StatedClock)
     rows_in_file: int = 0
 
     @property

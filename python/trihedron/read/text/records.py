@@ -16,7 +16,7 @@ _WORD = re.compile(r"\$?[A-Za-z_]\w*:?$")
 
 
 def split_records(text: str) -> tuple[dict[str, Rewritten], Counter[str]] | None:
-    """For ``accelerometer`` and ``gyroscope`` their lines under their own names, and how many lines each first word has.
+    """For ``accelerometer`` and ``gyroscope`` their lines under their own names; and lines by first word.
 
     None where the first words do not tell the two sensors apart.
     """
