@@ -14,6 +14,7 @@ false; a group of numbers whose true difference exceeds five of its own stated e
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
 import warnings
@@ -118,8 +119,8 @@ def with_nuisances(recording: Recording, rng: np.random.Generator) -> Recording:
     unit_g = np.radians(1 / 65.5)
     step_a, step_g = rng.uniform(5e-4, 3e-3) / unit_a, np.radians(rng.uniform(0.005, 0.03)) / unit_g
     t = recording.time_s
-    edges = [0, *[(a.stop + b.start) // 2 for a, b in zip(segments.holds, segments.holds[1:], strict=False)], len(t)]
-    for first, last in zip(edges, edges[1:], strict=False):
+    edges = [0, *[(a.stop + b.start) // 2 for a, b in itertools.pairwise(segments.holds)], len(t)]
+    for first, last in itertools.pairwise(edges):
         accel[first:last] += step_a * rng.standard_normal(3)
         gyro[first:last] += step_g * rng.standard_normal(3)
     line = np.radians(rng.uniform(0.005, 0.02)) / unit_g * np.sin(2 * np.pi * rng.uniform(3, 30) * t)
@@ -192,12 +193,8 @@ def true_differences(sim: Any, real: Any, kind: str) -> dict[str, list[float]]:
     out["triad-alignment"] = Rotation.from_matrix(R[1] @ R[0].T).as_rotvec().tolist()
     if kind == "gravity":
         out["accel-scale"] = [0.0] * 3
-        out["gravity"] = [-math_log(1.003)]
+        out["gravity"] = [-float(np.log(1.003))]
     return out
-
-
-def math_log(x: float) -> float:
-    return float(np.log(x))
 
 
 def trial(pair: Pair) -> dict[str, Any]:
@@ -210,7 +207,7 @@ def trial(pair: Pair) -> dict[str, Any]:
             found = trihedron.diagnose(recording, calibration=known)
         else:
             found = trihedron.diagnose(recording, against=simulated, gravity_m_s2=gravity)
-    except Exception as error:  # noqa: BLE001 -- a crash is a result
+    except Exception as error:  # a crash is a result
         return {**result, "crash": f"{type(error).__name__}: {error}", "right": False, "false": [], "z": []}
     document = found.to_dict()
     said_groups = sorted({p["id"] for p in document["parameters"] if p["significant"]})
@@ -253,7 +250,8 @@ def trial(pair: Pair) -> dict[str, Any]:
     )
     return {
         **result, "verdict": document["verdict"], "expected": expected, "right": document["verdict"] == expected,
-        "effect": answer["effect"], "first": first if side else None, "said": said_groups, "missed": sorted(must - set(said_groups)),
+        "effect": answer["effect"], "first": first if side else None, "said": said_groups,
+        "missed": sorted(must - set(said_groups)),
         "effects": [f"{w}:{e}" for w, e, _ in effects], "noise": noise, "false": false, "z": z,
         "off": [d["domain"] for d in document["remaining"] if d["disagrees"]],
     }  # fmt: skip
@@ -288,9 +286,8 @@ def main() -> None:
     firsts = [r["first"] for r in results if r.get("first") is not None]
     print(f"effect first: {sum(firsts)} of {len(firsts)}")
     if len(z):
-        print(
-            f"numbers: {len(z)} differences, rms z {np.sqrt(np.mean(z**2)):.2f}, within 1.96: {np.mean(np.abs(z) < 1.96):.3f}"
-        )
+        inside = np.mean(np.abs(z) < 1.96)
+        print(f"numbers: {len(z)} differences, rms z {np.sqrt(np.mean(z**2)):.2f}, within 1.96: {inside:.3f}")
     print(Counter((r["kind"], r.get("verdict")) for r in results))
     if options.json:
         options.json.write_text(json.dumps(results))

@@ -130,6 +130,6 @@ class DiagnosisResult(Diagnosis):
 
     def __str__(self) -> str:
         from trihedron.report import diagnosis_report, to_text
-        from trihedron.report.diagnosis import FIRST_SCREEN
+        from trihedron.report.diagnosis import first_screen
 
-        return to_text(diagnosis_report(self), sections=FIRST_SCREEN)
+        return to_text(diagnosis_report(self), sections=first_screen(self))

@@ -14,6 +14,9 @@ FloatArray = npt.NDArray[np.float64]
 
 PUBLISHED_DIGITS = 1e-6
 """A calibration without error bars is taken at its last printed digits: this share of each number."""
+LONGEST_CORNER = 0.25
+"""Corner times beyond a quarter of the recording are not told from none: a zero may wander as much as that allows.
+Over 14 simulated pairs of one unit the accelerometer's differences are then 0.9 to 1.1 of their error bars."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +62,8 @@ def model_of_calibration(calibration: Calibration) -> FittedModel:
 def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> FittedModel:
     """The fit of a recording to itself, with the effects accepted in it or without, widened by what is unexplained.
 
-    Wander of a zero between two sessions: the floor of its Allan variance, N²/τ with τ the corner time of the noise,
-    once for every session, and the variance of the mean of zeros that differ from pose to pose (eq. 9.2).
+    Wander of a zero between two sessions: twice the floor of its Allan variance, or what the zeros of the poses show
+    where that is more (eq. 9.2, 9.3).
     """
     fit = diagnosis.extended if with_effects else diagnosis.baseline
     tests = diagnosis.remaining if with_effects else diagnosis.domains
@@ -81,7 +84,7 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
         "" if gyro is None else str(gyro["raw_unit"]),
         covariance,
         _floor(diagnosis, "accelerometer"),
-        _floor(diagnosis, "gyroscope") + _scatter_of_mean(diagnosis),
+        np.maximum(_floor(diagnosis, "gyroscope"), _scatter_of_mean(diagnosis)),
     )
 
 
@@ -94,19 +97,28 @@ def _excess(tests: tuple[DomainTest, ...], domain: Domain) -> float:
 
 
 def _floor(diagnosis: Diagnosis, sensor: str) -> FloatArray:
+    """(3,) twice N²/τ, the Allan variance where white noise and walk cross (eq. 9.2)."""
     density, corner = diagnosis.noise.get(f"{sensor}_density"), diagnosis.noise.get(f"{sensor}_corner_s")
-    if density is None or not corner:
+    times = [shown.time_after_s for shown in diagnosis.residuals if len(shown.time_after_s)]
+    if density is None or not corner or not times:
         return np.zeros(3)
-    return np.asarray(density, dtype=np.float64) ** 2 / float(corner)
+    seen = LONGEST_CORNER * max(float(t[-1] - t[0]) for t in times)
+    return 2.0 * np.asarray(density, dtype=np.float64) ** 2 / min(float(corner), max(seen, 1.0))
 
 
 def _scatter_of_mean(diagnosis: Diagnosis) -> FloatArray:
-    """(3,) variance of the mean of a session's zeros beyond what the noise of the poses gives."""
+    """(3,) wander of a session's zero as its own poses show it: what neighbours share stays, what they do not averages.
+
+    ``2 C₁ + (V - C₁)/n``, V the variance of the zeros of n poses beyond their noise, C₁ the covariance of neighbours,
+    both pooled over the axes: between two sessions 1/f noise differs by twice what it does within one (eq. 9.3).
+    """
     for shown in diagnosis.residuals:
         if shown.domain == "static-gyro" and len(shown.after) > 2:
             n = len(shown.after)
             away = shown.after - shown.after.mean(axis=0)
-            beyond = (away**2).sum(axis=0) / (n - 1) - float(np.mean(shown.sigma_after**2))
-            variance: FloatArray = np.maximum(beyond, 0.0) / n
-            return variance
+            total = max(float((away**2).sum()) / (3 * (n - 1)) - float(np.mean(shown.sigma_after**2)), 0.0)
+            # Taking the mean off makes neighbours anticorrelated by variance/n: given back.
+            shared = float(np.mean(away[1:] * away[:-1])) + float(np.mean(away**2)) / n
+            shared = min(max(shared, 0.0), total)
+            return np.full(3, 2.0 * shared + (total - shared) / n)
     return np.zeros(3)

@@ -29,6 +29,9 @@ Sensor = Literal["accelerometer", "gyroscope", "both"]
 SPREAD_DOF = 100.0
 """Degrees of freedom of the covariances: those of a session of some tens of poses. F(3, 100) instead of χ² keeps the
 false alarms of 72 simulated pairs at their level; with 60 or 200 the 1 % point moves by 2 %."""
+WANDER_DOF = 10.0
+"""The same for zeros: their wander is read off one or two sessions, and scatters by 70 % from one to the next (28
+simulated sessions of 20 to 32 poses), which is that of a variance with 4 degrees of freedom a session."""
 RANGE_TOLERANCE = 0.05
 """A ratio of sensitivities within 5 % of a power of two on all axes is another range of the part: no part strays by a
 factor of 1.9 and ranges come in powers of two."""
@@ -50,14 +53,15 @@ class _Group:
     difference: FloatArray
     covariance: FloatArray
     unit: str
+    dof: float = SPREAD_DOF
 
     @property
     def p_value(self) -> float:
-        """d'C⁻¹d/n ~ F(n, 100)."""
+        """d'C⁻¹d/n ~ F(n, dof)."""
         n = len(self.difference)
         ridge = ADRIFT * max(float(np.trace(self.covariance)) / n, 1e-300)
         distance = float(self.difference @ np.linalg.solve(self.covariance + ridge * np.eye(n), self.difference))
-        return max(float(f_distribution.sf(distance / n, n, SPREAD_DOF)), 1e-300)
+        return max(float(f_distribution.sf(distance / n, n, self.dof)), 1e-300)
 
 
 @dataclass(frozen=True)
@@ -200,7 +204,7 @@ def _sensor(
     assert len(names) == len(PAIRS)
     # S is SI per raw unit: what reads a larger count for the same truth has the smaller S, so a scale is -ln k.
     groups = [
-        _Group(f"{prefix}-zero", sensor, _AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit),
+        _Group(f"{prefix}-zero", sensor, _AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit, WANDER_DOF),
         _Group(
             f"{prefix}-scale", sensor, _AXES, np.exp(log_m), np.exp(log_r), change, scale_covariance, "1"
         ),
