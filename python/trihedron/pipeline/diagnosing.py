@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.starting_point import is_open
+from trihedron.diagnose.session.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
@@ -19,6 +19,7 @@ from trihedron.pipeline.reading import Progress, read, segment
 from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.diagnosis import Diagnosis
+from trihedron.segment import resegment
 
 AnyRecording = Recording | str | os.PathLike[str]
 
@@ -96,7 +97,7 @@ def diagnose(
         recording_used, segments_used = _accelerometer_only(recording, segments)
     found = diagnose_recording(
         recording_used,
-        segments_used,
+        resegment(recording_used, segments_used),
         used,
         calibration_is_given=known is not None,
         alpha=alpha,

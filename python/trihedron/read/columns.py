@@ -72,6 +72,7 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
             )
     else:
         chosen = _positional(table, sensor)
+    chosen = _stated(table, chosen, explicit)
     if mapping is not None and re.search(r"(?:^|,)\s*(?:t|time)\s*=\s*(?:none|-)\s*(?:,|$)", mapping):
         chosen = replace(chosen, time=None)
     if chosen.accelerometer is None and chosen.gyroscope is None:
@@ -81,6 +82,18 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
             "name them, for example --columns time=1,ax=2,ay=3,az=4."
         )
     return chosen
+
+
+def _stated(table: Table, chosen: Columns, explicit: Columns | None) -> Columns:
+    """Clock columns as the format states them, where the user did not name another."""
+    said = table.clock
+    if said.counter is not None:
+        chosen = replace(chosen, counter=said.counter)
+    if explicit is not None and explicit.time is not None and explicit.time != said.time:
+        return chosen
+    if said.time is not None:
+        chosen = replace(chosen, time=said.time)
+    return replace(chosen, time_unit=said.unit) if said.unit and chosen.time is not None else chosen
 
 
 def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:

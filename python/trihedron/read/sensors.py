@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.clock import Clock, build_clock, mean_rate_hz
+from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
 from trihedron.read.errors import ReadError
 from trihedron.read.merge import merge
@@ -19,6 +19,7 @@ from trihedron.read.table import FloatArray, Progress, Table
 from trihedron.records import Finding, FindingCode, Severity
 
 ASSUMED_RATE_HZ = 100.0
+WITNESS_ROWS = 200_000
 _RATE_KEYS = frozenset(
     f"{a}{b}"
     for a in ("fs", "rate", "sampling rate", "sample rate", "sampling frequency", "frequency", "update rate")
@@ -187,7 +188,19 @@ def _is_gyro_first(first: FloatArray, second: FloatArray, rate_hz: float, findin
     return is_first is False
 
 
+def _witness(table: Table, chosen: Columns) -> Witness:
+    """Readings that limit how long a row can have lasted, in the order of the file (a first part of a long one)."""
+    triad, temperature = chosen.accelerometer, chosen.temperature
+    if triad is None or any(len(table.columns[c]) == 0 for c in triad):
+        readings = None
+    else:
+        readings = np.stack([table.columns[c][:WITNESS_ROWS] for c in triad], axis=1)
+    return Witness(readings, None if temperature is None else table.columns[temperature])
+
+
 def _stated_rate(table: Table) -> float | None:
+    if table.clock.rate_hz is not None:
+        return table.clock.rate_hz
     for key, text in table.metadata.items():
         if key.strip().lower().replace("_", " ") in _RATE_KEYS:
             try:
@@ -201,7 +214,9 @@ def _stated_rate(table: Table) -> float | None:
 
 def _time_base(table: Table, chosen: Columns, options: Options, findings: list[Finding]) -> tuple[Clock, float]:
     if chosen.time is not None:
-        clock = build_clock(table, chosen.time, chosen.time_unit, options.time_unit, chosen.nanoseconds)
+        clock = build_clock(
+            table, chosen.time, chosen.time_unit, options.time_unit, chosen.nanoseconds, _witness(table, chosen)
+        )
         findings += clock.findings
         rate = mean_rate_hz(clock.time_s)
         told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)

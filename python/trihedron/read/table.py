@@ -20,13 +20,27 @@ BYTES_PER_CELL_AT_PEAK = 24
 """Columns (8 bytes), the sensors' own (n, 3) arrays (8) and one pass of the audit (at most 8)."""
 
 
+@dataclass(frozen=True)
+class StatedClock:
+    """What a format itself says of its clock; what it leaves open is found from the numbers.
+
+    ``time``: column of the stamps; ``unit``: theirs (``s``, ``ms``, ``us``, ``ns`` or ``100us``); ``counter``: column
+    that counts samples, lost ones included; ``rate_hz``: the nominal rate, used where there are no stamps.
+    """
+
+    time: int | None = None
+    unit: str = ""
+    counter: int | None = None
+    rate_hz: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Table:
     """Columns (n,) float64 in file order; ``names`` is None where the file has no header.
 
     ``line_of_row`` (n,) gives the line of each row, or ``first_line`` alone when rows follow each other without a
     break; both are zero/None for binary formats, where places are counted in rows. ``metadata`` holds key and value of
-    preamble lines; ``is_integer`` says per column that the file stores integers.
+    preamble lines; ``clock`` is what the format states of its stamps.
     """
 
     path: Path
@@ -37,6 +51,7 @@ class Table:
     first_line: int = 0
     line_of_row: npt.NDArray[np.int64] | None = None
     findings: tuple[Finding, ...] = ()
+    clock: StatedClock = field(default_factory=StatedClock)
 
     @property
     def n_rows(self) -> int:

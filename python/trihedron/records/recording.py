@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -24,6 +24,34 @@ def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) ->
         wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ")"
         raise ValueError(f"{name} must have shape {wanted}, got {out.shape}")
     out.setflags(write=False)
+    return out
+
+
+def spread_stamps(time_s: FloatArray, step_s: float) -> FloatArray:
+    """Strictly increasing stamps (n,) from non-decreasing ones: those that are shared, spread evenly to one side.
+
+    Samples that were stamped when they arrived together have a long step before their stamp and were taken in it;
+    stamps that were cut off to few digits, or repeated, have it behind. The side with more room in the log as a whole
+    is taken; no two samples are put further apart than a sampling step.
+    """
+    if np.all(np.diff(time_s) > 0):
+        return time_s
+    first = np.flatnonzero(np.diff(time_s, prepend=-np.inf) > 0)
+    size = np.diff(first, append=len(time_s))
+    stamp = time_s[first]
+    before = np.diff(stamp, prepend=stamp[0] - step_s * size[0])
+    after = np.diff(stamp, append=stamp[-1] + step_s * size[-1])
+    shared = size > 1
+    inner = shared & (np.arange(len(size)) > 0) & (np.arange(len(size)) < len(size) - 1)
+    is_before = before[inner].sum() >= after[inner].sum()
+    apart = np.minimum((before if is_before else after) / size, step_s)
+    within = np.arange(len(time_s)) - np.repeat(first, size)
+    place = within - (np.repeat(size, size) - 1 if is_before else 0)
+    out = np.repeat(stamp, size) + place * np.repeat(apart, size)
+    out = np.asarray(out - out[0], dtype=np.float64)
+    # Stamps a rounding apart leave no room for what they share: the smallest number apart will do.
+    for k in np.flatnonzero(np.diff(out) <= 0):
+        out[k + 1] = np.nextafter(out[k], np.inf)
     return out
 
 
@@ -91,6 +119,11 @@ class Recording:
             raise ValueError(f"rate_hz must be a positive number, got {self.rate_hz}")
         object.__setattr__(self, "accelerometer_unit", AccelerationUnit(self.accelerometer_unit))
         object.__setattr__(self, "gyroscope_unit", RateUnit(self.gyroscope_unit))
+
+    def with_distinct_stamps(self) -> Recording:
+        """This recording with no two samples at one instant: stamps that are shared, spread (:func:`spread_stamps`)."""
+        distinct = spread_stamps(self.time_s, 1.0 / self.rate_hz)
+        return self if distinct is self.time_s else replace(self, time_s=distinct)
 
     @property
     def n_samples(self) -> int:

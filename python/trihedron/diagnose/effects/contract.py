@@ -12,8 +12,8 @@ from typing import ClassVar
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.observations import FloatArray
-from trihedron.diagnose.twin import Distortion
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.twin import Distortion
 from trihedron.records.diagnosis import EffectParameter
 
 AXES = ("x", "y", "z")

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, cholesky, eigh, solve_triangular
 
-from trihedron.diagnose.observations import FloatArray, Observations
-from trihedron.diagnose.twin import (
+from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.twin import (
     DYNAMICS,
     MOVES,
     STATIC_ACCEL,

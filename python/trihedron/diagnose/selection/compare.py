@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from trihedron.diagnose.agreement import physical_rms
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import Effect, catalogue
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.observations import FloatArray
-from trihedron.diagnose.solve import (
+from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.solve import (
     N_DOMAINS,
     Fit,
     Prediction,
@@ -24,7 +24,7 @@ from trihedron.diagnose.solve import (
     reduce,
     score,
 )
-from trihedron.diagnose.twin import PRIOR, Distortion, stacked
+from trihedron.diagnose.session.twin import PRIOR, Distortion, stacked
 
 MAX_EFFECTS = 4
 """Effects accepted at most: a recording of one session does not carry evidence for more."""
@@ -181,7 +181,7 @@ def _domain_chi2(fitted: Fit) -> FloatArray:
 
 def profile(fitted: Fit) -> float:
     """Marginal log-likelihood over the hidden states with the model's parameters at their optimum."""
-    from trihedron.diagnose.twin import N_ACCEL, N_GYRO, N_HOLD
+    from trihedron.diagnose.session.twin import N_ACCEL, N_GYRO, N_HOLD
 
     first, last = N_ACCEL + N_GYRO, N_ACCEL + N_GYRO + N_HOLD * fitted.line.obs.n_holds
     hidden = fitted.jacobian[:, first:last] / fitted.scale[first:last]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.ndimage import median_filter
 from scipy.special import chdtrc, gammaincc
 
-from trihedron.diagnose.observations import FloatArray, Observations
+from trihedron.diagnose.session.observations import FloatArray, Observations
 from trihedron.records.diagnosis import DomainTest, Where
 
 CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import fdtrc
 
-from trihedron.diagnose.observations import FloatArray
-from trihedron.diagnose.solve import Fit, leverage
-from trihedron.diagnose.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.solve import Fit, leverage
+from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.records.diagnosis import Domain, DomainTest, Where
 
 ROW_DOMAINS: dict[int, Domain] = {

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import trapezoid
 
-from trihedron.diagnose.observations import FloatArray, Observations
-from trihedron.diagnose.solve import Fit
-from trihedron.diagnose.twin import _LOWER, Prior, Twin
+from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.solve import Fit
+from trihedron.diagnose.session.twin import _LOWER, Prior, Twin
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.records.diagnosis import LinearModel
 from trihedron.units import acceleration_to_si, rate_to_si

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.effects.direct import Evidence
-from trihedron.diagnose.observations import Observations
-from trihedron.diagnose.solve import Fit, Prediction
-from trihedron.diagnose.twin import Distortion
+from trihedron.diagnose.session.observations import Observations
+from trihedron.diagnose.session.solve import Fit, Prediction
+from trihedron.diagnose.session.twin import Distortion
 from trihedron.records.diagnosis import HeldOut
 
 

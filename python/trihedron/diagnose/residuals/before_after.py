@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.diagnose.observations import FloatArray
-from trihedron.diagnose.solve import Fit
-from trihedron.diagnose.twin import _LOWER, N_ACCEL, N_GYRO, N_HOLD
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.solve import Fit
+from trihedron.diagnose.session.twin import _LOWER, N_ACCEL, N_GYRO, N_HOLD
 from trihedron.records.diagnosis import DomainResiduals, LinearModel
 
 _ROWS: tuple[tuple[str, str, str, str, tuple[str, ...]], ...] = (
