@@ -76,10 +76,7 @@ impl SpectralBins {
     /// Fit the strengths of the active terms.
     fn fit(&self, py: Python<'_>, active: Vec<usize>, has_line: bool) -> PyResult<SpectralFit> {
         self.know(&active)?;
-        let question = Question {
-            active,
-            has_line,
-        };
+        let question = Question { active, has_line };
         let fit = super::run(py, || likelihood::fit(&self.bins, &question))?;
         Ok(SpectralFit {
             strength: fit.strength,

@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{first_guess, Bins};
+use super::{Bins, first_guess};
 
 /// Fall of the deviance below which a fit has arrived.
 const ARRIVED: f64 = 1e-7;

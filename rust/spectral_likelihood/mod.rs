@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 mod marginal;
 mod profile;
 
-pub use profile::{invert, Inversion, LineMixture, Statement};
+pub use profile::{Inversion, LineMixture, Statement, invert};
 
 /// Averages of ordinates over bins, and what each noise term of unit strength contributes to them.
 #[derive(Debug, Clone)]

@@ -4,8 +4,8 @@
 //! over the least of all. `{a : Δ_k(a) ≤ rise}` is the interval; `exp(−½ Δ_k)` weighs amplitudes for the median. Fixing
 //! absent terms at zero instead makes every interval conditional on a choice that the same data made.
 
-use super::marginal::{best, fit, sigma, Point};
 use super::Bins;
+use super::marginal::{Point, best, fit, sigma};
 use crate::chi_square::normal_above;
 use crate::error::Result;
 
