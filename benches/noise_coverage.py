@@ -206,7 +206,8 @@ def total(runs=300):
         ratio = np.mean([c.variance[:, 0] for c in curves], axis=0) / truth
         hit = np.mean([(c.lower[:, 0] ** 2 <= truth) & (truth <= c.upper[:, 0] ** 2) for c in curves], axis=0)
         print(
-            f"  {kind}: " + ", ".join(f"m={c} {r:.2f} {100 * x:.0f} %" for c, r, x in zip(clusters, ratio, hit)),
+            f"  {kind}: "
+            + ", ".join(f"m={c} {r:.2f} {100 * x:.0f} %" for c, r, x in zip(clusters, ratio, hit, strict=True)),
             flush=True,
         )
 

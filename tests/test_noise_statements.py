@@ -39,7 +39,7 @@ def slow_deviance(bins, strength):
 
 def slow_least(bins, held=None, size=3):
     """Least deviance over non-negative strengths, by a general optimiser from several starts."""
-    count, power, _, _, basis = bins
+    _, power, _, _, basis = bins
     free = [k for k in range(size) if held is None or k not in held]
     scale = np.array([np.median(power / basis[k]) for k in range(size)])
 
@@ -101,7 +101,7 @@ def test_the_ramp_is_a_mixture_over_the_walk(small_bins):
 def test_intervals_hold_whatever_is_named():
     rng = np.random.default_rng(62)
     truth = {"N": 1e-2, "B": 3e-3, "K": 6e-4}
-    inside = {s: 0 for s in "QNBKR"}
+    inside = dict.fromkeys("QNBKR", 0)
     runs = 60
     for _ in range(runs):
         axis = identify_noise(in_time(rng, 1 << 15, 100.0, **truth), 100.0).axes[0]

@@ -107,7 +107,7 @@ fn quadratic_programme(matrix: &DMatrix<f64>, pull: &DVector<f64>) -> DVector<f6
             continue;
         };
         let y = solver.solve(&right);
-        if y.iter().any(|&y| !(y > 0.0)) {
+        if y.iter().any(|&y| y.is_nan() || y <= 0.0) {
             continue;
         }
         let least = -0.5 * y.dot(&right);

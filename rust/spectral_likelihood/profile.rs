@@ -189,7 +189,7 @@ fn state(bins: &Bins, k: usize, profile: &Profile, top: &Point, rise: f64) -> St
         let (before, after) = (roots.get(place.wrapping_sub(1)), roots.get(place));
         match (before, after) {
             (Some(&(a, r)), Some(&(b, s))) if s > r => a + (b - a) * (level - r) / (s - r),
-            (Some(&(a, _)), None) | (None, Some(&(a, _))) | (_, Some(&(a, _))) => a,
+            (_, Some(&(a, _))) | (Some(&(a, _)), None) => a,
             (None, None) => at,
         }
     };
@@ -227,7 +227,7 @@ fn middle(roots: &[(f64, f64)]) -> (f64, f64) {
         }
     }
     let total: f64 = cells.iter().map(|c| c.1).sum();
-    if !(total > 0.0) {
+    if total.is_nan() || total <= 0.0 {
         return (roots.first().map_or(0.0, |r| r.0), 0.0);
     }
     let mut below = 0.0;
@@ -255,7 +255,7 @@ fn line(profile: &Profile, least: f64, outside: f64) -> LineMixture {
         .filter(|w| w.0 > 0.0 && w.2.is_finite())
         .collect();
     let total: f64 = weighed.iter().map(|w| w.0).sum();
-    if !(total > 0.0) {
+    if total.is_nan() || total <= 0.0 {
         return LineMixture {
             median: 0.0,
             sigma: f64::INFINITY,

@@ -83,9 +83,10 @@ class NoiseTerm:
 
     ``lower`` and ``upper`` are the 95 % interval with every other term free; ``limit`` is its upper end. Both hold
     whether the term is named or not. ``is_present`` says that the log shows the term by itself; ``value`` is zero where
-    it does not, otherwise ``estimate``: the most likely value of Q and N, the median of what the likelihood allows of B,
-    K and R. ``sigma`` is the spread about it. ``fitted`` is the term's share in the most likely sum of all terms, from
-    which variances of means are made. ``evidence`` is the rise of the deviance (twice the log likelihood) without it.
+    it does not, otherwise ``estimate``: the most likely value of Q and N, the median of what the likelihood allows of
+    B, K and R. ``sigma`` is the spread about it. ``fitted`` is the term's share in the most likely sum of all terms,
+    from which variances of means are made. ``evidence`` is the rise of the deviance (twice the log likelihood) without
+    the term.
     """
 
     symbol: TermName

@@ -126,7 +126,11 @@ def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
     if any(axis.gauss_markov for axis in axes):
         rows.append((f"   Gauss-Markov σ [{unit_in_print(unit)}]", *(_gauss_markov(axis) for axis in axes)))
         rows.append(("   … correlation time [s]", *(_correlation(axis) for axis in axes)))
-    return Table(("", *(axis.name for axis in axes)), tuple(rows), "Noise terms ± standard error; < is the upper end of the 95 % interval")
+    return Table(
+        ("", *(axis.name for axis in axes)),
+        tuple(rows),
+        "Noise terms ± standard error; < is the upper end of the 95 % interval",
+    )
 
 
 def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:

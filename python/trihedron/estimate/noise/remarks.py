@@ -259,8 +259,8 @@ def _slow_noise_unresolved(axis: NoiseAxis) -> Finding:
     return _finding(
         FindingCode.SLOW_NOISE_UNRESOLVED,
         Severity.NOTE,
-        f"Slow noise is there; B and K are not separable here: B {flicker.lower:.2g} … {flicker.upper:.2g} {axis.unit}, "
-        f"K {walk.lower:.2g} … {walk.upper:.2g} {axis.unit}/√s, not both zero.",
+        f"Slow noise is there; B and K are not separable here: B {flicker.lower:.2g} … {flicker.upper:.2g} "
+        f"{axis.unit}, K {walk.lower:.2g} … {walk.upper:.2g} {axis.unit}/√s, not both zero.",
         "the log is short compared with the times over which flicker and walk differ",
         "Variances of means use the most likely sum of both; record longer to tell them apart.",
         evidence=evidence,
