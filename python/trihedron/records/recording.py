@@ -76,6 +76,9 @@ class Recording:
         The audit of the log.
     auxiliary : mapping of name to (n,) array
         Every other numeric column, untouched.
+    rows_in_file, rows_read : int
+        Rows that the file (or both files) holds, and those that became readings; the others are in findings, so that
+        ``rows_in_file == rows_read + rows_reported``. Zero where no file was read.
 
     Raises
     ------
@@ -96,6 +99,8 @@ class Recording:
     sha256: str = ""
     findings: tuple[Finding, ...] = ()
     auxiliary: MappingProxyType[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
+    rows_in_file: int = 0
+    rows_read: int = 0
 
     def __post_init__(self) -> None:
         time_s = _readonly(self.time_s, "time_s", (None,))
@@ -129,6 +134,11 @@ class Recording:
     def n_samples(self) -> int:
         """Number of rows."""
         return len(self.time_s)
+
+    @property
+    def rows_reported(self) -> int:
+        """Rows of the file that findings say are not among the readings."""
+        return round(sum(finding.numbers.get("rows_left_out", 0.0) for finding in self.findings))
 
     @property
     def duration_s(self) -> float:
