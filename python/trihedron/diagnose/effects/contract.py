@@ -54,6 +54,8 @@ class Effect(ABC):
     accounts_for: ClassVar[tuple[Domain, ...]] = ()
     """Domains of samples whose disagreement is this effect itself, seen from another side."""
 
+    is_of_session: ClassVar[bool] = False
+    """Whether it belongs to one experiment (a pushed pose, a tilted table) and to no instrument."""
     is_local: ClassVar[bool] = False
     """Whether it concerns one pose or move only: its gain may then come from one block of held-out data."""
 
