@@ -13,7 +13,7 @@ G = 9.8137
 
 @dataclass
 class Step:
-    """A rest of ``seconds``, a turn about the table's normal by ``turn`` degrees, or a move by hand to the attitude ``to``
+    """A rest of ``seconds``, a turn by ``turn`` degrees about the table's normal, or a move by hand to attitude ``to``
     (3, 3, body to room)."""
 
     seconds: float

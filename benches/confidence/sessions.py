@@ -44,6 +44,7 @@ def hand(seed, n_poses=18, move_s=2.0, hold_s=4.0, rate_hz=100.0, law=None, **se
 def table(seed, turns=(90, -90), rate_deg_s=90.0, tilt_deg=1.0, hold_s=4.0, rate_hz=100.0, bases=FACES, **sensor):
     """Faces set down by hand on a table that is not level, turned there by known angles at a constant rate."""
     rng = np.random.default_rng([12, seed])
+    sensor.setdefault("gyro_range", np.radians(500.0 if rate_deg_s < 300.0 else 2000.0))
     steps, first = [], None
     tilt = np.radians(tilt_deg)
     lean = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
