@@ -21,6 +21,7 @@ from trihedron.estimate.gyroscope import (
     scale_by_gravity,
     stated_turns,
 )
+from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.pipeline.choices import settle_gravity
@@ -108,7 +109,8 @@ def calibrate(
             recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
         )
     calibration = in_frame(calibration, wanted)
-    findings = (*said, *recording.findings, *segments.findings, *calibration.findings)
+    scale = [] if calibration.gyroscope is None else scale_findings(calibration.gyroscope.S, recording.gyroscope_unit)
+    findings = (*said, *recording.findings, *segments.findings, *calibration.findings, *scale)
     return CalibrationResult(replace(calibration, findings=findings), segments, recording)
 
 
