@@ -94,8 +94,10 @@ def draw(session: Session, seed: int) -> Zeros:
     for axis in range(3):
         size = session.axis_scale[axis]
         path = np.zeros(n)
-        path += session.walk * _unit(np.cumsum(rng.normal(size=n)))
-        path += session.smooth * _unit(np.cumsum(np.cumsum(rng.normal(size=n)) + rng.normal() * n**0.5))
+        # Scaled by their expected rms: a walk scaled by its own would be tamer than a walk.
+        path += session.walk * np.cumsum(rng.normal(size=n)) / np.sqrt(n / 6)
+        wave = np.cumsum(np.cumsum(rng.normal(size=n)) + rng.normal() * n**0.5)
+        path += session.smooth * wave / np.sqrt(n**3 * (1 / 30 + 1 / 12))
         path += session.warm_up * _unit(np.exp(-x / rng.uniform(0.1, 0.5))) * rng.choice((-1, 1))
         path += session.swing * hidden * rng.choice((-1, 1))
         path += session.thermal * temperature * rng.choice((-1, 1))
