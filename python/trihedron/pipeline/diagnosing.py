@@ -19,6 +19,7 @@ from trihedron.pipeline.reading import Progress, read, segment
 from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.diagnosis import Diagnosis
+from trihedron.segment import resegment
 
 AnyRecording = Recording | str | os.PathLike[str]
 
@@ -96,7 +97,7 @@ def diagnose(
         recording_used, segments_used = _accelerometer_only(recording, segments)
     found = diagnose_recording(
         recording_used,
-        segments_used,
+        resegment(recording_used, segments_used),
         used,
         calibration_is_given=known is not None,
         alpha=alpha,

@@ -8,9 +8,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
+from trihedron.diagnose.effects.insertion import bridge, insert_samples
 from trihedron.diagnose.effects.sample_steps import MAX_LOST, Loss, find_losses
-from trihedron.diagnose.repair import bridge, insert_samples, without_moves
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit
 from trihedron.diagnose.session.twin import NO_DISTORTION, Linearisation, Twin

@@ -65,7 +65,7 @@ class TimingJitter(DirectEffect):
         def reweigh(obs: Observations) -> Observations:
             if len(even) != len(obs.time_s):
                 return obs  # samples were put in since
-            again = observe(replace(obs.recording, time_s=even), obs.whole)
+            again = observe(replace(obs.recording, time_s=even), obs.segments)
             return replace(
                 again,
                 move_ranges=obs.move_ranges,

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.diagnose.repair import split_holds, unsplit
-from trihedron.diagnose.unresolved import unresolved_variance
+from trihedron.diagnose.residuals.aliasing import unresolved_variance
 from trihedron.records import Recording, Segments
 
 FloatArray = npt.NDArray[np.float64]
@@ -68,16 +67,15 @@ class Observations:
         return len(self.move_ranges)
 
 
-def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True) -> Observations:
+def observe(recording: Recording, segments: Segments) -> Observations:
     """Arrange a segmented recording for the twin.
-
-    Without ``cuts_bumps`` every pose is averaged over whatever happened in it, as if nobody had noticed.
 
     Raises
     ------
     ValueError
         When the recording has no accelerometer or fewer than two still poses: there is nothing to hold a twin against.
     """
+    recording = recording.with_distinct_stamps()
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise ValueError("a diagnosis needs accelerometer readings: this recording has none")
     if segments.n_holds < 2:
@@ -85,9 +83,8 @@ def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True
             f"a diagnosis needs still poses to hold the model against: {segments.n_holds} found, at least 2 are needed"
         )
     t = recording.time_s
-    bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in segments.holds for a, b in hold.disturbed)
-    whole = segments
-    segments = split_holds(recording, segments)[0] if cuts_bumps else unsplit(recording, segments)
+    whole = segments if segments.whole is None else segments.whole
+    bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in whole.holds for a, b in hold.disturbed)
     assert segments.accelerometer_sigma is not None
     assert segments.accelerometer_mean is not None
     assert segments.accelerometer_sigma_mean is not None
@@ -130,7 +127,7 @@ def observe(recording: Recording, segments: Segments, *, cuts_bumps: bool = True
         hold_rate=hold_rate,
         hold_force_sigma=segments.accelerometer_sigma_mean,
         hold_rate_sigma=hold_rate_sigma,
-        hold_time_s=segments.time_mid_s,
+        hold_time_s=np.array([0.5 * (t[hold.start] + t[hold.stop - 1]) for hold in segments.holds]),
         move_ranges=tuple(ranges) if raw_rate is not None else (),
         move_holds=np.array(holds if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
         force_density=segments.accelerometer_sigma * np.sqrt(step_s),

@@ -20,7 +20,8 @@ from trihedron.diagnose.session.observations import FloatArray, Observations
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 """Labels of residual rows; ``PRIOR`` rows keep flat directions finite and belong to no domain."""
 
-_LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
+_LOWER: tuple[tuple[int, int], ...] = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
+_FULL = tuple((i, j) for i in range(3) for j in range(3))
 N_ACCEL, N_GYRO, N_HOLD = 9, 9, 8
 """Unknowns: accelerometer, gyro, and per hold (2 tilt, 3 gyro bias, 3 accelerometer bias)."""
 
@@ -195,12 +196,14 @@ class Linearisation:
         self.path = trajectory(obs, twin, distortion)
         self.tangent = tangents(twin.up)
         self._moves = [self._move(m) for m in range(obs.n_moves)]
-        cov = np.einsum("ij,nj,kj->nik", twin.accel_S, obs.hold_force_sigma**2, twin.accel_S)
-        self._accel_white = np.linalg.inv(np.linalg.cholesky(cov))
+        # The raw reading is the datum: its noise is fixed in raw units, and S enters a rest row through S⁻¹ alone. A
+        # residual S w - β whitened by S R Sᵀ with S held fixed pulls S to zero wherever β scatters (eq. 8.1a).
+        self._accel_inverse = np.linalg.inv(twin.accel_S)
+        self._gyro_inverse = np.linalg.inv(twin.gyro_S)
+        self._accel_white = self._accel_inverse / obs.hold_force_sigma[:, :, None]
         self._gyro_white = None
         if obs.hold_rate_sigma is not None:
-            cov = np.einsum("ij,nj,kj->nik", twin.gyro_S, obs.hold_rate_sigma**2, twin.gyro_S)
-            self._gyro_white = np.linalg.inv(np.linalg.cholesky(cov))
+            self._gyro_white = self._gyro_inverse / obs.hold_rate_sigma[:, :, None]
 
     def at_twin(self, twin: Twin, distortion: Distortion) -> Linearisation:
         """The same linearisation for a twin at the same point (noise corners or idle effects may differ)."""
@@ -319,12 +322,14 @@ class Linearisation:
         label: list[tuple[int, int, int, int]] = []
         eye = np.eye(3)
         for i in range(h):
-            r = twin.accel_S @ obs.hold_force[i] + twin.accel_b - twin.accel_bias[i] - twin.gravity * twin.up[i]
+            true = twin.gravity * twin.up[i] + twin.accel_bias[i] - twin.accel_b
             if self.distortion.force is not None:
-                r = r - self.distortion.force[i] @ twin.effect
+                true = true + self.distortion.force[i] @ twin.effect
+            r = twin.accel_S @ obs.hold_force[i] - true
+            read = self._accel_inverse @ true
             J = np.zeros((3, n))
             for k, (row, col) in enumerate(_LOWER):
-                J[row, k] = obs.hold_force[i, col]
+                J[row, k] = read[col]  # ∂/∂S of w - S⁻¹ true, times S
             J[:, 6:9] = eye
             J[:, at(i, tilt)] = -twin.gravity * self.tangent[i]
             J[:, at(i, force_bias)] = -eye
@@ -335,11 +340,12 @@ class Linearisation:
         if self._gyro_white is not None:
             assert obs.hold_rate is not None
             for i in range(h):
-                r = twin.gyro_S @ obs.hold_rate[i] - twin.gyro_bias[i]
+                true = twin.gyro_bias[i]
                 if self.distortion.rate is not None:
-                    r = r - self.distortion.rate[i] @ twin.effect
+                    true = true + self.distortion.rate[i] @ twin.effect
+                r = twin.gyro_S @ obs.hold_rate[i] - true
                 J = np.zeros((3, n))
-                J[:, 9:18] = np.kron(eye, obs.hold_rate[i][None])
+                J[:, 9:18] = np.kron(eye, (self._gyro_inverse @ true)[None])
                 J[:, at(i, rate_bias)] = -eye
                 W = self._gyro_white[i]
                 rows_r.append(W @ r)
@@ -404,18 +410,21 @@ class Linearisation:
         obs, twin, h = self.obs, self.twin, self.obs.n_holds
         log_weight = 0.0
         gap = np.maximum(np.diff(obs.hold_time_s), 1e-3)
+        # As at rest: the walk is that of the raw zero, its strength fixed in raw units, so that S cannot buy itself a
+        # smaller step by shrinking: ∂(S⁻¹ Δβ) = -S⁻¹ ∂S S⁻¹ Δβ.
         sensors = [
-            (5, twin.accel_bias, np.sqrt((twin.accel_S**2) @ obs.force_density**2), twin.accel_corner_s, STATIC_ACCEL)
+            (5, twin.accel_bias, self._accel_inverse, obs.force_density, twin.accel_corner_s, STATIC_ACCEL, 0, _LOWER)
         ]
         if obs.rate_density is not None:
-            density = np.sqrt((twin.gyro_S**2) @ obs.rate_density**2)
-            sensors.append((2, twin.gyro_bias, density, twin.gyro_corner_s, STATIC_GYRO))
-        for offset, bias, density, corner_s, domain in sensors:
+            sensors.append(
+                (2, twin.gyro_bias, self._gyro_inverse, obs.rate_density, twin.gyro_corner_s, STATIC_GYRO, 9, _FULL)
+            )
+        for offset, bias, inverse, density, corner_s, domain, first_scale, entries in sensors:
             walk = np.sqrt(3.0) * density / corner_s  # K with N²/τ = K²τ/3 at the corner τ
             first = N_ACCEL + N_GYRO + offset
-            J = np.zeros((3, n))
             # The accelerometer's constant bias is b itself; the gyro's is only held finite.
-            sigma = 1e-6 * density if offset == 5 else np.full(3, 10.0)
+            sigma = 1e-6 * np.linalg.norm(np.linalg.inv(inverse) * density, axis=1) if offset == 5 else np.full(3, 10.0)
+            J = np.zeros((3, n))
             J[:, first : first + 3] = np.diag(1 / sigma)
             rows_r.append(bias[0] / sigma)
             rows_j.append(J)
@@ -423,13 +432,17 @@ class Linearisation:
             for i in range(h - 1):
                 sigma = walk * np.sqrt(gap[i])
                 here, there = first + N_HOLD * i, first + N_HOLD * (i + 1)
+                white = inverse / sigma[:, None]
+                change = inverse @ (bias[i + 1] - bias[i])
                 J = np.zeros((3, n))
-                J[:, there : there + 3] = np.diag(1 / sigma)
-                J[:, here : here + 3] = -np.diag(1 / sigma)
-                rows_r.append((bias[i + 1] - bias[i]) / sigma)
+                J[:, there : there + 3] = white
+                J[:, here : here + 3] = -white
+                for k, (row, col) in enumerate(entries):
+                    J[:, first_scale + k] = -white[:, row] * change[col]
+                rows_r.append(change / sigma)
                 rows_j.append(J)
                 label += [(domain, i, c, 1 if offset == 5 else 2) for c in range(3)]
-                log_weight -= float(np.log(sigma).sum())
+                log_weight += float(np.log(abs(np.linalg.det(inverse)))) - float(np.log(sigma).sum())
         if obs.rate_density is None:
             # No gyro: its unknowns per hold are pinned so that the system stays regular.
             for i in range(h):

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from trihedron.diagnose.agreement import physical_rms
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import Effect, catalogue
 from trihedron.diagnose.effects.contract import Variant
+from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
 from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import (
     N_DOMAINS,

@@ -1,4 +1,4 @@
-"""Changes to what the observations claim: lost samples put back, poses split where they were bumped or shaken."""
+"""Poses once more, as a joint model needs them: cut where they were bumped, found where they were only shaken."""
 
 from __future__ import annotations
 
@@ -15,91 +15,18 @@ RESTING = 1e-3
 """A mean rate of a thousandth of the moves' rms, five times over, is rest: below 1 °/s after moves of 3 rad/s."""
 
 
-def bridge(values: FloatArray, k: int, n: int) -> FloatArray:
-    """(n, ...) samples between ``k`` and ``k + 1`` on a cubic Hermite through the two samples on either side."""
-    if k < 1 or k + 2 >= len(values):
-        return np.repeat(values[k : k + 1], n, axis=0)
-    a, b = values[k], values[k + 1]
-    da, db = values[k] - values[k - 1], values[k + 2] - values[k + 1]
-    x = (np.arange(1, n + 1) / (n + 1)).reshape(-1, *([1] * (values.ndim - 1)))
-    width = n + 1
-    h00, h10 = 2 * x**3 - 3 * x**2 + 1, x**3 - 2 * x**2 + x
-    h01, h11 = -2 * x**3 + 3 * x**2, x**3 - x**2
-    out: FloatArray = h00 * a + h10 * width * da + h01 * b + h11 * width * db
-    return out
-
-
-def insert_samples(recording: Recording, segments: Segments, losses: dict[int, int]) -> tuple[Recording, Segments]:
-    """Put ``n`` samples behind sample ``k`` for every ``k: n``, on a cubic through the two samples on either side.
-
-    A cubic Hermite bridge keeps value and slope at both edges of the gap, so that the rotation integrated across it is
-    right to the fifth power of its length. Time stamps behind a gap move by what was lost.
-    """
-    n_old = recording.n_samples
-    step = 1.0 / recording.rate_hz
-    extra = np.zeros(n_old + 1, dtype=np.intp)
-    for k, n in losses.items():
-        extra[k + 1] += n
-    shift = np.cumsum(extra)[:n_old]
-    new_index = np.arange(n_old) + shift
-    total = n_old + int(extra.sum())
-    time_s = np.full(total, np.nan)
-    time_s[new_index] = recording.time_s + shift * step
-    gaps = np.isnan(time_s)
-    time_s[gaps] = np.interp(np.flatnonzero(gaps), new_index, recording.time_s + shift * step)
-
-    def bridged(values: FloatArray | None) -> FloatArray | None:
-        if values is None:
-            return None
-        out = np.full((total, *values.shape[1:]), np.nan)
-        out[new_index] = values
-        for k, n in losses.items():
-            out[k + shift[k] + 1 : k + shift[k] + 1 + n] = bridge(values, k, n)
-        return out
-
-    mended = replace(
-        recording,
-        time_s=time_s,
-        accelerometer=bridged(recording.accelerometer),
-        gyroscope=bridged(recording.gyroscope),
-        temperature_degc=bridged(recording.temperature_degc),
-        supply_v=bridged(recording.supply_v),
-        auxiliary=type(recording.auxiliary)({}),
-    )
-
-    def at(index: int) -> int:
-        return int(new_index[index]) if index < n_old else total
-
-    holds = tuple(
-        replace(
-            hold,
-            start=at(hold.start),
-            stop=at(hold.stop - 1) + 1,
-            outer_start=at(hold.outer_start),
-            outer_stop=at(hold.outer_stop - 1) + 1,
-            disturbed=tuple((at(a), at(b - 1) + 1) for a, b in hold.disturbed),
-        )
-        for hold in segments.holds
-    )
-    moves = tuple(
-        replace(move, start=holds[move.hold_before].stop, stop=holds[move.hold_after].start) for move in segments.moves
-    )
-    mid = np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in holds])
-    return mended, replace(segments, holds=holds, moves=moves, time_mid_s=mid)
-
-
-def split_holds(recording: Recording, segments: Segments, shortest_s: float = 0.3) -> tuple[Segments, tuple[int, ...]]:
-    """Poses as the twin needs them: cut where they were bumped, and found where they were only shaken.
+def resegment(recording: Recording, segments: Segments, shortest_s: float = 0.3) -> Segments:
+    """Poses as a model of the whole session needs them: cut where they were bumped, found where only shaken.
 
     A bump inside a hold turns the body; averaged over, it contradicts the moves on both sides. Cut there, the gyro
     carries the attitude across it like across any move. A pose that vibrates is no rest, but its slow part stands
     still: it becomes a hold of its own, so that a bias that follows the vibration can be seen.
 
-    Returns the segments and the numbers of the original holds that were bumped.
+    The answer's ``whole`` are the poses as they were found, each averaged over whatever happened in it.
     """
     shortest = max(int(shortest_s * recording.rate_hz), 8)
     spans: list[tuple[int, int, int]] = []
-    bumped: list[int] = []
+    was_bumped = False
     for i, hold in enumerate(segments.holds):
         cuts = [(a, b) for a, b in hold.disturbed if b > a]
         first = hold.start
@@ -109,16 +36,15 @@ def split_holds(recording: Recording, segments: Segments, shortest_s: float = 0.
             first = b
         pieces.append((first, hold.stop))
         kept = [(a, b) for a, b in pieces if b - a >= shortest]
-        if cuts:
-            bumped.append(i)
+        was_bumped |= bool(cuts)
         if not kept:
             kept = [(hold.start, hold.stop)]
         spans += [(a, b, i) for a, b in kept]
     shaken = [*_shaken(recording, segments), *_drifting(recording, segments)]
     merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in shaken)]))
-    if len(merged) == segments.n_holds and not shaken and not bumped:
-        return segments, ()
-    return _segments_of(recording, segments, merged), tuple(bumped)
+    if len(merged) == segments.n_holds and not shaken and not was_bumped:
+        return segments
+    return replace(_segments_of(recording, segments, merged), whole=_averaged_whole(recording, segments))
 
 
 LONG_S = 1800.0
@@ -127,7 +53,7 @@ MOST_PIECES = 40
 
 
 def _in_pieces(recording: Recording, spans: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
-    """Long poses cut into pieces, two samples apart so that the twin knows nothing turned between them."""
+    """Long poses cut into pieces, two samples apart so that a model knows nothing turned between them."""
     rate = recording.rate_hz
     total_s = sum((b - a) / rate for a, b, _ in spans if (b - a) / rate > LONG_S)
     piece_s = max(LONG_S / 2.0, total_s / MOST_PIECES)
@@ -168,9 +94,12 @@ def _drifting(recording: Recording, segments: Segments, block_s: float = 60.0) -
     return out
 
 
-def unsplit(recording: Recording, segments: Segments) -> Segments:
-    """The poses as they were found, averaged over all of their samples."""
-    return _segments_of(recording, segments, [(hold.start, hold.stop, i) for i, hold in enumerate(segments.holds)])
+def _averaged_whole(recording: Recording, segments: Segments) -> Segments:
+    """The poses as they were found, averaged over all of their samples, with the bumps that were seen in them."""
+    spans = [(hold.start, hold.stop, i) for i, hold in enumerate(segments.holds)]
+    out = _segments_of(recording, segments, spans)
+    holds = tuple(replace(new, disturbed=old.disturbed) for new, old in zip(out.holds, segments.holds, strict=True))
+    return replace(out, holds=holds)
 
 
 def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int, int, int]]) -> Segments:
@@ -265,11 +194,3 @@ def _shaken(
             if stop - start >= shortest_s * recording.rate_hz:
                 out.append((int(start), int(stop)))
     return out
-
-
-def without_moves(
-    ranges: tuple[tuple[int, int], ...], holds: npt.NDArray[np.intp], bad: set[int]
-) -> tuple[tuple[tuple[int, int], ...], npt.NDArray[np.intp]]:
-    """Move ranges and their holds without some of them."""
-    keep = [m for m in range(len(ranges)) if m not in bad]
-    return tuple(ranges[m] for m in keep), holds[keep]

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.growing import Found, GrowingModel
+from trihedron.diagnose.selection.model import Found, GrowingModel
 from trihedron.records.diagnosis import AcceptedEffect, EffectParameter
 
 

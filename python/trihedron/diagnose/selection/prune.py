@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.diagnose.agreement import ROW_DOMAINS
-from trihedron.diagnose.growing import Found, GrowingModel
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS
+from trihedron.diagnose.selection.model import Found, GrowingModel
 from trihedron.diagnose.session.solve import N_DOMAINS, folds_of, predict_held_out, tune_noise
 from trihedron.diagnose.session.twin import Prior, stacked
 from trihedron.records.diagnosis import Domain, DomainTest
