@@ -1,6 +1,6 @@
 """False alarms, power and coverage of the tests on zeros from pose to pose.
 
-    python benches/zero_process.py [--sessions 200] [--first-seed 1] [--only NAME]
+python benches/zero_process.py [--sessions 200] [--first-seed 1] [--only NAME]
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from zero_sessions import Session, draw
 
 from trihedron.diagnose.zeros.evidence import examine
 from trihedron.diagnose.zeros.process import ZeroReadings
+from zero_sessions import Session, draw
 
 QUIET = Session()
 SETTINGS: dict[str, Session] = {
@@ -78,8 +78,8 @@ def main() -> None:
         k = [100.0 * np.mean([one == word for one in kinds]) for word in ("drift", "walk", "slow")]
         inside = 100.0 * np.mean(np.abs(np.array(sizes)) < 2.0) if session.scatter else np.nan
         print(
-            f"{name:<26} {r[0]:5.1f} %  {r[1]:5.1f} %  {r[2]:5.1f} %  {r[3]:5.1f} %  {k[0]:4.0f}/{k[1]:3.0f}/{k[2]:3.0f}"
-            f"   {r[4]:5.1f} %  {r[5]:5.1f} %  {inside:5.1f} %  {1e3 * spent:6.0f}",
+            f"{name:<26} {r[0]:5.1f} %  {r[1]:5.1f} %  {r[2]:5.1f} %  {r[3]:5.1f} %  "
+            f"{k[0]:4.0f}/{k[1]:3.0f}/{k[2]:3.0f}   {r[4]:5.1f} %  {r[5]:5.1f} %  {inside:5.1f} %  {1e3 * spent:6.0f}",
             flush=True,
         )
 

@@ -1,6 +1,6 @@
 """Zeros of simulated sessions, made second by second from what a sensor does; shares nothing with the estimator.
 
-Every process is a path on a fine clock; a pose's two numbers are plain averages of path plus white noise over its halves.
+Every process is a path on a fine clock; a pose's two numbers are averages of path plus white noise over its halves.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The smooth latent curve of a zero with its band, and how far every pose lies from the others' prediction (eq. Z.10)."""
+"""The smooth latent curve of a zero with its band, and how far every pose lies from the others (eq. Z.10)."""
 
 from __future__ import annotations
 
@@ -50,18 +50,21 @@ def smooth_curve(process: ZeroProcess, keep: list[int], sigma: FloatArray, time_
     t, at = (r.time_s - start) / span, np.clip((time_s - start) / span, 0.0, 1.0)
     walk, drift = process.sizes
 
-    def kernel(a: FloatArray, b: FloatArray, w: float, d: float) -> FloatArray:
+    def kernel(a: FloatArray, b: FloatArray, w: float, d: float, length: FloatArray | None = None) -> FloatArray:
         low, high = np.minimum.outer(a, b), np.maximum.outer(a, b)
-        return np.asarray(
-            w / walk * low + d / drift * (low**2 * (3.0 * high - low) / 6.0 + INITIAL_SLOPE * np.outer(a, b))
-        )
+        bent = low**2 * (3.0 * high - low) / 6.0 + INITIAL_SLOPE * np.outer(a, b)
+        if length is not None:
+            # A value of the walk against its mean over a stretch around it.
+            inside = np.maximum(0.5 * length - np.abs(a[:, None] - b), 0.0)
+            low = low - inside**2 / (2.0 * np.maximum(length, 1e-12))
+        return np.asarray(w / walk * low + d / drift * bent)
 
     centre = np.eye(len(at)) - 1.0 / len(at)
     values, errors = [], []
     for axis, y in enumerate(r.values):
         V, _ = _covariance(process, axis, sigma)
         _, w, d = (process.axis_factor[axis] * sigma) ** 2
-        cross = centre @ kernel(at, t, w, d)
+        cross = centre @ kernel(at, t, w, d, r.length_s / span)
         inverse = np.linalg.inv(V)
         side = inverse @ X
         A = np.linalg.pinv(X.T @ side)

@@ -1,4 +1,4 @@
-"""What the zeros of a session show, tested in order: temperature, gravity, slow change and its kind, scatter (eq. Z.5-Z.9)."""
+"""What the zeros of a session show: temperature, gravity, slow change and its kind, scatter (eq. Z.5-Z.9)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Kind = Literal["", "walk", "drift", "slow"]
 
 @dataclass(frozen=True, eq=False)
 class Coefficients:
-    """Columns of the mean tested together: (axes, k) values, (axes, k, k) covariance, p-value, confounded with drift."""
+    """Columns tested together: (axes, k) values, (axes, k, k) covariance, p-value, confounded with drift."""
 
     values: FloatArray
     covariance: FloatArray
@@ -124,6 +124,9 @@ def _thermal(process: ZeroProcess, every: list[int], columns: list[int]) -> Coef
     value = mean[:, place]
     block = covariance[:, place][:, :, place]
     chi2 = float(sum(v @ np.linalg.solve(c, v) for v, c in zip(value, block, strict=True)))
+    if (process.axis_factor != 1.0).any():
+        # Every axis tells its own size by its own readings alone: the correction of eq. Z.7.
+        chi2 *= (process.readings.n_poses - len(every) + 0.5) / process.readings.n_poses
     wide = np.einsum("akk->ak", block) / np.maximum(np.einsum("akk->ak", plain[:, place][:, :, place]), 1e-300)
     return Coefficients(value, block, float(chdtrc(value.size, chi2)), bool(np.median(wide) > CONFOUNDED_VARIANCE))
 
@@ -141,9 +144,7 @@ def _gravity(process: ZeroProcess, every: list[int], columns: list[int]) -> Coef
     return Coefficients(mean[:, place], covariance[:, place][:, :, place], float(chdtrc(dof, max(ratio, 0.0))))
 
 
-def _without_worst(
-    process: ZeroProcess, every: list[int], sigma: FloatArray, *, is_norm: bool
-) -> tuple[int, float]:
+def _without_worst(process: ZeroProcess, every: list[int], sigma: FloatArray, *, is_norm: bool) -> tuple[int, float]:
     """The pose whose zero is farthest from the others' prediction, and the scatter's p-value without it."""
     readings = process.readings
     if readings.n_poses <= (12 if is_norm else 6):
@@ -171,7 +172,8 @@ def _scatter_sizes(process: ZeroProcess, every: list[int], sigma: FloatArray) ->
     x = np.linspace(0.0, 1.0, 61)[1:] ** 2 * top
     slow = np.unique(np.vstack([sigma[1:], [0.0, sigma[2]], [sigma[1], 0.0], 2.0 * sigma[1:], 0.5 * sigma[1:]]), axis=0)
     sigmas = np.concatenate([np.column_stack([x, np.tile(s, (len(x), 1))]) for s in slow])
-    value = process.grams(sigmas).log_likelihood(every, restricted=True).reshape(len(process.axis_factor), len(slow), -1)
+    value = process.grams(sigmas).log_likelihood(every, restricted=True)
+    value = value.reshape(len(process.axis_factor), len(slow), -1)
     weight = np.exp(value - value.max(axis=(1, 2), keepdims=True)).sum(axis=1) * np.gradient(x)
     weight /= weight.sum(axis=1, keepdims=True)
     scaled = process.axis_factor[:, None] * x

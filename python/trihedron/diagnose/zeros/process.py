@@ -1,8 +1,9 @@
 """One Gaussian process for a zero from pose to pose: scatter, walk, drift (docs/zeros.md, eq. Z.1-Z.4).
 
-Per axis ``y = X θ + e``, flat prior on θ, ``V = φ² diag σ² + σ_s² (ones within a pose) + σ_w² W + σ_d² D``; W is a random
-walk, D an integrated walk whose initial slope is random too, both scaled so that σ_w and σ_d are rms about the mean of
-the session. All three strengths are always free: coefficients are judged against whichever of them the zeros have.
+Per axis ``y = X θ + e``, flat prior on θ, ``V = φ² diag σ² + σ_s² (ones within a pose) + σ_w² W + σ_d² D``; W is a
+random walk, D an integrated walk whose initial slope is random too, both scaled so that σ_w and σ_d are the expected
+rms about the mean of the session. All three strengths are always free: coefficients are judged against whichever the
+zeros have.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from trihedron import _core
 FloatArray = npt.NDArray[np.float64]
 SCATTER, WALK, DRIFT = 0, 1, 2
 INITIAL_SLOPE = 1.0
-"""Variance of the drift's slope at the start over what it gains in the session: a straight line is a drift like another."""
+"""Variance of the drift's slope at the start over what it gains in the session: a straight line is a drift too."""
 LEVELS = 6
 """Levels of each σ on the grid besides 0, a factor of 2.5 to 4 apart: the best is refined."""
 POLISH = (1.8, 1.35, 1.15)
@@ -36,9 +37,10 @@ NOISE_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0, 9.0, 25.0, 100.0)
 class ZeroReadings:
     """Zeros of one sensor, two means a pose, in the order of time.
 
-    ``values``, ``sigma`` (axes, n) the means and their standard errors; ``time_s`` (n,) their middles, ``length_s`` (n,)
-    how long each was averaged, ``pose`` (n,) number of the pose; ``design`` (n, p) columns of the mean, the constant first; ``direction`` (n, k) along which k independent walks
-    are seen: ones (n, 1) for the axes of a gyro, the vertical (n, 3) for the length of specific force.
+    ``values``, ``sigma`` (axes, n) the means and their standard errors; ``time_s`` (n,) their middles, ``length_s``
+    (n,) how long each was averaged, ``pose`` (n,) number of the pose; ``design`` (n, p) columns of the mean, the
+    constant first; ``direction`` (n, k) along which k independent walks are seen: ones (n, 1) for the axes of a gyro,
+    the vertical (n, 3) for the length of specific force.
     """
 
     values: FloatArray
@@ -133,26 +135,28 @@ class ZeroProcess:
     def of(readings: ZeroReadings) -> ZeroProcess:
         """The process with relative sizes of the axes and the noise of the means as the readings show them."""
         process = ZeroProcess(readings, np.ones(len(readings.values)))
-        if process.halves_contradict():
+        contradicted = process.halves_contradict()
+        if contradicted:
             columns = list(range(readings.design.shape[1]))
-            tried = [replace(process, noise_factor=f) for f in NOISE_FACTORS]
-            tops = [float(p.grid.log_likelihood(columns, restricted=True).sum(axis=0).max()) for p in tried]
+            factors = (1.0, *(f for f in NOISE_FACTORS if (f - 1.0) * contradicted > 0.0))
+            tried = [replace(process, noise_factor=f) for f in factors]
+            tops = [p.maximum((SCATTER, WALK, DRIFT), columns, restricted=True)[0] for p in tried]
             k = int(np.argmax(tops))
             # A walk within poses makes halves differ too: the noise is blamed where that is clearly likelier (1e-3).
-            if 2.0 * (tops[k] - tops[NOISE_FACTORS.index(1.0)]) > 10.8:
+            if 2.0 * (tops[k] - tops[0]) > 10.8:
                 process = tried[k]
         return process._with_axis_factors()
 
-    def halves_contradict(self) -> bool:
-        """Whether the two halves of a pose differ by more, or less, than their stated errors (two-sided, 1e-3)."""
+    def halves_contradict(self) -> int:
+        """1 or -1 where the two halves of poses differ by more, or less, than their stated errors (two-sided, 1e-3)."""
         r = self.readings
         pair = np.flatnonzero(np.diff(r.pose) == 0)
         away = (r.values[:, pair + 1] - r.values[:, pair]) ** 2 / (r.sigma[:, pair + 1] ** 2 + r.sigma[:, pair] ** 2)
         dof = float(away.size)
         if dof < 1.0:
-            return False
+            return 0
         p = _core.chi_square_above(float(away.sum()), dof)
-        return bool(min(p, 1.0 - p) < 0.5e-3)
+        return int(p < 0.5e-3) - int(1.0 - p < 0.5e-3)
 
     def _with_axis_factors(self) -> ZeroProcess:
         """Sizes of the axes relative to each other, where equal ones are plainly refuted.
