@@ -430,11 +430,8 @@ pub trait Descent {
     ///
     /// # Errors
     /// When the model cannot be evaluated there at all.
-    fn linearise(
-        &self,
-        point: &Self::Point,
-        previous: Option<&Self::Local>,
-    ) -> Result<Self::Local>;
+    fn linearise(&self, point: &Self::Point, previous: Option<&Self::Local>)
+    -> Result<Self::Local>;
 
     /// F of GN1; infinite where the model does not hold, which the solver treats as a wall.
     ///

@@ -190,10 +190,7 @@ impl StepWeights {
     }
 
     /// Both moments of a signal.
-    pub fn moments(
-        &self,
-        signal: impl Fn(usize) -> Vector3<f64>,
-    ) -> (Vector3<f64>, Vector3<f64>) {
+    pub fn moments(&self, signal: impl Fn(usize) -> Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         let (mut zeroth, mut first) = (Vector3::zeros(), Vector3::zeros());
         for j in 0..4 {
             if self.zeroth[j] != 0.0 || self.first[j] != 0.0 {
