@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trihedron.diagnose.session.observations import observe, spread_stamps
+from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.diagnose.session.twin import NO_DISTORTION
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
+from trihedron.records.recording import spread_stamps
 from trihedron.segment import segment_recording
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.named import _of
@@ -75,7 +76,7 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
 
 def test_samples_that_share_a_stamp_are_spread_to_the_next():
     stamps = np.array([0.0, 0.01, 0.02, 0.02, 0.02, 0.05, 0.06, 0.06])
-    spread = spread_stamps(stamps)
+    spread = spread_stamps(stamps, 0.01)
     np.testing.assert_allclose(spread, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.065], atol=1e-12)
 
 

@@ -48,6 +48,8 @@ class Effect(ABC):
     repeatable: ClassVar[bool] = False
     """Whether it may be accepted more than once (another pose, another line)."""
 
+    is_of_session: ClassVar[bool] = False
+    """Whether it belongs to one experiment (a pushed pose, a tilted table) and to no instrument."""
     is_local: ClassVar[bool] = False
     """Whether it concerns one pose or move only: its gain may then come from one block of held-out data."""
 

@@ -144,6 +144,7 @@ class DisturbedPose(DirectEffect):
     """A bump seen inside the hold, or one pose with an acceleration of its own."""
 
     id = "disturbed-pose"
+    is_of_session = True
     mechanism = "one pose was not still or was pushed"
     experiment = "repeat that pose"
     repeatable = True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -67,22 +67,6 @@ class Observations:
         return len(self.move_ranges)
 
 
-def spread_stamps(time_s: FloatArray) -> FloatArray:
-    """(n,) stamps in which samples that share one are spread evenly to the next: arrival times come in bursts.
-
-    A step of no duration carries no turn and has no derivative; what shares a stamp was taken after it, in order.
-    """
-    if len(time_s) < 2 or (np.diff(time_s) > 0.0).all():
-        return time_s
-    first = np.flatnonzero(np.concatenate([[True], np.diff(time_s) > 0.0]))
-    count = np.diff(np.append(first, len(time_s)))
-    usual = float(np.median(np.diff(time_s[first]))) if len(first) > 1 else 1.0
-    until = np.append(np.diff(time_s[first]), usual)
-    place = np.arange(len(time_s)) - np.repeat(first, count)
-    out: FloatArray = np.repeat(time_s[first], count) + np.repeat(until / count, count) * place
-    return out
-
-
 def observe(recording: Recording, segments: Segments) -> Observations:
     """Arrange a segmented recording for the twin.
 
@@ -91,7 +75,7 @@ def observe(recording: Recording, segments: Segments) -> Observations:
     ValueError
         When the recording has no accelerometer or fewer than two still poses: there is nothing to hold a twin against.
     """
-    recording = replace(recording, time_s=spread_stamps(recording.time_s))
+    recording = recording.with_distinct_stamps()
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise ValueError("a diagnosis needs accelerometer readings: this recording has none")
     if segments.n_holds < 2:
