@@ -188,27 +188,13 @@ impl SessionModel {
         rate_effect: Option<Array3<'_>>,
         is_tuned: bool,
     ) -> PyResult<SessionFit> {
-        let h = self.session.n_poses();
-        let state = State {
-            force_scale: matrix3("force_scale", &force_scale)?,
-            force_bias: vector3("force_bias", &force_bias)?,
-            rate_scale: matrix3("rate_scale", &rate_scale)?,
-            up: rows3("up", &up)?,
-            rate_zero: rows3("rate_zero", &rate_zero)?,
-            force_zero: rows3("force_zero", &force_zero)?,
-            own: [vec![Vector3::zeros(); h], vec![Vector3::zeros(); h]],
-            effect: DVector::from_vec(samples(&effect)),
-        };
-        if [
-            state.up.len(),
-            state.rate_zero.len(),
-            state.force_zero.len(),
-        ] != [h; 3]
-        {
-            return Err(PyValueError::new_err(format!(
-                "the state needs one vertical and one zero of each sensor for each of {h} poses"
-            )));
-        }
+        let state = self.state(
+            &force_scale,
+            &force_bias,
+            &rate_scale,
+            [&up, &rate_zero, &force_zero],
+            samples(&effect),
+        )?;
         let effects = distortion(
             force_effect.as_ref(),
             rate_effect.as_ref(),
@@ -237,6 +223,72 @@ impl SessionModel {
             session: Arc::clone(&self.session),
             fit: Arc::new(found),
         })
+    }
+
+    /// `(moves, 5)` whitened residuals of the moves at a state, nothing fitted.
+    #[pyo3(signature = (*, force_scale, force_bias, rate_scale, up, rate_zero, force_zero))]
+    #[allow(clippy::too_many_arguments)]
+    fn move_residuals<'py>(
+        &self,
+        py: Python<'py>,
+        force_scale: Array2<'py>,
+        force_bias: PyReadonlyArray1<'py, f64>,
+        rate_scale: Array2<'py>,
+        up: Array2<'py>,
+        rate_zero: Array2<'py>,
+        force_zero: Array2<'py>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let state = self.state(
+            &force_scale,
+            &force_bias,
+            &rate_scale,
+            [&up, &rate_zero, &force_zero],
+            Vec::new(),
+        )?;
+        let session = Arc::clone(&self.session);
+        let (weights, passed) = super::run(py, || session.weigh(&state, &Distortion::default()))?;
+        let flat: Vec<f64> = weights
+            .white
+            .iter()
+            .zip(&passed)
+            .flat_map(|(white, one)| (white * one.carried.residual).as_slice().to_vec())
+            .collect();
+        flat.to_pyarray(py).reshape([passed.len(), 5])
+    }
+}
+
+impl SessionModel {
+    fn state(
+        &self,
+        force_scale: &Array2<'_>,
+        force_bias: &PyReadonlyArray1<'_, f64>,
+        rate_scale: &Array2<'_>,
+        of_poses: [&Array2<'_>; 3],
+        effect: Vec<f64>,
+    ) -> PyResult<State> {
+        let h = self.session.n_poses();
+        let [up, rate_zero, force_zero] = of_poses;
+        let state = State {
+            force_scale: matrix3("force_scale", force_scale)?,
+            force_bias: vector3("force_bias", force_bias)?,
+            rate_scale: matrix3("rate_scale", rate_scale)?,
+            up: rows3("up", up)?,
+            rate_zero: rows3("rate_zero", rate_zero)?,
+            force_zero: rows3("force_zero", force_zero)?,
+            own: [vec![Vector3::zeros(); h], vec![Vector3::zeros(); h]],
+            effect: DVector::from_vec(effect),
+        };
+        if [
+            state.up.len(),
+            state.rate_zero.len(),
+            state.force_zero.len(),
+        ] != [h; 3]
+        {
+            return Err(PyValueError::new_err(format!(
+                "the state needs one vertical and one zero of each sensor for each of {h} poses"
+            )));
+        }
+        Ok(state)
     }
 }
 

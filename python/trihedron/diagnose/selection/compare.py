@@ -181,15 +181,7 @@ def _domain_chi2(fitted: Fit) -> FloatArray:
 
 def profile(fitted: Fit) -> float:
     """Marginal log-likelihood over the hidden states with the model's parameters at their optimum."""
-    from trihedron.diagnose.session.twin import N_ACCEL, N_GYRO, N_HOLD
-
-    first, last = N_ACCEL + N_GYRO, N_ACCEL + N_GYRO + N_HOLD * fitted.line.obs.n_holds
-    hidden = fitted.jacobian[:, first:last] / fitted.scale[first:last]
-    normal = hidden.T @ hidden
-    normal[np.diag_indices_from(normal)] += 1e-12
-    log_det = 2.0 * float(np.log(np.diag(np.linalg.cholesky(normal))).sum())
-    log_det += 2.0 * float(np.log(fitted.scale[first:last]).sum())
-    return -0.5 * fitted.chi2 - 0.5 * log_det + fitted.system.log_weight
+    return fitted.log_profile
 
 
 def refined(context: Context, accepted: list[Distortion], best: Refit) -> Refit:
