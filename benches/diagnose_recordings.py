@@ -14,7 +14,7 @@ from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
 from trihedron.records import Calibration
-from trihedron.segment import segment_recording
+from trihedron.segment import resegment, segment_recording
 
 
 def recordings(folder):
@@ -59,7 +59,7 @@ def main():
             )  # fmt: skip
             calibration: Calibration = calibrate_joint(recording, segments, accelerometer, gravity, "given")
             start = time.perf_counter()
-            d = diagnose_recording(recording, segments, calibration)
+            d = diagnose_recording(recording, resegment(recording, segments), calibration)
         except ValueError as error:
             print(f"\n{name}: {error}")
             continue

@@ -7,7 +7,7 @@ from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.effects import catalogue
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
-from trihedron.segment import segment_recording
+from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.named import _of
@@ -27,7 +27,7 @@ def diagnosed(effect_id=None, seed=1, grade="mpu", **size):
         raw_unit=recording.accelerometer_unit,
     )
     calibration = calibrate_joint(recording, segments, accelerometer, truth.gravity_m_s2, "simulated")
-    return diagnose_recording(recording, segments, calibration)
+    return diagnose_recording(recording, resegment(recording, segments), calibration)
 
 
 @pytest.mark.parametrize("grade", ["mpu", "adis", "tactical"])

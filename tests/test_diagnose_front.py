@@ -301,3 +301,19 @@ def test_a_simulated_effect_comes_back_from_its_diagnosis_with_its_sign(effect_i
     assert done == (effect_id,)
     # A mapping with a wrong sign or axis is off by the size itself.
     assert np.allclose(effects_of(made)[effect_id][key], size, rtol=0.1, atol=0.01 * np.max(np.abs(size)))
+
+
+def test_a_diagnosis_of_the_first_schema_is_still_read(said, tmp_path):
+    from trihedron.files.diagnosis import read_diagnosis
+
+    document = json.loads(json.dumps(said[1]))
+    document["schema_version"] = 1
+    document["noise"] = document.pop("noise_model")
+    for key in ("parameters", "laws", "stages"):
+        del document[key]
+    for effect in document["effects"]:
+        del effect["in"], effect["share"]
+    (tmp_path / "old.json").write_text(json.dumps(document))
+    again = read_diagnosis(tmp_path / "old.json")
+    assert again["effects"][0]["id"] == said[1]["effects"][0]["id"]
+    assert again["schema_version"] == 2

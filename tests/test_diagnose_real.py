@@ -8,12 +8,12 @@ import pytest
 
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.effects.stamp_errors import stamp_errors
-from trihedron.diagnose.observations import observe
-from trihedron.diagnose.unresolved import unresolved_variance
+from trihedron.diagnose.residuals.aliasing import unresolved_variance
+from trihedron.diagnose.session.observations import observe
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
-from trihedron.segment import segment_recording
+from trihedron.segment import resegment, segment_recording
 
 
 def diagnosed(gravity: float, **arguments: object):
@@ -22,7 +22,9 @@ def diagnosed(gravity: float, **arguments: object):
     accelerometer, _ = calibrate_norm(
         segments.accelerometer_mean, segments.accelerometer_sigma_mean, gravity, raw_unit=recording.accelerometer_unit
     )
-    return diagnose_recording(recording, segments, calibrate_joint(recording, segments, accelerometer, gravity, "test"))
+    return diagnose_recording(
+        recording, resegment(recording, segments), calibrate_joint(recording, segments, accelerometer, gravity, "test")
+    )
 
 
 def test_xsens_holds_g_sensitivity_and_gravity_after_moves_gains_threefold(real_data: Path) -> None:
@@ -47,7 +49,7 @@ def test_a_session_with_wild_rotation_at_its_end_is_healthy_but_for_the_range(re
 
 def test_stamps_on_a_coarse_grid_are_not_when_the_samples_were_taken(real_data: Path) -> None:
     recording = read_recording(real_data / "kim/kim_imu_good1.txt")
-    observed = observe(recording, segment_recording(recording))
+    observed = observe(recording, resegment(recording, segment_recording(recording)))
     found = stamp_errors(observed)
     assert found is not None
     # Stamps on a grid of 5.12 ms scatter by its twelfth root, 1.48 ms; the readings do not follow them at all.

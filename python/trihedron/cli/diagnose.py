@@ -25,6 +25,10 @@ def diagnose(
         Optional[Path],  # noqa: UP045
         typer.Option("--against", metavar="SIMULATED_LOG", help="Your own simulation of the same protocol, as model."),
     ] = None,
+    updated: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--updated", metavar="FILE", help="Write the calibration that this log itself gives."),
+    ] = None,
     alpha: Annotated[
         float, typer.Option(metavar="P", help="Chance that a healthy log is called anything but consistent.")
     ] = 0.01,
@@ -38,15 +42,17 @@ def diagnose(
         raise typer.BadParameter("give either --calibration or --against: each is the model")
     if not 0.0 < alpha < 0.5:
         raise typer.BadParameter(f"--alpha is a small probability such as 0.01, not {alpha:g}")
-    check_outputs(json, force=force, report=report)
-    from trihedron.files.calibration import read_calibration
+    if updated is not None and calibration is None:
+        raise typer.BadParameter("--updated goes with --calibration OLD; without one, use trihedron calibrate")
+    check_outputs(json, updated, force=force, report=report)
+    from trihedron.files.calibration import read_calibration, write_calibration
 
     known = None if calibration is None else read_calibration(calibration)
     recording = source.read()
     from trihedron import pipeline
     from trihedron.files.diagnosis import diagnosis_document
     from trihedron.report import diagnosis_report
-    from trihedron.report.diagnosis import FIRST_SCREEN
+    from trihedron.report.diagnosis import first_screen
 
     with progress("diagnosing") as tell:
         result = pipeline.diagnose(
@@ -61,8 +67,16 @@ def diagnose(
         )
     document = diagnosis_report(result)
     machine = diagnosis_document(result)
-    show(document, json, sections=None if full else FIRST_SCREEN)
+    show(document, json, sections=None if full else first_screen(result))
     write_json(machine, json, force=force)
     write_report(document, machine, report, force=force)
+    if updated is not None:
+        if result.updated is None:
+            say(f"{updated}: not written, the poses of this log do not carry a calibration of their own.")
+        else:
+            write_calibration(result.updated, updated, overwrite=force)
+            say(f"calibration of this log: {updated}")
+    elif result.updated is not None and any(p.significant for p in result.parameters):
+        say("The calibration that this log itself gives: --updated FILE.")
     if not full and report is None:
         say("Every candidate, both models and findings: --full; pictures before and after: --report FILE.html.")

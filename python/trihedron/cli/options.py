@@ -57,7 +57,7 @@ class LogSource:
     ] = None
     gyro_unit: Annotated[
         Optional[str],  # noqa: UP045
-        typer.Option("--gyro-unit", metavar="UNIT", help="rad/s, mrad/s, deg/s or counts; detected otherwise."),
+        typer.Option("--gyro-unit", metavar="UNIT", help="rad/s, mrad/s, deg/s, mdeg/s or counts; detected otherwise."),
     ] = None
     time_unit: Annotated[
         Optional[str],  # noqa: UP045

@@ -17,8 +17,8 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
-from trihedron.diagnose.observations import FloatArray, Observations
-from trihedron.diagnose.solve import Fit
+from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.solve import Fit
 from trihedron.records import Recording
 
 N_ITERATIONS = 2

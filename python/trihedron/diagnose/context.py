@@ -10,8 +10,8 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import savgol_filter
 
-from trihedron.diagnose.observations import FloatArray, Observations
-from trihedron.diagnose.solve import Fit
+from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.solve import Fit
 
 VIBRATION_WINDOW_S = 0.25
 """Stretch over which a parabola follows the motion while vibration is measured in a move."""

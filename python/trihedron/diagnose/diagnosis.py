@@ -10,15 +10,15 @@ import numpy as np
 from scipy.special import chdtrc
 from threadpoolctl import threadpool_limits
 
-from trihedron.diagnose.agreement import ROW_DOMAINS, physical_rms, test_rows
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.growing import Found, GrowingModel
-from trihedron.diagnose.hollow import drop_hollow, settle_direct
-from trihedron.diagnose.observations import Observations, observe
-from trihedron.diagnose.pictures import residuals_before_after, with_covariance
-from trihedron.diagnose.selection import (
+from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms, test_rows
+from trihedron.diagnose.residuals.timing import test_timing
+from trihedron.diagnose.residuals.within_holds import test_within_static
+from trihedron.diagnose.selection.accepted import worded
+from trihedron.diagnose.selection.compare import (
     CONFOUNDED_DELTA_BIC,
     MAX_EFFECTS,
     MIN_DELTA_BIC,
@@ -29,12 +29,12 @@ from trihedron.diagnose.selection import (
     refit,
     score_all,
 )
-from trihedron.diagnose.solve import N_DOMAINS, Fit, Prediction, folds_of, predict_held_out, tune_noise
-from trihedron.diagnose.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
-from trihedron.diagnose.timing import test_timing
-from trihedron.diagnose.twin import NO_DISTORTION, PRIOR, Prior, Twin, stacked
-from trihedron.diagnose.within_static import test_within_static
-from trihedron.diagnose.wording import worded
+from trihedron.diagnose.selection.model import Found, GrowingModel
+from trihedron.diagnose.selection.prune import drop_hollow, settle_direct
+from trihedron.diagnose.session.observations import Observations, observe
+from trihedron.diagnose.session.solve import N_DOMAINS, Fit, Prediction, folds_of, predict_held_out, tune_noise
+from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
+from trihedron.diagnose.session.twin import NO_DISTORTION, PRIOR, Prior, Twin, stacked
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import (
     Candidate,

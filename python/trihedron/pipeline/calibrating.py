@@ -14,6 +14,7 @@ from scipy import stats
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm
 from trihedron.estimate.accelerometer.face_poses import identify
 from trihedron.estimate.gyroscope import MoveOptions, Turn, calibrate_moves, calibrate_turns
+from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import Progress, segment
@@ -96,7 +97,8 @@ def calibrate(
         options = MoveOptions(nominal_scale=gyroscope_nominal)
         calibration = _by_poses(recording, segments, gravity, source, method, wanted, axis_signs, loss, options)
     calibration = in_frame(calibration, wanted)
-    findings = (*said, *recording.findings, *segments.findings, *calibration.findings)
+    scale = [] if calibration.gyroscope is None else scale_findings(calibration.gyroscope.S, recording.gyroscope_unit)
+    findings = (*said, *recording.findings, *segments.findings, *calibration.findings, *scale)
     return CalibrationResult(replace(calibration, findings=findings), segments, recording)
 
 

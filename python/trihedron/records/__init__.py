@@ -25,7 +25,16 @@ from trihedron.records.kalman import (
     NormKalmanCalibration,
     PoseTable,
 )
-from trihedron.records.noise import AllanCurve, GaussMarkov, Noise, NoiseAxis, NoiseTerm, SpectralLine, TermName
+from trihedron.records.noise import (
+    AllanCurve,
+    GaussMarkov,
+    Noise,
+    NoiseAxis,
+    NoiseTerm,
+    SlowPair,
+    SpectralLine,
+    TermName,
+)
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Hold, Move, Segments
 from trihedron.records.truth import TrueSegment, Truth
@@ -61,6 +70,7 @@ __all__ = [
     "Segments",
     "SensorCalibration",
     "Severity",
+    "SlowPair",
     "SpectralLine",
     "TermName",
     "TrueSegment",

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 
-Verdict = Literal["consistent", "missing-physics", "unexplained"]
-Domain = Literal["static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing"]
+Verdict = Literal["consistent", "parameters-differ", "missing-physics", "unexplained", "not-testable"]
+Domain = Literal["static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing", "numbers", "noise"]
 DOMAINS: tuple[Domain, ...] = ("static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing")
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,10 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class AcceptedEffect:
-    """An effect the recording demands."""
+    """An effect the recording demands, or, with ``side`` ``model``, one that only the given model has.
+
+    ``share`` is the part of the misfit of the recording that it removes, 0 to 1; ``None`` where that was not computed.
+    """
 
     id: str
     statement: str
@@ -147,11 +150,15 @@ class AcceptedEffect:
     confounded_with: tuple[str, ...] = ()
     separating_experiment: str = ""
     model: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    share: float | None = None
+    side: Literal["recording", "model"] = "recording"
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types; ``heldout`` is the most improved domain, ``heldout_all`` every domain touched."""
         return {
             "id": self.id,
+            "in": self.side,
+            "share": self.share,
             "statement": self.statement,
             "parameters": [p.to_dict() for p in self.parameters],
             "p_adjusted": self.p_adjusted,
@@ -162,6 +169,138 @@ class AcceptedEffect:
             "separating_experiment": self.separating_experiment,
             "model": dict(self.model),
         }
+
+
+@dataclass(frozen=True)
+class ParameterDifference:
+    """One number of a given model against the value that the recording has.
+
+    ``id`` is the group (``gyro-zero``, ``accel-scale``, ...), ``name`` the component. ``difference`` is recording minus
+    model; ``p_value`` and ``significant`` are those of the group, the search over all groups paid for.
+    """
+
+    id: str
+    sensor: Literal["accelerometer", "gyroscope", "both"]
+    name: str
+    model: float
+    recording: float
+    difference: float
+    std: float
+    unit: str
+    p_value: float
+    significant: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types (the ``parameters`` entries of the schema)."""
+        return {
+            "id": self.id,
+            "sensor": self.sensor,
+            "name": self.name,
+            "model": self.model,
+            "recording": self.recording,
+            "difference": self.difference,
+            "std": self.std,
+            "unit": self.unit,
+            "p_value": self.p_value,
+            "significant": self.significant,
+        }
+
+
+NoiseTerm = Literal[
+    "N", "B", "K", "Q", "bandwidth", "line", "resolution", "range", "rate", "jitter", "octave", "distribution"
+]
+
+
+@dataclass(frozen=True)
+class NoiseDifference:
+    """One figure of noise or sampling of a given model against the recording's.
+
+    ``ratio`` is model over recording with its 95 % ``interval``; ``axis`` is empty for what all axes share; ``remark``
+    says in words what the number resembles (a density scaled by the rate twice).
+    """
+
+    sensor: Literal["accelerometer", "gyroscope", "both"]
+    axis: str
+    term: NoiseTerm
+    model: float | None
+    recording: float | None
+    ratio: float | None
+    interval: tuple[float, float] | None
+    unit: str
+    p_value: float | None
+    significant: bool
+    remark: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types (the ``noise`` entries of the schema)."""
+        return {
+            "sensor": self.sensor,
+            "axis": self.axis,
+            "term": self.term,
+            "model": self.model,
+            "recording": self.recording,
+            "ratio": self.ratio,
+            "interval": None if self.interval is None else list(self.interval),
+            "unit": self.unit,
+            "p_value": self.p_value,
+            "significant": self.significant,
+            "remark": self.remark,
+        }
+
+
+@dataclass(frozen=True)
+class Law:
+    """What a misfit without a known mechanism depends on, by which law, and how much of it that law predicts."""
+
+    sensor: Literal["accelerometer", "gyroscope"]
+    depends_on: tuple[str, ...]
+    form: str
+    coefficients: tuple[EffectParameter, ...]
+    share: float
+    held_out: HeldOut | None
+    resembles: tuple[str, ...] = ()
+    experiment: str = ""
+    statement: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types (the ``laws`` entries of the schema)."""
+        return {
+            "sensor": self.sensor,
+            "depends_on": list(self.depends_on),
+            "form": self.form,
+            "coefficients": [c.to_dict() for c in self.coefficients],
+            "share": self.share,
+            "heldout": None if self.held_out is None else self.held_out.to_dict(),
+            "resembles": list(self.resembles),
+            "experiment": self.experiment,
+            "statement": self.statement,
+        }
+
+
+@dataclass(frozen=True)
+class StageDomain:
+    """One domain at one stage, on poses and moves that the stage's fit did not see."""
+
+    domain: Domain
+    rms: float
+    chi2_per_dof: float | None
+    unit: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        return {"domain": self.domain, "rms": self.rms, "chi2_per_dof": self.chi2_per_dof, "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Stage:
+    """How well the recording is predicted: as given, with numbers, noise, effects re-estimated one after the other."""
+
+    stage: Literal["as-given", "numbers", "noise", "effects"]
+    domains: tuple[StageDomain, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types (the ``stages`` entries of the schema)."""
+        return {"stage": self.stage, "domains": [d.to_dict() for d in self.domains]}
 
 
 @dataclass(frozen=True)
@@ -200,7 +339,7 @@ class LinearModel:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What came out when the digital twin was held against the recording (schema version 1)."""
+    """What came out when the digital twin was held against the recording (schema version 2)."""
 
     verdict: Verdict
     domains: tuple[DomainTest, ...]
@@ -216,6 +355,10 @@ class Diagnosis:
     recording_sha256: str = ""
     references: MappingProxyType[str, float] = field(default_factory=lambda: MappingProxyType({}))
     residuals: tuple[DomainResiduals, ...] = ()
+    parameters: tuple[ParameterDifference, ...] = ()
+    noise_compared: tuple[NoiseDifference, ...] = ()
+    laws: tuple[Law, ...] = ()
+    stages: tuple[Stage, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types, valid against the published schema."""
@@ -227,7 +370,11 @@ class Diagnosis:
             "remaining": [d.to_dict() for d in self.remaining],
             "candidates": [c.to_dict() for c in self.candidates],
             "calibration": {"baseline": self.baseline.to_dict(), "extended": self.extended.to_dict()},
-            "noise": dict(self.noise),
+            "parameters": [p.to_dict() for p in self.parameters],
+            "noise": [n.to_dict() for n in self.noise_compared],
+            "noise_model": dict(self.noise),
+            "laws": [law.to_dict() for law in self.laws],
+            "stages": [stage.to_dict() for stage in self.stages],
             "gravity_m_s2": self.gravity_m_s2,
             "alpha": self.alpha,
             "recording": {"source": self.recording_source, "sha256": self.recording_sha256},

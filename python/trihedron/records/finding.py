@@ -40,6 +40,10 @@ class FindingCode(str, Enum):
     COLUMNS_ASSUMED = "columns-assumed"
     COLUMN_LEFT_OUT = "column-left-out"
     LINE_INCOMPLETE = "line-incomplete"
+    ROWS_LEFT_OUT = "rows-left-out"
+    ROWS_UNACCOUNTED = "rows-unaccounted"
+    DEVICE_CHOSEN = "device-chosen"
+    RAW_STEP = "raw-step"
     UNIT_DETECTED = "unit-detected"
     UNIT_CONTRADICTED = "unit-contradicted"
     RATE_STATED = "rate-stated"
@@ -92,6 +96,7 @@ class FindingCode(str, Enum):
     SPECTRUM_UNEXPLAINED = "spectrum-unexplained"
     CURVE_ALONE = "curve-alone"
     RAMP_OR_WALK = "ramp-or-walk"
+    SLOW_NOISE_UNRESOLVED = "slow-noise-unresolved"
     QUANTISATION_DEAD = "quantisation-dead"
     STRETCHES_EXCLUDED = "stretches-excluded"
     # kalman

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -27,6 +27,34 @@ def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) ->
     return out
 
 
+def spread_stamps(time_s: FloatArray, step_s: float) -> FloatArray:
+    """Strictly increasing stamps (n,) from non-decreasing ones: those that are shared, spread evenly to one side.
+
+    Samples that were stamped when they arrived together have a long step before their stamp and were taken in it;
+    stamps that were cut off to few digits, or repeated, have it behind. The side with more room in the log as a whole
+    is taken; no two samples are put further apart than a sampling step.
+    """
+    if np.all(np.diff(time_s) > 0):
+        return time_s
+    first = np.flatnonzero(np.diff(time_s, prepend=-np.inf) > 0)
+    size = np.diff(first, append=len(time_s))
+    stamp = time_s[first]
+    before = np.diff(stamp, prepend=stamp[0] - step_s * size[0])
+    after = np.diff(stamp, append=stamp[-1] + step_s * size[-1])
+    shared = size > 1
+    inner = shared & (np.arange(len(size)) > 0) & (np.arange(len(size)) < len(size) - 1)
+    is_before = before[inner].sum() >= after[inner].sum()
+    apart = np.minimum((before if is_before else after) / size, step_s)
+    within = np.arange(len(time_s)) - np.repeat(first, size)
+    place = within - (np.repeat(size, size) - 1 if is_before else 0)
+    out = np.repeat(stamp, size) + place * np.repeat(apart, size)
+    out = np.asarray(out - out[0], dtype=np.float64)
+    # Stamps a rounding apart leave no room for what they share: the smallest number apart will do.
+    for k in np.flatnonzero(np.diff(out) <= 0):
+        out[k + 1] = np.nextafter(out[k], np.inf)
+    return out
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Raw readings on a common time base.
@@ -48,6 +76,9 @@ class Recording:
         The audit of the log.
     auxiliary : mapping of name to (n,) array
         Every other numeric column, untouched.
+    rows_in_file, rows_read : int
+        Rows that the file (or both files) holds, and those that became readings; the others are in findings, so that
+        ``rows_in_file == rows_read + rows_reported``. Zero where no file was read.
 
     Raises
     ------
@@ -68,6 +99,8 @@ class Recording:
     sha256: str = ""
     findings: tuple[Finding, ...] = ()
     auxiliary: MappingProxyType[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
+    rows_in_file: int = 0
+    rows_read: int = 0
 
     def __post_init__(self) -> None:
         time_s = _readonly(self.time_s, "time_s", (None,))
@@ -92,10 +125,20 @@ class Recording:
         object.__setattr__(self, "accelerometer_unit", AccelerationUnit(self.accelerometer_unit))
         object.__setattr__(self, "gyroscope_unit", RateUnit(self.gyroscope_unit))
 
+    def with_distinct_stamps(self) -> Recording:
+        """This recording with no two samples at one instant: stamps that are shared, spread (:func:`spread_stamps`)."""
+        distinct = spread_stamps(self.time_s, 1.0 / self.rate_hz)
+        return self if distinct is self.time_s else replace(self, time_s=distinct)
+
     @property
     def n_samples(self) -> int:
         """Number of rows."""
         return len(self.time_s)
+
+    @property
+    def rows_reported(self) -> int:
+        """Rows of the file that findings say are not among the readings."""
+        return round(sum(finding.numbers.get("rows_left_out", 0.0) for finding in self.findings))
 
     @property
     def duration_s(self) -> float:

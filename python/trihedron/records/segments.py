@@ -66,7 +66,8 @@ class Segments:
     the holds; ``accelerometer_mean`` / ``gyroscope_mean`` (n_holds, 3) the mean raw reading of each hold, with
     ``accelerometer_sigma_mean`` / ``gyroscope_sigma_mean`` (n_holds, 3) the standard error of each mean (not assuming
     whiteness: slow noise inside a hold raises it). ``n_averaged`` (n_holds,) counts the samples behind each mean,
-    ``time_mid_s`` (n_holds,) and ``duration_s`` (n_holds,) say when and how long.
+    ``time_mid_s`` (n_holds,) and ``duration_s`` (n_holds,) say when and how long. ``whole`` are the poses before they
+    were cut at bumps, each averaged over all of its samples; ``None`` where nothing was cut.
     """
 
     holds: tuple[Hold, ...]
@@ -81,6 +82,7 @@ class Segments:
     time_mid_s: FloatArray
     duration_s: FloatArray
     findings: tuple[Finding, ...] = ()
+    whole: Segments | None = None
 
     def __post_init__(self) -> None:
         n = len(self.holds)

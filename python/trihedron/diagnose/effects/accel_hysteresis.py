@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
-from trihedron.diagnose.observations import FloatArray
+from trihedron.diagnose.session.observations import FloatArray
 
 PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
 CREEP_TIMES_S = (5.0, 20.0, 60.0)

@@ -12,8 +12,8 @@ from typing import ClassVar
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.observations import FloatArray
-from trihedron.diagnose.twin import Distortion
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.twin import Distortion
 from trihedron.records.diagnosis import EffectParameter
 
 AXES = ("x", "y", "z")
@@ -48,6 +48,8 @@ class Effect(ABC):
     repeatable: ClassVar[bool] = False
     """Whether it may be accepted more than once (another pose, another line)."""
 
+    is_of_session: ClassVar[bool] = False
+    """Whether it belongs to one experiment (a pushed pose, a tilted table) and to no instrument."""
     is_local: ClassVar[bool] = False
     """Whether it concerns one pose or move only: its gain may then come from one block of held-out data."""
 

@@ -7,9 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+import numpy.typing as npt
+
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
-from trihedron.diagnose.observations import Observations
+from trihedron.diagnose.session.observations import Observations
 from trihedron.records.diagnosis import Domain, EffectParameter, HeldOut, Where
 
 NOWHERE = Where()
@@ -51,3 +54,11 @@ class DirectEffect(Effect):
     def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
         """Direct effects do not compete in the score test."""
         return []
+
+
+def without_moves(
+    ranges: tuple[tuple[int, int], ...], holds: npt.NDArray[np.intp], bad: set[int]
+) -> tuple[tuple[tuple[int, int], ...], npt.NDArray[np.intp]]:
+    """Move ranges and their holds without some of them."""
+    keep = [m for m in range(len(ranges)) if m not in bad]
+    return tuple(ranges[m] for m in keep), holds[keep]

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.diagnose.agreement import ROW_DOMAINS, physical_rms
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.observations import Observations, observe
-from trihedron.diagnose.solve import fit, folds_of, leverage, predict_held_out
-from trihedron.diagnose.twin import NO_DISTORTION, STATIC_ACCEL
-from trihedron.diagnose.within_static import hold_scatter
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
+from trihedron.diagnose.residuals.within_holds import hold_scatter
+from trihedron.diagnose.session.observations import Observations, observe
+from trihedron.diagnose.session.solve import fit, folds_of, leverage, predict_held_out
+from trihedron.diagnose.session.twin import NO_DISTORTION, STATIC_ACCEL
 from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
 
 MOST = 0.25
@@ -70,7 +70,7 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
     obs, twin = context.obs, context.fitted.twin
     if len(twin.effect):
         return ()
-    whole = observe(obs.recording, obs.whole, cuts_bumps=False)
+    whole = observe(obs.recording, obs.whole)
     force = whole.hold_force @ twin.accel_S.T + twin.accel_b
     n = whole.n_holds
     start = replace(
@@ -144,6 +144,7 @@ class DisturbedPose(DirectEffect):
     """A bump seen inside the hold, or one pose with an acceleration of its own."""
 
     id = "disturbed-pose"
+    is_of_session = True
     mechanism = "one pose was not still or was pushed"
     experiment = "repeat that pose"
     repeatable = True

@@ -8,8 +8,8 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, per_axis
-from trihedron.diagnose.observations import FloatArray
-from trihedron.diagnose.twin import Distortion
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.twin import Distortion
 
 WARM_UP_FRACTIONS = (0.04, 0.1, 0.25, 0.6)
 """Time constants tried, as fractions of the recording: faster is over before the first moves, slower is a line."""

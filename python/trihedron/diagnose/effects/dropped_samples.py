@@ -8,12 +8,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
+from trihedron.diagnose.effects.insertion import bridge, insert_samples
 from trihedron.diagnose.effects.sample_steps import MAX_LOST, Loss, find_losses
-from trihedron.diagnose.observations import Observations, observe
-from trihedron.diagnose.repair import bridge, insert_samples, without_moves
-from trihedron.diagnose.solve import fit
-from trihedron.diagnose.twin import NO_DISTORTION, Linearisation, Twin
+from trihedron.diagnose.session.observations import Observations, observe
+from trihedron.diagnose.session.solve import fit
+from trihedron.diagnose.session.twin import NO_DISTORTION, Linearisation, Twin
 from trihedron.records.diagnosis import EffectParameter, Where
 
 CLEAR_COUNT = 3.0
@@ -95,6 +95,7 @@ class DroppedSamples(DirectEffect):
     """Both sensors jump at once by the same whole number of samples; put back, the motion is smooth again."""
 
     id = "dropped-samples"
+    is_of_session = True
     mechanism = "samples are missing though the time stamps run on evenly"
     experiment = "log the sensor's own sample counter"
 

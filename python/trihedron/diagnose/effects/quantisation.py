@@ -9,8 +9,8 @@ from scipy.special import ndtr
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.observations import FloatArray, Observations
-from trihedron.diagnose.within_static import CHANNELS
+from trihedron.diagnose.residuals.within_holds import CHANNELS
+from trihedron.diagnose.session.observations import FloatArray, Observations
 from trihedron.records.diagnosis import EffectParameter, Where
 
 COARSE = 0.45

@@ -11,7 +11,7 @@ from scipy.ndimage import percentile_filter
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.saturation import plateaus
-from trihedron.diagnose.observations import FloatArray, Observations
+from trihedron.diagnose.session.observations import FloatArray, Observations
 
 HALF_WINDOW = 6
 """Samples on either side from which the local motion is learnt."""

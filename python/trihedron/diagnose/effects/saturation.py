@@ -11,10 +11,9 @@ from scipy.special import chdtrc
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.observations import FloatArray, Observations
-from trihedron.diagnose.repair import without_moves
-from trihedron.diagnose.twin import DYNAMICS, MOVES
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
+from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.twin import DYNAMICS, MOVES
 from trihedron.records.diagnosis import EffectParameter, Where
 
 BAND_SIGMA = 4.0

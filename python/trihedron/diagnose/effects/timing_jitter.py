@@ -11,7 +11,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.sample_steps import StepErrors, step_errors
 from trihedron.diagnose.effects.stamp_errors import CLEAR, stamp_errors
-from trihedron.diagnose.observations import Observations, observe
+from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.records.diagnosis import EffectParameter
 
 STEP_FACTOR = 5.0
@@ -65,7 +65,7 @@ class TimingJitter(DirectEffect):
         def reweigh(obs: Observations) -> Observations:
             if len(even) != len(obs.time_s):
                 return obs  # samples were put in since
-            again = observe(replace(obs.recording, time_s=even), obs.whole)
+            again = observe(replace(obs.recording, time_s=even), obs.segments)
             return replace(
                 again,
                 move_ranges=obs.move_ranges,

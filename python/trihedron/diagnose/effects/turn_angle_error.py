@@ -8,7 +8,7 @@ from scipy.special import chdtrc
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.table_turns import NEAR_DEG, TableTurn, meant_as_multiples, table_turns
-from trihedron.diagnose.observations import FloatArray
+from trihedron.diagnose.session.observations import FloatArray
 from trihedron.records.diagnosis import EffectParameter, Where
 
 
@@ -16,6 +16,7 @@ class TurnAngleError(DirectEffect):
     """Table turns against a wall miss their multiple of 90° by more than the gyro's own error."""
 
     id = "turn-angle-error"
+    is_of_session = True
     mechanism = "a turn meant to be a multiple of 90° was not"
     experiment = "repeat the turns against a stop; turn back by the same angle"
 

@@ -1,0 +1,1 @@
+"""Where model and recording differ: one test per domain, and what carries the disagreement."""

@@ -1,0 +1,103 @@
+"""What a diagnosis shows: residuals of every pose and move before and after, and the covariance of the linear model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.solve import Fit
+from trihedron.diagnose.session.twin import _LOWER, N_ACCEL, N_GYRO, N_HOLD
+from trihedron.records.diagnosis import DomainResiduals, LinearModel
+
+_ROWS: tuple[tuple[str, str, str, str, tuple[str, ...]], ...] = (
+    ("static-accel", "|f| − |g| at rest", "m/s^2", "hold", ("norm",)),
+    ("static-gyro", "rate at rest, minus its mean", "rad/s", "hold", ("gx", "gy", "gz")),
+    ("moves", "gravity missed after the move", "deg", "move", ("angle",)),
+    ("dynamics", "velocity over the move", "m/s", "move", ("vx", "vy", "vz")),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """One domain of one fit: ``value`` (n, k) and predicted noise ``sigma`` (n,) at ``time_s`` (n,)."""
+
+    time_s: FloatArray
+    value: FloatArray
+    sigma: FloatArray
+
+
+def residuals_before_after(before: Fit, after: Fit) -> tuple[DomainResiduals, ...]:
+    """Both fits' residuals in physical units, for the domains that the recording has.
+
+    At rest slow bias walk is *not* taken off: the numbers are those that S, b and the effects alone leave.
+    """
+    a, b = _shown(before), _shown(after)
+    out = []
+    for domain, quantity, unit, kind, channels in _ROWS:
+        if domain in a and domain in b:
+            x, y = a[domain], b[domain]
+            out.append(
+                DomainResiduals(
+                    domain, quantity, unit, kind, channels,  # type: ignore[arg-type]
+                    x.time_s, x.value, x.sigma, y.time_s, y.value, y.sigma,
+                )
+            )  # fmt: skip
+    return tuple(out)
+
+
+def _shown(fitted: Fit) -> dict[str, _Shown]:
+    line, twin, obs = fitted.line, fitted.twin, fitted.line.obs
+    h = obs.n_holds
+    out: dict[str, _Shown] = {}
+    force = obs.hold_force @ twin.accel_S.T + twin.accel_b
+    if line.distortion.force is not None:
+        force = force - line.distortion.force[:h] @ twin.effect
+    size = np.linalg.norm(force, axis=1)
+    along = (force / size[:, None]) @ twin.accel_S
+    sigma = np.sqrt(((along * obs.hold_force_sigma) ** 2).sum(axis=1))
+    out["static-accel"] = _Shown(obs.hold_time_s, (size - twin.gravity)[:, None], sigma)
+    if obs.hold_rate is not None and obs.hold_rate_sigma is not None:
+        rate = obs.hold_rate @ twin.gyro_S.T
+        if line.distortion.rate is not None:
+            rate = rate - line.distortion.rate[:h] @ twin.effect
+        spread = np.sqrt((obs.hold_rate_sigma**2 @ (twin.gyro_S**2).T).mean(axis=1))
+        out["static-gyro"] = _Shown(obs.hold_time_s, rate - rate.mean(axis=0), spread)
+    if obs.n_moves:
+        noise = []
+        for move in line._moves:
+            root = np.linalg.inv(move["white"])
+            noise.append(np.diag(root @ root.T))
+        variance = np.array(noise)
+        residual = np.array([move["residual"] for move in line._moves])
+        middle = np.array([0.5 * (obs.time_s[a] + obs.time_s[b - 1]) for a, b in obs.move_ranges])
+        angle = np.degrees(np.hypot(residual[:, 0], residual[:, 1]) / twin.gravity)
+        expected = np.degrees(np.sqrt(variance[:, :2].sum(axis=1)) / twin.gravity)
+        out["moves"] = _Shown(middle, angle[:, None], expected)
+        out["dynamics"] = _Shown(middle, residual[:, 2:], np.sqrt(variance[:, 2:].mean(axis=1)))
+    return out
+
+
+def with_covariance(model: LinearModel, fitted: Fit) -> LinearModel:
+    """The linear model with the full covariance of its numbers, in the order of a calibration file.
+
+    ``cov = T C Tᵀ``: T takes the fit's unknowns on centred readings to S row by row and b on raw ones.
+    """
+    obs = fitted.line.obs
+    C = fitted.covariance()
+    h = obs.n_holds
+    T = np.zeros((24, len(C)))
+    for k, (i, j) in enumerate(_LOWER):
+        T[3 * i + j, k] = 1.0
+        T[9 + i, k] -= obs.force_origin[j]
+    T[9:12, 6:9] = np.eye(3)
+    if model.gyroscope is None:
+        return replace(model, covariance=T[:12] @ C @ T[:12].T)
+    T[12:21, N_ACCEL : N_ACCEL + N_GYRO] = np.eye(9)
+    T[21:24, N_ACCEL : N_ACCEL + N_GYRO] = -np.kron(np.eye(3), obs.rate_origin[None])
+    for hold in range(h):
+        first = N_ACCEL + N_GYRO + N_HOLD * hold + 2
+        T[21:24, first : first + 3] = -np.eye(3) / h
+    covariance = T @ C @ T.T
+    return replace(model, covariance=0.5 * (covariance + covariance.T))

@@ -1,0 +1,102 @@
+"""Does a domain agree with its predicted noise, and where does it not?"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import fdtrc
+
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.solve import Fit, leverage
+from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
+from trihedron.records.diagnosis import Domain, DomainTest, Where
+
+ROW_DOMAINS: dict[int, Domain] = {
+    STATIC_ACCEL: "static-accel",
+    STATIC_GYRO: "static-gyro",
+    MOVES: "moves",
+    DYNAMICS: "dynamics",
+}
+NOISE_DOF = 100.0
+"""The predicted noise is itself measured in the recording: to about 7 %, as 100 degrees of freedom give."""
+
+_CHANNELS = {
+    STATIC_ACCEL: ("ax", "ay", "az"),
+    STATIC_GYRO: ("gx", "gy", "gz"),
+    MOVES: ("gx", "gy", "gz"),
+    DYNAMICS: ("ax", "ay", "az"),
+}
+
+
+def test_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
+    """Chi-square of every row domain against its degrees of freedom (eq. 8.9).
+
+    ``alpha`` is the chance that a healthy recording disagrees in any domain; it is shared by six domains.
+    """
+    used = leverage(fitted)
+    physical, rms_unit = physical_rms(fitted)
+    tests = []
+    for label, name in ROW_DOMAINS.items():
+        rows = fitted.system.domain == label
+        dof = float((1.0 - used[rows]).sum())
+        if dof < 0.5:
+            continue
+        # A widened domain is judged by the noise it was predicted to have.
+        widened = {MOVES: fitted.line.obs.moves_inflation, DYNAMICS: fitted.line.obs.dynamics_inflation}.get(label, 1.0)
+        chi2 = float((fitted.system.residual[rows] ** 2).sum()) * widened**2
+        p = float(fdtrc(dof, NOISE_DOF, chi2 / dof))
+        disagrees = p < alpha / 6.0
+        where = locate(fitted, label) if disagrees else Where()
+        tests.append(
+            DomainTest(name, chi2 / dof, dof, p, disagrees, where, physical.get(label, 0.0), rms_unit.get(label, ""))
+        )
+    return tuple(tests)
+
+
+def locate(fitted: Fit, label: int, n_most: int = 5) -> Where:
+    """The channels and segments that carry a domain's misfit."""
+    system, obs = fitted.system, fitted.line.obs
+    rows = np.flatnonzero((system.domain == label) & (system.walk == 0))
+    squared = system.residual[rows] ** 2
+    segments = system.segment[rows]
+    per_segment = {int(s): float(squared[segments == s].sum()) for s in np.unique(segments)}
+    heavy = [s for s, v in sorted(per_segment.items(), key=lambda item: -item[1]) if v > 9.0][:n_most]
+    per_channel = np.array([squared[system.channel[rows] == c].sum() for c in range(3)])
+    names = _CHANNELS[label]
+    channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] > 0.2 * per_channel.sum())
+    is_hold = label in (STATIC_ACCEL, STATIC_GYRO)
+    t = obs.time_s
+    spans = []
+    for s in heavy:
+        first, last = (obs.segments.holds[s].start, obs.segments.holds[s].stop) if is_hold else obs.move_ranges[s]
+        spans.append((float(t[first]), float(t[last - 1])))
+    kind = "hold" if is_hold else "move"
+    return Where(channels, tuple(f"{kind} {s}" for s in heavy), tuple(spans))
+
+
+def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[dict[int, float], dict[int, str]]:
+    """Rms of each row domain in physical units: norm error of poses, rate at rest, degrees after moves, velocity.
+
+    ``rows_residual`` replaces the fit's own whitened residuals, e.g. by held-out ones.
+    """
+    line, system = fitted.line, fitted.system
+    r = system.residual if rows_residual is None else rows_residual
+    out: dict[int, float] = {}
+    h = line.obs.n_holds
+    direct = system.walk == 0
+    rows = np.flatnonzero((system.domain == STATIC_ACCEL) & direct)
+    error = np.linalg.solve(line._accel_white, r[rows].reshape(h, 3, 1))[:, :, 0]
+    out[STATIC_ACCEL] = float(np.sqrt(np.mean(np.einsum("ni,ni->n", error, line.twin.up) ** 2)))
+    if line._gyro_white is not None:
+        rows = np.flatnonzero((system.domain == STATIC_GYRO) & direct)
+        error = np.linalg.solve(line._gyro_white, r[rows].reshape(h, 3, 1))[:, :, 0]
+        out[STATIC_GYRO] = float(np.sqrt(np.mean(error**2)))
+    angle, speed = [], []
+    for m in range(line.obs.n_moves):
+        rows = np.flatnonzero(np.isin(system.domain, (MOVES, DYNAMICS)) & (system.segment == m) & direct)
+        error = np.linalg.solve(line._moves[m]["white"], r[rows])
+        angle.append(float((error[:2] ** 2).sum()) / line.twin.gravity**2)
+        speed.append(float((error[2:] ** 2).mean()))
+    if angle:
+        out[MOVES] = float(np.degrees(np.sqrt(np.mean(angle))))
+        out[DYNAMICS] = float(np.sqrt(np.mean(speed)))
+    return out, {STATIC_ACCEL: "m/s^2", STATIC_GYRO: "rad/s", MOVES: "deg", DYNAMICS: "m/s"}

@@ -1,0 +1,230 @@
+"""Inside the still poses: lines in the spectrum, poses noisier than the others, drift, resolution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import median_filter
+from scipy.special import chdtrc, gammaincc
+
+from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.records.diagnosis import DomainTest, Where
+
+CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
+
+
+MIN_LINE_SHARE = 0.01
+"""Long holds resolve lines far below the noise; a hundredth of its variance changes nothing that the model says."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A spectral line of one channel; powers are relative to the noise around it, amplitude in raw units."""
+
+    channel: str
+    axis: int
+    frequency_hz: float
+    frequency_sigma_hz: float
+    resolution_hz: float
+    amplitude: float
+    amplitude_sigma: float
+    p_value: float
+    power_before: float
+    power_after: float
+    rms_before: float
+    rms_after: float
+
+    @property
+    def share(self) -> float:
+        """Variance of the line over that of the readings at rest."""
+        return 0.5 * self.amplitude**2 / max(self.rms_before, 1e-300) ** 2
+
+
+def hold_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
+    """``(first sample, (n, 6 or 3) raw readings minus their hold mean)`` of every hold."""
+    x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
+    out = []
+    # A line is looked for where the place is quiet: shaking has a spectrum of its own.
+    quiet: npt.NDArray[np.bool_] = np.asarray((hold_scatter(obs).ratio < 2.0).all(axis=1))
+    if quiet.sum() < 3:
+        quiet[:] = True
+    for i in np.flatnonzero(quiet):
+        keep = obs.segments.holds[i].samples()
+        if len(keep) < 32:
+            continue
+        # Contiguous part only: a line keeps its phase across it.
+        breaks = np.flatnonzero(np.diff(keep) > 1)
+        for part in np.split(keep, breaks + 1):
+            piece = x[part]
+            if len(part) >= 32 and np.isfinite(piece).all():
+                out.append((int(part[0]), piece - piece.mean(axis=0)))
+    return out
+
+
+def _averaged_spectrum(pieces: list[tuple[int, FloatArray]], n: int) -> tuple[FloatArray, int]:
+    """Mean periodogram (n//2+1, channels) of non-overlapping stretches of n samples, and how many there were."""
+    total, count = None, 0
+    window = np.hanning(n)[:, None]
+    for _, piece in pieces:
+        for k in range(len(piece) // n):
+            part = piece[k * n : (k + 1) * n]
+            power = np.abs(np.fft.rfft((part - part.mean(axis=0)) * window, axis=0)) ** 2
+            total = power if total is None else total + power
+            count += 1
+    assert total is not None
+    return total / count, count
+
+
+@lru_cache(maxsize=4)
+def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
+    """Lines that stand out of the smooth spectrum of the holds, one at most per channel (eq. 8.12)."""
+    pieces = hold_pieces(obs)
+    if not pieces:
+        return []
+    longest = max(len(p) for _, p in pieces)
+    n = 1 << int(np.log2(min(longest, 1024)))
+    while n > 64 and sum(len(p) // n for _, p in pieces) < 6:
+        n //= 2
+    if sum(len(p) // n for _, p in pieces) < 3:
+        return []
+    spectrum, count = _averaged_spectrum(pieces, n)
+    rate = obs.recording.rate_hz
+    out = []
+    width = max(15, (n // 32) | 1)
+    for c in range(spectrum.shape[1]):
+        power = spectrum[:, c]
+        if not np.all(power[1:] > 0):
+            continue
+        smooth = median_filter(power, size=width, mode="nearest")
+        # The median of an average of `count` exponentials sits a little below its mean.
+        ratio = power / smooth * (1.0 - 1.0 / (3.0 * count))
+        usable = slice(max(3, n // 128), n // 2 - 1)
+        k = usable.start + int(np.argmax(ratio[usable]))
+        # Adjacent bins of a Hann window share power: the free bins are about two thirds of all.
+        p = float(min(1.0, gammaincc(count, count * ratio[k]) * (n / 2) * spectrum.shape[1]))
+        if p > p_limit:
+            continue
+        line = _refine(obs, pieces, c, k * rate / n, rate / n, p, float(smooth[k] / (np.hanning(n) ** 2).sum()))
+        if line is not None:
+            out.append(line)
+    return out
+
+
+def _refine(
+    obs: Observations,
+    pieces: list[tuple[int, FloatArray]],
+    c: int,
+    f0: float,
+    resolution: float,
+    p: float,
+    density: float,
+) -> Line | None:
+    """Frequency and amplitude by coherent least squares over all holds; half of each hold predicts the other half."""
+    t = np.concatenate([obs.time_s[a : a + len(x)] for a, x in pieces])
+    x = np.concatenate([part[:, c] for _, part in pieces])
+    early = np.concatenate([np.arange(len(part)) < len(part) // 2 for _, part in pieces])
+
+    def project(f: float, rows: FloatArray) -> tuple[FloatArray, float]:
+        basis = np.column_stack([np.cos(2 * np.pi * f * t[rows]), np.sin(2 * np.pi * f * t[rows])])
+        coefficient, *_ = np.linalg.lstsq(basis, x[rows], rcond=None)
+        return coefficient, float(((basis @ coefficient) ** 2).sum())
+
+    everything = np.ones(len(t), dtype=bool)
+    span = float(t[-1] - t[0])
+    # From the coarse bin down to the resolution of the whole recording, in steps no wider than half a lobe.
+    best_f, width = f0, resolution
+    length = min(max(len(part) for _, part in pieces) / obs.recording.rate_hz, span)
+    stretch = length
+    while True:
+        stretch = min(stretch, span)
+        chosen = np.abs(t - t[len(t) // 2]) <= stretch
+        if chosen.sum() < 64:
+            chosen = everything
+        grid = best_f + np.linspace(-width, width, 41)
+        best_f = float(max(grid, key=lambda f: project(f, chosen)[1]))
+        width /= 6.0
+        if stretch >= span:
+            break
+        stretch *= 3.0
+    coefficient, _ = project(best_f, everything)
+    amplitude = float(np.hypot(*coefficient))
+    noise = np.sqrt(density)
+    sigma = float(noise * np.sqrt(2.0 / len(t)))
+    if amplitude < 4.0 * sigma:
+        # Not coherent through the recording: the line is real, its amplitude is that of single holds.
+        powers = [project_piece(obs.time_s[a : a + len(part)], part[:, c], f0) for a, part in pieces]
+        amplitude = float(np.sqrt(np.mean(np.square(powers))))
+    train, _ = project(best_f, early)
+    rest = ~early
+    model = np.column_stack([np.cos(2 * np.pi * best_f * t[rest]), np.sin(2 * np.pi * best_f * t[rest])]) @ train
+    before, after = float(np.sqrt(np.mean(x[rest] ** 2))), float(np.sqrt(np.mean((x[rest] - model) ** 2)))
+    frequency_sigma = float(np.sqrt(6.0) / np.pi / span * sigma / max(amplitude, 1e-300) / np.sqrt(2.0))
+    return Line(
+        CHANNELS[c], c % 3, best_f, frequency_sigma, resolution, amplitude, sigma, max(p, 1e-300),
+        (before / noise) ** 2, (after / noise) ** 2, before, after,
+    )  # fmt: skip
+
+
+def project_piece(t: FloatArray, x: FloatArray, f: float) -> float:
+    """Amplitude of a sinusoid of known frequency in one stretch."""
+    basis = np.column_stack([np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)])
+    coefficient, *_ = np.linalg.lstsq(basis, x, rcond=None)
+    return float(np.hypot(*coefficient))
+
+
+@dataclass(frozen=True, eq=False)
+class HoldScatter:
+    """Fast scatter of every hold against the common level: variances ``ratio`` (holds, channels), ``dof`` (holds,)."""
+
+    ratio: FloatArray
+    dof: FloatArray
+    p_value: FloatArray
+
+
+def hold_scatter(obs: Observations) -> HoldScatter:
+    """Variance of first differences per hold over the median of all: blind to slow drift, sharp on shaking."""
+    x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
+    ratio, dof = [], []
+    for hold in obs.segments.holds:
+        part = x[hold.start : hold.stop]
+        ratio.append(np.nanvar(np.diff(part, axis=0), axis=0))
+        # Neighbouring differences share a sample: two thirds as many independent ones.
+        dof.append((len(part) - 1) * 2.0 / 3.0)
+    ratio_array, dof_array = np.array(ratio), np.array(dof)
+    # Readings that toggle between two neighbouring codes scatter by up to half a step squared without any shaking.
+    still = np.concatenate([x[hold.start : hold.stop] for hold in obs.segments.holds])
+    floor = np.array([0.5 * float(np.diff(np.unique(np.round(c[np.isfinite(c)], 9))).min(initial=np.inf)) ** 2
+                      for c in still.T])  # fmt: skip
+    centre = np.maximum(np.median(ratio_array, axis=0), np.where(np.isfinite(floor), floor, 0.0))
+    centre[centre == 0] = 1.0
+    relative = ratio_array / centre
+    p = chdtrc(dof_array[:, None], dof_array[:, None] * relative)
+    return HoldScatter(relative, dof_array, np.asarray(p))
+
+
+def test_within_static(obs: Observations, alpha: float) -> DomainTest:
+    """Lines and noisy poses, as one domain; the p-value is the smallest, paid for by the number of looks."""
+    scatter = hold_scatter(obs)
+    n_looks = scatter.p_value.size
+    # Real noise is not exactly Gaussian or white: a pose must be half as noisy again before its variance counts.
+    loud = np.where(scatter.ratio > 1.5, scatter.p_value, 1.0)
+    p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0
+    lines = [line for line in find_lines(obs) if line.share > MIN_LINE_SHARE]
+    p_line = min((line.p_value for line in lines), default=1.0)
+    p = min(1.0, 2.0 * min(p_scatter, p_line))
+    dof = float(scatter.dof.sum() * scatter.ratio.shape[1])
+    chi2_per_dof = float(np.average(scatter.ratio, axis=0, weights=scatter.dof).mean())
+    disagrees = p < alpha / 6.0
+    where = Where()
+    if disagrees:
+        holds = np.flatnonzero(loud.min(axis=1) * n_looks < alpha)[:8]
+        t = obs.time_s
+        spans = tuple((float(t[obs.segments.holds[i].start]), float(t[obs.segments.holds[i].stop - 1])) for i in holds)
+        strong = [line for line in lines if line.p_value < alpha]
+        loud_channels = [CHANNELS[c] for c in np.flatnonzero(loud.min(axis=0) * n_looks < alpha)]
+        channels = tuple(dict.fromkeys([line.channel for line in strong] + loud_channels))
+        where = Where(channels, tuple(f"hold {i}" for i in holds), spans, tuple(line.frequency_hz for line in strong))
+    return DomainTest("within-static", chi2_per_dof, dof, p, disagrees, where, 0.0, "")

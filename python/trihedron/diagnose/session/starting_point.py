@@ -1,0 +1,217 @@
+"""From a calibration to the twin's start, and back from the twin to a linear model."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.integrate import trapezoid
+
+from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.solve import Fit
+from trihedron.diagnose.session.twin import _LOWER, Prior, Twin
+from trihedron.records import Calibration, SensorCalibration
+from trihedron.records.diagnosis import LinearModel
+from trihedron.units import acceleration_to_si, rate_to_si
+
+OPEN_BIAS_M_S2, OPEN_SCALE = 0.3, 0.03
+"""Standard errors above which the poses have not determined the accelerometer."""
+WHOLE_SCALE = 0.01
+"""Error of a gyro's scale (relative) taken from table turns meant as whole right angles."""
+TYPICAL_BIAS_M_S2, TYPICAL_SCALE, TYPICAL_ANGLE = 0.5, 0.05, 0.03
+"""How far an instrument strays from a plain triad of its nominal scale: zero, scale (relative), axes (rad)."""
+TABLE_TURN_RAD, WHOLE_TURN_RAD = 0.05, 0.07
+"""A turn that leaves the vertical within 3° is one about it; turns meant as multiples of 90° miss by 4° on average."""
+START_CORNER_S = 160.0
+"""Where the search for the noise corner begins."""
+
+
+def lower_frame(S: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """``(Q, L)`` with S = Q L, L lower triangular with the signs of S's own diagonal kept where they are clear."""
+    flip = np.eye(3)[::-1]
+    q, r = np.linalg.qr(S @ flip)
+    Q, L = q @ flip, flip @ r @ flip
+    signs = np.where(np.sign(np.diag(L)) * np.sign(np.diag(S)) < 0, -1.0, 1.0)
+    return Q * signs, signs[:, None] * L
+
+
+def start_twin(obs: Observations, calibration: Calibration) -> Twin:
+    """The calibration in the lower frame on centred readings, every hold at its measured vertical and bias."""
+    Q, L = lower_frame(calibration.accelerometer.S)
+    b = Q.T @ calibration.accelerometer.b + L @ obs.force_origin
+    gyro_S = np.eye(3) if calibration.gyroscope is None else Q.T @ calibration.gyroscope.S
+    force = obs.hold_force @ L.T + b
+    n = obs.n_holds
+    bias = np.zeros((n, 3)) if obs.hold_rate is None else obs.hold_rate @ gyro_S.T
+    return Twin(
+        gravity=calibration.gravity_m_s2,
+        accel_S=L,
+        accel_b=b,
+        gyro_S=gyro_S,
+        up=force / np.linalg.norm(force, axis=1, keepdims=True),
+        gyro_bias=bias,
+        accel_bias=np.zeros((n, 3)),
+        gyro_corner_s=START_CORNER_S,
+        accel_corner_s=START_CORNER_S,
+        effect=np.zeros(0),
+    )
+
+
+def is_open(calibration: Calibration) -> bool:
+    """Whether the poses left directions of the accelerometer's model undetermined (too few faces up)."""
+    sensor = calibration.accelerometer
+    sigma = np.sqrt(np.diag(np.asarray(sensor.covariance))[:12])
+    scale = float(np.abs(np.linalg.det(sensor.S))) ** (1.0 / 3.0)
+    return bool(sigma[9:].max() > OPEN_BIAS_M_S2 or sigma[:9].max() > OPEN_SCALE * scale)
+
+
+def nominal_start(obs: Observations, calibration: Calibration) -> tuple[Twin, Prior]:
+    """Where the poses do not determine the model: a plain triad of the unit's scale, and how far real ones stray.
+
+    The accelerometer's scale is that of its unit, or of counts the one that makes |g| of the typical pose; the gyro's
+    that of its unit, or of counts the one that turns gravity by what the poses show. Axes are taken as documented.
+    """
+    known_scale = acceleration_to_si(obs.recording.accelerometer_unit)
+    raw = obs.hold_force + obs.force_origin
+    by_length = calibration.gravity_m_s2 / float(np.median(np.linalg.norm(raw, axis=1)))
+    scale = by_length if known_scale is None else known_scale
+    force = scale * raw
+    up = force / np.linalg.norm(force, axis=1, keepdims=True)
+    rate_scales, rate_sigma = np.ones(3), np.full(3, TYPICAL_SCALE)
+    if obs.raw_rate is not None:
+        known_rate = rate_to_si(obs.recording.gyroscope_unit)
+        if known_rate is None:
+            rate_scales, is_whole = _rate_scales_of_counts(obs, up)
+            rate_sigma = np.where(is_whole, WHOLE_SCALE, TYPICAL_SCALE)
+        else:
+            rate_scales = np.full(3, known_rate)
+    n = obs.n_holds
+    twin = Twin(
+        gravity=calibration.gravity_m_s2,
+        accel_S=scale * np.eye(3),
+        accel_b=scale * obs.force_origin,
+        gyro_S=np.diag(rate_scales),
+        up=up,
+        gyro_bias=np.zeros((n, 3)) if obs.hold_rate is None else rate_scales * obs.hold_rate,
+        accel_bias=np.zeros((n, 3)),
+        gyro_corner_s=START_CORNER_S,
+        accel_corner_s=START_CORNER_S,
+        effect=np.zeros(0),
+    )
+    mean = np.concatenate([[twin.accel_S[i, j] for i, j in _LOWER], twin.accel_b, twin.gyro_S.ravel()])
+    lower = [(TYPICAL_SCALE if i == j else TYPICAL_ANGLE) * scale for i, j in _LOWER]
+    full = [(rate_sigma[i] if i == j else TYPICAL_ANGLE) * rate_scales[j] for i in range(3) for j in range(3)]
+    sigma = np.array([*lower, *[TYPICAL_BIAS_M_S2] * 3, *full])
+    return twin, Prior(mean, np.diag(sigma**2), is_weak=True)
+
+
+def _rate_scales_of_counts(obs: Observations, up: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """(3,) scale of every gyro in counts: what turns gravity by what the poses show, then what makes table turns whole.
+
+    Turns about the vertical leave gravity where it was; if those about one axis are all near multiples of a right angle
+    for one scale within a quarter of the first guess, that is the scale, and the second answer says so.
+    """
+    assert obs.raw_rate is not None
+    ratios, turns = [], []
+    for (a, b), (before, after) in zip(obs.move_ranges, obs.move_holds, strict=True):
+        angle = float(np.arccos(np.clip(up[before] @ up[after], -1.0, 1.0)))
+        read = trapezoid(obs.raw_rate[a:b], obs.time_s[a:b], axis=0)
+        if angle > 0.5 and np.linalg.norm(read) > 0.0:
+            ratios.append(angle / float(np.linalg.norm(read)))
+        elif angle < TABLE_TURN_RAD:
+            turns.append((int(np.abs(up[before]).argmax()), float(read @ up[before])))
+    first = float(np.median(ratios)) if ratios else 1.0
+    out, is_whole = np.full(3, first), np.zeros(3, dtype=bool)
+    right = np.pi / 2.0
+    for axis in range(3):
+        read_angles = np.array([value for k, value in turns if k == axis and abs(value) * first > right / 2.0])
+        if len(read_angles) < 4:
+            continue
+        trial = first * np.linspace(0.8, 1.25, 901)
+        angles = np.abs(trial[:, None] * read_angles)
+        miss = np.abs((angles + right / 2.0) % right - right / 2.0).mean(axis=1)
+        if miss.min() < WHOLE_TURN_RAD and miss.min() < 0.5 * float(np.median(miss)):
+            out[axis], is_whole[axis] = trial[miss.argmin()], True
+    return out, is_whole
+
+
+def prior_of(obs: Observations, calibration: Calibration) -> Prior:
+    """A given calibration as knowledge about the 18 unknowns, in the lower frame on centred readings."""
+    Q, L = lower_frame(calibration.accelerometer.S)
+    b = Q.T @ calibration.accelerometer.b + L @ obs.force_origin
+    gyro_S = np.eye(3) if calibration.gyroscope is None else Q.T @ calibration.gyroscope.S
+    mean = np.concatenate([[L[i, j] for i, j in _LOWER], b, gyro_S.ravel()])
+    turn = np.kron(Q.T, np.eye(3))
+    to_lower = np.zeros((6, 9))
+    for k, (i, j) in enumerate(_LOWER):
+        to_lower[k] = turn[3 * i + j]
+    centred = np.kron(np.eye(3), obs.force_origin[None])  # b' = b + S origin
+    A = np.zeros((18, 24))
+    A[:6, :9] = to_lower
+    A[6:9, :9] = centred @ turn
+    A[6:9, 9:12] = Q.T
+    A[9:18, 12:21] = turn
+    cov = np.zeros((24, 24))
+    given = calibration.covariance
+    cov[: len(given), : len(given)] = given
+    if calibration.gyroscope is None:
+        cov[12:, 12:] = np.eye(12)
+    out = A @ cov @ A.T
+    # A published calibration carries no error bars: then it is taken at its last printed digits.
+    floor = (1e-6 * np.maximum(np.abs(mean), 1e-3 * np.abs(mean).max())) ** 2
+    out[np.diag_indices_from(out)] += floor
+    return Prior(mean, out)
+
+
+def linear_model(fitted: Fit) -> LinearModel:
+    """S, b of both sensors from a fitted twin, with standard errors, on raw readings."""
+    twin, obs = fitted.twin, fitted.line.obs
+    cov = fitted.covariance()
+    origin = obs.force_origin
+    S = twin.accel_S
+    to_b = np.zeros((3, 9))
+    for k, (i, j) in enumerate(_LOWER):
+        to_b[i, k] = -origin[j]
+    to_b[:, 6:9] = np.eye(3)
+    sigma_S = np.zeros((3, 3))
+    for k, (i, j) in enumerate(_LOWER):
+        sigma_S[i, j] = np.sqrt(max(cov[k, k], 0.0))
+    cov_b = to_b @ cov[:9, :9] @ to_b.T
+    accel: dict[str, Any] = {
+        "S": S.tolist(),
+        "b": (twin.accel_b - S @ origin).tolist(),
+        "sigma_S": sigma_S.tolist(),
+        "sigma_b": np.sqrt(np.maximum(np.diag(cov_b), 0.0)).tolist(),
+        "raw_unit": obs.recording.accelerometer_unit.value,
+    }
+    if obs.raw_rate is None:
+        return LinearModel(MappingProxyType(accel), None)
+    mean_bias = twin.gyro_bias.mean(axis=0)
+    n = obs.n_holds
+    pick = np.zeros((3, cov.shape[0]))
+    for h in range(n):
+        pick[:, 18 + 8 * h + 2 : 18 + 8 * h + 5] = -np.eye(3) / n
+    pick[:, 9:18] = -np.kron(np.eye(3), obs.rate_origin[None])
+    gyro: dict[str, Any] = {
+        "S": twin.gyro_S.tolist(),
+        "b": (-twin.gyro_S @ obs.rate_origin - mean_bias).tolist(),
+        "sigma_S": np.sqrt(np.maximum(np.diag(cov)[9:18], 0.0)).reshape(3, 3).tolist(),
+        "sigma_b": np.sqrt(np.maximum(np.diag(pick @ cov @ pick.T), 0.0)).tolist(),
+        "raw_unit": obs.recording.gyroscope_unit.value,
+    }
+    return LinearModel(MappingProxyType(accel), MappingProxyType(gyro))
+
+
+def extended_sensor(model: MappingProxyType[str, Any], si_unit: str) -> SensorCalibration:
+    """A linear model's sensor as a calibration record (diagonal covariance: numbers, not their fit)."""
+    variance = np.concatenate([np.square(model["sigma_S"]).ravel(), np.square(model["sigma_b"])])
+    return SensorCalibration(
+        S=np.array(model["S"]),
+        b=np.array(model["b"]),
+        covariance=np.diag(variance),
+        raw_unit=str(model["raw_unit"]),
+        si_unit=si_unit,
+        method="diagnosis",
+    )

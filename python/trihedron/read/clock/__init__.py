@@ -1,0 +1,7 @@
+"""The time base of a log: its unit, its order, its rate, and whether its stamps are when the samples were taken."""
+
+from trihedron.read.clock.base import Clock, build_clock
+from trihedron.read.clock.rate import mean_rate_hz
+from trihedron.read.clock.unit import SECONDS, Witness, parse_time_unit
+
+__all__ = ["SECONDS", "Clock", "Witness", "build_clock", "mean_rate_hz", "parse_time_unit"]

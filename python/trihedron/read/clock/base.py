@@ -1,0 +1,92 @@
+"""The time base: unit, start, wraps, order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.clock.order import order_of_rows, unwrap
+from trihedron.read.clock.unit import SECONDS, Witness, time_unit
+from trihedron.read.errors import ReadError
+from trihedron.read.table import FloatArray, Table
+from trihedron.records import Finding, FindingCode, Severity
+
+_LONGEST_S = 3.2e9
+"""A century."""
+NOBODY = Witness()
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """``time_s`` (n,) from the first sample on, ``start_s`` the clock's reading there, ``rows`` (n,) the table rows."""
+
+    time_s: FloatArray
+    start_s: float
+    rows: npt.NDArray[np.int64] | None
+    findings: tuple[Finding, ...]
+
+
+def build_clock(
+    table: Table,
+    column: int,
+    named: str,
+    given: str | None,
+    nanoseconds: int | None = None,
+    witness: Witness = NOBODY,
+) -> Clock:
+    """Seconds from a time column, or from whole seconds and a column of ``nanoseconds`` beside them.
+
+    ``witness`` holds readings that limit how long a row can have lasted, where nothing states the unit.
+
+    Raises
+    ------
+    ReadError
+        When the column is constant, runs backward as a whole, or jumps back further than rows can be late.
+    """
+    raw = table.columns[column]
+    base = 0.0
+    if nanoseconds is not None:
+        # Relative to the first second, so that no digit of the nanoseconds is lost.
+        base = float(raw[0]) if np.isfinite(raw[0]) else 0.0
+        raw = (raw - base) + 1e-9 * table.columns[nanoseconds]
+        named = "s"
+    findings: list[Finding] = []
+    rows: npt.NDArray[np.int64] | None = None
+    finite = np.isfinite(raw)
+    if not finite.all():
+        bad = int(np.flatnonzero(~finite)[0])
+        if finite.sum() < 2:
+            raise ReadError(f"{table.path}: the time column {table.label(column)} holds no numbers; name another one.")
+        findings.append(
+            Finding(
+                FindingCode.NON_FINITE,
+                Severity.WARNING,
+                f"{int((~finite).sum())} rows have no time (first: {table.place(bad)}) and were left out.",
+                "Damaged rows.",
+                "Check the logger.",
+                MappingProxyType({"count": float((~finite).sum()), "row": float(bad)}),
+            )
+        )
+        rows = np.flatnonzero(finite)
+        raw = raw[rows]
+    if len(raw) > 1 and np.all(raw == raw[0]):
+        raise ReadError(
+            f"{table.path}: the time column {table.label(column)} holds {raw[0]:.12g} in every row; "
+            "choose another with --columns time=..., or --columns time=none with --rate."
+        )
+    raw, wraps = unwrap(raw, table, rows, findings)
+    order = order_of_rows(raw, table, column, rows, findings) if len(raw) > 1 else None
+    if order is not None:
+        raw = raw[order]
+        rows = order if rows is None else rows[order]
+    unit = time_unit(raw, named, given, wraps, witness, findings)
+    scale = SECONDS[unit]
+    if not (raw[-1] - raw[0]) * scale < _LONGEST_S:
+        raise ReadError(
+            f"{table.path}: column {table.label(column)} read as time in {unit} spans "
+            f"{(raw[-1] - raw[0]) * scale:.3g} s, which no log does; give --time-unit, or name another time column."
+        )
+    return Clock((raw - raw[0]) * scale, float(base + raw[0]) * scale, rows, tuple(findings))

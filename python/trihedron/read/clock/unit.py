@@ -1,0 +1,172 @@
+"""The unit of a time column: said, named, or weighed from step, digits, length and readings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from trihedron.read.errors import ReadError
+from trihedron.read.table import FloatArray
+from trihedron.records import Finding, FindingCode, Severity
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "100us": 1e-4}
+_CANDIDATES = ("s", "ms", "us", "ns")
+PLAUSIBLE_HZ = (0.02, 20000.0)
+_SLOW_TICKS = -1.0
+"""Whoever logs slower than 2 Hz writes seconds; a tick counter that slow is rarer than one 1000 times quicker."""
+_BANDS = ((0.2, -5.0), (0.7, -3.0), (2.0, -1.0), (10.0, -1.5), (900.0, 0.0), (2500.0, -1.5), (math.inf, -3.0))
+"""Log odds of a rate below each bound: loggers run between 10 Hz and 1 kHz, some at 1 Hz, hardly any below 0.2 Hz."""
+_FRACTIONS = {"s": 0.0, "ms": -1.5, "us": -4.0, "ns": -6.0}
+"""Log odds of digits behind the point: seconds need them, tick counts have none (some programs print ms with them)."""
+_NANOSECONDS = -2.0
+"""Nanoseconds come as dates, which settle the unit, or with their name; seldom as a bare count."""
+_SHORTEST_S, _SHORT = 5.0, -2.5
+"""Nobody keeps a thousand rows of a log shorter than this."""
+_IMPOSSIBLE = -20.0
+QUICKEST_TURN_S = 0.03
+"""20 degrees from rest to rest in this time take 1500 rad/s², more than a wrist flicks and a table bears."""
+SLOWEST_TURN_S, _SLOW = 60.0, -3.0
+"""The quickest change of pose in a session takes less, unless it is a drift in a chamber."""
+FASTEST_KELVIN_S = 5.0
+"""A part in its case does not warm faster; a chamber runs at 0.1 K/s."""
+_TURN_DEG, _SIDE = 20.0, 5
+_SURE = 3.9
+"""Odds of fifty to one."""
+_MOST_ROWS = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """Readings in the order of the rows that limit how long a row can have lasted: (n, 3) and (n,), or ``None``."""
+
+    accelerometer: FloatArray | None = None
+    temperature: FloatArray | None = None
+
+
+def parse_time_unit(text: str) -> str:
+    """A user's unit word."""
+    words = {"sec": "s", "seconds": "s", "millis": "ms", "micros": "us", "µs": "us", "nanos": "ns"}
+    unit = words.get(text.strip().lower(), text.strip().lower())
+    if unit not in SECONDS:
+        raise ReadError(f"'{text}' is not a time unit; use s, ms, us or ns.")
+    return unit
+
+
+def time_unit(
+    raw: FloatArray, named: str, given: str | None, wraps: bool, witness: Witness, findings: list[Finding]
+) -> str:
+    """Unit of stamps (n,) in order: as given, as named, by their date, or the likeliest; a doubt becomes a finding."""
+    if given is not None:
+        return parse_time_unit(given)
+    if named:
+        return named
+    step = np.diff(raw)
+    positive = step[step > 0]
+    if not len(positive):
+        return "s"
+    # Stamps that several rows share: a row lasts the span over the rows, not the step between stamps.
+    shared = len(positive) < 0.8 * len(step)
+    usual = float((raw[-1] - raw[0]) / len(step)) if shared else float(np.median(positive))
+    start = float(raw[0])
+    possible = [
+        u for u in _CANDIDATES if PLAUSIBLE_HZ[0] <= 1.0 / (usual * SECONDS[u]) <= PLAUSIBLE_HZ[1]
+    ]  # fmt: skip
+    # A date between 2001 and 2096 in the unit settles it; nothing else counts that high.
+    dated = [u for u in _CANDIDATES if 1e9 <= start * SECONDS[u] <= 4e9]
+    dated = [u for u in dated if u in possible] or (dated if len(dated) == 1 and not wraps else [])
+    if dated:
+        choice, sure = dated[0], True
+    elif possible:
+        scores = _scores(raw, usual, possible, witness)
+        ranked = sorted(possible, key=lambda u: -scores[u])
+        choice = ranked[0]
+        sure = len(ranked) == 1 or scores[choice] - scores[ranked[1]] > _SURE
+        possible = [u for u in ranked if scores[u] > scores[choice] - 2.0 * _SURE]
+    else:
+        choice, sure = "s", 0.5 * usual < 60.0
+    findings.append(_statement(usual, choice, sure, possible))
+    return choice
+
+
+def _scores(raw: FloatArray, usual: float, possible: list[str], witness: Witness) -> dict[str, float]:
+    """Log odds of every unit."""
+    fractions = bool(np.any(raw[:_MOST_ROWS] != np.rint(raw[:_MOST_ROWS])))
+    rest_to_rest, any_turn = _quickest_turns(witness.accelerometer)
+    kelvin = _quickest_warming(witness.temperature)
+    scores = {}
+    for unit in possible:
+        row_s = usual * SECONDS[unit]
+        score = next(odds for bound, odds in _BANDS if 1.0 / row_s < bound)
+        score += _FRACTIONS[unit] if fractions else 0.0
+        score += _SLOW_TICKS if unit != "s" and row_s > 0.5 else 0.0
+        score += _NANOSECONDS if unit == "ns" else 0.0
+        if len(raw) > 1000 and len(raw) * row_s < _SHORTEST_S:
+            score += _SHORT
+        if rest_to_rest is not None and rest_to_rest * row_s < QUICKEST_TURN_S:
+            score += _IMPOSSIBLE
+        if any_turn is not None and any_turn * row_s > SLOWEST_TURN_S:
+            score += _SLOW
+        if kelvin is not None and kelvin / row_s > FASTEST_KELVIN_S:
+            score += _IMPOSSIBLE
+        scores[unit] = score
+    return scores
+
+
+def _quickest_turns(accelerometer: FloatArray | None) -> tuple[int | None, int | None]:
+    """Rows in which gravity at its quickest turned by 20 degrees: between two stretches at rest, and at all.
+
+    A stretch is five rows; at rest it turns ten times slower than between the two, so that no rate need be known.
+    """
+    if accelerometer is None or len(accelerometer) < 4 * _SIDE:
+        return None, None
+    readings = accelerometer[:_MOST_ROWS]
+    readings = readings[np.isfinite(readings).all(axis=1)]
+    norm = np.linalg.norm(readings, axis=1)
+    if len(readings) < 4 * _SIDE or not np.all(norm > 0):
+        return None, None
+    total = np.vstack([np.zeros(3), np.cumsum(readings / norm[:, None], axis=0)])
+    mean = (total[_SIDE:] - total[:-_SIDE]) / _SIDE
+    length = np.linalg.norm(mean, axis=1)
+    # Unit vectors spread evenly over an angle a have a mean shorter by a²/24.
+    spread = np.sqrt(24.0 * np.maximum(1.0 - length, 0.0))
+    mean /= np.maximum(length, 1e-12)[:, None]
+    turn = math.radians(_TURN_DEG)
+    rows, any_turn = 1, None
+    while rows + _SIDE < len(mean):
+        lag = rows + _SIDE - 1
+        has_turned = (mean[:-lag] * mean[lag:]).sum(axis=1) < math.cos(turn)
+        if np.any(has_turned):
+            any_turn = any_turn or rows + 1
+            quiet = spread <= 0.1 * turn * _SIDE / (rows + 1)
+            if np.any(quiet[:-lag] & quiet[lag:] & has_turned):
+                return rows + 1, any_turn
+        rows = max(rows + 1, int(1.5 * rows))
+    return None, any_turn
+
+
+def _quickest_warming(temperature: FloatArray | None) -> float | None:
+    """Kelvin per row over the quickest fiftieth of the log (the noise of a thermometer averages out over it)."""
+    if temperature is None or len(temperature) < 500:
+        return None
+    n = len(temperature) // 50
+    blocks = np.nanmean(temperature[: n * 50].reshape(50, n), axis=1) if np.isfinite(temperature).any() else None
+    if blocks is None or not np.isfinite(blocks).all():
+        return None
+    return float(np.abs(np.diff(blocks)).max() / n)
+
+
+def _statement(usual: float, choice: str, sure: bool, possible: list[str]) -> Finding:
+    rate = 1.0 / (usual * SECONDS[choice])
+    others = [f"{u} ({1.0 / (usual * SECONDS[u]):.4g} Hz)" for u in possible if u != choice]
+    return Finding(
+        FindingCode.TIME_UNIT_DETECTED,
+        Severity.NOTE if sure else Severity.WARNING,
+        f"The time column steps by {usual:.6g}, so its unit is {choice} ({rate:.5g} Hz)"
+        + (f"; {', '.join(others)} would be possible too." if others else "."),
+        "" if sure else "The step alone does not tell the unit; every rate and every noise density depends on it.",
+        "" if sure else "Say it with --time-unit s, ms, us or ns if this is wrong.",
+        MappingProxyType({"rate_hz": rate, "step": usual}),
+    )

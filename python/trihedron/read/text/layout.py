@@ -1,0 +1,218 @@
+"""How a text log is laid out: separator, decimal mark, preamble, header and first line of numbers."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+COMMENT_STARTS = ("#", "%", "//")
+MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
+_NUMBER_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
+_UNIT_WORD = re.compile(
+    r"[\[(]?(s|m?secs?|m?seconds?|m?s|us|µs|ns|utc|m?g|m ?/ ?\(?s(?:ec)?(\^?2|²|/s)\)?|m ?s\^?-2|m?dps|rad|deg"
+    r"|(m?rad|m?deg|°) ?(/ ?s(?:ec)?|s\^?-1)|counts?|lsb|raw|adc|no_units|u?t|µt|gauss|local_flux|m?v"
+    r"|°?c|degc|degrees celsius|k?pa|y|-)?[\])]?$",
+    re.IGNORECASE,
+)
+_QUALIFIERS = frozenset({"cal", "uncal", "raw", "calibrated", "uncalibrated"})
+MAX_STRAY_LINES = 20
+"""Lines of numbers above the table that a preamble (a matrix, a list of offsets) may hold; more are rows lost."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the first lines tell. ``separator`` " " stands for any run of blanks; lines are counted from 1."""
+
+    separator: str
+    decimal_comma: bool
+    n_fields: int
+    trailing_separator: bool
+    first_line: int
+    names: tuple[str, ...] | None
+    metadata: dict[str, str] = field(default_factory=dict)
+    header_ignored: str = ""
+    stray: tuple[int, ...] = ()
+    """Lines (from 1) above the first row that look like rows of another layout, or stand between names and rows."""
+
+
+def is_comment(line: str) -> bool:
+    """A line that carries no numbers by convention."""
+    return line.startswith(COMMENT_STARTS)
+
+
+def split(line: str, separator: str) -> list[str]:
+    """Fields without surrounding blanks and quotes."""
+    fields = line.split() if separator == " " else line.split(separator)
+    return [f.strip().strip('"').strip() for f in fields]
+
+
+def is_number(text: str, decimal_comma: bool) -> bool:
+    """The text of one number, missing-value words not included."""
+    return bool((_NUMBER_COMMA if decimal_comma else _NUMBER).match(text))
+
+
+def _numeric_fraction(fields: list[str], decimal_comma: bool) -> float:
+    filled = [f for f in fields if f.lower() not in MISSING or f.lower() == "nan"]
+    if not filled:
+        return 0.0
+    return sum(is_number(f, decimal_comma) for f in filled) / len(filled)
+
+
+def _judge(lines: list[str], separator: str, decimal_comma: bool) -> tuple[float, int]:
+    """(how well this separator explains the lines, its usual number of fields)."""
+    rows = [split(line, separator) for line in lines]
+    rows = [row for row in rows if _numeric_fraction(row, decimal_comma) >= 0.5]
+    if not rows:
+        return 0.0, 0
+    counts = [len(row) for row in rows]
+    usual = max(set(counts), key=lambda n: (counts.count(n), n))
+    fitting = [row for row in rows if len(row) == usual]
+    fraction = sum(_numeric_fraction(row, decimal_comma) for row in fitting) / len(fitting)
+    # One column explains anything: a real separator must always win over it.
+    return fraction * len(fitting) / len(lines) * (1.0 if usual > 1 else 0.1), usual
+
+
+def detect(text: str) -> Layout | None:
+    """Layout of a text log from its first lines, or None where no line of numbers is found."""
+    lines = [line.strip("\r") for line in text.split("\n")]
+    body = [line.strip(" ") for line in lines if line.strip() and not is_comment(line.strip())]
+    tail = body[len(body) // 2 :][-200:]
+    candidates = [(",", False), ("\t", False), (";", False), (" ", False), (";", True), ("\t", True), (" ", True)]
+    judged = [(_judge(tail, sep, comma), -i, sep, comma) for i, (sep, comma) in enumerate(candidates)]
+    (score, n_fields), _, separator, decimal_comma = max(judged, key=lambda j: (j[0][0], j[1]))
+    if score <= 0.0:
+        return None
+    first = _first_data_line(lines, separator, decimal_comma, n_fields)
+    if first is None:
+        return None
+    first, rate = _past_start_and_rate(lines, first, separator)
+    trailing = separator != " " and n_fields > 1 and all(line.rstrip(" ").endswith(separator) for line in tail)
+    n_kept = n_fields - trailing
+    header = _header(lines[:first], separator, n_kept)
+    return Layout(
+        separator,
+        decimal_comma,
+        n_kept,
+        trailing,
+        first + 1,
+        header.names,
+        header.metadata | rate,
+        header.ignored,
+        () if rate else _stray(lines[:first], header, decimal_comma),
+    )
+
+
+def _past_start_and_rate(lines: list[str], first: int, separator: str) -> tuple[int, dict[str, str]]:
+    """Empatica's two lines above the rows: the start in seconds since 1970 and the rate, once for each column."""
+    if first != 0 or len(lines) < 4:
+        return first, {}
+    start, rate = (split(line, separator) for line in lines[:2])
+    if len(set(start)) != 1 or len(set(rate)) != 1 or len(start) < 3 or len(start) != len(rate):
+        return first, {}
+    if not (is_number(start[0], False) and is_number(rate[0], False)):
+        return first, {}
+    if not (1e9 <= float(start[0]) <= 4e9 and 0.0 < float(rate[0]) <= 1e4):
+        return first, {}
+    return 2, {"start": start[0], "rate": rate[0]}
+
+
+def _looks_like_row(line: str, decimal_comma: bool) -> bool:
+    """Three numbers or more, under any separator, and nothing much else."""
+    for separator in (",", "\t", ";", " "):
+        fields = split(line, separator)
+        if sum(is_number(f, decimal_comma) for f in fields) >= 3 and _numeric_fraction(fields, decimal_comma) >= 0.5:
+            return True
+    return False
+
+
+def _stray(lines: list[str], header: _Header, decimal_comma: bool) -> tuple[int, ...]:
+    """Lines above the first row that are neither names nor units nor remarks, but may have been rows."""
+    found = []
+    for i, raw in enumerate(lines):
+        line = raw.strip()
+        if not line or is_comment(line) or i in header.used:
+            continue
+        is_below_names = header.names is not None and header.used and i > max(header.used)
+        if is_below_names or _looks_like_row(line, decimal_comma):
+            found.append(i + 1)
+    return tuple(found)
+
+
+def _first_data_line(lines: list[str], separator: str, decimal_comma: bool, n_fields: int) -> int | None:
+    for i, raw in enumerate(lines):
+        line = raw.strip(" ")
+        if not line or is_comment(line):
+            continue
+        fields = split(line, separator)
+        if len(fields) == n_fields and _numeric_fraction(fields, decimal_comma) >= 0.5:
+            return i
+    return None
+
+
+@dataclass(frozen=True)
+class _Header:
+    names: tuple[str, ...] | None
+    metadata: dict[str, str]
+    ignored: str
+    used: tuple[int, ...]
+    """Lines (from 0) that became names, units or qualifiers of names."""
+
+
+def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
+    metadata: dict[str, str] = {}
+    matching: list[tuple[int, list[str]]] = []
+    ignored = ""
+    for i, raw in enumerate(lines):
+        line = raw.strip()
+        if not line or line.strip('"').lower().startswith("sep="):
+            continue
+        plain = re.sub(r"^(#+|%+|//+)\s*", "", line) if is_comment(line) else line
+        fields = _header_fields(plain, separator, n_fields)
+        if fields is not None and not any(is_number(f, False) for f in fields):
+            matching.append((i, fields))
+            continue
+        pair = re.match(r"\s*([^:=,;\t]+?)\s*[:=,;\t]\s*([^,;\t]+?)[\s,;]*$", plain)
+        if pair and not is_number(pair.group(1), False):
+            metadata[pair.group(1)] = pair.group(2)
+        elif not is_comment(line):
+            ignored = line
+    if not matching:
+        return _Header(None, metadata, ignored, ())
+    units: list[str] = []
+    qualifiers: list[str] = []
+    used = [matching[-1][0]]
+    # Names, then CAL or RAW, then units, as Shimmer writes them; or names and units.
+    while len(matching) > 1:
+        row = matching[-1][1]
+        if not units and _share(row, _UNIT_WORD) >= 0.6:
+            units = row
+        elif not qualifiers and _share(row, _QUALIFIERS) == 1.0:
+            qualifiers = row
+        else:
+            break
+        matching.pop()
+        used.append(matching[-1][0])
+    names = matching[-1][1]
+    if qualifiers:
+        names = [f"{name} {word}".strip() for name, word in zip(names, qualifiers, strict=True)]
+    if units:
+        bare = [unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()") else unit for unit in units]
+        names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, bare, strict=True)]
+    return _Header(tuple(names), metadata, "", tuple(used))
+
+
+def _share(fields: list[str], test: re.Pattern[str] | frozenset[str]) -> float:
+    filled = [f for f in fields if f]
+    hits = sum(bool(test.match(f)) if isinstance(test, re.Pattern) else f.lower() in test for f in filled)
+    return hits / len(filled) if filled else 1.0
+
+
+def _header_fields(line: str, separator: str, n_fields: int) -> list[str] | None:
+    for sep in (separator, ",", "\t", ";", " "):
+        fields = split(line, sep)
+        while len(fields) > n_fields and not fields[-1]:
+            fields.pop()
+        if len(fields) == n_fields:
+            return fields
+    return None

@@ -1,0 +1,196 @@
+"""Poses once more, as a joint model needs them: cut where they were bumped, found where they were only shaken."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records import Hold, Move, Recording, Segments
+
+FloatArray = npt.NDArray[np.float64]
+RESTING = 1e-3
+"""A mean rate of a thousandth of the moves' rms, five times over, is rest: below 1 °/s after moves of 3 rad/s."""
+
+
+def resegment(recording: Recording, segments: Segments, shortest_s: float = 0.3) -> Segments:
+    """Poses as a model of the whole session needs them: cut where they were bumped, found where only shaken.
+
+    A bump inside a hold turns the body; averaged over, it contradicts the moves on both sides. Cut there, the gyro
+    carries the attitude across it like across any move. A pose that vibrates is no rest, but its slow part stands
+    still: it becomes a hold of its own, so that a bias that follows the vibration can be seen.
+
+    The answer's ``whole`` are the poses as they were found, each averaged over whatever happened in it.
+    """
+    shortest = max(int(shortest_s * recording.rate_hz), 8)
+    spans: list[tuple[int, int, int]] = []
+    was_bumped = False
+    for i, hold in enumerate(segments.holds):
+        cuts = [(a, b) for a, b in hold.disturbed if b > a]
+        first = hold.start
+        pieces: list[tuple[int, int]] = []
+        for a, b in cuts:
+            pieces.append((first, a))
+            first = b
+        pieces.append((first, hold.stop))
+        kept = [(a, b) for a, b in pieces if b - a >= shortest]
+        was_bumped |= bool(cuts)
+        if not kept:
+            kept = [(hold.start, hold.stop)]
+        spans += [(a, b, i) for a, b in kept]
+    shaken = [*_shaken(recording, segments), *_drifting(recording, segments)]
+    merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in shaken)]))
+    if len(merged) == segments.n_holds and not shaken and not was_bumped:
+        return segments
+    return replace(_segments_of(recording, segments, merged), whole=_averaged_whole(recording, segments))
+
+
+LONG_S = 1800.0
+"""A pose that lasts longer is cut into pieces: its bias has time to drift, and one mean would hide it."""
+MOST_PIECES = 40
+
+
+def _in_pieces(recording: Recording, spans: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
+    """Long poses cut into pieces, two samples apart so that a model knows nothing turned between them."""
+    rate = recording.rate_hz
+    total_s = sum((b - a) / rate for a, b, _ in spans if (b - a) / rate > LONG_S)
+    piece_s = max(LONG_S / 2.0, total_s / MOST_PIECES)
+    out = []
+    for a, b, source in spans:
+        n = round((b - a) / rate / piece_s) if (b - a) / rate > LONG_S else 1
+        edges = np.linspace(a, b, max(n, 1) + 1).astype(int)
+        out += [(int(p), int(q) - (2 if q < b else 0), source) for p, q in pairwise(edges)]
+    return out
+
+
+def _drifting(recording: Recording, segments: Segments, block_s: float = 60.0) -> list[tuple[int, int]]:
+    """Hours between poses in which nothing moves but the readings drift: block after block as quiet as a pose."""
+    if recording.accelerometer is None:
+        return []
+    assert segments.accelerometer_sigma is not None
+    block = max(round(block_s * recording.rate_hz), 8)
+    out: list[tuple[int, int]] = []
+    for move in segments.moves:
+        n = (move.stop - move.start) // block
+        if n * block < LONG_S * recording.rate_hz:
+            continue
+        quiet = np.ones(n, dtype=bool)
+        pairs = (
+            (recording.accelerometer, segments.accelerometer_sigma),
+            (recording.gyroscope, segments.gyroscope_sigma),
+        )
+        for values, sigma in pairs:
+            if values is None or sigma is None:
+                continue
+            steps = np.diff(values[move.start : move.start + n * block].reshape(n, block, 3), axis=1)
+            quiet &= (np.nanvar(steps, axis=1) < 2.0 * 2.0 * sigma**2).all(axis=1)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], quiet.astype(np.int8), [0]]))).reshape(-1, 2)
+        for first, last in edges:
+            start, stop = move.start + (first + 1) * block, move.start + (last - 1) * block
+            if stop - start >= 0.5 * LONG_S * recording.rate_hz:
+                out.append((int(start), int(stop)))
+    return out
+
+
+def _averaged_whole(recording: Recording, segments: Segments) -> Segments:
+    """The poses as they were found, averaged over all of their samples, with the bumps that were seen in them."""
+    spans = [(hold.start, hold.stop, i) for i, hold in enumerate(segments.holds)]
+    out = _segments_of(recording, segments, spans)
+    holds = tuple(replace(new, disturbed=old.disturbed) for new, old in zip(out.holds, segments.holds, strict=True))
+    return replace(out, holds=holds)
+
+
+def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int, int, int]]) -> Segments:
+    def is_unsteady(source: int) -> bool:
+        return source < 0 or segments.holds[source].is_unsteady
+
+    holds = tuple(Hold(k, a, b, a, b, is_unsteady=is_unsteady(source)) for k, (a, b, source) in enumerate(spans))
+    moves = tuple(Move(k, k, k + 1, holds[k].stop, holds[k + 1].start) for k in range(len(holds) - 1))
+
+    def statistics(values: FloatArray | None, sigma: FloatArray | None, old: FloatArray | None):  # type: ignore[no-untyped-def]
+        if values is None or sigma is None or old is None:
+            return None, None
+        mean = np.array([np.nanmean(values[a:b], axis=0) for a, b, _ in spans])
+        error = np.zeros_like(mean)
+        # How far the old means' errors exceed white noise, for pieces of other lengths.
+        colour = np.median(old / (sigma / np.sqrt(np.maximum(segments.n_averaged, 1))[:, None]), axis=0)
+        for k, (a, b, source) in enumerate(spans):
+            n = b - a
+            if source >= 0 and n == segments.holds[source].stop - segments.holds[source].start:
+                mean[k] = np.nanmean(values[a:b], axis=0)
+                error[k] = old[source]
+            else:
+                part = values[a:b][np.isfinite(values[a:b]).all(axis=1)]
+                blocks = np.array_split(part, 8) if len(part) >= 8 else [np.zeros((1, 3))] * 8
+                scatter = np.std([block.mean(axis=0) for block in blocks], axis=0, ddof=1) / np.sqrt(8.0)
+                floor = np.maximum(colour, 1.0) * sigma / np.sqrt(n)
+                # Eight blocks tell a pose that goes on settling (several times the noise), not 20 % of its noise.
+                error[k] = np.maximum(floor, scatter if source < 0 else np.where(scatter > 2.0 * floor, scatter, 0.0))
+        return mean, error
+
+    accel_mean, accel_error = statistics(
+        recording.accelerometer, segments.accelerometer_sigma, segments.accelerometer_sigma_mean
+    )
+    gyro_mean, gyro_error = statistics(recording.gyroscope, segments.gyroscope_sigma, segments.gyroscope_sigma_mean)
+    t = recording.time_s
+    return replace(
+        segments,
+        holds=holds,
+        moves=moves,
+        accelerometer_mean=accel_mean,
+        accelerometer_sigma_mean=accel_error,
+        gyroscope_mean=gyro_mean,
+        gyroscope_sigma_mean=gyro_error,
+        n_averaged=np.array([b - a for a, b, _ in spans]),
+        time_mid_s=np.array([0.5 * (t[a] + t[b - 1]) for a, b, _ in spans]),
+        duration_s=np.array([(b - a) / recording.rate_hz for a, b, _ in spans]),
+    )
+
+
+MAX_TURNING = 0.05
+"""Scatter of the rate in a shaken pose, as a share of the fastest rate of the recording."""
+
+
+def _shaken(
+    recording: Recording, segments: Segments, block_s: float = 0.25, shortest_s: float = 1.5
+) -> list[tuple[int, int]]:
+    """Stretches of moves whose block means stand still while the samples shake."""
+    if recording.gyroscope is None or recording.accelerometer is None or segments.gyroscope_mean is None:
+        return []
+    assert segments.accelerometer_sigma is not None
+    block = max(round(block_s * recording.rate_hz), 5)
+    zero = np.median(segments.gyroscope_mean, axis=0)
+    assert segments.gyroscope_sigma is not None
+    spread = np.maximum(np.std(segments.gyroscope_mean, axis=0), segments.gyroscope_sigma / np.sqrt(block))
+    # A bias that follows the shaking is no motion: rates far below those of real moves count as none.
+    moving = np.concatenate([recording.gyroscope[m.start : m.stop] for m in segments.moves] or [np.zeros((1, 3))])
+    spread = np.maximum(spread, RESTING * float(np.sqrt(np.nanmean((moving - zero) ** 2))))
+    fastest = float(np.nanmax(np.abs(recording.gyroscope - zero)))
+    out: list[tuple[int, int]] = []
+    for move in segments.moves:
+        a, b = move.start, move.stop
+        n = (b - a) // block
+        if n * block < shortest_s * recording.rate_hz:
+            continue
+        gyro = recording.gyroscope[a : a + n * block].reshape(n, block, 3)
+        accel = recording.accelerometer[a : a + n * block].reshape(n, block, 3)
+        rate_mean = np.nanmean(gyro, axis=1)
+        own = np.nanstd(gyro, axis=1) / np.sqrt(block)
+        force_mean = np.nanmean(accel, axis=1)
+        force_own = np.nanstd(accel, axis=1)
+        # Zero rate within its own scatter, and force that steps from block to block by less than it shakes in one.
+        still = (np.abs(rate_mean - zero) < 5.0 * np.hypot(own, spread)).all(axis=1)
+        step = np.abs(np.diff(force_mean, axis=0, prepend=force_mean[:1]))
+        calm = (step < 4.0 * np.sqrt(2.0 / block) * np.maximum(force_own, segments.accelerometer_sigma)).all(axis=1)
+        shaking = (force_own > 3.0 * segments.accelerometer_sigma).any(axis=1)
+        # A hand that swings back and forth is no pose: what only shakes turns slowly beside the session's moves.
+        turning = (np.nanstd(gyro, axis=1) > MAX_TURNING * fastest).any(axis=1)
+        good = still & calm & shaking & ~turning
+        edges = np.flatnonzero(np.diff(np.r_[0, good.astype(np.int8), 0])).reshape(-1, 2)
+        for first, last in edges:
+            start, stop = a + first * block + block, a + last * block - block
+            if stop - start >= shortest_s * recording.rate_hz:
+                out.append((int(start), int(stop)))
+    return out

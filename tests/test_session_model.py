@@ -1,0 +1,94 @@
+"""The joint model of a session: whitening, derivatives, zeros that differ from pose to pose, stamps that repeat."""
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trihedron.diagnose.session.observations import observe
+from trihedron.diagnose.session.solve import tune_noise
+from trihedron.diagnose.session.starting_point import start_twin
+from trihedron.diagnose.session.twin import NO_DISTORTION
+from trihedron.estimate.accelerometer import calibrate_norm
+from trihedron.estimate.joint import calibrate_joint
+from trihedron.read import read_recording
+from trihedron.records.recording import spread_stamps
+from trihedron.segment import segment_recording
+from trihedron.simulate import hand_session, simulate
+from trihedron.simulate.named import _of
+from trihedron.simulate.profiles import profile_by_name
+
+
+def session_of(seed, n_poses=18):
+    scenario = _of(profile_by_name("adis"), hand_session(n_poses, layout=seed), "session", seed)
+    return simulate(scenario, seed)
+
+
+def fitted_to(recording, gravity):
+    segments = segment_recording(recording)
+    accelerometer, _ = calibrate_norm(
+        segments.accelerometer_mean, segments.accelerometer_sigma_mean, gravity, raw_unit=recording.accelerometer_unit
+    )
+    calibration = calibrate_joint(recording, segments, accelerometer, gravity, "test")
+    obs = observe(recording, segments)
+    return tune_noise(obs, start_twin(obs, calibration), NO_DISTORTION, None), calibration
+
+
+def scattered(recording, segments, sigma_raw, rng):
+    """The recording with a zero of its own in every pose, carried from pose to pose in the middle of each move."""
+    offset = np.zeros_like(recording.gyroscope)
+    edges = [0, *((move.start + move.stop) // 2 for move in segments.moves), recording.n_samples]
+    for start, stop in pairwise(edges):
+        offset[start:stop] = sigma_raw * rng.standard_normal(3)
+    return replace(recording, gyroscope=recording.gyroscope + offset)
+
+
+def test_a_zero_that_scatters_from_pose_to_pose_does_not_shrink_the_gyro():
+    change = []
+    for seed in range(3):
+        recording, truth = session_of(seed)
+        plain, calibration = fitted_to(recording, truth.gravity_m_s2)
+        scale = np.linalg.norm(calibration.gyroscope.S, 2)
+        moved = scattered(
+            recording, segment_recording(recording), np.radians(0.1) / scale, np.random.default_rng(seed + 50)
+        )
+        fitted, _ = fitted_to(moved, truth.gravity_m_s2)
+        change.append(np.diag(fitted.twin.gyro_S) / np.diag(plain.twin.gyro_S) - 1.0)
+    # A zero wrong by 0.1 deg/s in half of a move of 2 s is 0.1 deg in 120 deg, 1e-3 a move and less over 17 moves;
+    # shrinking, where it happened, was -5e-3 with one sign on every axis.
+    assert abs(np.mean(change)) < 5e-4
+    assert np.abs(change).max() < 2e-3
+
+
+def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_data: Path) -> None:
+    folder = real_data / "getovermassif"
+    recording = read_recording(
+        accelerometer_path=folder / "session4_acc.txt", gyroscope_path=folder / "session4_gyro.txt"
+    )
+    fitted, _ = fitted_to(recording, 9.803)
+    # imu_tk found 1.000 on the log's own unit; shrunk by its zeros' scatter it was 0.816, moves 4.70 deg.
+    assert fitted.twin.gyro_S[0, 0] == pytest.approx(1.0, abs=0.01)
+    missed = [np.linalg.norm(move["residual"][:2]) for move in fitted.line._moves]
+    assert np.degrees(np.sqrt(np.mean(np.square(missed))) / 9.803) < 0.35
+
+
+def test_samples_that_share_a_stamp_are_spread_to_the_next():
+    stamps = np.array([0.0, 0.01, 0.02, 0.02, 0.02, 0.05, 0.06, 0.06])
+    spread = spread_stamps(stamps, 0.01)
+    np.testing.assert_allclose(spread, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.065], atol=1e-12)
+
+
+def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
+    recording, truth = session_of(4)
+    plain, _ = fitted_to(recording, truth.gravity_m_s2)
+    stamps = recording.time_s.copy()
+    moves = segment_recording(recording).moves
+    for move in moves[2:8]:
+        stamps[(move.start + move.stop) // 2] = stamps[(move.start + move.stop) // 2 - 1]
+    with np.errstate(all="raise", under="ignore"):
+        fitted, _ = fitted_to(replace(recording, time_s=stamps), truth.gravity_m_s2)
+    sigma = np.sqrt(np.diag(plain.covariance()))[9:18]
+    # One stamp of a move of some hundred samples late by half a step: a fraction of the noise.
+    assert np.abs((fitted.twin.gyro_S - plain.twin.gyro_S).ravel() / sigma).max() < 1.0
