@@ -10,12 +10,15 @@ import numpy.typing as npt
 
 from trihedron.capture import Found, LineColumns, NameColumns, Source, find_protocol, open_source
 from trihedron.files.frame_declaration import read_frame_declaration
-from trihedron.read.clock import PLAUSIBLE_HZ, SECONDS, parse_time_unit
+from trihedron.read.clock import SECONDS, parse_time_unit
 from trihedron.read.columns import Columns, find_columns
 from trihedron.read.table import Table
 from trihedron.records.frame_declaration import FrameDeclaration
 
 Cells = npt.NDArray[np.float64]
+
+PLAUSIBLE_HZ = (2.0, 20_000.0)
+"""What a board streams: slower or faster than that its step is in another unit."""
 
 USUAL_HZ = 100.0
 """A step that fits two units is taken for the one whose rate is nearer to this, in ratio."""
