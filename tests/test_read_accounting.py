@@ -203,3 +203,16 @@ def test_readings_in_si_that_step_like_counts_say_their_step(tmp_path):
     # Fine readings have no step, and whole numbers need no word about theirs.
     fine = np.column_stack([np.arange(2000) / 100, rng.normal([0, 0, 9.8, 0, 0, 0], 0.02, (2000, 6))])
     assert FindingCode.RAW_STEP not in codes(read_recording(write(tmp_path / "fine.csv", fine)))
+
+
+def test_counts_that_were_interpolated_onto_the_other_clock_are_still_counts(tmp_path):
+    rng = np.random.default_rng(5)
+    time_s = np.arange(400) / 100
+    acc = np.column_stack([time_s, np.rint(rng.normal([0, 0, 8192], 20, (400, 3)))])
+    gyr = np.column_stack([time_s + 0.003, np.rint(rng.normal([300, -200, 40], 20, (400, 3)))])
+    recording = read_recording(
+        accelerometer_path=write(tmp_path / "a.csv", acc, "t,x,y,z\n"),
+        gyroscope_path=write(tmp_path / "g.csv", gyr, "t,x,y,z\n"),
+    )
+    assert recording.gyroscope_unit is RateUnit.COUNTS
+    assert recording.accelerometer_unit is AccelerationUnit.COUNTS

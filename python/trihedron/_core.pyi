@@ -445,3 +445,14 @@ def simulate_convert(
 
 # trajectory
 def attitude_in_moves(time_s: FloatArray, rate: FloatArray, moves: list[tuple[int, int]]) -> FloatArray: ...
+
+# zero_process
+def zero_process_grams(
+    columns: FloatArray,
+    variance: FloatArray,
+    time: FloatArray,
+    length: FloatArray,
+    pose: npt.NDArray[np.int64],
+    direction: FloatArray,
+    strengths: FloatArray,
+) -> tuple[FloatArray, FloatArray]: ...

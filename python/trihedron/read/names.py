@@ -42,7 +42,7 @@ _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
 
 _TIME_UNITS = {
     "s": ["s", "sec", "secs", "second", "seconds"],
-    "ms": ["ms", "msec", "millis", "milliseconds", "millisecond"],
+    "ms": ["ms", "msec", "msecs", "millis", "milliseconds", "millisecond"],
     "us": ["us", "µs", "usec", "micros", "microseconds", "microsecond"],
     "ns": ["ns", "nsec", "nanos", "nanoseconds", "nanosecond", "nanosec"],
 }
@@ -100,7 +100,7 @@ def _unit(sensor: str, words: list[str]) -> str:
 @lru_cache(maxsize=4096)
 def parse_name(name: str) -> ColumnName:
     """What a column called ``name`` holds."""
-    text = name.strip().strip('"').strip().replace("m/(s^2)", "m/s^2")
+    text = name.strip().strip('"').strip().replace("m/(s^2)", "m/s^2").replace("m/(sec^2)", "m/s^2")
     if re.fullmatch(r"gF[xyz]", text):
         # Physics Toolbox: force in g along an axis, not a gyro's x.
         return ColumnName("accelerometer", text[-1], "gf", "g", rank=1)

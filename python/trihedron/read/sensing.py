@@ -18,6 +18,8 @@ from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, a
 
 NEAR_GRAVITY = 0.2
 """An uncalibrated accelerometer at rest may be this far off: scale a few per cent, zero offset a tenth of g."""
+WHOLE = "whole numbers"
+"""Stands for the unit of readings that were whole numbers before they were interpolated."""
 MIN_TURNS = 3
 MAX_TURN_RATIO = 2.0
 """Gravity's turn over the gyro's path: 1 at most by geometry, 1.1 with the scale errors of uncalibrated sensors."""
@@ -75,7 +77,8 @@ def judge_accelerometer(
 ) -> Judged:
     """Unit of the accelerometer: as given, else as named, else from |a| at rest."""
     norm = rest_norm(readings, windows)
-    whole = is_integer(readings)
+    whole = is_integer(readings) or named == WHOLE
+    named = "" if named == WHOLE else named
     if given is not None or named not in {"", "raw"}:
         unit = parse_acceleration_unit(given if given is not None else named)
         source = "as you said" if given is not None else "by its column names"
@@ -176,7 +179,8 @@ def judge_gyroscope(
     """Unit of the gyro: as given, else as named, else by turning gravity, else by magnitude (a warning)."""
     by_turn: RateUnit | None = None
     evidence = ""
-    whole = is_integer(readings)
+    whole = is_integer(readings) or named == WHOLE
+    named = "" if named == WHOLE else named
     if accelerometer is not None and windows is not None and not whole:
         by_turn, evidence = unit_by_turning(accelerometer, readings, time_s, rate_hz, windows)
     if given is not None or named not in {"", "raw"}:

@@ -15,7 +15,8 @@ from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.merge import merge
 from trihedron.read.names import parse_name
-from trihedron.read.sensing import order_of_triads
+from trihedron.read.rest import is_integer
+from trihedron.read.sensing import WHOLE, order_of_triads
 from trihedron.read.table import FloatArray, Progress, Table
 from trihedron.records import Finding, FindingCode, Severity
 
@@ -343,6 +344,11 @@ def _rate_stated(rate: float, source: str) -> Finding:
     )
 
 
+def _unit_before(named: str, readings: FloatArray) -> str:
+    """Interpolation hides that readings were whole numbers, which tells their unit."""
+    return WHOLE if named in {"", "raw"} and is_integer(readings) else named
+
+
 def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
     assert accelerometer.accelerometer is not None
     assert gyroscope.gyroscope is not None
@@ -379,12 +385,12 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
             temperature=base.columns.temperature,
             supply=base.columns.supply,
             counter=base.columns.counter,
-            accelerometer_unit=accelerometer.columns.accelerometer_unit,
+            accelerometer_unit=_unit_before(accelerometer.columns.accelerometer_unit, accelerometer.accelerometer),
         ),
         base.rows,
         merged.first,
         base.has_clock,
-        gyroscope.gyroscope_unit,
+        _unit_before(gyroscope.gyroscope_unit, gyroscope.gyroscope),
         (*accelerometer.findings, *extra, *merged.findings),
         accelerometer.rows_in_file + gyroscope.rows_in_file,
         accelerometer.rows_read + gyroscope.rows_read - merged.rows_left_out,

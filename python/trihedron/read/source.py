@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from trihedron.read.archive import read_npy, read_npz
+from trihedron.read.archive import read_npy
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, check_readable, from_os_error
 from trihedron.read.refused import refuse_foreign
 from trihedron.read.table import Progress, Table
+from trihedron.read.zipped import read_zip
 
 
 def read_table(path: Path, device: int | None = None, progress: Progress | None = None) -> Table:
@@ -42,7 +43,7 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     if magic.startswith(b"\x93NUMPY"):
         return (read_npy(path),)
     if magic.startswith(b"PK\x03\x04"):
-        return (read_npz(path, choice.device),)
+        return read_zip(path, choice, progress)
     if choice.device is not None:
         raise ReadError(f"{path}: a device was asked for but this is not an .npz archive; leave --device out.")
     # Tables bring a large library with them, which arrays do not need.

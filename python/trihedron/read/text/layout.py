@@ -10,8 +10,8 @@ MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _NUMBER_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _UNIT_WORD = re.compile(
-    r"[\[(]?(s|sec|seconds?|m?s|us|µs|ns|utc|m?g|m ?/ ?\(?s(\^?2|²|/s)\)?|m ?s\^?-2|m?dps|rad|deg"
-    r"|(m?rad|m?deg|°) ?(/ ?s|s\^?-1)|counts?|lsb|raw|adc|no_units|u?t|µt|gauss|local_flux|m?v"
+    r"[\[(]?(s|m?secs?|m?seconds?|m?s|us|µs|ns|utc|m?g|m ?/ ?\(?s(?:ec)?(\^?2|²|/s)\)?|m ?s\^?-2|m?dps|rad|deg"
+    r"|(m?rad|m?deg|°) ?(/ ?s(?:ec)?|s\^?-1)|counts?|lsb|raw|adc|no_units|u?t|µt|gauss|local_flux|m?v"
     r"|°?c|degc|degrees celsius|k?pa|y|-)?[\])]?$",
     re.IGNORECASE,
 )
@@ -86,6 +86,7 @@ def detect(text: str) -> Layout | None:
     first = _first_data_line(lines, separator, decimal_comma, n_fields)
     if first is None:
         return None
+    first, rate = _past_start_and_rate(lines, first, separator)
     trailing = separator != " " and n_fields > 1 and all(line.rstrip(" ").endswith(separator) for line in tail)
     n_kept = n_fields - trailing
     header = _header(lines[:first], separator, n_kept)
@@ -96,10 +97,24 @@ def detect(text: str) -> Layout | None:
         trailing,
         first + 1,
         header.names,
-        header.metadata,
+        header.metadata | rate,
         header.ignored,
-        _stray(lines[:first], header, decimal_comma),
+        () if rate else _stray(lines[:first], header, decimal_comma),
     )
+
+
+def _past_start_and_rate(lines: list[str], first: int, separator: str) -> tuple[int, dict[str, str]]:
+    """Empatica's two lines above the rows: the start in seconds since 1970 and the rate, once for each column."""
+    if first != 0 or len(lines) < 4:
+        return first, {}
+    start, rate = (split(line, separator) for line in lines[:2])
+    if len(set(start)) != 1 or len(set(rate)) != 1 or len(start) < 3 or len(start) != len(rate):
+        return first, {}
+    if not (is_number(start[0], False) and is_number(rate[0], False)):
+        return first, {}
+    if not (1e9 <= float(start[0]) <= 4e9 and 0.0 < float(rate[0]) <= 1e4):
+        return first, {}
+    return 2, {"start": start[0], "rate": rate[0]}
 
 
 def _looks_like_row(line: str, decimal_comma: bool) -> bool:
