@@ -656,7 +656,7 @@ impl SessionFit {
     }
 
     /// Held-out prediction of folds of rows, `(folds, rows)` flags: χ² `(folds, 4)`, log-determinants `(folds,)`,
-    /// directions `(4,)`, innovations `(rows,)`.
+    /// directions `(4,)`, innovations `(rows,)` whitened, and over each row's own noise.
     #[allow(clippy::type_complexity)]
     fn held_out<'py>(
         &self,
@@ -664,6 +664,7 @@ impl SessionFit {
         folds: PyReadonlyArray2<'py, bool>,
     ) -> PyResult<(
         Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray1<f64>>,
         Bound<'py, PyArray1<f64>>,
         Bound<'py, PyArray1<f64>>,
         Bound<'py, PyArray1<f64>>,
@@ -688,6 +689,7 @@ impl SessionFit {
             out.log_det.to_pyarray(py),
             out.n_rows.to_pyarray(py),
             out.residual.to_pyarray(py),
+            out.innovation.to_pyarray(py),
         ))
     }
 

@@ -28,6 +28,8 @@ pub struct HeldOut {
     pub n_rows: [f64; N_DOMAINS],
     /// `(rows)` whitened innovations.
     pub residual: Vec<f64>,
+    /// `(rows)` the same over each row's own noise alone.
+    pub innovation: Vec<f64>,
 }
 
 /// One zero for the session, raw and centred.
@@ -145,6 +147,7 @@ impl Fit {
                 let eigen = spread.symmetric_eigen();
                 let along = eigen.eigenvectors.tr_mul(&innovation);
                 let mut whitened = DVector::zeros(n);
+                let mut plain = DVector::zeros(n);
                 let mut share = DVector::zeros(n);
                 let mut log_det = 0.0;
                 for k in 0..n {
@@ -152,12 +155,14 @@ impl Fit {
                     if value < OPEN {
                         let vector = eigen.eigenvectors.column(k);
                         whitened.axpy(along[k] / value.sqrt(), &vector, 1.0);
+                        plain.axpy(along[k], &vector, 1.0);
                         share += vector.component_mul(&vector);
                         log_det += value.ln();
                     }
                 }
                 Ok(FoldPart {
                     whitened,
+                    plain,
                     share,
                     log_det,
                 })
@@ -168,6 +173,7 @@ impl Fit {
             log_det: Vec::with_capacity(folds.len()),
             n_rows: [0.0; N_DOMAINS],
             residual: vec![0.0; self.n_rows()],
+            innovation: vec![0.0; self.n_rows()],
         };
         for (fold, part) in folds.iter().zip(parts) {
             let part = part?;
@@ -182,6 +188,7 @@ impl Fit {
                         out.n_rows[domain] += part.share[at];
                     }
                     out.residual[firsts[g] + r] = part.whitened[at];
+                    out.innovation[firsts[g] + r] = part.plain[at];
                     at += 1;
                 }
             }
@@ -307,6 +314,7 @@ impl Fit {
 
 struct FoldPart {
     whitened: DVector<f64>,
+    plain: DVector<f64>,
     share: DVector<f64>,
     log_det: f64,
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -15,6 +15,12 @@ from trihedron.records.diagnosis import AcceptedEffect, Candidate, ParameterDiff
 FRAME_TOLERANCE = 0.03
 """Parameters of one effect are stated along the axes of each side's own fit: 3 % (the angle between the two frames and
 the first order of the mechanisms) is no difference."""
+
+
+def left_open_by(effects: Iterable[AcceptedEffect]) -> frozenset[str]:
+    """Ids of numbers that cannot be judged beside these effects."""
+    named = {effect.id: effect.leaves_open for effect in catalogue()}
+    return frozenset(number for effect in effects for number in named.get(effect.id, ()))
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
@@ -86,7 +87,12 @@ class ComparedNumbers:
 
 
 def compare_numbers(
-    model: FittedModel, recording: FittedModel, *, alpha: float, linear: FittedModel | None = None
+    model: FittedModel,
+    recording: FittedModel,
+    *,
+    alpha: float,
+    linear: FittedModel | None = None,
+    left_open: Collection[str] = (),
 ) -> ComparedNumbers:
     """Hold the numbers of ``model`` against those of ``recording``.
 
@@ -99,13 +105,15 @@ def compare_numbers(
     linear : FittedModel, optional
         The recording's fit without effects. A linear calibration absorbs part of an effect that it does not know: a
         group counts only where it differs from this fit too.
+    left_open : ids, optional
+        Groups that cannot be judged beside the effects accepted: shown, never significant.
     """
     groups, ranges = _groups(model, recording)
     p = np.array([group.p_value for group in groups])
     if linear is not None:
         beside = {group.id: group.p_value for group in _groups(model, linear)[0]}
         p = np.array([max(value, beside.get(group.id, 0.0)) for value, group in zip(p, groups, strict=True)])
-    significant = _holm(p, alpha / 2.0)
+    significant = _holm(p, alpha / 2.0) & np.array([group.id not in left_open for group in groups])
     out: list[ParameterDifference] = []
     for group, p_value, is_significant in zip(groups, p, significant, strict=True):
         named = _as_gravity(group, alpha) if is_significant and group.id == "accel-scale" else group

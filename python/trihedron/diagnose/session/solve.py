@@ -191,13 +191,15 @@ class Prediction:
     """Held-out prediction of rows: innovation chi-square per fold and domain, its volume, and the innovations.
 
     ``fold_chi2`` (folds, domains), ``fold_log_det`` (folds,) log-determinant of the predicted covariance, ``n_rows``
-    (domains,), ``residual`` (rows,) whitened innovations.
+    (domains,), ``residual`` (rows,) whitened innovations; ``innovation`` (rows,) the same over each row's own noise
+    alone, so that a model which merely predicts less sharply does not look better in physical units.
     """
 
     fold_chi2: FloatArray
     fold_log_det: FloatArray
     n_rows: FloatArray
     residual: FloatArray
+    innovation: FloatArray
 
     @property
     def chi2(self) -> FloatArray:
