@@ -22,7 +22,7 @@ def demo(
     ] = None,
     seed: Annotated[
         Optional[int],  # noqa: UP045
-        typer.Option("--seed", metavar="N", min=0, help="Repeat the second act with this unit and flaw; drawn if not said."),
+        typer.Option("--seed", metavar="N", min=0, help="Unit and flaw of the second act; drawn if not said."),
     ] = None,
     force: Force = False,
 ) -> None:

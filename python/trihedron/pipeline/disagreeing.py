@@ -22,7 +22,15 @@ from trihedron.pipeline.results import DiagnosisResult
 from trihedron.report import diagnosis_report, disagreement_report
 from trihedron.report.document import Document
 from trihedron.report.page import to_html
-from trihedron.simulate import Environment, Scenario, diagnosed_sizes, hand_session, profile_by_name, simulate, with_effect
+from trihedron.simulate import (
+    Environment,
+    Scenario,
+    diagnosed_sizes,
+    hand_session,
+    profile_by_name,
+    simulate,
+    with_effect,
+)
 
 Draw = Callable[[np.random.Generator], dict[str, Any]]
 LATITUDE_DEG = 59.94
@@ -101,7 +109,7 @@ def disagree(
     write_whole(folder / "disagreement.html", to_html(diagnosis_report(found)), overwrite=overwrite)
     tell("opening the seal")
     opened = json.loads((folder / "sealed.json").read_text(encoding="utf-8"))
-    sizes = {effect_id: size for effect_id, size in diagnosed_sizes([e.to_dict() for e in found.own_effects])[0]}
+    sizes = dict(diagnosed_sizes([e.to_dict() for e in found.own_effects])[0])
     document = disagreement_report(found, improved, opened, sizes, folder, seed)
     return Disagreement(seed, found, improved, opened, document)
 
