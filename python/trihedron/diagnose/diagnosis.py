@@ -18,6 +18,7 @@ from trihedron.diagnose.selection.evidence import with_evidence
 from trihedron.diagnose.selection.model import StepwiseModel, begin
 from trihedron.diagnose.selection.prune import judged_again
 from trihedron.diagnose.selection.score import Scored
+from trihedron.diagnose.selection.stages import held_out_stages
 from trihedron.diagnose.selection.stepwise import MAX_EFFECTS, candidates_of, scores, with_next
 from trihedron.diagnose.selection.verdict import accounted_for, verdict_of
 from trihedron.diagnose.session.observations import Observations, observe
@@ -98,6 +99,7 @@ def diagnose_recording(
         recording_sha256=recording.sha256,
         references=MappingProxyType(model.context.references),
         residuals=residuals_before_after(base, model.fitted),
+        stages=held_out_stages(run.bare, model),
     )
     tell(1.0, "done")
     return result
