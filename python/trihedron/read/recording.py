@@ -6,14 +6,16 @@ import hashlib
 import os
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
-from trihedron.read.devices import Choice
+from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError
+from trihedron.read.memory import table_of
 from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of
@@ -26,7 +28,7 @@ from trihedron.units import AccelerationUnit, RateUnit
 # Absurd readings (1e300) overflow squares; they then fail every test of plausibility, which is what they should.
 @np.errstate(over="ignore", invalid="ignore")
 def read_recording(
-    path: str | os.PathLike[str] | None = None,
+    path: Any = None,
     *,
     accelerometer_path: str | os.PathLike[str] | None = None,
     gyroscope_path: str | os.PathLike[str] | None = None,
@@ -44,8 +46,9 @@ def read_recording(
 
     Parameters
     ----------
-    path : file
-        Text (CSV, TSV, blanks; gzip, bzip2, xz), ``.npz``, ``.npy`` or Parquet, told by content; or
+    path : file, or readings in memory
+        Text (CSV, TSV, blanks; gzip, bzip2, xz), ``.npz``, ``.npy``, Parquet and others
+        (``docs/reading.md``), told by content; or arrays, a dictionary or a data frame; or
     accelerometer_path, gyroscope_path : file
         one file per sensor, each with its own clock; they are merged on a common base. One alone is read alone.
     columns : str
@@ -81,8 +84,13 @@ def read_recording(
     if path is not None and (accelerometer_path is not None or gyroscope_path is not None):
         raise ReadError("give either one log or one file per sensor, not both.")
     if path is not None:
-        sensors = _of_file(Path(path), None, options)
-        source, sha256 = str(path), sensors.table.sha256
+        if isinstance(path, str | os.PathLike):
+            sensors = _of_file(Path(path), None, options)
+            source = str(path)
+        else:
+            sensors = of_tables(by_sensor(table_of(path)), None, options)
+            source = "memory"
+        sha256 = sensors.table.sha256
     elif accelerometer_path is not None and gyroscope_path is not None:
         accelerometer = _of_file(Path(accelerometer_path), "accelerometer", options)
         gyroscope = _of_file(Path(gyroscope_path), "gyroscope", options)

@@ -58,6 +58,9 @@ class Effect(ABC):
 
     is_of_session: ClassVar[bool] = False
     """Whether it belongs to one experiment (a pushed pose, a tilted table) and to no instrument."""
+    leaves_open: ClassVar[tuple[str, ...]] = ()
+    """Numbers (ids) whose level depends on where the effect is counted from: a zero at the session's mean temperature
+    is no other zero than one at 25 °C."""
     is_local: ClassVar[bool] = False
     """Whether it concerns one pose or move only: its gain may then come from one block of held-out data."""
 
