@@ -77,7 +77,7 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
 def test_samples_that_share_a_stamp_are_spread_to_the_next():
     stamps = np.array([0.0, 0.01, 0.02, 0.02, 0.02, 0.05, 0.06, 0.06])
     spread = spread_stamps(stamps, 0.01)
-    np.testing.assert_allclose(spread, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.065], atol=1e-12)
+    np.testing.assert_allclose(spread, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07], atol=1e-12)
 
 
 def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
