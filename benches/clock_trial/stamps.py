@@ -68,12 +68,12 @@ def in_order(arrival: FloatArray) -> FloatArray:
     return np.maximum.accumulate(arrival)
 
 
-def exact(taken: FloatArray, period_s: float, rng: Rng) -> FloatArray:
+def exact(taken: FloatArray, _period_s: float, _rng: Rng) -> FloatArray:
     return np.round(taken, 9)
 
 
 def rounded(taken: FloatArray, period_s: float, rng: Rng) -> FloatArray:
-    grid = period_s * rng.choice([0.05, 0.1, 0.25, 0.51])
+    grid = period_s * rng.choice([0.05, 0.1, 0.25, 0.51]) * rng.uniform(0.93, 1.07)
     return np.asarray(np.floor(taken / grid + rng.random()) * grid)
 
 
@@ -158,6 +158,8 @@ def draw(
     pause_after = np.sort(rng.choice(np.arange(n // 10, n - n // 10), pauses, replace=False)) if pauses else []
     for k in pause_after:
         taken[k + 1 :] += period_s * rng.uniform(60, 5000)
-    stamp = LAWS[law](taken, period_s, rng)
+    # What is held back when the logger pauses is written before it does.
+    parts = np.split(taken, np.asarray(pause_after, dtype=np.int64) + 1)
+    stamp = np.concatenate([LAWS[law](part, period_s, np.random.default_rng([seed, 7])) for part in parts])
     start = stamp[0]
     return Stamped(law, period_s, stamp - start, taken - start, tick, True, np.asarray(pause_after, np.int64))

@@ -15,10 +15,13 @@ from trihedron.read.columns import Sensor
 from trihedron.read.errors import ReadError
 from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
-from trihedron.read.sensors import Options, Sensors, merge_sensors, read_one
+from trihedron.read.sensors import Options, Sensors, merge_sensors, read_one, settled
 from trihedron.read.table import FloatArray, Progress
 from trihedron.records import Recording
 from trihedron.units import AccelerationUnit, RateUnit
+
+STAMPS = "stamps as logged [s]"
+"""Name under which stamps that gave way to an even clock are kept."""
 
 
 # Absurd readings (1e300) overflow squares; they then fail every test of plausibility, which is what they should.
@@ -72,7 +75,7 @@ def read_recording(
     if path is not None and (accelerometer_path is not None or gyroscope_path is not None):
         raise ReadError("give either one log or one file per sensor, not both.")
     if path is not None:
-        sensors = read_one(Path(path), None, options)
+        sensors = settled(read_one(Path(path), None, options))
         source, sha256 = str(path), sensors.table.sha256
     elif accelerometer_path is not None and gyroscope_path is not None:
         accelerometer = read_one(Path(accelerometer_path), "accelerometer", options)
@@ -83,7 +86,7 @@ def read_recording(
     elif accelerometer_path is not None or gyroscope_path is not None:
         only: Sensor = "accelerometer" if accelerometer_path is not None else "gyroscope"
         one = Path(accelerometer_path if accelerometer_path is not None else gyroscope_path or "")
-        sensors = read_one(one, only, options)
+        sensors = settled(read_one(one, only, options))
         source, sha256 = str(one), sensors.table.sha256
     else:
         raise ReadError("no log was named; give a file, or one file per sensor.")
@@ -101,7 +104,7 @@ def _audited(
     findings = list(sensors.findings)
     time_s, table = sensors.time_s, sensors.table
     n = len(time_s)
-    rate = mean_rate_hz(time_s)
+    rate = _rate_hz(sensors)
     present = {
         name: triad
         for name, triad in (("accelerometer", sensors.accelerometer), ("gyroscope", sensors.gyroscope))
@@ -130,7 +133,7 @@ def _audited(
         gyr_unit = RateUnit(judged.unit)
         findings += judged.findings
     if sensors.has_clock:
-        findings += audit_timing(time_s, rate, sensors.place)
+        findings += audit_timing(time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.stamps_s)
     counter = sensors.columns.counter
     if counter is not None:
         findings += audit_counter(_kept(sensors, counter, n), table.label(counter), sensors.place)
@@ -157,8 +160,17 @@ def _audited(
         source=source,
         sha256=sha256,
         findings=tuple(findings),
+        sampling=sensors.sampling,
         auxiliary=MappingProxyType(_auxiliary(sensors, n)),
     )
+
+
+def _rate_hz(sensors: Sensors) -> float:
+    """Samples per second: of the clock behind the stamps where losses can be told on it, else of the rows."""
+    sampling = sensors.sampling
+    if sampling.period_s > 0.0 and (sampling.counts_losses or sampling.is_even):
+        return 1.0 / sampling.period_s
+    return mean_rate_hz(sensors.time_s)
 
 
 def _kept(sensors: Sensors, column: int, n: int) -> FloatArray:
@@ -180,4 +192,8 @@ def _auxiliary(sensors: Sensors, n: int) -> dict[str, FloatArray]:
         kept = np.array(_kept(sensors, i, n))
         kept.setflags(write=False)
         out[key] = kept
+    if sensors.stamps_s is not None:
+        stamps = np.array(sensors.stamps_s)
+        stamps.setflags(write=False)
+        out[STAMPS] = stamps
     return out

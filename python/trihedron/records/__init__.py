@@ -27,6 +27,7 @@ from trihedron.records.kalman import (
 )
 from trihedron.records.noise import AllanCurve, GaussMarkov, Noise, NoiseAxis, NoiseTerm, SpectralLine, TermName
 from trihedron.records.recording import Recording
+from trihedron.records.sampling import Sampling, StampKind
 from trihedron.records.segments import Hold, Move, Segments
 from trihedron.records.truth import TrueSegment, Truth
 from trihedron.records.verification import Verification
@@ -58,10 +59,12 @@ __all__ = [
     "Observability",
     "PoseTable",
     "Recording",
+    "Sampling",
     "Segments",
     "SensorCalibration",
     "Severity",
     "SpectralLine",
+    "StampKind",
     "TermName",
     "TrueSegment",
     "Truth",

@@ -1,4 +1,4 @@
-"""The sampling period from the stamps alone, before any loss is counted: the peak of a phase sum (docs/reading.md, 4)."""
+"""The sampling period from stamps alone, before any loss is counted: the peak of a phase sum (docs/reading.md, 4)."""
 
 from __future__ import annotations
 
@@ -14,22 +14,29 @@ IntArray = npt.NDArray[np.int64]
 
 WINDOW = 2048
 """Rows of one phase sum: a rate that wanders by 10⁻⁴ within it turns the phase by a fifth of a period."""
-MOST_WINDOWS = 12
+MOST_WINDOWS = 10
 LOWEST, HIGHEST = 0.8, 1.9
 """Periods looked for, as parts of the rows' mean distance: up to 45 % of all samples may be lost."""
-GRID_HIGHEST = 25.0
+GRID_HIGHEST = 16.0
 """A grid of stamps finer than this part of a period is no matter."""
 LINE, LINE_HELD = 0.98, 0.9
 """Power of a phase sum, and of that of its eighth multiple, above which all stamps lie on multiples of one step."""
 CHANCE = 1e-7
 """Chance of noise to pass for a period at one frequency looked at (some 10⁴ of them). Steps drawn anew, without a clock
 behind them, leave a hump as high as a line, but wide: what a line is held against lies beside it."""
-COARSE_COHERENCE = 0.15
-"""On a grid wider than the period aliases of the two are as high as the period itself below this."""
+SLOWER = 0.985
+"""A beat with fewer ticks than the log has rows is no period; there is room for the error of counting."""
+ALIASED, COARSE_COHERENCE = 0.75, 0.15
+"""On a beat slower than the first, aliases of beat and period lie among the periods looked for, as high as the period
+itself if its phase sum is shorter than the second."""
+MANY, PLAIN = 0.15, 0.25
+"""A period by which more than this share of samples is lost needs a power of its phase sum above the second."""
 FEWEST_STAMPS = 100
 """Distinct stamps that a period needs."""
 WHOLE = 0.005
 """A packet holds a whole number of samples if the rows come this near to it."""
+REGULAR = 0.12
+"""Share of samples that may be lost with regularity before a coarse grid is the likelier cause."""
 PAUSE_STEPS = 50.0
 """A step longer than this many is a pause of the logger, not a loss to be counted."""
 
@@ -48,15 +55,15 @@ class Period:
 def find_period(time_s: FloatArray) -> Period:
     """Period of stamps (n,) in order; at least 64 rows.
 
-    ``|mean exp(2πi t/T)|²`` is averaged over windows of 2048 rows. Samples lost by whole periods leave its peak where it
-    is; a delay d lowers it to ``|E exp(2πi d/T)|²``. Where several periods explain the stamps alike (batches, coarse
+    ``|mean exp(2πi t/T)|²`` is averaged over windows of 2048 rows. Samples lost by whole periods leave its peak where
+    it is; a delay d lowers it to ``|E exp(2πi d/T)|²``. Where several periods explain the stamps alike (batches, coarse
     grids) the one that loses fewest samples is taken.
     """
     windows, mean_step = _windows(time_s)
     cell = mean_step / (2.0 * GRID_HIGHEST)
     size = max(float(w[-1]) for w in windows) / cell
     length = int(fft.next_fast_len(int(4 * size) + 16, real=True))
-    power = sum(len(w) * _phase_sum(w / cell, length) for w in windows) / sum(len(w) for w in windows)
+    power = np.average([_phase_sum(w / cell, length) for w in windows], axis=0, weights=[len(w) for w in windows])
     threshold = float(stats.gamma.isf(CHANCE, len(windows)) / stats.gamma.median(len(windows)))
     spectrum = _Spectrum(np.asarray(power), mean_step / (length * cell), int(2 * length / size) + 1, threshold)
     line = _first_line(windows, mean_step, spectrum)
@@ -157,6 +164,17 @@ def _phase_sum(position: FloatArray, length: int) -> FloatArray:
     return np.asarray((np.abs(spectrum) / damped / taper.sum()) ** 2)
 
 
+def _poll(spectrum: _Spectrum) -> float:
+    """Frequency of a beat slower than the rows that most stamps keep to; 0 where there is none."""
+    a, b = int(0.2 / spectrum.width), int(SLOWER / spectrum.width)
+    if b - a < 3:
+        return 0.0
+    k = a + int(np.argmax(spectrum.power[a:b]))
+    inside = spectrum.power[int(SLOWER / spectrum.width) : int(HIGHEST / spectrum.width)]
+    strong = spectrum.power[k] > 0.5 and spectrum.power[k] >= 0.9 * float(inside.max())
+    return _summit(spectrum.power, k) * spectrum.width if strong and k < b - spectrum.lobe else 0.0
+
+
 def _shortest_step(windows: list[FloatArray]) -> float:
     """A step that only one in 500 falls short of."""
     return float(np.percentile(np.concatenate([np.diff(w) for w in windows]), 0.2))
@@ -173,22 +191,33 @@ def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:
     near = 2 * spectrum.lobe * spectrum.width
     multiple = np.rint(per_step / line) if line else np.zeros(len(peaks))
     is_line = (multiple > 0) & (np.abs(per_step - multiple * line) < near)
+    poll = _poll(spectrum) if not line else 0.0
+    if poll:
+        # A beat at which the log was written, too slow to be the sensor's: unless a whole number of samples shares it,
+        # its multiples are not the period either.
+        line = poll
+        multiple = np.rint(per_step / poll)
+        is_line = np.abs(per_step - multiple * poll) < 2.0 * near * multiple
     free, strength = per_step[~is_line], power[~is_line]
     chosen: float | None = None
+    # A period that leaves many samples lost must be plain.
+    plain = (_cost(free) < MANY) | (strength > PLAIN)
+    free, strength = free[plain], strength[plain]
     if len(free):
         strong = free[strength >= 0.4 * strength.max()]
         chosen = float(strong[np.argmin(_cost(strong))])
     if not line or line > HIGHEST:
         return chosen
     of_line = line * max(round(1.0 / line), 1)
-    if line < LOWEST:
+    if line < SLOWER:
         # Packets of a whole number of samples; else a coarse grid, on which the period is a weaker peak or none.
         if _cost(np.array([of_line]))[0] < WHOLE:
             return of_line
-        clear = chosen is not None and strength[free == chosen].max() > COARSE_COHERENCE**2
+        clear = chosen is not None and (line > ALIASED or strength[free == chosen].max() > COARSE_COHERENCE**2)
         return chosen if clear else None
-    # An exact log has its own line alone; on a grid about as wide as the period the period loses fewer samples.
-    loses_fewer = chosen is not None and _cost(np.array([chosen]))[0] < _cost(np.array([of_line]))[0] - 0.02
+    # An exact log has its own line alone; on a grid about as wide as the period the period loses fewer samples. Every
+    # tenth sample lost and a grid of nine tenths of the period look alike: the loss is the commoner.
+    loses_fewer = chosen is not None and _cost(np.array([of_line]))[0] > max(_cost(np.array([chosen]))[0], REGULAR)
     return chosen if loses_fewer else of_line
 
 
