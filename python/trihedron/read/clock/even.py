@@ -30,6 +30,8 @@ GROWTH = 4.0
 stamps: 16 for steps drawn anew, 1 for an even clock."""
 TAKEN_BACK = 0.02
 """Share of blocks whose earliest stamp may move back by a whole period: an even clock's never do."""
+CLOSE_PIECES = 60
+"""Pieces of a log over which a wandering rate is followed: a thermal drift takes minutes."""
 STALL_STEPS = 120
 """A link that stands still for longer than this has paused."""
 
@@ -75,8 +77,19 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
     else:
         width = _block(time_s, period, found.coherence)
         period, tick, pauses, moved_back = _track(time_s, period, width, sees, found.coherence > 0.9)
-    even, sigma, wanders = _lay(time_s, tick, period, pauses, width, False)
+    even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False)
     error = time_s - even
+    for _ in range(3 if counter is None and sees else 0):
+        # Followed loosely: a loss counted too early makes a dip that the clock must not follow.
+        moved = _behind_late_rows(tick, error / period)
+        if moved is tick:
+            break
+        tick = moved
+        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False)
+        error = time_s - even
+    if wanders:
+        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, CLOSE_PIECES)
+        error = time_s - even
     on_grid = 0.0 < found.grid_s < 1.3 * period and _range(error) < 1.3 * found.grid_s
     growth = 0.0 if on_grid else _growth(error, pauses, UNSEEN * period)
     if moved_back > TAKEN_BACK or growth > GROWTH or (not sees and growth > 0.5 * GROWTH):
@@ -84,12 +97,10 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
     kind = _kind(error, period, found.grid_s)
     if kind is not StampKind.LATE:
         # Two-sided errors have their middle, not their edge, on the clock.
-        even, sigma, wanders = _lay(time_s, tick, period, pauses, width, True)
+        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, True, CLOSE_PIECES)
         error = time_s - even
     rms = float(np.sqrt(np.mean((error - error.mean()) ** 2)))
-    if not len(pauses):
-        period = float((even[-1] - even[0]) / (tick[-1] - tick[0]))
-    return EvenClock(kind, period, sigma, tick, even, rms, sees, pauses, found.grid_s, wanders)
+    return EvenClock(kind, mean_period, sigma, tick, even, rms, sees, pauses, found.grid_s, wanders)
 
 
 def _long_run(time_s: FloatArray, tick: IntArray) -> float:
@@ -242,14 +253,21 @@ def _settle(first: FloatArray, count: IntArray) -> None:
 
 
 def _lay(
-    time_s: FloatArray, tick: IntArray, period: float, pauses: IntArray, width: int, through_middle: bool
-) -> tuple[FloatArray, float, bool]:
-    """The even clock (n,) under the earliest stamps, or through the middle of all; the standard error of its period;
-    whether its rate wanders."""
+    time_s: FloatArray,
+    tick: IntArray,
+    period: float,
+    pauses: IntArray,
+    width: int,
+    through_middle: bool,
+    pieces: int = 12,
+) -> tuple[FloatArray, float, float, bool]:
+    """The even clock (n,) under the earliest stamps, or through the middle of all; its mean period over the
+    longest stretch and the standard error of that;
+    whether its rate wanders, followed in so many ``pieces``."""
     late = time_s - period * tick
     even = np.empty_like(late)
     edges = np.concatenate([[0], pauses + 1, [len(late)]])
-    sigma, longest, wanders = np.inf, 0, False
+    sigma, longest, wanders, slope = np.inf, 0, False, 0.0
     for a, b in pairwise(edges):
         piece = late[a:b]
         if b - a < 4 * width:
@@ -258,33 +276,34 @@ def _lay(
         if through_middle:
             cut = (b - a) // width * width
             x = tick[a : a + cut].reshape(-1, width).mean(axis=1)
-            y = np.median(piece[:cut].reshape(-1, width), axis=1)
+            y = each = np.median(piece[:cut].reshape(-1, width), axis=1)
         else:
             at = _argmin_blocks(piece, width)
-            x, y = tick[a:b][at].astype(np.float64), _ahead(piece[at], STALL_STEPS // width + 1)
+            x, each = tick[a:b][at].astype(np.float64), piece[at]
+            y = _ahead(each, STALL_STEPS // width + 1)
         x0, scale = x.mean(), max(float(np.ptp(x)), 1.0)
         u = (x - x0) / scale
         line = _robust_line(u, y)
         left = y - np.polyval(line, u)
-        noise = 1.4826 * float(np.median(np.abs(np.diff(y)))) / np.sqrt(2.0) + 1e-3 * period
+        noise = 1.4826 * float(np.median(np.abs(np.diff(each)))) / np.sqrt(2.0) + 1e-3 * period
         size = min(max(len(y) // 12, 5), 401) | 1
         smooth = median_filter(left, size, mode="nearest")
         # Wander: the smoothed rest is far more than the blocks' own scatter leaves in it.
-        curved = float(np.std(smooth)) > 4.0 * noise / np.sqrt(size) and float(np.std(smooth)) > 0.02 * period
+        curved = float(np.std(smooth)) > max(8.0 * noise / np.sqrt(size), UNSEEN * period)
         even[a:b] = np.polyval(line, (tick[a:b] - x0) / scale)
         if curved and len(y) >= 24:
             wanders = True
             even[a:b] += np.interp(
-                tick[a:b], x, median_filter(left, min(max(len(y) // 60, 5), 101) | 1, mode="nearest")
+                tick[a:b], x, median_filter(left, min(max(len(y) // pieces, 5), 101) | 1, mode="nearest")
             )
         even[a:b] += period * tick[a:b]
         if b - a > longest:
-            longest = b - a
+            longest, slope = b - a, float(line[0]) / scale
             spread = float(np.std(left - smooth if curved else left))
             # Neighbouring blocks share what delays them: four count as one.
             sigma = spread / scale / max(float(np.std(u)), 1e-9) / np.sqrt(max(len(y) / 4.0, 1.0))
     digits = float(np.spacing(np.abs(time_s).max())) / max(int(tick[-1] - tick[0]), 1)
-    return even, float(np.hypot(sigma, digits)), wanders
+    return even, period + slope, float(np.hypot(sigma, digits)), wanders
 
 
 def _robust_line(u: FloatArray, y: FloatArray) -> FloatArray:
@@ -299,6 +318,28 @@ def _robust_line(u: FloatArray, y: FloatArray) -> FloatArray:
             break
         line = np.polyfit(u[keep], y[keep], 1)
     return np.asarray(line)
+
+
+def _behind_late_rows(tick: IntArray, error: FloatArray) -> IntArray:
+    """Ticks with every loss put behind the rows that it would have stamped before they were taken.
+
+    A row late by most of a period in front of a loss looks like one behind it; counted so its ``error`` (n,), in
+    periods about the earliest stamps, is negative.
+    """
+    lost = np.diff(tick, prepend=tick[0] - 1) - 1
+    at = np.flatnonzero(lost > 0)
+    if not len(at):
+        return tick
+    early = -0.1
+    shift = np.zeros(len(tick), dtype=np.int64)
+    moved = False
+    for i in at:
+        k, count = int(i), int(lost[i])
+        while k < len(tick) and k < i + STALL_STEPS and error[k] < early and lost[k] == (count if k == i else 0):
+            shift[k] += count
+            k += 1
+        moved = moved or k > int(i)
+    return tick - shift if moved else tick
 
 
 def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:
@@ -317,8 +358,8 @@ def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:
 
 
 def _range(error: FloatArray) -> float:
-    """Width that holds all but 0.4 % of the errors."""
-    low, high = np.percentile(error[:: max(len(error) // 100_000, 1)], [0.2, 99.8])
+    """Width that holds all but 2 % of the errors: those next to a loss may stand on its wrong side."""
+    low, high = np.percentile(error[:: max(len(error) // 100_000, 1)], [1.0, 99.0])
     return float(high - low)
 
 
@@ -329,7 +370,7 @@ def _kind(error: FloatArray, period: float, grid: float) -> StampKind:
     rms = float(np.std(probe))
     if rms < EXACT * period:
         return StampKind.EXACT
-    if 0.0 < grid < 1.3 * period and high - low < 1.3 * grid:
+    if 0.0 < grid < 1.3 * period and _range(error) < 1.3 * grid:
         return StampKind.ROUNDED
     # One-sided: the early edge is sharp, the late one runs out; or samples come in packets.
     together = float(np.mean(np.diff(error) < -0.7 * period))

@@ -35,6 +35,8 @@ FEWEST_STAMPS = 100
 """Distinct stamps that a period needs."""
 WHOLE = 0.005
 """A packet holds a whole number of samples if the rows come this near to it."""
+POLLED = 0.55
+"""Slower beats than this may be packets of two and more samples, whose multiples hold the period."""
 REGULAR = 0.12
 """Share of samples that may be lost with regularity before a coarse grid is the likelier cause."""
 PAUSE_STEPS = 50.0
@@ -72,7 +74,8 @@ def find_period(time_s: FloatArray) -> Period:
     if best is None or sum(np.count_nonzero(np.diff(w) > 0.2 * mean_step) for w in windows) < FEWEST_STAMPS:
         return Period(mean_step, 0.0, grid, False)
     k = int(np.argmin(np.abs(spectrum.per_step - best)))
-    k = int(np.argmax(power[k - 1 : k + 2])) + k - 1
+    reach = spectrum.lobe
+    k = int(np.argmax(power[k - reach : k + reach + 1])) + k - reach
     period = mean_step / (_summit(power, k) * spectrum.width)
     if grid and abs(grid - period) < 0.02 * grid:
         grid = 0.0  # the period itself
@@ -165,14 +168,15 @@ def _phase_sum(position: FloatArray, length: int) -> FloatArray:
 
 
 def _poll(spectrum: _Spectrum) -> float:
-    """Frequency of a beat slower than the rows that most stamps keep to; 0 where there is none."""
-    a, b = int(0.2 / spectrum.width), int(SLOWER / spectrum.width)
-    if b - a < 3:
-        return 0.0
-    k = a + int(np.argmax(spectrum.power[a:b]))
+    """Lowest frequency of a beat slower than the rows that most stamps keep to; 0 where there is none."""
+    a, b = int(POLLED / spectrum.width), int(SLOWER / spectrum.width) - spectrum.lobe
     inside = spectrum.power[int(SLOWER / spectrum.width) : int(HIGHEST / spectrum.width)]
-    strong = spectrum.power[k] > 0.5 and spectrum.power[k] >= 0.9 * float(inside.max())
-    return _summit(spectrum.power, k) * spectrum.width if strong and k < b - spectrum.lobe else 0.0
+    strong = np.flatnonzero(spectrum.power[a:b] > max(0.5, 0.9 * float(inside.max()))) if b > a else np.zeros(0)
+    if not len(strong):
+        return 0.0
+    k = a + int(strong[0])
+    k += int(np.argmax(spectrum.power[k : k + 2 * spectrum.lobe]))
+    return _summit(spectrum.power, k) * spectrum.width
 
 
 def _shortest_step(windows: list[FloatArray]) -> float:
@@ -193,8 +197,7 @@ def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:
     is_line = (multiple > 0) & (np.abs(per_step - multiple * line) < near)
     poll = _poll(spectrum) if not line else 0.0
     if poll:
-        # A beat at which the log was written, too slow to be the sensor's: unless a whole number of samples shares it,
-        # its multiples are not the period either.
+        # A beat at which the log was written, too slow to be the sensor's: its multiples are not the period either.
         line = poll
         multiple = np.rint(per_step / poll)
         is_line = np.abs(per_step - multiple * poll) < 2.0 * near * multiple
@@ -211,7 +214,7 @@ def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:
     of_line = line * max(round(1.0 / line), 1)
     if line < SLOWER:
         # Packets of a whole number of samples; else a coarse grid, on which the period is a weaker peak or none.
-        if _cost(np.array([of_line]))[0] < WHOLE:
+        if not poll and _cost(np.array([of_line]))[0] < WHOLE:
             return of_line
         clear = chosen is not None and (line > ALIASED or strength[free == chosen].max() > COARSE_COHERENCE**2)
         return chosen if clear else None

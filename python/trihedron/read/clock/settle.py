@@ -23,6 +23,8 @@ SHARED = 0.005
 """Share of samples with the stamp of the one before, above which stamps cannot be when samples were taken."""
 STANDARD_ERRORS, SYSTEMATIC = 4.0, 0.15
 """A share of 0 or 1 is refused beyond four standard errors and what a filter, or a bent course, makes of it."""
+VAGUE = 0.2
+"""Standard error of the share above which motion tells nothing."""
 ONE_STEP = 0.9
 """Part of the steps a sample counter makes that are its usual one; counters of inner ticks alternate."""
 
@@ -119,7 +121,7 @@ def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Find
     }.get(sampling.kind, f"scattered by {1e3 * error:.2g} ms rms")
     by_motion = (
         f"the readings follow {sampling.followed:.2f} ± {sampling.sigma_followed:.2g} of it"
-        if np.isfinite(sampling.sigma_followed)
+        if sampling.sigma_followed < VAGUE
         else "no motion tells when the samples were taken"
     )
     rate = f"T = {1e3 * period:.6g} ± {1e3 * sampling.sigma_period_s:.1g} ms ({1 / period:.6g} Hz)"
