@@ -19,6 +19,7 @@ pub mod simulate;
 pub mod spectral_likelihood;
 pub mod stillness;
 pub mod trajectory;
+pub mod zero_process;
 
 #[cfg(feature = "python")]
 mod python;

@@ -210,7 +210,7 @@ class Identified:
     resolution: float = 0.001
     gauss_markov: object = None
 
-    def value(self, symbol):
+    def fitted(self, symbol):
         return self.terms.get(symbol, 0.0)
 
 

@@ -14,7 +14,7 @@ from trihedron.records import FindingCode, Recording, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
 # By name: the package also exports a function called `read`.
-text_module = importlib.import_module("trihedron.read.text")
+text_module = importlib.import_module("trihedron.read.text.blocks")
 HEADER = "t,ax,ay,az,gx,gy,gz\n"
 
 

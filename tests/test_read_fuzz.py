@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from trihedron.read import ReadError, read_recording
-from trihedron.read.layout import detect
 from trihedron.read.names import parse_name
+from trihedron.read.text.layout import detect
 from trihedron.records import Recording
 
 FUZZ = settings(

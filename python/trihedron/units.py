@@ -28,6 +28,7 @@ class RateUnit(str, Enum):
     RAD_S = "rad/s"
     MRAD_S = "mrad/s"
     DEG_S = "deg/s"
+    MDEG_S = "mdeg/s"
     COUNTS = "counts"
 
 
@@ -37,6 +38,7 @@ _ACCELERATION_TO_SI = {
     AccelerationUnit.MG: STANDARD_GRAVITY_M_S2 / 1000.0,
 }
 _RATE_TO_SI = {RateUnit.RAD_S: 1.0, RateUnit.MRAD_S: 1e-3, RateUnit.DEG_S: math.pi / 180.0}
+_RATE_TO_SI[RateUnit.MDEG_S] = _RATE_TO_SI[RateUnit.DEG_S] / 1000.0
 
 
 def acceleration_to_si(unit: AccelerationUnit) -> float | None:

@@ -89,6 +89,8 @@ impl Prefix {
             total / present as f64
         };
         let centre = pivot + shift;
+        // What readings are freed of is the rounded centre: at a level of 1e9 the block starts must know.
+        let shift = centre - pivot;
         let (mut high, mut low) = (0.0, 0.0);
         let starts: Vec<f64> = partial
             .iter()

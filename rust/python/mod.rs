@@ -24,6 +24,7 @@ mod simulate;
 mod spectral_likelihood;
 mod stillness;
 mod trajectory;
+mod zero_process;
 
 /// The one doorway: run a kernel without holding the interpreter, map its refusal to `ValueError`.
 pub(crate) fn run<T: Send>(
@@ -49,6 +50,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     spectral_likelihood::register(module)?;
     stillness::register(module)?;
     trajectory::register(module)?;
+    zero_process::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
     module.delattr("__all__")?;
     Ok(())

@@ -3,11 +3,12 @@
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
-use crate::spectral_likelihood::{self as likelihood, Bins, Question};
+use crate::spectral_likelihood::{self as likelihood, Bins, Question, Statement};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<SpectralBins>()?;
     module.add_class::<SpectralFit>()?;
+    module.add_class::<SpectralInversion>()?;
     Ok(())
 }
 
@@ -26,6 +27,25 @@ pub(crate) struct SpectralFit {
     deviance: f64,
     sigma_log: Vec<f64>,
     is_converged: bool,
+}
+
+/// What a spectrum says about the amplitude of every term, about a pair of them, and about the line.
+#[pyclass(frozen, get_all, module = "trihedron._core")]
+pub(crate) struct SpectralInversion {
+    most_likely: Vec<f64>,
+    median: Vec<f64>,
+    spread: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    rise_without: Vec<f64>,
+    strength: Vec<f64>,
+    strength_without_pair: Vec<f64>,
+    rise_without_pair: f64,
+    slope: f64,
+    sigma_slope: f64,
+    slope_lower: f64,
+    slope_upper: f64,
+    slope_tail: f64,
 }
 
 #[pymethods]
@@ -56,11 +76,7 @@ impl SpectralBins {
     /// Fit the strengths of the active terms.
     fn fit(&self, py: Python<'_>, active: Vec<usize>, has_line: bool) -> PyResult<SpectralFit> {
         self.know(&active)?;
-        let question = Question {
-            active,
-            has_line,
-            held: None,
-        };
+        let question = Question { active, has_line };
         let fit = super::run(py, || likelihood::fit(&self.bins, &question))?;
         Ok(SpectralFit {
             strength: fit.strength,
@@ -72,24 +88,35 @@ impl SpectralBins {
         })
     }
 
-    /// Strengths of term `k` at which the deviance exceeds its minimum by `rise`.
-    fn interval(
+    /// What the spectrum says about every term with all of them in the model and the line integrated out.
+    fn invert(
         &self,
         py: Python<'_>,
-        active: Vec<usize>,
-        has_line: bool,
-        k: usize,
         rise: f64,
-    ) -> PyResult<(f64, f64)> {
-        self.know(&active)?;
-        self.know(&[k])?;
-        let question = Question {
-            active,
-            has_line,
-            held: None,
-        };
-        super::run(py, || {
-            likelihood::profile_interval(&self.bins, &question, k, rise)
+        pair: (usize, usize),
+        walk: usize,
+        line_outside: f64,
+    ) -> PyResult<SpectralInversion> {
+        self.know(&[pair.0, pair.1, walk])?;
+        let found = super::run(py, || {
+            likelihood::invert(&self.bins, rise, pair, walk, line_outside)
+        })?;
+        let of = |pick: fn(&Statement) -> f64| found.terms.iter().map(pick).collect::<Vec<f64>>();
+        Ok(SpectralInversion {
+            most_likely: of(|t| t.most_likely),
+            median: of(|t| t.median),
+            spread: of(|t| t.spread),
+            lower: of(|t| t.lower),
+            upper: of(|t| t.upper),
+            rise_without: of(|t| t.rise_without),
+            strength: found.strength,
+            strength_without_pair: found.strength_without_pair,
+            rise_without_pair: found.rise_without_pair,
+            slope: found.line.median,
+            sigma_slope: found.line.sigma,
+            slope_lower: found.line.lower,
+            slope_upper: found.line.upper,
+            slope_tail: found.line.tail,
         })
     }
 }

@@ -23,7 +23,19 @@ def diagnose(
     ] = None,
     against: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--against", metavar="SIMULATED_LOG", help="Your own simulation of the same protocol, as model."),
+        typer.Option(
+            "--against",
+            metavar="SIM",
+            help="Your simulation as model: a log or a scenario (.toml).",
+        ),
+    ] = None,
+    improved: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says."),
+    ] = None,
+    updated: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--updated", metavar="FILE", help="Write the calibration that this log itself gives."),
     ] = None,
     alpha: Annotated[
         float, typer.Option(metavar="P", help="Chance that a healthy log is called anything but consistent.")
@@ -38,15 +50,21 @@ def diagnose(
         raise typer.BadParameter("give either --calibration or --against: each is the model")
     if not 0.0 < alpha < 0.5:
         raise typer.BadParameter(f"--alpha is a small probability such as 0.01, not {alpha:g}")
-    check_outputs(json, force=force, report=report)
-    from trihedron.files.calibration import read_calibration
+    if updated is not None and calibration is None:
+        raise typer.BadParameter("--updated goes with --calibration OLD; without one, use trihedron calibrate")
+    if improved is not None and (against is None or against.suffix.lower() != ".toml"):
+        raise typer.BadParameter("--improved goes with --against SCENARIO.toml: that file is what is improved")
+    if improved is not None and against is not None and improved.resolve() == against.resolve():
+        raise typer.BadParameter("--improved would overwrite the scenario that it improves; give it another name")
+    check_outputs(json, updated, improved, force=force, report=report)
+    from trihedron.files.calibration import read_calibration, write_calibration
 
     known = None if calibration is None else read_calibration(calibration)
     recording = source.read()
     from trihedron import pipeline
     from trihedron.files.diagnosis import diagnosis_document
     from trihedron.report import diagnosis_report
-    from trihedron.report.diagnosis import FIRST_SCREEN
+    from trihedron.report.diagnosis import first_screen
 
     with progress("diagnosing") as tell:
         result = pipeline.diagnose(
@@ -61,8 +79,24 @@ def diagnose(
         )
     document = diagnosis_report(result)
     machine = diagnosis_document(result)
-    show(document, json, sections=None if full else FIRST_SCREEN)
+    show(document, json, sections=None if full else first_screen(result))
     write_json(machine, json, force=force)
     write_report(document, machine, report, force=force)
+    if improved is not None and against is not None:
+        from trihedron.files.scenario import write_scenario
+
+        better = pipeline.improve(against, result)
+        for effect_id, why in better.left_out.items():
+            say(f"effect {effect_id} is not in the scenario: {why}.")
+        write_scenario(better.text, improved, overwrite=force)
+        say(f"improved scenario: {improved}")
+    if updated is not None:
+        if result.updated is None:
+            say(f"{updated}: not written, the poses of this log do not carry a calibration of their own.")
+        else:
+            write_calibration(result.updated, updated, overwrite=force)
+            say(f"calibration of this log: {updated}")
+    elif result.updated is not None and any(p.significant for p in result.parameters):
+        say("The calibration that this log itself gives: --updated FILE.")
     if not full and report is None:
         say("Every candidate, both models and findings: --full; pictures before and after: --report FILE.html.")

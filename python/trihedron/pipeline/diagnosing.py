@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -15,11 +16,14 @@ from trihedron.diagnose.session.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
+from trihedron.pipeline.comparing import compared
+from trihedron.pipeline.improving import driven
 from trihedron.pipeline.reading import Progress, read, segment
 from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.segment import resegment
+from trihedron.simulate import Scenario, read_scenario
 
 AnyRecording = Recording | str | os.PathLike[str]
 
@@ -32,7 +36,7 @@ def diagnose(
     height_m: float | None = None,
     segments: Segments | None = None,
     calibration: AnyCalibration | None = None,
-    against: AnyRecording | None = None,
+    against: AnyRecording | Scenario | None = None,
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
@@ -48,9 +52,9 @@ def diagnose(
         Still poses and moves; found when not given.
     calibration : calibration or path, optional
         The model to be held against the recording, with its error bars. Without it one is fitted to the recording.
-    against : Recording or path, optional
-        A simulated recording of the same protocol as the model: it is calibrated, and that calibration, with the error
-        bars it has, is the model.
+    against : Recording, Scenario or path, optional
+        The user's simulation as the model: a simulated recording, with everything that it contains, or a scenario
+        (``.toml``), whose instrument is moved as the recording was.
     alpha : float
         Chance that a healthy recording is called anything but consistent.
 
@@ -81,28 +85,36 @@ def diagnose(
     tell(0.02, "finding still poses")
     segments = segment(recording) if segments is None else segments
     findings += segments.findings
+    simulated: _Free | None = None
     if against is not None:
-        tell(0.05, "calibrating the simulated recording")
-        known, more = _model_of(against, gravity, recording, segments)
-        findings += more
-    if known is None:
-        tell(0.05, "calibrating")
-        used = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
-    else:
-        used = replace(known, gravity_m_s2=gravity)
+        tell(0.05, "diagnosing the simulated recording")
+        log = _simulated_log(against, recording, segments, gravity)
+        simulated = _simulation(log, gravity, alpha, lambda fraction, text: tell(0.05 + 0.4 * fraction, text))
+        known = simulated.calibration
+        findings += _protocol(simulated.segments, segments)
+    begun = 0.05 if simulated is None else 0.45
+    tell(begun, "calibrating")
+    used, free = _start(recording, segments, gravity, known)
     recording_used, segments_used = recording, segments
     # Where the poses leave the model open the twin starts from nominal values, for the gyro too.
-    if recording.gyroscope is not None and used.gyroscope is None and not (known is None and is_open(used)):
+    if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
         findings += [f for f in used.findings if f.code is FindingCode.GYROSCOPE_LEFT_OUT] or [_gyroscope_left_out()]
         recording_used, segments_used = _accelerometer_only(recording, segments)
     found = diagnose_recording(
         recording_used,
         resegment(recording_used, segments_used),
         used,
-        calibration_is_given=known is not None,
+        calibration_is_given=not free,
         alpha=alpha,
-        progress=lambda fraction, text: tell(0.1 + 0.9 * fraction, text),
+        progress=lambda fraction, text: tell(begun + (1.0 - begun) * fraction, text),
     )
+    updated, own_effects = None, found.effects
+    if known is not None and free:
+        given = replace(known, gravity_m_s2=gravity)
+        found = compared(
+            found, given, None if simulated is None else simulated.diagnosis, recording_used, segments_used, alpha
+        )
+        updated, used = used, given
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(
         **values,
@@ -110,32 +122,75 @@ def diagnose(
         gravity_source=source,
         model_is_given=known is not None,
         calibration=used,
+        updated=updated,
+        own_effects=own_effects,
         segments=segments,
         recording=recording,
     )
 
 
-def _model_of(
-    against: AnyRecording, gravity: float, recording: Recording, segments: Segments
-) -> tuple[Calibration, tuple[Finding, ...]]:
-    simulated = against if isinstance(against, Recording) else read(against)
+@dataclass(frozen=True, eq=False)
+class _Free:
+    """A simulated recording, calibrated and diagnosed on its own."""
+
+    calibration: Calibration
+    segments: Segments
+    diagnosis: Diagnosis
+
+
+def _start(
+    recording: Recording, segments: Segments, gravity: float, known: Calibration | None
+) -> tuple[Calibration, bool]:
+    """The model that the search begins from, and whether it is the recording's own.
+
+    A given model is compared with what the recording says of itself. Where its poses are too few to say it, the given
+    numbers stay, with their error bars as knowledge.
+    """
+    if known is None:
+        return calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration, True
     try:
-        result = calibrate(simulated, gravity_m_s2=gravity)
+        own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+    except ValueError:
+        return replace(known, gravity_m_s2=gravity), False
+    is_poor = is_open(own) or (known.gyroscope is not None and own.gyroscope is None)
+    return (replace(known, gravity_m_s2=gravity), False) if is_poor else (own, True)
+
+
+def _simulated_log(
+    against: AnyRecording | Scenario, recording: Recording, segments: Segments, gravity: float
+) -> Recording:
+    if isinstance(against, Recording):
+        return against
+    if not isinstance(against, Scenario):
+        if Path(against).suffix.lower() != ".toml":
+            return read(against)
+        against = read_scenario(Path(against))
+    own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+    return driven(against, recording, segments, own)
+
+
+def _simulation(recording: Recording, gravity: float, alpha: float, tell: Progress) -> _Free:
+    try:
+        result = calibrate(recording, gravity_m_s2=gravity)
     except ValueError as error:
         raise ValueError(f"the simulated recording cannot be calibrated: {error}") from None
-    check_units(result.calibration, recording)
-    n, m = result.segments.n_holds, segments.n_holds
+    diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=tell)
+    return _Free(result.calibration, result.segments, diagnosis)
+
+
+def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
+    n, m = simulated.n_holds, segments.n_holds
     if n == m:
-        return result.calibration, ()
+        return ()
     finding = Finding(
         FindingCode.PROTOCOL_DIFFERS,
-        Severity.WARNING,
+        Severity.NOTE,
         f"The simulated recording has {n} still poses and the real one {m}.",
         "They do not follow the same protocol, or a pose was not still.",
-        "Simulate the same poses and moves; only the model (S, b and their error bars) is taken from the simulation.",
+        "Numbers, noise and physics are compared all the same, each from its own poses; only their error bars differ.",
         MappingProxyType({"n_simulated": float(n), "n_real": float(m)}),
     )
-    return result.calibration, (finding,)
+    return (finding,)
 
 
 def _gyroscope_left_out() -> Finding:

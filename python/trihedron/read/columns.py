@@ -221,20 +221,31 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         tilt = _triads(parsed, "translation")  # tx ty tz beside wx wy wz
         if tilt:
             triads["accelerometer"] = tilt[0]
+    own_time: int | None = None
     unnamed = sum(1 for i, name in enumerate(table.names) if not name and len(table.columns[i]))
-    if triads["accelerometer"] is None and triads["gyroscope"] is None and unnamed in (3, 6):
+    if triads["accelerometer"] is None and triads["gyroscope"] is None and unnamed in (3, 4, 6, 7):
         by_place = _positional(table, sensor)
         triads = {"accelerometer": by_place.accelerometer, "gyroscope": by_place.gyroscope}
+        own_time = by_place.time
         notes += by_place.findings
     bare = _triads(parsed, "bare")
     if bare and triads["accelerometer"] is None and triads["gyroscope"] is None:
-        guess: Sensor = sensor or sensor_of_file_name(table.path.name) or "accelerometer"
+        name = parsed[bare[0][0]]
+        by_unit: Sensor | None = (
+            "gyroscope" if name.unit_for("gyroscope") and not name.unit_for("accelerometer") else None
+        )
+        if by_unit is None and name.unit_for("accelerometer") and not name.unit_for("gyroscope"):
+            by_unit = "accelerometer"
+        told = sensor or sensor_of_file_name(table.path.name) or by_unit
+        guess: Sensor = told or "accelerometer"
         triads[guess] = bare[0]
         units[guess] = parsed[bare[0][0]].unit_for(guess)
-        if sensor is None and sensor_of_file_name(table.path.name) is None:
+        if told is None:
             notes.append(_assumed("Columns x y z do not say which sensor they are and were taken as an accelerometer."))
     times = [i for i, p in enumerate(parsed) if p.role == "time"]
     time = max(times, key=lambda i: (parsed[i].rank, -i)) if times else None
+    if own_time is not None:
+        time = own_time  # the device's clock, beside the one of whoever listened
     first = {role: next((i for i, p in enumerate(parsed) if p.role == role), None) for role in _SINGLE}
     return Columns(
         time=time,
@@ -247,7 +258,7 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         accelerometer_unit=units["accelerometer"],
         gyroscope_unit=units["gyroscope"],
         time_unit=parsed[time].time_unit if time is not None else "",
-        positional=unnamed == 6 and not any(p.role in _SENSORS for p in parsed),
+        positional=unnamed in (6, 7) and not any(p.role in _SENSORS for p in parsed),
         findings=tuple(notes),
     )
 

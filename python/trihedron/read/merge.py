@@ -31,6 +31,7 @@ class Merged:
     first: int
     stop: int
     findings: tuple[Finding, ...]
+    rows_left_out: int = 0
 
 
 def resample(
@@ -108,9 +109,13 @@ def merge(
     kept_t, kept_v = base_t[first:stop], base_v[first:stop]
     brought, factor = resample(other_t, kept_t, other_v, 1.0 / other_rate)
     lost = ~np.isfinite(brought).all(axis=1) & np.isfinite(kept_v).all(axis=1)
-    finding = _statement(base, acc_t, gyr_t, acc_rate, gyr_rate, factor, len(base_t) - len(kept_t), int(lost.sum()))
+    n_cut = len(base_t) - len(kept_t)
+    step = 1.0 / other_rate
+    n_beyond = int(np.count_nonzero((other_t < kept_t[0] - step) | (other_t > kept_t[-1] + step)))
+    finding = _statement(base, acc_t, gyr_t, acc_rate, gyr_rate, factor, n_cut, n_beyond, int(lost.sum()))
     acc, gyr = (kept_v, brought) if base == "accelerometer" else (brought, kept_v)
-    return Merged(kept_t - kept_t[0], float(kept_t[0]), acc, gyr, base, first, stop, (finding,))
+    start_s = float(kept_t[0])
+    return Merged(kept_t - start_s, start_s, acc, gyr, base, first, stop, (finding,), n_cut + n_beyond)
 
 
 def _statement(
@@ -121,6 +126,7 @@ def _statement(
     gyr_rate: float,
     factor: FloatArray,
     n_cut: int,
+    n_beyond: int,
     n_lost: int,
 ) -> Finding:
     other = "gyro" if base == "accelerometer" else "accelerometer"
@@ -133,7 +139,7 @@ def _statement(
         f"{1e3 * (gyr_t[0] - acc_t[0]):+.3g} ms after; the {base.replace('gyroscope', 'gyro')} keeps its samples, the "
         f"{other} was taken at the same tick in {100 * same:.3g} % of rows and interpolated between neighbours in the "
         f"rest, which leaves {100 * variance:.3g} % of its white-noise variance; {n_cut} rows outside the overlap were "
-        f"cut, {n_lost} rows in gaps of the {other} hold no reading."
+        f"cut, and {n_beyond} of the {other}'s, {n_lost} rows in gaps of the {other} hold no reading."
     )
     return Finding(
         FindingCode.CLOCKS_MERGED,
@@ -152,6 +158,7 @@ def _statement(
                 "variance_factor": variance,
                 "same_tick_fraction": same,
                 "cut_rows": float(n_cut),
+                "rows_left_out": float(n_cut + n_beyond),
                 "lost_rows": float(n_lost),
             }
         ),

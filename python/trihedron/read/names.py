@@ -9,7 +9,7 @@ from functools import lru_cache
 _NOT_A_SENSOR = frozenset(
     {"cov", "covariance", "std", "stddev", "sigma", "var", "bias", "offset", "integral", "dt", "euler", "orientation"}
     | {"quaternion", "quat", "mag", "magnetometer", "magnetic", "gravity", "clipping", "clip", "samples", "sat", "flag"}
-    | {"status", "heading", "delta", "id", "count", "error"}
+    | {"status", "heading", "delta", "id", "count", "error", "drift"}
 )
 _SENSOR_WORDS = {
     "accelerometer": re.compile(r"acc|accel\w*|acceler\w*|specific|specificforce|sf"),
@@ -21,7 +21,20 @@ _LETTER = {"a": "accelerometer", "f": "accelerometer", "g": "gyroscope", "w": "g
 _GLUED = re.compile(
     r"^(acc|accel|accelero?|accelerometer|acceleration|gyr|gyro|gyroscope|omega|linacc|[agwft])_?([xyz])(raw|adc|out)?$"
 )
-_TIME_WORDS = {"t", "time", "timestamp", "timestamps", "ts", "stamp", "elapsed", "epoch", "clock", "datetime"}
+_TIME_WORDS = {
+    "t",
+    "time",
+    "epoc",
+    "chiptime",
+    "timestamp",
+    "timestamps",
+    "ts",
+    "stamp",
+    "elapsed",
+    "epoch",
+    "clock",
+    "datetime",
+}
 _TIME_WORDS |= {"millis", "micros", "seconds", "secs", "ticks", "unix"}
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
 _TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
@@ -29,21 +42,22 @@ _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
 
 _TIME_UNITS = {
     "s": ["s", "sec", "secs", "second", "seconds"],
-    "ms": ["ms", "msec", "millis", "milliseconds", "millisecond"],
+    "ms": ["ms", "msec", "msecs", "millis", "milliseconds", "millisecond"],
     "us": ["us", "µs", "usec", "micros", "microseconds", "microsecond"],
     "ns": ["ns", "nsec", "nanos", "nanoseconds", "nanosecond", "nanosec"],
 }
 _TIME_UNIT_OF = {word: unit for unit, words in _TIME_UNITS.items() for word in words}
 _UNITS = {
     "accelerometer": {
-        "m/s^2": "ms2 mss mps2 msec2 ms-2 m/s2 m/s/s mpss",
+        "m/s^2": "ms2 mss mps2 mpers2 msec2 ms-2 m/s2 m/s/s mpss",
         "g": "g gee gees",
         "mg": "mg millig",
         "counts": "adc counts count lsb ticks digits int16",
         "raw": "raw",
     },
     "gyroscope": {
-        "rad/s": "rads radsec rad rads-1 radps",
+        "mdeg/s": "mdps mdegs mdegsec mdegps",
+        "rad/s": "rads radsec rad rads-1 radps radpersec",
         "mrad/s": "mrads mrad mradps",
         "deg/s": "dps degs deg degsec degps °s ° degs-1 °s-1",
         "counts": "adc counts count lsb ticks digits int16",
@@ -86,7 +100,12 @@ def _unit(sensor: str, words: list[str]) -> str:
 @lru_cache(maxsize=4096)
 def parse_name(name: str) -> ColumnName:
     """What a column called ``name`` holds."""
-    text = name.strip().strip('"').strip()
+    text = name.strip().strip('"').strip().replace("m/(s^2)", "m/s^2").replace("m/(sec^2)", "m/s^2")
+    if re.fullmatch(r"gF[xyz]", text):
+        # Physics Toolbox: force in g along an axis, not a gyro's x.
+        return ColumnName("accelerometer", text[-1], "gf", "g", rank=1)
+    # GnssLogger joins axis and unit: UncalAccelXMps2, UncalGyroZRadPerSec.
+    text = re.sub(r"([XYZ])(Mps2|RadPerSec|MicroT)\b", lambda m: f" {m[1]} {m[2].lower()}", text)
     bracket = ""
     index = ""
     found = re.search(r"[\[({]\s*([^\])}]*?)\s*[\])}]\s*$", text)
@@ -132,6 +151,8 @@ def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName
         return single
     axis = index or glued_axis
     rest = list(expanded)
+    if len(rest) > 1 and "axis" in rest:
+        rest.remove("axis")
     if not axis:
         for label in ("x", "y", "z", "0", "1", "2", "3"):
             if label in rest:
@@ -153,7 +174,9 @@ def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName
     rank = 0
     if any(w in {"measured", "raw", "uncalibrated", "uncal", "unbiased"} for w in rest):
         rank += 2
-    if any(w in {"user", "linacc", "filtered", "lp", "smooth", "output"} for w in rest):
+    if "unfilt" in rest or "unfiltered" in rest:
+        rank += 1
+    if any(w in {"user", "free", "linear", "linacc", "filtered", "lp", "smooth", "output"} for w in rest):
         rank -= 2
     return ColumnName(sensor, axis, key, unit, rank=rank, words=tuple(left + unit_words))
 
@@ -174,6 +197,8 @@ def _sensor(words: list[str]) -> str:
             for sensor, pattern in _SENSOR_WORDS.items():
                 if pattern.fullmatch(word) and word != "rate":
                     return sensor
+    if words and words[0] == "alpha":
+        return "translation"  # Kalibr's name for acceleration, beside omega; alone it is an angular acceleration
     if words and words[0] in _LETTER:
         return _LETTER[words[0]]
     return ""
@@ -183,7 +208,11 @@ def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
     joined = "".join(words)
     if words[0] in {"temp", "temperature", "tempc"} or any(_TEMPERATURE.fullmatch(w) for w in words):
         return ColumnName("temperature", words=tuple(words))
+    if words == ["t"] and set(unit_words) & {"°", "c", "°c", "degc", "k"}:
+        return ColumnName("temperature", words=tuple(words))
     if any(w in _SUPPLY for w in words):
+        if "mv" in unit_words:
+            return ColumnName()  # supply_v is in volts
         return ColumnName("supply", words=tuple(words))
     if joined == "sampletimefine":
         return ColumnName("time", time_unit="100us", rank=3)

@@ -6,18 +6,22 @@ import hashlib
 import os
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
-from trihedron.read.audit import audit_counter, audit_readings, audit_timing
+from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
+from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError
+from trihedron.read.memory import table_of
 from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
-from trihedron.read.sensors import Options, Sensors, merge_sensors, read_one, settled
-from trihedron.read.table import FloatArray, Progress
-from trihedron.records import Recording
+from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of, settled
+from trihedron.read.source import read_tables
+from trihedron.read.table import FloatArray, Progress, Table
+from trihedron.records import Finding, FindingCode, Recording, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
 STAMPS = "stamps as logged [s]"
@@ -27,7 +31,7 @@ STAMPS = "stamps as logged [s]"
 # Absurd readings (1e300) overflow squares; they then fail every test of plausibility, which is what they should.
 @np.errstate(over="ignore", invalid="ignore")
 def read_recording(
-    path: str | os.PathLike[str] | None = None,
+    path: Any = None,
     *,
     accelerometer_path: str | os.PathLike[str] | None = None,
     gyroscope_path: str | os.PathLike[str] | None = None,
@@ -37,14 +41,17 @@ def read_recording(
     gyroscope_unit: str | RateUnit | None = None,
     time_unit: str | None = None,
     device: int | None = None,
+    topic: str | None = None,
+    instance: int | str | None = None,
     progress: Progress | None = None,
 ) -> Recording:
     """Read and audit a log: one file, or one file per sensor.
 
     Parameters
     ----------
-    path : file
-        Text (CSV, TSV, blanks; gzip, bzip2, xz), ``.npz``, ``.npy`` or Parquet, told by content; or
+    path : file, or readings in memory
+        Text (CSV, TSV, blanks; gzip, bzip2, xz), ``.npz``, ``.npy``, Parquet and others
+        (``docs/reading.md``), told by content; or arrays, a dictionary or a data frame; or
     accelerometer_path, gyroscope_path : file
         one file per sensor, each with its own clock; they are merged on a common base. One alone is read alone.
     columns : str
@@ -56,6 +63,10 @@ def read_recording(
         Units, where what is detected from names and readings is wrong.
     device : int
         Which device (from 1) of an archive ``counts`` (n, devices, 6).
+    topic : str
+        Which topic, dataset or member of a file that holds several.
+    instance : int or str
+        Which of several IMUs whose readings one file holds.
     progress : callable
         Called with (done fraction, text).
 
@@ -71,29 +82,67 @@ def read_recording(
     """
     if rate_hz is not None and not (np.isfinite(rate_hz) and 0 < rate_hz < 1e7):
         raise ReadError(f"the rate must be a positive number of samples per second, got {rate_hz}.")
-    options = Options(columns, rate_hz, time_unit, device, progress)
+    choice = Choice(device, topic, None if instance is None else str(instance))
+    options = Options(columns, rate_hz, time_unit, choice, progress)
     if path is not None and (accelerometer_path is not None or gyroscope_path is not None):
         raise ReadError("give either one log or one file per sensor, not both.")
     if path is not None:
-        sensors = settled(read_one(Path(path), None, options))
-        source, sha256 = str(path), sensors.table.sha256
+        if isinstance(path, str | os.PathLike):
+            sensors = _of_file(Path(path), None, options)
+            source = str(path)
+        else:
+            sensors = of_tables(by_sensor(table_of(path)), None, options)
+            source = "memory"
+        sha256 = sensors.table.sha256
     elif accelerometer_path is not None and gyroscope_path is not None:
-        accelerometer = read_one(Path(accelerometer_path), "accelerometer", options)
-        gyroscope = read_one(Path(gyroscope_path), "gyroscope", options)
+        accelerometer = _of_file(Path(accelerometer_path), "accelerometer", options)
+        gyroscope = _of_file(Path(gyroscope_path), "gyroscope", options)
         sensors = merge_sensors(accelerometer, gyroscope)
         source = f"{accelerometer_path} + {gyroscope_path}"
         sha256 = hashlib.sha256((accelerometer.table.sha256 + gyroscope.table.sha256).encode()).hexdigest()
     elif accelerometer_path is not None or gyroscope_path is not None:
         only: Sensor = "accelerometer" if accelerometer_path is not None else "gyroscope"
         one = Path(accelerometer_path if accelerometer_path is not None else gyroscope_path or "")
-        sensors = settled(read_one(one, only, options))
+        sensors = _of_file(one, only, options)
         source, sha256 = str(one), sensors.table.sha256
     else:
         raise ReadError("no log was named; give a file, or one file per sensor.")
-    return _audited(sensors, source, sha256, accelerometer_unit, gyroscope_unit, progress)
+    return audited(sensors, source, sha256, accelerometer_unit, gyroscope_unit, progress)
 
 
-def _audited(
+def _of_file(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
+    return of_tables(read_tables(path, options.choice, options.progress), sensor, options)
+
+
+def of_tables(tables: tuple[Table, ...], sensor: Sensor | None, options: Options) -> Sensors:
+    """The sensors of one table, of two (accelerometer, gyro) merged, or of the one of two that is wanted."""
+    if len(tables) == 1:
+        return sensors_of(tables[0], sensor, options)
+    if sensor is not None:
+        return sensors_of(next(table for table in tables if table.sensor == sensor), sensor, options)
+    accelerometer, gyroscope = (sensors_of(table, table.sensor, options) for table in tables)
+    return merge_sensors(accelerometer, gyroscope)
+
+
+def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
+    """Every row of the file is a reading or in a finding; where it is not, the answer is not to be trusted."""
+    reported = round(sum(finding.numbers.get("rows_left_out", 0.0) for finding in findings))
+    missing = sensors.rows_in_file - sensors.rows_read - reported
+    if missing:
+        findings.append(
+            Finding(
+                FindingCode.ROWS_UNACCOUNTED,
+                Severity.SERIOUS,
+                f"The file holds {sensors.rows_in_file} rows, {sensors.rows_read} were read and {reported} reported as "
+                f"left out: {missing} are not accounted for.",
+                "A fault of the reader.",
+                "Report it with the file; until then convert the log to CSV with another program.",
+                MappingProxyType({"count": float(missing)}),
+            )
+        )
+
+
+def audited(
     sensors: Sensors,
     source: str,
     sha256: str,
@@ -101,7 +150,10 @@ def _audited(
     gyroscope_unit: str | RateUnit | None,
     progress: Progress | None,
 ) -> Recording:
+    """Units settled, clock and readings audited, rows accounted for: a record."""
+    sensors = settled(sensors)
     findings = list(sensors.findings)
+    _accounted(sensors, findings)
     time_s, table = sensors.time_s, sensors.table
     n = len(time_s)
     rate = _rate_hz(sensors)
@@ -141,6 +193,7 @@ def _audited(
         if progress is not None:
             progress((done + 1) / (len(present) + 1), f"checking the {name}")
         findings += audit_readings(name, triad, windows, sensors.place)
+        findings += audit_steps(name, triad, acc_unit if name == "accelerometer" else gyr_unit)
     if progress is not None:
         progress(1.0, f"read {n} samples")
     temperature, supply = sensors.columns.temperature, sensors.columns.supply
@@ -162,6 +215,8 @@ def _audited(
         findings=tuple(findings),
         sampling=sensors.sampling,
         auxiliary=MappingProxyType(_auxiliary(sensors, n)),
+        rows_in_file=sensors.rows_in_file,
+        rows_read=sensors.rows_read,
     )
 
 

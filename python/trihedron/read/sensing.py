@@ -11,12 +11,18 @@ import numpy as np
 from trihedron.read.errors import ReadError
 from trihedron.read.rest import Windows, is_integer, look
 from trihedron.read.table import FloatArray
+from trihedron.read.turning import turn_ratio as gyroscope_turns
 from trihedron.read.turning import unit_by_turning
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si
+from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
 
 NEAR_GRAVITY = 0.2
 """An uncalibrated accelerometer at rest may be this far off: scale a few per cent, zero offset a tenth of g."""
+WHOLE = "whole numbers"
+"""Stands for the unit of readings that were whole numbers before they were interpolated."""
+MIN_TURNS = 3
+MAX_TURN_RATIO = 2.0
+"""Gravity's turn over the gyro's path: 1 at most by geometry, 1.1 with the scale errors of uncalibrated sensors."""
 _ADVICE = {
     "accelerometer": "Say it with --accel-unit m/s^2, g, mg or counts if this is wrong.",
     "gyroscope": "Say it with --gyro-unit rad/s, mrad/s, deg/s or counts if this is wrong.",
@@ -43,12 +49,12 @@ def parse_acceleration_unit(text: str | AccelerationUnit) -> AccelerationUnit:
 
 def parse_rate_unit(text: str | RateUnit) -> RateUnit:
     """A user's unit word."""
-    words = {"dps": "deg/s", "°/s": "deg/s", "si": "rad/s", "raw": "counts", "lsb": "counts"}
+    words = {"dps": "deg/s", "mdps": "mdeg/s", "°/s": "deg/s", "si": "rad/s", "raw": "counts", "lsb": "counts"}
     key = text.value if isinstance(text, RateUnit) else str(text).strip().lower()
     try:
         return RateUnit(words.get(key, key))
     except ValueError:
-        raise ReadError(f"'{text}' is not an angular rate unit; use rad/s, mrad/s, deg/s or counts.") from None
+        raise ReadError(f"'{text}' is not an angular rate unit; use rad/s, mrad/s, deg/s, mdeg/s or counts.") from None
 
 
 def _finding(code: FindingCode, severity: Severity, seen: str, cause: str, action: str, **numbers: float) -> Finding:
@@ -71,7 +77,8 @@ def judge_accelerometer(
 ) -> Judged:
     """Unit of the accelerometer: as given, else as named, else from |a| at rest."""
     norm = rest_norm(readings, windows)
-    whole = is_integer(readings)
+    whole = is_integer(readings) or named == WHOLE
+    named = "" if named == WHOLE else named
     if given is not None or named not in {"", "raw"}:
         unit = parse_acceleration_unit(given if given is not None else named)
         source = "as you said" if given is not None else "by its column names"
@@ -172,7 +179,8 @@ def judge_gyroscope(
     """Unit of the gyro: as given, else as named, else by turning gravity, else by magnitude (a warning)."""
     by_turn: RateUnit | None = None
     evidence = ""
-    whole = is_integer(readings)
+    whole = is_integer(readings) or named == WHOLE
+    named = "" if named == WHOLE else named
     if accelerometer is not None and windows is not None and not whole:
         by_turn, evidence = unit_by_turning(accelerometer, readings, time_s, rate_hz, windows)
     if given is not None or named not in {"", "raw"}:
@@ -187,6 +195,8 @@ def judge_gyroscope(
                 "A wrong unit or a wrong sampling rate.",
                 _ADVICE["gyroscope"],
             )
+        elif unit is not RateUnit.COUNTS and by_turn is None and windows is not None and accelerometer is not None:
+            against = _rate_contradiction(unit, gyroscope_turns(readings, time_s, windows), source)
         return Judged(unit, _stated("gyro", unit, source, against))
     if whole:
         seen = "The gyro's readings are whole numbers and were taken as counts."
@@ -195,6 +205,25 @@ def judge_gyroscope(
         seen = f"The gyro's unit is {by_turn.value}: {evidence}."
         return Judged(by_turn, (_finding(FindingCode.UNIT_DETECTED, Severity.NOTE, seen, "", ""),))
     return _gyroscope_by_magnitude(readings, windows)
+
+
+def _rate_contradiction(unit: RateUnit, turns: tuple[float, int], source: str) -> Finding | None:
+    """Gravity cannot turn further than the gyro's path; where it does by far, unit or time base are wrong."""
+    ratio, n_turns = turns
+    scale = rate_to_si(unit) or math.nan
+    factor = ratio / scale
+    if n_turns < MIN_TURNS or not factor > MAX_TURN_RATIO:
+        return None
+    return _finding(
+        FindingCode.UNIT_CONTRADICTED,
+        Severity.SERIOUS,
+        f"The gyro is in {unit.value} {source}, but in {n_turns} turns between rests gravity moved {factor:.3g} times "
+        "as far as it can have.",
+        "A wrong unit, or a time base or rate that is wrong by that factor.",
+        "Check --time-unit, --rate and --gyro-unit: gyro scale is inversely proportional to the rate.",
+        turn_ratio=factor,
+        turns=float(n_turns),
+    )
 
 
 def _gyroscope_by_magnitude(readings: FloatArray, windows: Windows | None) -> Judged:

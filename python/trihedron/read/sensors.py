@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
@@ -11,10 +11,12 @@ import numpy.typing as npt
 
 from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz, settle_clock
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
+from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.merge import merge
-from trihedron.read.sensing import order_of_triads
-from trihedron.read.source import read_table
+from trihedron.read.names import parse_name
+from trihedron.read.rest import is_integer
+from trihedron.read.sensing import WHOLE, order_of_triads
 from trihedron.read.table import FloatArray, Progress, Table
 from trihedron.records import Finding, FindingCode, Sampling, Severity
 from trihedron.records.sampling import UNJUDGED
@@ -33,7 +35,7 @@ class Options:
     columns: str | None
     rate_hz: float | None
     time_unit: str | None
-    device: int | None
+    choice: Choice
     progress: Progress | None
 
 
@@ -58,6 +60,8 @@ class Sensors:
     lost_behind: npt.NDArray[np.int64] | None = None
     stamps_s: FloatArray | None = None
     findings: tuple[Finding, ...] = field(default=())
+    rows_in_file: int = 0
+    rows_read: int = 0
 
     def row(self, sample: int) -> int:
         """Row of the base table that holds a sample."""
@@ -83,12 +87,22 @@ def _triad(table: Table, triad: tuple[int, int, int] | None, rows: npt.NDArray[n
     return out
 
 
-def read_one(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
-    table = read_table(path, options.device, options.progress)
-    chosen = find_columns(table, options.columns, sensor)
+def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors:
+    """One table's sensors (only ``sensor``, where it is said) on the table's clock.
+
+    Raises
+    ------
+    ReadError
+        When the table cannot become readings on a time base.
+    """
+    path = table.path
+    chosen = find_columns(table, options.columns, sensor or table.sensor)
+    table = one_device(table, options.choice, chosen.used())
     if table.n_rows < 2:
         raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
-    findings = [*table.findings, *chosen.findings]
+    findings = [*table.findings, *chosen.findings, *_words_left_out(table)]
+    if chosen.time is None:
+        _refuse_unread_time(table, options)
     clock, rate = _time_base(table, chosen, options, findings)
     clock = _without_copies(table, chosen, clock, findings)
     accelerometer = _triad(table, chosen.accelerometer, clock.rows)
@@ -123,7 +137,33 @@ def read_one(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
         chosen.time is not None,
         chosen.gyroscope_unit,
         findings=tuple(findings),
+        rows_in_file=table.n_in_file,
+        rows_read=len(clock.time_s),
     )
+
+
+def _words_left_out(table: Table) -> list[Finding]:
+    return [
+        Finding(
+            FindingCode.COLUMN_LEFT_OUT,
+            Severity.NOTE,
+            f"Column {table.label(i)} holds words (such as {example[:40]!r}) and was left out.",
+        )
+        for i, example in table.words.items()
+    ]
+
+
+def _refuse_unread_time(table: Table, options: Options) -> None:
+    """A time that cannot be understood must not become 100 Hz."""
+    if table.names is None or (options.columns is not None and re.search(r"(?:t|time)\s*=", options.columns)):
+        return
+    for i, example in table.words.items():
+        parsed = parse_name(table.names[i])
+        if parsed.role == "time":
+            raise ReadError(
+                f"{table.path}: column {table.label(i)} holds {example[:40]!r}, which is no time known here; write it "
+                "in seconds or as 2024-03-01 12:00:00.000, or read with --columns time=none --rate HZ."
+            )
 
 
 def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:
@@ -148,7 +188,9 @@ def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[
             f"{table.place(int(rows[drop[0]]))}); they were left out.",
             "A logger that writes a row twice, or a stream joined with itself.",
             "",
-            MappingProxyType({"count": float(len(drop)), "row": float(rows[drop[0]])}),
+            MappingProxyType(
+                {"count": float(len(drop)), "row": float(rows[drop[0]]), "rows_left_out": float(len(drop))}
+            ),
         )
     )
     return Clock(np.delete(clock.time_s, drop), clock.start_s, np.delete(rows, drop), clock.findings)
@@ -206,8 +248,8 @@ def _witness(table: Table, chosen: Columns) -> Witness:
 
 
 def settled(sensors: Sensors) -> Sensors:
-    """The same on the clock that its stamps, its counter and the motion speak for."""
-    if not sensors.has_clock:
+    """The same on the clock that its stamps, its counter and the motion speak for; as it is where that was done."""
+    if not sensors.has_clock or sensors.sampling is not UNJUDGED:
         return sensors
     triads = [x for x in (sensors.accelerometer, sensors.gyroscope) if x is not None]
     n, counter = len(sensors.time_s), sensors.columns.counter
@@ -244,10 +286,11 @@ def _stated_rate(table: Table) -> float | None:
 
 def _time_base(table: Table, chosen: Columns, options: Options, findings: list[Finding]) -> tuple[Clock, float]:
     if chosen.time is not None:
-        clock = build_clock(
-            table, chosen.time, chosen.time_unit, options.time_unit, chosen.nanoseconds, _witness(table, chosen)
-        )
-        findings += clock.findings
+        named = chosen.time_unit
+        if named == "100us" and not table.clock.unit:
+            named = _sample_time_fine(table, chosen.time, findings)
+        clock = build_clock(table, chosen.time, named, options.time_unit, chosen.nanoseconds, _witness(table, chosen))
+        findings += _with_rows_left_out(clock, table.n_rows)
         rate = mean_rate_hz(clock.time_s)
         told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)
         if told is not None and abs(rate / told - 1.0) > 0.01:
@@ -287,6 +330,41 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
     return Clock(np.arange(table.n_rows) / rate, 0.0, None, ()), rate
 
 
+def _with_rows_left_out(clock: Clock, n_rows: int) -> tuple[Finding, ...]:
+    """The clock's findings; the one about rows without a time says how many there are."""
+    left = n_rows - len(clock.time_s)
+    out = []
+    for finding in clock.findings:
+        if finding.code is FindingCode.NON_FINITE and left and "rows_left_out" not in finding.numbers:
+            finding = replace(finding, numbers=MappingProxyType({**finding.numbers, "rows_left_out": float(left)}))
+        out.append(finding)
+    return tuple(out)
+
+
+def _sample_time_fine(table: Table, column: int, findings: list[Finding]) -> str:
+    """``SampleTimeFine`` counts 100 µs in Xsens MTi and MTw logs, and microseconds in those of Xsens (Movella) DOT.
+
+    A DOT sends 120 samples a second at most (8333 µs apart), an MTi no fewer than one (10 000 steps of 100 µs); its
+    usual rates lie far above 2 Hz (5000 steps), so the step tells them apart and the finding says what was taken.
+    """
+    step = np.diff(table.columns[column])
+    positive = step[step > 0]
+    usual = float(np.median(positive)) if len(positive) else 0.0
+    unit, maker = (
+        ("us", "microseconds, as Movella DOT does") if usual >= 5000.0 else ("100us", "100 µs, as Xsens MTi does")
+    )
+    findings.append(
+        Finding(
+            FindingCode.TIME_UNIT_DETECTED,
+            Severity.NOTE,
+            f"SampleTimeFine steps by {usual:.6g}, so it counts {maker}.",
+            action="Say it with --time-unit us if this is wrong." if unit == "100us" else "",
+            numbers=MappingProxyType({"step": usual}),
+        )
+    )
+    return unit
+
+
 def _rate_stated(rate: float, source: str) -> Finding:
     return Finding(
         FindingCode.RATE_STATED,
@@ -294,6 +372,11 @@ def _rate_stated(rate: float, source: str) -> Finding:
         f"No time column; the rate is {rate:.6g} Hz {source}.",
         numbers=MappingProxyType({"rate_hz": rate}),
     )
+
+
+def _unit_before(named: str, readings: FloatArray) -> str:
+    """Interpolation hides that readings were whole numbers, which tells their unit."""
+    return WHOLE if named in {"", "raw"} and is_integer(readings) else named
 
 
 def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
@@ -325,7 +408,7 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
     seen = {(f.code, f.seen) for f in accelerometer.findings}
     extra = [f for f in gyroscope.findings if (f.code, f.seen) not in seen]
     kept = slice(merged.first, merged.first + len(merged.time_s))
-    both = Sensors(
+    return Sensors(
         merged.time_s,
         merged.start_s,
         merged.accelerometer,
@@ -338,15 +421,16 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
             temperature=base.columns.temperature,
             supply=base.columns.supply,
             counter=base.columns.counter,
-            accelerometer_unit=accelerometer.columns.accelerometer_unit,
+            accelerometer_unit=_unit_before(accelerometer.columns.accelerometer_unit, accelerometer.accelerometer),
         ),
         base.rows,
         merged.first,
         base.has_clock,
-        gyroscope.gyroscope_unit,
+        _unit_before(gyroscope.gyroscope_unit, gyroscope.gyroscope),
         base.sampling,
         None if base.lost_behind is None else base.lost_behind[kept][: len(merged.time_s) - 1],
         None if base.stamps_s is None else base.stamps_s[kept],
         (*accelerometer.findings, *extra, *merged.findings),
+        accelerometer.rows_in_file + gyroscope.rows_in_file,
+        accelerometer.rows_read + gyroscope.rows_read - merged.rows_left_out,
     )
-    return settled(both) if same_stamps else both

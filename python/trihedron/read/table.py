@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -36,11 +37,14 @@ class StatedClock:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns (n,) float64 in file order; ``names`` is None where the file has no header.
+    """Columns (n,) float64 in file order, empty where a column holds words; ``names`` is None without a header.
 
     ``line_of_row`` (n,) gives the line of each row, or ``first_line`` alone when rows follow each other without a
     break; both are zero/None for binary formats, where places are counted in rows. ``metadata`` holds key and value of
-    preamble lines; ``clock`` is what the format states of its stamps.
+    preamble lines. ``words`` gives an example cell of each column of words, ``labels`` its different words and the word
+    (n,) of each row where these are few. What a format knows of itself: ``sensor`` says whose ``x y z`` the columns
+    are, ``clock`` what it states of its stamps. ``rows_in_file`` counts what the file holds, left-out rows
+    included (0: as many as there are here); every row that is not here is in a finding's ``rows_left_out``.
     """
 
     path: Path
@@ -51,12 +55,38 @@ class Table:
     first_line: int = 0
     line_of_row: npt.NDArray[np.int64] | None = None
     findings: tuple[Finding, ...] = ()
+    words: dict[int, str] = field(default_factory=dict)
+    labels: dict[int, tuple[tuple[str, ...], npt.NDArray[np.int64]]] = field(default_factory=dict)
+    sensor: Literal["accelerometer", "gyroscope"] | None = None
     clock: StatedClock = field(default_factory=StatedClock)
+    rows_in_file: int = 0
+
+    @property
+    def n_in_file(self) -> int:
+        """Rows that the file holds, those included that are not in this table."""
+        return self.rows_in_file or self.n_rows
+
+    def take(self, rows: npt.NDArray[np.int64], n_in_file: int, *findings: Finding) -> Table:
+        """Some of the rows, in order, as a table of which the file holds ``n_in_file`` rows."""
+        lines = None
+        if self.line_of_row is not None:
+            lines = self.line_of_row[rows]
+        elif self.first_line:
+            lines = self.first_line + rows
+        return replace(
+            self,
+            columns=tuple(column[rows] if len(column) else column for column in self.columns),
+            labels={i: (words, codes[rows]) for i, (words, codes) in self.labels.items()},
+            line_of_row=lines,
+            findings=(*self.findings, *findings),
+            rows_in_file=n_in_file,
+        )
 
     @property
     def n_rows(self) -> int:
         """Number of rows."""
-        return max((len(column) for column in self.columns), default=0)
+        labelled = (len(codes) for _, codes in self.labels.values())
+        return max((*(len(column) for column in self.columns), *labelled), default=0)
 
     def line(self, row: int) -> int:
         """Line of the file that holds a row; 0 where the format has no lines."""

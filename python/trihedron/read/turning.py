@@ -24,7 +24,7 @@ _SLOPE_LOW, _SLOPE_HIGH = 0.4, 1.6
 _MIN_CORRELATION = 0.25
 _BLOCK_S = 0.1
 _MAX_BLOCKS = 20_000
-_CANDIDATES = (RateUnit.RAD_S, RateUnit.DEG_S, RateUnit.MRAD_S)
+_CANDIDATES = (RateUnit.RAD_S, RateUnit.DEG_S, RateUnit.MRAD_S, RateUnit.MDEG_S)
 
 
 def unit_by_turning(

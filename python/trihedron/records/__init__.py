@@ -25,7 +25,16 @@ from trihedron.records.kalman import (
     NormKalmanCalibration,
     PoseTable,
 )
-from trihedron.records.noise import AllanCurve, GaussMarkov, Noise, NoiseAxis, NoiseTerm, SpectralLine, TermName
+from trihedron.records.noise import (
+    AllanCurve,
+    GaussMarkov,
+    Noise,
+    NoiseAxis,
+    NoiseTerm,
+    SlowPair,
+    SpectralLine,
+    TermName,
+)
 from trihedron.records.recording import Recording
 from trihedron.records.sampling import Sampling, StampKind
 from trihedron.records.segments import Hold, Move, Segments
@@ -63,6 +72,7 @@ __all__ = [
     "Segments",
     "SensorCalibration",
     "Severity",
+    "SlowPair",
     "SpectralLine",
     "StampKind",
     "TermName",

@@ -12,7 +12,7 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 Verdict = Literal["consistent", "parameters-differ", "missing-physics", "unexplained", "not-testable"]
-Domain = Literal["static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing"]
+Domain = Literal["static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing", "numbers", "noise"]
 DOMAINS: tuple[Domain, ...] = ("static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing")
 SCHEMA_VERSION = 2
 

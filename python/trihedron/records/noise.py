@@ -79,11 +79,14 @@ class AllanCurve:
 
 @dataclass(frozen=True)
 class NoiseTerm:
-    """One term of IEEE 952, present with its certainty or absent with its limit.
+    """One term of IEEE 952: what the log says of it, whatever else it may hold.
 
-    ``value`` is zero when the log does not show the term; ``limit`` is then the largest value that it does not exclude
-    (95 %, one-sided). ``sigma`` is the standard error, ``lower`` and ``upper`` the 95 % interval from the likelihood.
-    ``evidence`` is the drop of the deviance (twice the log likelihood) that the term earns: 4 is weak, 8 was asked for.
+    ``lower`` and ``upper`` are the 95 % interval with every other term free; ``limit`` is its upper end. Both hold
+    whether the term is named or not. ``is_present`` says that the log shows the term by itself; ``value`` is zero where
+    it does not, otherwise ``estimate``: the most likely value of Q and N, the median of what the likelihood allows of
+    B, K and R. ``sigma`` is the spread about it. ``fitted`` is the term's share in the most likely sum of all terms,
+    from which variances of means are made. ``evidence`` is the rise of the deviance (twice the log likelihood) without
+    the term.
     """
 
     symbol: TermName
@@ -94,6 +97,19 @@ class NoiseTerm:
     upper: float
     limit: float
     evidence: float
+    estimate: float = 0.0
+    fitted: float = 0.0
+
+
+@dataclass(frozen=True)
+class SlowPair:
+    """Whether the log shows slow noise at all: ``evidence`` is the rise of the deviance without B and K together.
+
+    ``is_present`` without either of the two being named: slow noise is there, flicker and walk cannot be told apart.
+    """
+
+    evidence: float
+    is_present: bool
 
 
 @dataclass(frozen=True)
@@ -143,6 +159,7 @@ class NoiseAxis:
     resolution: float
     terms: MappingProxyType[TermName, NoiseTerm]
     gauss_markov: GaussMarkov | None = None
+    slow_pair: SlowPair | None = None
     lines: tuple[SpectralLine, ...] = ()
     lowest_hz: float = 0.0
     highest_hz: float = 0.0
@@ -159,15 +176,26 @@ class NoiseAxis:
         """Value of a term, 0 when it is absent."""
         return self.terms[TermName(symbol)].value
 
+    def fitted(self, symbol: TermName | str) -> float:
+        """Share of a term in the most likely sum of all terms; of B and K also where only their sum shows."""
+        return self.terms[TermName(symbol)].fitted
+
+    @property
+    def is_slow_noise_unresolved(self) -> bool:
+        """Slow noise shows, and whether it is B or K does not."""
+        named = (TermName.BIAS_INSTABILITY, TermName.RATE_RANDOM_WALK)
+        pair = self.slow_pair
+        return pair is not None and pair.is_present and not any(self.terms[term].is_present for term in named)
+
     @property
     def shortest_described_s(self) -> float:
         """Shortest averaging time that the terms describe, s: a reading, or half the period of ``highest_hz``."""
         return max(1.0 / self.rate_hz, 0.5 / self.highest_hz if self.highest_hz > 0.0 else 0.0)
 
     def allan_variance(self, tau_s: npt.ArrayLike) -> FloatArray:
-        """(k,) Allan variance of all terms found, at averaging times ``tau_s`` (docs/noise.md, eq. 7)."""
+        """(k,) Allan variance of the most likely sum of terms, at averaging times ``tau_s`` (docs/noise.md, eq. 7)."""
         tau = np.atleast_1d(np.asarray(tau_s, dtype=np.float64))
-        Q, N, B, K, R = (self.value(term) for term in TermName)
+        Q, N, B, K, R = (self.fitted(term) for term in TermName)
         total = 3 * (Q / tau) ** 2 + N**2 / tau + 2 * math.log(2) / math.pi * B**2 + K**2 * tau / 3 + (R * tau) ** 2 / 2
         if self.gauss_markov is not None:
             total = total + _gauss_markov_allan(self.gauss_markov, tau)
@@ -189,7 +217,7 @@ class NoiseAxis:
             return float(self.allan_variance(window_s)[0])
         if session_s < window_s:
             raise ValueError(f"a session of {session_s} s holds no window of {window_s} s")
-        Q, N, B, K, R = (self.value(term) for term in TermName)
+        Q, N, B, K, R = (self.fitted(term) for term in TermName)
         t, d = window_s, session_s
         total = 2 * Q**2 * (1 / t**2 - 1 / d**2) + N**2 * (1 / t - 1 / d) + B**2 / math.pi * math.log(d / t)
         total += K**2 * (d - t) / 6 + R**2 * (d**2 - t**2) / 12

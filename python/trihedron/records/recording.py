@@ -80,6 +80,9 @@ class Recording:
         What the stamps are worth, as judged when the log was read.
     auxiliary : mapping of name to (n,) array
         Every other numeric column, untouched.
+    rows_in_file, rows_read : int
+        Rows that the file (or both files) holds, and those that became readings; the others are in findings, so that
+        ``rows_in_file == rows_read + rows_reported``. Zero where no file was read.
 
     Raises
     ------
@@ -101,6 +104,8 @@ class Recording:
     findings: tuple[Finding, ...] = ()
     sampling: Sampling = UNJUDGED
     auxiliary: MappingProxyType[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
+    rows_in_file: int = 0
+    rows_read: int = 0
 
     def __post_init__(self) -> None:
         time_s = _readonly(self.time_s, "time_s", (None,))
@@ -130,10 +135,51 @@ class Recording:
         distinct = spread_stamps(self.time_s, 1.0 / self.rate_hz)
         return self if distinct is self.time_s else replace(self, time_s=distinct)
 
+    @classmethod
+    def from_arrays(
+        cls,
+        time_s: npt.ArrayLike | None,
+        accelerometer: npt.ArrayLike | None = None,
+        gyroscope: npt.ArrayLike | None = None,
+        *,
+        accelerometer_unit: str | AccelerationUnit = AccelerationUnit.M_S2,
+        gyroscope_unit: str | RateUnit = RateUnit.RAD_S,
+        rate_hz: float | None = None,
+        temperature_degc: npt.ArrayLike | None = None,
+        supply_v: npt.ArrayLike | None = None,
+    ) -> Recording:
+        """An audited recording of arrays: ``time_s`` (n,) [s] or None with ``rate_hz``, readings (n, 3) in their units.
+
+        Masked and NaN readings are missing; rows of them stay in place. The audit is that of a log.
+
+        Raises
+        ------
+        ValueError
+            When shapes disagree, or neither ``time_s`` nor ``rate_hz`` is given.
+        """
+        # The audit belongs to the reader; people look for the constructor here.
+        from trihedron.pipeline.reading import of_arrays
+
+        return of_arrays(
+            time_s,
+            accelerometer,
+            gyroscope,
+            accelerometer_unit=accelerometer_unit,
+            gyroscope_unit=gyroscope_unit,
+            rate_hz=rate_hz,
+            temperature_degc=temperature_degc,
+            supply_v=supply_v,
+        )
+
     @property
     def n_samples(self) -> int:
         """Number of rows."""
         return len(self.time_s)
+
+    @property
+    def rows_reported(self) -> int:
+        """Rows of the file that findings say are not among the readings."""
+        return round(sum(finding.numbers.get("rows_left_out", 0.0) for finding in self.findings))
 
     @property
     def duration_s(self) -> float:

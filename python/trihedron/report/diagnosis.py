@@ -6,6 +6,14 @@ from collections.abc import Callable, Iterable
 
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis, DomainResiduals, DomainTest, HeldOut
+from trihedron.report.diagnosis_numbers import (
+    differing_in_short,
+    differing_noise,
+    differing_numbers,
+    noise_blocks,
+    numbers_blocks,
+    stages_blocks,
+)
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
@@ -19,9 +27,6 @@ from trihedron.report.numbers import (
 )
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
-FIRST_SCREEN = 3
-"""Sections that fit one screen: where it disagrees, what was left out, what remains."""
-
 MEANING = {
     "static-accel": "gravity at rest",
     "static-gyro": "gyro at rest",
@@ -29,6 +34,8 @@ MEANING = {
     "dynamics": "velocity over a move",
     "within-static": "inside still poses",
     "timing": "sampling instants",
+    "numbers": "numbers of the model",
+    "noise": "noise and sampling",
 }
 _CAPTIONS = {
     "static-accel": "Length of gravity in every still pose.",
@@ -40,16 +47,30 @@ MOST_NAMED = 4
 MOST_PARAMETERS = 9
 
 
+def first_screen(diagnosis: Diagnosis) -> int:
+    """Sections that fit one screen: where it disagrees, numbers of a given model, what was left out, what remains."""
+    return 4 if diagnosis.parameters else 3
+
+
 def diagnosis_report(diagnosis: Diagnosis) -> Document:
     """Lay out a diagnosis; the first sections fit one screen."""
-    sections = [
-        Section("Where recording and model differ", _located(diagnosis)),
-        Section("What was left out", _effects(diagnosis)),
+    sections = [Section("Where recording and model differ", _located(diagnosis))]
+    if diagnosis.parameters:
+        numbers = [*differing_numbers(diagnosis), *differing_noise(diagnosis)]
+        words = tuple(("", word) for word in numbers) or (("", "None of the given numbers differs."),)
+        sections.append(Section("Numbers that differ (recording minus model)", (Facts(words),)))
+    sections += [
+        Section("What was left out", effects_blocks(diagnosis)),
         Section("What remains", (Paragraph(_remaining(diagnosis)),)),
         Section("Held out: before and after", _held_out(diagnosis)),
         Section("Candidates", (_candidates(diagnosis),)),
         Section("Calibration and noise", _models(diagnosis)),
     ]
+    if diagnosis.parameters:
+        sections.append(Section("Stage by stage", stages_blocks(diagnosis, MEANING)))
+        sections.append(Section("All numbers of the model", numbers_blocks(diagnosis)))
+    if diagnosis.noise_compared:
+        sections.append(Section("Noise and sampling of the model", noise_blocks(diagnosis)))
     findings: Iterable[Finding] = getattr(diagnosis, "findings", ())
     if findings:
         sections.append(Section("Findings", (findings_block(findings),)))
@@ -68,20 +89,32 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     """The verdict and what carries it, in one sentence."""
     off: list[str] = [d.domain for d in diagnosis.domains if d.disagrees]
     left: list[str] = [d.domain for d in diagnosis.remaining if d.disagrees]
+    numbers = differing_in_short(diagnosis)
     if diagnosis.verdict == "consistent":
         return "CONSISTENT: the model and its noise account for this recording; nothing is missing that it could show."
     if diagnosis.verdict == "unexplained":
         return (
             f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
-            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it."
+            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it"
+            + (f"; numbers differ too ({listed(numbers)})." if numbers else ".")
         )
-    named = listed([effect.id for effect in diagnosis.effects])
+    if diagnosis.verdict == "parameters-differ":
+        return f"PARAMETERS DIFFER: {listed(numbers)}; nothing else, no physics is missing."
+    missing = [effect.id for effect in diagnosis.effects if effect.side == "recording"]
+    surplus = [effect.id for effect in diagnosis.effects if effect.side == "model"]
     tail = (
         f"; {listed(left)} still {'disagree' if len(left) > 1 else 'disagrees'}."
         if left
         else "; nothing else disagrees."
     )
-    return f"MISSING PHYSICS: {named} {'was' if len(diagnosis.effects) == 1 else 'were'} left out of the model{tail}"
+    said = []
+    if missing:
+        said.append(f"{listed(missing)} {'was' if len(missing) == 1 else 'were'} left out of the model")
+    if surplus:
+        said.append(f"the model has {listed(surplus)}, which the recording lacks")
+    if numbers:
+        said.append(f"numbers differ ({listed(numbers)})")
+    return f"MISSING PHYSICS: {'; '.join(said)}{tail}"
 
 
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -159,7 +192,7 @@ def where_in_words(test: DomainTest) -> str:
     return "; ".join(parts)
 
 
-def _effects(diagnosis: Diagnosis) -> tuple[Block, ...]:
+def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if not diagnosis.effects:
         return (Paragraph("No effect of the catalogue earns its place in the model."),)
     blocks: list[Block] = []

@@ -51,6 +51,7 @@ def noise_report(
         sections=(
             Section("Result", tuple(tables)),
             Section("Findings", (findings_block(findings),)),
+            Section("Intervals", tuple(_intervals_table(axes, unit) for unit, axes in groups)),
             Section("Customary units", tuple(b for unit, axes in groups for b in _customary(axes, unit))),
             *([Section("How long to record", (_lengths_table(noise, lengths, accuracy),))] if lengths else []),
             Section("Kalibr", (Facts(tuple(kalibr_rows(noise).items())),)),
@@ -125,7 +126,26 @@ def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
     if any(axis.gauss_markov for axis in axes):
         rows.append((f"   Gauss-Markov σ [{unit_in_print(unit)}]", *(_gauss_markov(axis) for axis in axes)))
         rows.append(("   … correlation time [s]", *(_correlation(axis) for axis in axes)))
-    return Table(("", *(axis.name for axis in axes)), tuple(rows), "Noise terms ± standard error; < is a 95 % limit")
+    return Table(
+        ("", *(axis.name for axis in axes)),
+        tuple(rows),
+        "Noise terms ± standard error; < is the upper end of the 95 % interval",
+    )
+
+
+def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:
+    def cell(term: NoiseTerm) -> str:
+        return f"{plain_number(term.lower, 2)} … {plain_number(term.upper, 2)}"
+
+    rows = [
+        (f"{term.value}  {TERM_WORDS[term]} [{unit_of(term, unit)}]", *(cell(axis.terms[term]) for axis in axes))
+        for term in TermName
+    ]
+    if any(axis.is_slow_noise_unresolved for axis in axes):
+        words = ("not both zero" if axis.is_slow_noise_unresolved else "" for axis in axes)
+        rows.append(("   B and K together", *words))
+    caption = "95 % intervals, every other term free: they hold whether a term is named or not"
+    return Table(("", *(axis.name for axis in axes)), tuple(rows), caption)
 
 
 def _gauss_markov(axis: NoiseAxis) -> str:

@@ -63,6 +63,8 @@ def _axis_record(axis: NoiseAxis, lengths: Mapping[TermName, float | None]) -> d
             "upper": found.upper,
             "limit": found.limit,
             "evidence": found.evidence,
+            "estimate": found.estimate,
+            "fitted": found.fitted,
             "unit": f"{axis.unit}{PER_UNIT[term]}",
         }
         usual = customary(term, axis.unit)
@@ -80,6 +82,7 @@ def _axis_record(axis: NoiseAxis, lengths: Mapping[TermName, float | None]) -> d
         "resolution": axis.resolution,
         "terms": terms,
         "gauss_markov": None if axis.gauss_markov is None else dict(vars(axis.gauss_markov)),
+        "slow_pair": None if axis.slow_pair is None else dict(vars(axis.slow_pair)),
         "lines": [dict(vars(line)) for line in axis.lines],
         "lowest_hz": axis.lowest_hz,
         "highest_hz": axis.highest_hz,

@@ -15,6 +15,7 @@ class TableTilt(DirectEffect):
     """Turning on a tilted table swings the vertical about the table's normal: it comes back only after a full turn."""
 
     id = "table-tilt"
+    is_of_session = True
     mechanism = "the table is not level"
     experiment = "level the table, or hold every face in two headings 180° apart and average"
 

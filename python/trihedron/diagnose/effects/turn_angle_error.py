@@ -16,6 +16,7 @@ class TurnAngleError(DirectEffect):
     """Table turns against a wall miss their multiple of 90° by more than the gyro's own error."""
 
     id = "turn-angle-error"
+    is_of_session = True
     mechanism = "a turn meant to be a multiple of 90° was not"
     experiment = "repeat the turns against a stop; turn back by the same angle"
 

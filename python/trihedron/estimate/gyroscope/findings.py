@@ -13,9 +13,11 @@ from trihedron.estimate.gyroscope.measurements import MoveMeasurements, audit_mo
 from trihedron.estimate.gyroscope.observability import describe, observability_findings
 from trihedron.estimate.gyroscope.verification import Prediction
 from trihedron.records.finding import Finding, FindingCode, Severity
-from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians
+from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, degrees_from_radians, rate_to_si
 
 FloatArray = npt.NDArray[np.float64]
+MAX_SCALE_RATIO = 1.5
+"""Untrimmed MEMS gyros are within 10 % of their data sheet; half as much again is a wrong unit or rate."""
 
 
 def findings_of(aligned: Aligned, measured: MoveMeasurements, held: Prediction | None) -> tuple[Finding, ...]:
@@ -53,6 +55,26 @@ def findings_of(aligned: Aligned, measured: MoveMeasurements, held: Prediction |
     found += _attitude_findings(measured, S)
     found += _drift_findings(measured, S)
     return tuple(found)
+
+
+def scale_findings(S: FloatArray, raw_unit: RateUnit) -> list[Finding]:
+    """A scale that contradicts the unit of the log: the rate of the log, or the unit, is wrong by that factor."""
+    nominal = rate_to_si(raw_unit)
+    if nominal is None:
+        return []
+    ratio = float(np.exp(np.mean(np.log(np.linalg.norm(S, axis=0) / nominal))))
+    if not np.isfinite(ratio) or 1.0 / MAX_SCALE_RATIO <= ratio <= MAX_SCALE_RATIO:
+        return []
+    return [
+        Finding(
+            FindingCode.SCALE_NOT_NOMINAL,
+            Severity.SERIOUS,
+            f"The gyro needs a factor {ratio:.4g} although the log is in {raw_unit.value}.",
+            "The log's time base or rate is wrong by that factor, or its unit is another one.",
+            "Check --time-unit, --rate and --gyro-unit.",
+            MappingProxyType({"scale_ratio": ratio}),
+        )
+    ]
 
 
 def handedness(S: FloatArray, S_accelerometer: FloatArray) -> list[Finding]:

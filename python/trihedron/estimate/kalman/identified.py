@@ -44,8 +44,8 @@ class IdentifiedAxis(Protocol):
     def gauss_markov(self) -> IdentifiedProcess | None:
         """First-order process besides the five terms."""
 
-    def value(self, symbol: str) -> float:
-        """Coefficient Q, N, B, K or R; 0 when the term is absent."""
+    def fitted(self, symbol: str) -> float:
+        """Share of Q, N, B, K or R in the most likely sum of terms."""
 
 
 def noise_from_identified(
@@ -86,11 +86,11 @@ def _one(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> AxisNoise:
         factor = has / wanted
     process = axis.gauss_markov
     noise = AxisNoise(
-        quantisation=axis.value("Q"),
-        white=axis.value("N"),
-        flicker=axis.value("B"),
-        walk=axis.value("K"),
-        ramp=abs(axis.value("R")),
+        quantisation=axis.fitted("Q"),
+        white=axis.fitted("N"),
+        flicker=axis.fitted("B"),
+        walk=axis.fitted("K"),
+        ramp=abs(axis.fitted("R")),
         gauss_markov=0.0 if process is None else process.sigma_process,
         gauss_markov_time_s=0.0 if process is None else process.correlation_time_s,
         resolution=axis.resolution,

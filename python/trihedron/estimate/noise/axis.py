@@ -7,19 +7,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
-from trihedron import _core
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.lines import find_lines, misfit_groups, white_limit
 from trihedron.estimate.noise.screening import Event, Readout
 from trihedron.estimate.noise.selection import Selection, select
 from trihedron.estimate.noise.spectrum import Ordinates
-from trihedron.estimate.noise.terms import SYMBOLS
+from trihedron.estimate.noise.statements import gauss_markov_of, invert, slow_pair_of, terms_of
 from trihedron.records.finding import Finding
-from trihedron.records.noise import AllanCurve, GaussMarkov, NoiseAxis, NoiseTerm, TermName
+from trihedron.records.noise import AllanCurve, NoiseAxis, NoiseTerm, TermName
 
-_RISE_95 = 3.841
-"""Rise of the deviance at the ends of a two-sided 95 % interval (chi-square, one degree of freedom)."""
-_RISE_95_ONE_SIDED = 2.706
 LEAST_EDF = 8.0
 """Degrees of freedom that give an Allan deviation to 25 %."""
 TOLERANCE = 0.02
@@ -28,7 +24,8 @@ TOLERANCE = 0.02
 
 def identify_axis(bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurve, channel: int) -> NoiseAxis:
     """``blank`` with the terms that its spectrum shows, its lines, and what was noticed on the way."""
-    nyquist = blank.rate_hz / 2.0
+    # Thinned readings of slow noise show themselves as means only, and end where these do.
+    nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
     findings: list[Finding] = []
     highest, at_nyquist = white_limit(bands, nyquist, None)
     selection = select(bands, highest, tolerance=TOLERANCE if highest < nyquist else 0.0)
@@ -43,10 +40,13 @@ def identify_axis(bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurv
     if worst is not None:
         findings.append(remarks.unexplained(*worst))
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
+    found = invert(selection)
+    pair = slow_pair_of(found)
     axis = replace(
         blank,
-        terms=MappingProxyType(_terms(selection)),
-        gauss_markov=_gauss_markov(selection),
+        terms=MappingProxyType(terms_of(found, pair)),
+        gauss_markov=gauss_markov_of(found, selection),
+        slow_pair=pair,
         lines=tuple(lines),
         lowest_hz=float(selection.spectrum.frequency_hz[0]),
         highest_hz=float(highest),
@@ -102,52 +102,3 @@ def _tempered(selection: Selection) -> tuple[Selection, float, tuple[float, floa
     worst = max(bad, key=lambda g: abs(g.deviation))
     large = (worst.deviation, worst.frequency_hz) if abs(worst.deviation) > 0.1 else None
     return replace(selection, fit=fit, spectrum=spectrum), max(g.z**2 for g in bad), large
-
-
-def _terms(selection: Selection) -> dict[TermName, NoiseTerm]:
-    likelihood = selection.spectrum.likelihood()
-    fit = selection.fit
-    out = {}
-    for k, symbol in enumerate(SYMBOLS):
-        term = TermName(symbol)
-        if k in selection.active:
-            low, high = likelihood.interval(selection.active, selection.has_ramp, k, _RISE_95)
-            value = math.sqrt(fit.strength[k])
-            sigma = 0.5 * value * fit.sigma_log[selection.active.index(k)]
-            low, high = math.sqrt(low), math.sqrt(high)
-            out[term] = NoiseTerm(term, True, value, sigma, low, high, high, selection.evidence[k])
-        else:
-            _, high = likelihood.interval(selection.active, selection.has_ramp, k, _RISE_95_ONE_SIDED)
-            limit = math.sqrt(high)
-            out[term] = NoiseTerm(term, False, 0.0, 0.0, 0.0, limit, limit, selection.evidence[k])
-    out[TermName.RATE_RAMP] = _ramp(selection, likelihood)
-    return out
-
-
-def _ramp(selection: Selection, likelihood: _core.SpectralBins) -> NoiseTerm:
-    fit = selection.fit if selection.has_ramp else likelihood.fit(selection.active, True)
-    slope, sigma = fit.slope, fit.sigma_slope
-    limit = abs(slope) + 1.645 * sigma
-    if selection.has_ramp:
-        low, high = abs(slope) - 1.96 * sigma, abs(slope) + 1.96 * sigma
-        return NoiseTerm(
-            TermName.RATE_RAMP, True, abs(slope), sigma, max(low, 0.0), high, high, selection.evidence_ramp
-        )
-    return NoiseTerm(TermName.RATE_RAMP, False, 0.0, 0.0, 0.0, limit, limit, selection.evidence_ramp)
-
-
-def _gauss_markov(selection: Selection) -> GaussMarkov | None:
-    if selection.correlation_time_s is None:
-        return None
-    k = len(SYMBOLS)
-    strength = selection.fit.strength[k]
-    low, high = selection.spectrum.likelihood().interval(selection.active, selection.has_ramp, k, _RISE_95)
-    value = math.sqrt(strength)
-    return GaussMarkov(
-        sigma_process=value,
-        correlation_time_s=selection.correlation_time_s,
-        sigma=0.5 * value * selection.fit.sigma_log[selection.active.index(k)],
-        lower=math.sqrt(low),
-        upper=math.sqrt(high),
-        evidence=selection.evidence_gauss_markov,
-    )

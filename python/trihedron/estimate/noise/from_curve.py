@@ -104,7 +104,7 @@ def _axis(curve: AllanCurve, channel: int) -> NoiseAxis:
             value = math.sqrt(fit.squares[k])
             place = fit.active.index(k)
             error = 0.5 * value * math.sqrt(scale * fit.covariance[place, place])
-            terms[term] = NoiseTerm(term, True, value, error, low, high, high, found.evidence[k])
+            terms[term] = NoiseTerm(term, True, value, error, low, high, high, found.evidence[k], value, value)
         else:
             terms[term] = NoiseTerm(term, False, 0.0, 0.0, 0.0, high, high, found.evidence[k])
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]

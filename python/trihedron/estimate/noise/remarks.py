@@ -252,6 +252,25 @@ def unexplained(deviation: float, frequency_hz: float) -> Finding:
     )
 
 
+def _slow_noise_unresolved(axis: NoiseAxis) -> Finding:
+    """B and K together are needed, neither by itself."""
+    flicker, walk = axis.terms[TermName.BIAS_INSTABILITY], axis.terms[TermName.RATE_RANDOM_WALK]
+    evidence = axis.slow_pair.evidence if axis.slow_pair is not None else 0.0
+    return _finding(
+        FindingCode.SLOW_NOISE_UNRESOLVED,
+        Severity.NOTE,
+        f"Slow noise is there; B and K are not separable here: B {flicker.lower:.2g} … {flicker.upper:.2g} "
+        f"{axis.unit}, K {walk.lower:.2g} … {walk.upper:.2g} {axis.unit}/√s, not both zero.",
+        "the log is short compared with the times over which flicker and walk differ",
+        "Variances of means use the most likely sum of both; record longer to tell them apart.",
+        evidence=evidence,
+        flicker_lower=flicker.lower,
+        flicker_upper=flicker.upper,
+        walk_lower=walk.lower,
+        walk_upper=walk.upper,
+    )
+
+
 def about_terms(axis: NoiseAxis) -> list[Finding]:
     """Drift, and a log too short to show any minimum."""
     out = []
@@ -268,6 +287,8 @@ def about_terms(axis: NoiseAxis) -> list[Finding]:
                 slope=ramp.value,
             )
         )
+    if axis.is_slow_noise_unresolved:
+        out.append(_slow_noise_unresolved(axis))
     if not axis.terms[TermName.RATE_RANDOM_WALK].is_present and axis.optimal_averaging() is None:
         limit = axis.terms[TermName.RATE_RANDOM_WALK].limit
         out.append(

@@ -7,10 +7,17 @@
 //! `D(p, slope) = Σ_b n_b (ln v_b + P_b / v_b)`, `P_b = mean (c − slope t)²`
 //!
 //! by a monotone multiplicative start, then Fisher scoring in `ln p`. `slope` is profiled out: it is linear.
+//!
+//! What is *said* of a term comes from [`invert`]: all terms stay in the model and the line is integrated out.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::{Error, Result};
+
+mod marginal;
+mod profile;
+
+pub use profile::{Inversion, LineMixture, Statement, invert};
 
 /// Averages of ordinates over bins, and what each noise term of unit strength contributes to them.
 #[derive(Debug, Clone)]
@@ -34,8 +41,6 @@ pub struct Question {
     pub active: Vec<usize>,
     /// Whether a straight line in time is fitted.
     pub has_line: bool,
-    /// A term whose strength is given instead of fitted (it need not be active).
-    pub held: Option<(usize, f64)>,
 }
 
 /// The most likely strengths.
@@ -131,28 +136,12 @@ impl Bins {
 /// `BadInput` when the bins disagree or no term is asked for.
 pub fn fit(bins: &Bins, question: &Question) -> Result<Fit> {
     bins.check()?;
-    Ok(fit_checked(bins, question, None))
-}
-
-fn fit_checked(bins: &Bins, question: &Question, start: Option<&[f64]>) -> Fit {
-    let free: Vec<usize> = question
-        .active
-        .iter()
-        .copied()
-        .filter(|&k| question.held.is_none_or(|(held, _)| held != k))
-        .collect();
+    let free = question.active.clone();
     let mut strength = vec![0.0; bins.basis.len()];
     for &k in &free {
-        strength[k] = start.map_or(0.0, |s| s[k]);
-        if strength[k] <= 0.0 {
-            strength[k] = first_guess(bins, k);
-        }
+        strength[k] = first_guess(bins, k);
     }
-    if let Some((held, value)) = question.held {
-        strength[held] = value;
-    }
-    let rounds = if start.is_some() { 2 } else { 12 };
-    for _ in 0..rounds {
+    for _ in 0..12 {
         multiply(bins, &free, question.has_line, &mut strength);
     }
     let is_converged = score(bins, &free, question.has_line, &mut strength);
@@ -174,14 +163,14 @@ fn fit_checked(bins: &Bins, question: &Question, start: Option<&[f64]>) -> Fit {
         })
         .collect();
     let deviance = bins.deviance(&v, slope);
-    Fit {
+    Ok(Fit {
         strength,
         slope,
         sigma_slope,
         deviance,
         sigma_log,
         is_converged,
-    }
+    })
 }
 
 /// A tenth of the bins lie below this strength of the term alone.
@@ -270,80 +259,4 @@ fn score(bins: &Bins, free: &[usize], has_line: bool, strength: &mut [f64]) -> b
         }
     }
     false
-}
-
-/// Strengths of term `k` at which the deviance exceeds its minimum by `rise`: below and above the most likely one.
-///
-/// The lower is zero when the deviance at zero strength does not exceed the minimum by `rise`.
-///
-/// # Errors
-/// `BadInput` when the bins disagree.
-pub fn profile_interval(
-    bins: &Bins,
-    question: &Question,
-    k: usize,
-    rise: f64,
-) -> Result<(f64, f64)> {
-    bins.check()?;
-    let mut active = question.active.clone();
-    if !active.contains(&k) {
-        active.push(k);
-    }
-    let free = Question {
-        active,
-        has_line: question.has_line,
-        held: None,
-    };
-    let best = fit_checked(bins, &free, None);
-    let held_at = |value: f64, near: &[f64]| {
-        fit_checked(
-            bins,
-            &Question {
-                held: Some((k, value)),
-                ..free.clone()
-            },
-            Some(near),
-        )
-    };
-    let excess = |value: f64| held_at(value, &best.strength).deviance - best.deviance - rise;
-    let peak = best.strength[k];
-    let others: f64 = first_guess(bins, k);
-    let seed = if peak > 1e-12 * others {
-        peak
-    } else {
-        1e-6 * others
-    };
-    let mut above = seed * 1.3;
-    let mut inside = seed;
-    while excess(above) < 0.0 && above < 1e12 * others.max(seed) {
-        inside = above;
-        above *= 1.6;
-    }
-    let upper = bisect(inside, above, &excess);
-    if peak <= 0.0 || excess(0.0) <= 0.0 {
-        return Ok((0.0, upper));
-    }
-    let mut below = peak / 1.3;
-    let mut inside = peak;
-    while excess(below) < 0.0 && below > 1e-12 * peak {
-        inside = below;
-        below /= 1.6;
-    }
-    Ok((bisect(inside, below, &excess), upper))
-}
-
-/// Where `f` changes sign between `inside` (negative) and `outside` (positive), to 1e-4, on a logarithmic scale.
-fn bisect(mut inside: f64, mut outside: f64, f: &impl Fn(f64) -> f64) -> f64 {
-    for _ in 0..40 {
-        if (outside / inside - 1.0).abs() < 1e-4 {
-            break;
-        }
-        let middle = (inside * outside).sqrt();
-        if f(middle) < 0.0 {
-            inside = middle;
-        } else {
-            outside = middle;
-        }
-    }
-    (inside * outside).sqrt()
 }

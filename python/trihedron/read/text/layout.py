@@ -10,10 +10,14 @@ MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _NUMBER_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _UNIT_WORD = re.compile(
-    r"[\[(]?(s|sec|seconds?|m?s|us|µs|ns|m?g|m ?/ ?s(\^?2|²|/s)|m ?s\^?-2|(m?rad|deg|°) ?(/ ?s|s\^?-1)|dps|rad|deg"
-    r"|counts?|lsb|raw|adc|u?t|µt|gauss|v|°?c|degc|pa|-)?[\])]?$",
+    r"[\[(]?(s|m?secs?|m?seconds?|m?s|us|µs|ns|utc|m?g|m ?/ ?\(?s(?:ec)?(\^?2|²|/s)\)?|m ?s\^?-2|m?dps|rad|deg"
+    r"|(m?rad|m?deg|°) ?(/ ?s(?:ec)?|s\^?-1)|counts?|lsb|raw|adc|no_units|u?t|µt|gauss|local_flux|m?v"
+    r"|°?c|degc|degrees celsius|k?pa|y|-)?[\])]?$",
     re.IGNORECASE,
 )
+_QUALIFIERS = frozenset({"cal", "uncal", "raw", "calibrated", "uncalibrated"})
+MAX_STRAY_LINES = 20
+"""Lines of numbers above the table that a preamble (a matrix, a list of offsets) may hold; more are rows lost."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,8 @@ class Layout:
     names: tuple[str, ...] | None
     metadata: dict[str, str] = field(default_factory=dict)
     header_ignored: str = ""
+    stray: tuple[int, ...] = ()
+    """Lines (from 1) above the first row that look like rows of another layout, or stand between names and rows."""
 
 
 def is_comment(line: str) -> bool:
@@ -80,10 +86,57 @@ def detect(text: str) -> Layout | None:
     first = _first_data_line(lines, separator, decimal_comma, n_fields)
     if first is None:
         return None
+    first, rate = _past_start_and_rate(lines, first, separator)
     trailing = separator != " " and n_fields > 1 and all(line.rstrip(" ").endswith(separator) for line in tail)
     n_kept = n_fields - trailing
-    names, metadata, ignored = _header(lines[:first], separator, n_kept)
-    return Layout(separator, decimal_comma, n_kept, trailing, first + 1, names, metadata, ignored)
+    header = _header(lines[:first], separator, n_kept)
+    return Layout(
+        separator,
+        decimal_comma,
+        n_kept,
+        trailing,
+        first + 1,
+        header.names,
+        header.metadata | rate,
+        header.ignored,
+        () if rate else _stray(lines[:first], header, decimal_comma),
+    )
+
+
+def _past_start_and_rate(lines: list[str], first: int, separator: str) -> tuple[int, dict[str, str]]:
+    """Empatica's two lines above the rows: the start in seconds since 1970 and the rate, once for each column."""
+    if first != 0 or len(lines) < 4:
+        return first, {}
+    start, rate = (split(line, separator) for line in lines[:2])
+    if len(set(start)) != 1 or len(set(rate)) != 1 or len(start) < 3 or len(start) != len(rate):
+        return first, {}
+    if not (is_number(start[0], False) and is_number(rate[0], False)):
+        return first, {}
+    if not (1e9 <= float(start[0]) <= 4e9 and 0.0 < float(rate[0]) <= 1e4):
+        return first, {}
+    return 2, {"start": start[0], "rate": rate[0]}
+
+
+def _looks_like_row(line: str, decimal_comma: bool) -> bool:
+    """Three numbers or more, under any separator, and nothing much else."""
+    for separator in (",", "\t", ";", " "):
+        fields = split(line, separator)
+        if sum(is_number(f, decimal_comma) for f in fields) >= 3 and _numeric_fraction(fields, decimal_comma) >= 0.5:
+            return True
+    return False
+
+
+def _stray(lines: list[str], header: _Header, decimal_comma: bool) -> tuple[int, ...]:
+    """Lines above the first row that are neither names nor units nor remarks, but may have been rows."""
+    found = []
+    for i, raw in enumerate(lines):
+        line = raw.strip()
+        if not line or is_comment(line) or i in header.used:
+            continue
+        is_below_names = header.names is not None and header.used and i > max(header.used)
+        if is_below_names or _looks_like_row(line, decimal_comma):
+            found.append(i + 1)
+    return tuple(found)
 
 
 def _first_data_line(lines: list[str], separator: str, decimal_comma: bool, n_fields: int) -> int | None:
@@ -97,32 +150,62 @@ def _first_data_line(lines: list[str], separator: str, decimal_comma: bool, n_fi
     return None
 
 
-def _header(lines: list[str], separator: str, n_fields: int) -> tuple[tuple[str, ...] | None, dict[str, str], str]:
+@dataclass(frozen=True)
+class _Header:
+    names: tuple[str, ...] | None
+    metadata: dict[str, str]
+    ignored: str
+    used: tuple[int, ...]
+    """Lines (from 0) that became names, units or qualifiers of names."""
+
+
+def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
     metadata: dict[str, str] = {}
-    matching: list[list[str]] = []
+    matching: list[tuple[int, list[str]]] = []
     ignored = ""
-    for raw in lines:
+    for i, raw in enumerate(lines):
         line = raw.strip()
-        if not line:
+        if not line or line.strip('"').lower().startswith("sep="):
             continue
         plain = re.sub(r"^(#+|%+|//+)\s*", "", line) if is_comment(line) else line
         fields = _header_fields(plain, separator, n_fields)
         if fields is not None and not any(is_number(f, False) for f in fields):
-            matching.append(fields)
+            matching.append((i, fields))
             continue
         pair = re.match(r"\s*([^:=,;\t]+?)\s*[:=,;\t]\s*([^,;\t]+?)[\s,;]*$", plain)
-        if pair:
+        if pair and not is_number(pair.group(1), False):
             metadata[pair.group(1)] = pair.group(2)
         elif not is_comment(line):
             ignored = line
     if not matching:
-        return None, metadata, ignored
-    names = matching[-1]
-    if len(matching) >= 2 and all(_UNIT_WORD.match(field) for field in names):
-        names = [
-            f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in zip(matching[-2], names, strict=True)
-        ]
-    return tuple(names), metadata, ""
+        return _Header(None, metadata, ignored, ())
+    units: list[str] = []
+    qualifiers: list[str] = []
+    used = [matching[-1][0]]
+    # Names, then CAL or RAW, then units, as Shimmer writes them; or names and units.
+    while len(matching) > 1:
+        row = matching[-1][1]
+        if not units and _share(row, _UNIT_WORD) >= 0.6:
+            units = row
+        elif not qualifiers and _share(row, _QUALIFIERS) == 1.0:
+            qualifiers = row
+        else:
+            break
+        matching.pop()
+        used.append(matching[-1][0])
+    names = matching[-1][1]
+    if qualifiers:
+        names = [f"{name} {word}".strip() for name, word in zip(names, qualifiers, strict=True)]
+    if units:
+        bare = [unit[1:-1] if unit[:1] + unit[-1:] in ("[]", "()") else unit for unit in units]
+        names = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, bare, strict=True)]
+    return _Header(tuple(names), metadata, "", tuple(used))
+
+
+def _share(fields: list[str], test: re.Pattern[str] | frozenset[str]) -> float:
+    filled = [f for f in fields if f]
+    hits = sum(bool(test.match(f)) if isinstance(test, re.Pattern) else f.lower() in test for f in filled)
+    return hits / len(filled) if filled else 1.0
 
 
 def _header_fields(line: str, separator: str, n_fields: int) -> list[str] | None:

@@ -1,0 +1,297 @@
+"""Blind pairs: a simulation held against a recording, what differs sealed until the verdict stands.
+
+    python benches/blind_pairs.py --pairs 60 --seed 1             # every kind in turn
+    python benches/blind_pairs.py --kind surplus --pairs 20
+    python benches/blind_pairs.py --pairs 60 --nuisances          # the recording has the small faults of real logs
+
+Kinds: the same unit on another day's session; a nominal simulation of the part; another unit; one number moved (zero,
+scale, misalignment, the gyro triad turned, gravity); an effect that only the recording has, or only the simulation, or
+both; noise twice as large; a coarser converter. Each pair is held against its log (``--against``) or, for one kind in
+three, against a calibration made from the simulated log (``--calibration``). A name said of nothing that was drawn is
+false; a group of numbers whose true difference exceeds five of its own stated errors must be found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import sys
+import warnings
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import trihedron
+from blind_trial.draw import grade_profile, moves_of
+from blind_trial.sizes import ON_A_TABLE, SIZES, Session
+from trihedron.records import Recording
+from trihedron.simulate import Scenario, hand_session, simulate
+from trihedron.simulate.effects import with_effect
+
+KINDS = (
+    "same", "nominal", "other-unit", "accel-zero", "gyro-zero", "accel-scale", "gyro-scale", "accel-misalignment",
+    "gyro-misalignment", "triad-alignment", "gravity", "missing", "surplus", "both", "noise", "resolution",
+)  # fmt: skip
+NOT_PAIRED = {
+    *ON_A_TABLE, "disturbed-pose", "dropped-samples", "timing-jitter", "axis-handedness", "earth-rate", "lever-arm",
+    "accel-saturation", "gyro-saturation", "quantisation", "supply-sensitivity",
+}  # fmt: skip
+GROUPS = (
+    "accel-zero", "accel-scale", "accel-misalignment", "gyro-zero", "gyro-scale", "gyro-misalignment",
+    "triad-alignment", "gravity",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Pair:
+    kind: str
+    seed: int
+    nuisances: bool = False
+    by_file: bool = False
+
+
+def matrix(S: np.ndarray) -> Any:
+    return tuple(tuple(float(v) for v in row) for row in S)
+
+
+def triple(b: np.ndarray) -> Any:
+    return tuple(float(v) for v in b)
+
+
+def turned(angle: np.ndarray) -> np.ndarray:
+    """Rotation matrix of a rotation vector."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(angle).as_matrix())
+
+
+def moved(kind: str, accel: Any, gyro: Any, rng: np.random.Generator) -> tuple[Any, Any]:
+    """One number moved, in the direction in which the instrument is made: raw = S⁻¹(truth - b)."""
+    sign = rng.choice((-1.0, 1.0), 3) * rng.uniform(0.5, 1.5, 3)
+    if kind == "accel-zero":
+        accel = replace(accel, b=triple(np.array(accel.b) + 0.03 * sign))
+    elif kind == "gyro-zero":
+        gyro = replace(gyro, b=triple(np.array(gyro.b) + np.radians(0.3) * sign))
+    elif kind in ("accel-scale", "gyro-scale", "accel-misalignment", "gyro-misalignment", "triad-alignment"):
+        sensor = accel if kind.startswith("accel") else gyro
+        M = np.linalg.inv(np.array(sensor.S))
+        k = np.linalg.norm(M, axis=1)
+        n = M / k[:, None]
+        offset = -M @ np.array(sensor.b)
+        if kind.endswith("scale"):
+            k, offset = k * (1 + 0.004 * sign), offset * (1 + 0.004 * sign)
+        elif kind == "triad-alignment":
+            n = n @ turned(0.006 * sign).T
+        else:
+            # Two axes opened against each other, their mean direction kept, so that the triad does not turn.
+            i, j = rng.choice(3, 2, replace=False)
+            other = n[j] - (n[j] @ n[i]) * n[i]
+            other /= np.linalg.norm(other)
+            angle = float(np.arccos(n[i] @ n[j])) + 0.004 * float(sign[0])
+            centre = (n[i] + n[j]) / np.linalg.norm(n[i] + n[j])
+            side = (n[j] - n[i]) / np.linalg.norm(n[j] - n[i])
+            n = n.copy()
+            n[i] = np.cos(angle / 2) * centre - np.sin(angle / 2) * side
+            n[j] = np.cos(angle / 2) * centre + np.sin(angle / 2) * side
+        S = np.linalg.inv(k[:, None] * n)
+        sensor = replace(sensor, S=matrix(S), b=triple(-S @ offset))
+        accel, gyro = (sensor, gyro) if kind.startswith("accel") else (accel, sensor)
+    return accel, gyro
+
+
+def session(rng: np.random.Generator) -> Any:
+    return hand_session(
+        int(rng.integers(20, 33)), hold_s=float(rng.uniform(3.5, 7.0)), layout=int(rng.integers(1, 10000)),
+        move_s=float(rng.uniform(1.4, 2.6)),
+    )  # fmt: skip
+
+
+def with_nuisances(recording: Recording, rng: np.random.Generator) -> Recording:
+    """Zeros that differ from pose to pose, a faint line, a jolt after setting down: as public recordings show them."""
+    segments = trihedron.segment(recording)
+    accel, gyro = np.array(recording.accelerometer), np.array(recording.gyroscope)
+    unit_a = 9.81 / float(np.median(np.linalg.norm(accel[segments.holds[0].samples()], axis=1)))
+    unit_g = np.radians(1 / 65.5)
+    step_a, step_g = rng.uniform(5e-4, 3e-3) / unit_a, np.radians(rng.uniform(0.005, 0.03)) / unit_g
+    t = recording.time_s
+    edges = [0, *[(a.stop + b.start) // 2 for a, b in itertools.pairwise(segments.holds)], len(t)]
+    for first, last in itertools.pairwise(edges):
+        accel[first:last] += step_a * rng.standard_normal(3)
+        gyro[first:last] += step_g * rng.standard_normal(3)
+    line = np.radians(rng.uniform(0.005, 0.02)) / unit_g * np.sin(2 * np.pi * rng.uniform(3, 30) * t)
+    gyro[:, int(rng.integers(3))] += line
+    return replace(recording, accelerometer=accel, gyroscope=gyro)
+
+
+def make(pair: Pair) -> tuple[Recording, Recording, float, dict[str, Any]]:
+    """Simulated log, recording, gravity, sealed answer."""
+    rng = np.random.default_rng([pair.seed, 77])
+    profile = grade_profile("mpu")
+    number = int(rng.integers(1, 10000))
+    accel, gyro = profile.unit(number)
+    sim_a, sim_g = accel, gyro
+    if pair.kind == "nominal":
+        sim_a, sim_g = profile.accelerometer, profile.gyroscope
+    elif pair.kind == "other-unit":
+        sim_a, sim_g = profile.unit(number + 1)
+    elif pair.kind == "noise":
+        factor = float(rng.uniform(1.6, 2.5))
+        sim_g = replace(gyro, noise=replace(gyro.noise, N=triple(factor * np.array(gyro.noise.N) * np.ones(3))))
+    elif pair.kind == "resolution":
+        sim_a = replace(accel, adc=replace(accel.adc, lsb=accel.adc.lsb * float(rng.choice((16.0, 64.0)))))
+    else:
+        sim_a, sim_g = moved(pair.kind, accel, gyro, rng)
+    motion_r, motion_s = session(rng), session(rng)
+    real = Scenario(motion_r, "recording", accel, gyro, profile.clock)
+    sim = Scenario(motion_s, "simulation", sim_a, sim_g, profile.clock)
+    effect = ""
+    if pair.kind in ("missing", "surplus", "both"):
+        effect = str(rng.choice([e for e in SIZES if e not in NOT_PAIRED]))
+        size = SIZES[effect](rng, 1.0, Session(profile, accel, moves_of(motion_r)))
+        if pair.kind != "surplus":
+            real = with_effect(real, effect, **size)
+        if pair.kind != "missing":
+            sim = with_effect(sim, effect, **size)
+    recording, truth = simulate(real, pair.seed)
+    simulated, truth_s = simulate(sim, pair.seed + 1)
+    gravity = truth.gravity_m_s2
+    if pair.kind == "gravity":
+        sim = replace(sim, environment=replace(sim.environment, gravity_m_s2=gravity * (1.0 + 3e-3)))
+        simulated, truth_s = simulate(sim, pair.seed + 1)
+    if pair.nuisances:
+        recording = with_nuisances(recording, rng)
+    answer = {"kind": pair.kind, "effect": effect, "numbers": true_differences(truth_s, truth, pair.kind)}
+    return simulated, recording, gravity, answer
+
+
+def true_differences(sim: Any, real: Any, kind: str) -> dict[str, list[float]]:
+    """Recording minus simulation, group by group, from the two truths and nothing of the tool's own formulas."""
+    out: dict[str, list[float]] = {}
+    axes = {}
+    for name in ("accel", "gyro"):
+        side = []
+        for truth in (sim, real):
+            S = np.array(getattr(truth, "accelerometer_S" if name == "accel" else "gyroscope_S"))
+            b = np.array(getattr(truth, "accelerometer_b" if name == "accel" else "gyroscope_b"))
+            M = np.linalg.inv(S)
+            k = np.sqrt((M**2).sum(axis=1))
+            n = (M.T / k).T
+            cosines = n @ n.T
+            side.append((-(M @ b) / k, np.log(k), np.arccos(cosines[[0, 0, 1], [1, 2, 2]]), n))
+        for group, index in (("zero", 0), ("scale", 1), ("misalignment", 2)):
+            out[f"{name}-{group}"] = (side[1][index] - side[0][index]).tolist()
+        axes[name] = (side[0][3], side[1][3])
+    from scipy.linalg import polar
+    from scipy.spatial.transform import Rotation
+
+    R = [polar(axes["gyro"][s])[0] @ polar(axes["accel"][s])[0].T for s in (0, 1)]
+    out["triad-alignment"] = Rotation.from_matrix(R[1] @ R[0].T).as_rotvec().tolist()
+    if kind == "gravity":
+        out["accel-scale"] = [0.0] * 3
+        out["gravity"] = [-float(np.log(1.003))]
+    return out
+
+
+def trial(pair: Pair) -> dict[str, Any]:
+    warnings.simplefilter("ignore")
+    simulated, recording, gravity, answer = make(pair)
+    result: dict[str, Any] = {"kind": pair.kind, "seed": pair.seed, "by_file": pair.by_file, "crash": ""}
+    try:
+        if pair.by_file:
+            known = trihedron.calibrate(simulated, gravity_m_s2=gravity)
+            found = trihedron.diagnose(recording, calibration=known)
+        else:
+            found = trihedron.diagnose(recording, against=simulated, gravity_m_s2=gravity)
+    except Exception as error:  # a crash is a result
+        return {**result, "crash": f"{type(error).__name__}: {error}", "right": False, "false": [], "z": []}
+    document = found.to_dict()
+    said_groups = sorted({p["id"] for p in document["parameters"] if p["significant"]})
+    z: list[float] = []
+    must, may = set(), set()
+    for group, values in answer["numbers"].items():
+        rows = [p for p in document["parameters"] if p["id"] == group]
+        if any(abs(v) > 1e-9 for v in values):
+            may.add(group)
+        if len(rows) == len(values):
+            errors = [(p["difference"] - v) / p["std"] for p, v in zip(rows, values, strict=True)]
+            z += errors
+            if any(abs(v) > 5 * p["std"] for p, v in zip(rows, values, strict=True)):
+                must.add(group)
+        elif group == "gravity":
+            must.add(group)
+    effects = [(e["in"], e["id"], e["confounded_with"]) for e in document["effects"]]
+    side = {"missing": "recording", "surplus": "model"}.get(answer["kind"], "")
+    false = [g for g in said_groups if g in GROUPS and g not in may and not (g == "accel-scale" and "gravity" in may)]
+    false += [
+        f"{where}:{e}" for where, e, c in effects
+        if not (where == side and (e == answer["effect"] or answer["effect"] in c))
+    ]  # fmt: skip
+    noise = sorted({f"{n['sensor']} {n['term']}" for n in document["noise"] if n["significant"]})
+    if answer["kind"] == "noise":
+        false += [n for n in noise if n not in ("gyroscope N", "gyroscope octave", "gyroscope distribution")]
+    elif answer["kind"] == "resolution":
+        false += [n for n in noise if not n.startswith("accelerometer")]
+    else:
+        false += noise
+    expected = "consistent"
+    if must or answer["kind"] in ("noise", "resolution"):
+        expected = "parameters-differ"
+    if side:
+        expected = "missing-physics"
+    first = (
+        bool(effects)
+        and effects[0][0] == side
+        and (effects[0][1] == answer["effect"] or answer["effect"] in effects[0][2])
+    )
+    return {
+        **result, "verdict": document["verdict"], "expected": expected, "right": document["verdict"] == expected,
+        "effect": answer["effect"], "first": first if side else None, "said": said_groups,
+        "missed": sorted(must - set(said_groups)),
+        "effects": [f"{w}:{e}" for w, e, _ in effects], "noise": noise, "false": false, "z": z,
+        "off": [d["domain"] for d in document["remaining"] if d["disagrees"]],
+    }  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pairs", type=int, default=32)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kind", action="append", choices=KINDS)
+    parser.add_argument("--nuisances", action="store_true")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    rng = np.random.default_rng(options.seed)
+    kinds = options.kind or list(KINDS)
+    pairs = [
+        Pair(kinds[k % len(kinds)], int(rng.integers(1 << 30)), options.nuisances, (k // len(kinds)) % 3 == 2)
+        for k in range(options.pairs)
+    ]
+    results = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for r in pool.map(trial, pairs):
+            results.append(r)
+            if not r["right"] or r["false"] or r.get("missed") or r["crash"]:
+                print({k: v for k, v in r.items() if k != "z"}, flush=True)
+    z = np.array([v for r in results for v in r["z"]])
+    n = len(results)
+    print(f"\n{n} pairs: verdict right {sum(r['right'] for r in results)}, with a false name "
+          f"{sum(bool(r['false']) for r in results)}, a group missed {sum(bool(r.get('missed')) for r in results)}, "
+          f"crashes {sum(bool(r['crash']) for r in results)}")  # fmt: skip
+    firsts = [r["first"] for r in results if r.get("first") is not None]
+    print(f"effect first: {sum(firsts)} of {len(firsts)}")
+    if len(z):
+        inside = np.mean(np.abs(z) < 1.96)
+        print(f"numbers: {len(z)} differences, rms z {np.sqrt(np.mean(z**2)):.2f}, within 1.96: {inside:.3f}")
+    print(Counter((r["kind"], r.get("verdict")) for r in results))
+    if options.json:
+        options.json.write_text(json.dumps(results))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,270 @@
+"""The numbers of a given model against those of the recording, group by group (docs/diagnosis-method.md, section 9)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import f as f_distribution
+
+from trihedron.diagnose.against.fitted import FittedModel
+from trihedron.diagnose.against.invariants import (
+    PAIRS,
+    Invariants,
+    invariants,
+    jacobian,
+    rotation_vector,
+    triad_jacobian,
+    triad_rotation,
+)
+from trihedron.records.diagnosis import ParameterDifference
+from trihedron.units import AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
+
+FloatArray = npt.NDArray[np.float64]
+Sensor = Literal["accelerometer", "gyroscope", "both"]
+
+SPREAD_DOF = 100.0
+"""Degrees of freedom of the covariances: those of a session of some tens of poses. F(3, 100) instead of χ² keeps the
+false alarms of 72 simulated pairs at their level; with 60 or 200 the 1 % point moves by 2 %."""
+WANDER_DOF = 10.0
+"""The same for zeros: their wander is read off one or two sessions, and scatters by 70 % from one to the next (28
+simulated sessions of 20 to 32 poses), which is that of a variance with 4 degrees of freedom a session."""
+RANGE_TOLERANCE = 0.05
+"""A ratio of sensitivities within 5 % of a power of two on all axes is another range of the part: no part strays by a
+factor of 1.9 and ranges come in powers of two."""
+ADRIFT = 1e-9
+"""Variance, relative to its group's largest, below which a covariance is not told from zero."""
+
+NOTHING_OPEN: Mapping[str, float] = MappingProxyType({})
+_AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """One id of the contract: (n,) model values, recording values, difference and its covariance (n, n)."""
+
+    id: str
+    sensor: Sensor
+    names: tuple[str, ...]
+    model: FloatArray
+    recording: FloatArray
+    difference: FloatArray
+    covariance: FloatArray
+    unit: str
+    dof: float = SPREAD_DOF
+
+    @property
+    def p_value(self) -> float:
+        """d'C⁻¹d/n ~ F(n, dof)."""
+        n = len(self.difference)
+        ridge = ADRIFT * max(float(np.trace(self.covariance)) / n, 1e-300)
+        distance = float(self.difference @ np.linalg.solve(self.covariance + ridge * np.eye(n), self.difference))
+        return max(float(f_distribution.sf(distance / n, n, self.dof)), 1e-300)
+
+
+@dataclass(frozen=True)
+class RangeRatio:
+    """A sensor whose counts are a power of two apart: ``exponent`` n means 2ⁿ times as many counts in the recording."""
+
+    sensor: Sensor
+    exponent: int
+
+
+@dataclass(frozen=True)
+class ComparedNumbers:
+    """Every number, significant or not, and what was told apart from it."""
+
+    parameters: tuple[ParameterDifference, ...]
+    ranges: tuple[RangeRatio, ...]
+
+    @property
+    def differ(self) -> bool:
+        """Whether any group is significant."""
+        return any(p.significant for p in self.parameters)
+
+
+def compare_numbers(
+    model: FittedModel,
+    recording: FittedModel,
+    *,
+    alpha: float,
+    linear: FittedModel | None = None,
+    left_open: Mapping[str, float] = NOTHING_OPEN,
+) -> ComparedNumbers:
+    """Hold the numbers of ``model`` against those of ``recording``.
+
+    Parameters
+    ----------
+    model, recording : FittedModel
+        What is given, and the fit of the recording with the effects found in it.
+    alpha : float
+        Chance that any group of one unit on one day is called different; half of it is spent here (Holm).
+    linear : FittedModel, optional
+        The recording's fit without effects. A linear calibration absorbs part of an effect that it does not know: a
+        group counts only where it differs from this fit too.
+    left_open : mapping from id to size, optional
+        Groups whose level an accepted effect leaves open by so much: beneath it they are shown, never significant.
+    """
+    groups, ranges = _groups(model, recording)
+    p = np.array([group.p_value for group in groups])
+    if linear is not None:
+        beside = {group.id: group.p_value for group in _groups(model, linear)[0]}
+        p = np.array([max(value, beside.get(group.id, 0.0)) for value, group in zip(p, groups, strict=True)])
+    is_judged = [float(np.abs(group.difference).max()) > left_open.get(group.id, 0.0) for group in groups]
+    significant = _holm(p, alpha / 2.0) & np.array(is_judged)
+    out: list[ParameterDifference] = []
+    for group, p_value, is_significant in zip(groups, p, significant, strict=True):
+        named = _as_gravity(group, alpha) if is_significant and group.id == "accel-scale" else group
+        sigma = np.sqrt(np.maximum(np.diag(named.covariance), 0.0))
+        out += [
+            ParameterDifference(
+                named.id,
+                named.sensor,
+                named.names[k],
+                float(named.model[k]),
+                float(named.recording[k]),
+                float(named.difference[k]),
+                float(sigma[k]),
+                named.unit,
+                float(p_value),
+                bool(is_significant),
+            )
+            for k in range(len(named.names))
+        ]
+    return ComparedNumbers(tuple(out), ranges)
+
+
+def _holm(p: FloatArray, alpha: float) -> npt.NDArray[np.bool_]:
+    out = np.zeros(len(p), dtype=bool)
+    for rank, k in enumerate(np.argsort(p)):
+        if p[k] > alpha / (len(p) - rank):
+            break
+        out[k] = True
+    return out
+
+
+def _groups(model: FittedModel, recording: FittedModel) -> tuple[list[_Group], tuple[RangeRatio, ...]]:
+    groups: list[_Group] = []
+    ranges: list[RangeRatio] = []
+    accel = (model.accel_S, model.accel_b), (recording.accel_S, recording.accel_b)
+    blocks = model.covariance[:12, :12], recording.covariance[:12, :12]
+    units = _known_acceleration(model.accel_unit), _known_acceleration(recording.accel_unit)
+    is_same = model.accel_unit == recording.accel_unit
+    more, ratio = _sensor("accel", accel, blocks, units, is_same, model.accel_wander, recording.accel_wander)
+    groups += more
+    ranges += [RangeRatio("accelerometer", ratio)] if ratio else []
+    if model.gyro_S is None or model.gyro_b is None or recording.gyro_S is None or recording.gyro_b is None:
+        return groups, tuple(ranges)
+    gyro = (model.gyro_S, model.gyro_b), (recording.gyro_S, recording.gyro_b)
+    blocks = model.covariance[12:, 12:], recording.covariance[12:, 12:]
+    units = _known_rate(model.gyro_unit), _known_rate(recording.gyro_unit)
+    is_same = model.gyro_unit == recording.gyro_unit
+    more, ratio = _sensor("gyro", gyro, blocks, units, is_same, model.gyro_wander, recording.gyro_wander)
+    groups += more
+    ranges += [RangeRatio("gyroscope", ratio)] if ratio else []
+    groups.append(_triads(model, recording))
+    return groups, tuple(ranges)
+
+
+def _known_acceleration(unit: str) -> float | None:
+    return acceleration_to_si(AccelerationUnit(unit))
+
+
+def _known_rate(unit: str) -> float | None:
+    return rate_to_si(RateUnit(unit))
+
+
+def _sensor(
+    prefix: Literal["accel", "gyro"],
+    pair: tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
+    covariances: tuple[FloatArray, FloatArray],
+    units: tuple[float | None, float | None],
+    is_same_unit: bool,
+    wander_model: FloatArray,
+    wander_recording: FloatArray,
+) -> tuple[list[_Group], int]:
+    """Zero, scale and misalignment of one sensor, and the power of two between its counts."""
+    (S_m, b_m), (S_r, b_r) = pair
+    a, r = invariants(S_m, b_m), invariants(S_r, b_r)
+    J_m, J_r = jacobian(S_m, b_m), jacobian(S_r, b_r)
+    covariance = J_m @ covariances[0] @ J_m.T + J_r @ covariances[1] @ J_r.T
+    # A file without a record of wander: the same unit wanders as the recording shows.
+    before = wander_model if np.any(wander_model) else wander_recording
+    covariance[:3, :3] += np.diag(before + wander_recording)
+    sensor: Sensor = "accelerometer" if prefix == "accel" else "gyroscope"
+    unit = "m/s^2" if prefix == "accel" else "rad/s"
+    log_m, log_r, is_relative = _log_scales(a, r, units, is_same_unit)
+    exponent = 0
+    change = log_r - log_m
+    nearest = round(float(np.median(change)) / math.log(2.0))
+    if nearest and np.all(np.abs(change - nearest * math.log(2.0)) < RANGE_TOLERANCE):
+        exponent = nearest
+        log_m = log_m + nearest * math.log(2.0)
+        change = log_r - log_m
+    scale_covariance = covariance[3:6, 3:6]
+    if is_relative:
+        # Counts against SI: only what differs from axis to axis can be compared.
+        centre = np.eye(3) - np.ones((3, 3)) / 3.0
+        scale_covariance = centre @ scale_covariance @ centre.T + np.ones((3, 3)) * np.trace(scale_covariance) / 3.0
+    names = tuple(f"{a}{b}" for a, b in (("x", "y"), ("x", "z"), ("y", "z")))
+    assert len(names) == len(PAIRS)
+    # S is SI per raw unit: what reads a larger count for the same truth has the smaller S, so a scale is -ln k.
+    groups = [
+        _Group(f"{prefix}-zero", sensor, _AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit, WANDER_DOF),
+        _Group(
+            f"{prefix}-scale", sensor, _AXES, np.exp(log_m), np.exp(log_r), change, scale_covariance, "1"
+        ),
+        _Group(
+            f"{prefix}-misalignment", sensor, names, a.angle, r.angle, r.angle - a.angle, covariance[6:, 6:], "rad"
+        ),
+    ]  # fmt: skip
+    return groups, exponent
+
+
+def _log_scales(
+    a: Invariants, r: Invariants, units: tuple[float | None, float | None], is_same_unit: bool
+) -> tuple[FloatArray, FloatArray, bool]:
+    """ln of sensitivities of both sides in one unit; True where that is known only up to a common factor."""
+    if is_same_unit:
+        return a.log_scale, r.log_scale, False
+    if units[0] is not None and units[1] is not None:
+        return a.log_scale + math.log(units[0]), r.log_scale + math.log(units[1]), False
+    return a.log_scale - a.log_scale.mean(), r.log_scale - r.log_scale.mean(), True
+
+
+def _triads(model: FittedModel, recording: FittedModel) -> _Group:
+    """The rotation of the gyro triad against the accelerometer triad: ``log(R_r R_mᵀ)``."""
+    assert model.gyro_S is not None
+    assert recording.gyro_S is not None
+    zero = np.zeros(3)
+    turned = [
+        triad_rotation(invariants(one.accel_S, zero), invariants(one.gyro_S, zero))
+        for one in (model, recording)
+        if one.gyro_S is not None
+    ]
+    J_m, J_r = triad_jacobian(model.accel_S, model.gyro_S), triad_jacobian(recording.accel_S, recording.gyro_S)
+    covariance = J_m @ model.covariance @ J_m.T + J_r @ recording.covariance @ J_r.T
+    difference = rotation_vector(turned[1] @ turned[0].T)
+    before, after = rotation_vector(turned[0]), rotation_vector(turned[1])
+    return _Group("triad-alignment", "both", _AXES, before, after, difference, covariance, "rad")
+
+
+def _as_gravity(scale: _Group, alpha: float) -> _Group:
+    """All three accelerometer scales changed alike: gravity, which no norm of it can tell from a common scale."""
+    ones = np.ones(3)
+    weight = np.linalg.inv(scale.covariance + ADRIFT * np.trace(scale.covariance) * np.eye(3))
+    variance = 1.0 / float(ones @ weight @ ones)
+    common = variance * float(ones @ weight @ scale.difference)
+    rest = scale.difference - common
+    unlike = float(rest @ weight @ rest) / 2.0
+    if f_distribution.sf(unlike, 2, SPREAD_DOF) < alpha:
+        return scale
+    return _Group(
+        "gravity", "accelerometer", ("common scale",), np.ones(1), np.exp([common]), np.array([common]),
+        np.array([[variance]]), "1",
+    )  # fmt: skip

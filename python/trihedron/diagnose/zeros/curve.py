@@ -1,0 +1,96 @@
+"""The smooth latent curve of a zero with its band, and how far every pose lies from the others (eq. Z.10)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.diagnose.zeros.process import INITIAL_SLOPE, FloatArray, ZeroProcess, unit_kernels
+
+
+@dataclass(frozen=True, eq=False)
+class DriftCurve:
+    """``values``, ``sigma`` (axes, m) at ``time_s`` (m,): walk plus drift about its mean over the session."""
+
+    time_s: FloatArray
+    values: FloatArray
+    sigma: FloatArray
+
+    @property
+    def rms(self) -> FloatArray:
+        """(axes,) rms about the mean."""
+        return np.asarray(np.sqrt(np.mean((self.values - self.values.mean(axis=1, keepdims=True)) ** 2, axis=1)))
+
+    @property
+    def range(self) -> FloatArray:
+        """(axes,) from the lowest to the highest value."""
+        return np.asarray(np.ptp(self.values, axis=1))
+
+
+def _covariance(process: ZeroProcess, axis: int, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n, n) covariance of the readings, and the share of walk and drift in it."""
+    r = process.readings
+    W, D, _, _ = unit_kernels(r)
+    s, w, d = (process.axis_factor[axis] * sigma) ** 2
+    slow = w * W + d * D
+    V = slow + s * (r.pose[:, None] == r.pose[None, :]) + np.diag(process.noise_factor * r.sigma[axis] ** 2)
+    return V, slow
+
+
+def smooth_curve(process: ZeroProcess, keep: list[int], sigma: FloatArray, time_s: FloatArray) -> DriftCurve:
+    """Mean and standard error of walk plus drift at ``time_s`` (m,), its mean over those times taken off.
+
+    Only for zeros seen one axis at a time (``direction`` of one column).
+    """
+    r = process.readings
+    X = r.design[:, keep]
+    start, span = r.time_s[0], max(float(r.time_s[-1] - r.time_s[0]), 1e-9)
+    t, at = (r.time_s - start) / span, np.clip((time_s - start) / span, 0.0, 1.0)
+    walk, drift = process.sizes
+
+    def kernel(a: FloatArray, b: FloatArray, w: float, d: float, length: FloatArray | None = None) -> FloatArray:
+        low, high = np.minimum.outer(a, b), np.maximum.outer(a, b)
+        bent = low**2 * (3.0 * high - low) / 6.0 + INITIAL_SLOPE * np.outer(a, b)
+        if length is not None:
+            # A value of the walk against its mean over a stretch around it.
+            inside = np.maximum(0.5 * length - np.abs(a[:, None] - b), 0.0)
+            low = low - inside**2 / (2.0 * np.maximum(length, 1e-12))
+        return np.asarray(w / walk * low + d / drift * bent)
+
+    centre = np.eye(len(at)) - 1.0 / len(at)
+    values, errors = [], []
+    for axis, y in enumerate(r.values):
+        V, _ = _covariance(process, axis, sigma)
+        _, w, d = (process.axis_factor[axis] * sigma) ** 2
+        cross = centre @ kernel(at, t, w, d, r.length_s / span)
+        inverse = np.linalg.inv(V)
+        side = inverse @ X
+        A = np.linalg.pinv(X.T @ side)
+        P = inverse - side @ A @ side.T
+        values.append(cross @ P @ y)
+        covariance = centre @ kernel(at, at, w, d) @ centre - cross @ P @ cross.T
+        errors.append(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+    return DriftCurve(time_s, np.array(values), np.array(errors))
+
+
+def residuals_of_poses(
+    process: ZeroProcess, keep: list[int], sigma: FloatArray
+) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """``(poses, (axes, poses))``: mean of every pose less the others' prediction, over its standard error."""
+    r = process.readings
+    X = r.design[:, keep]
+    poses = np.unique(r.pose)
+    out = np.zeros((len(r.values), len(poses)))
+    for axis, y in enumerate(r.values):
+        V, _ = _covariance(process, axis, sigma)
+        inverse = np.linalg.inv(V)
+        side = inverse @ X
+        P = inverse - side @ np.linalg.pinv(X.T @ side) @ side.T
+        Py = P @ y
+        for k, pose in enumerate(poses):
+            # One unknown mean of the pose: its estimate over its standard error, by the readings' own precision matrix.
+            own = (r.pose == pose).astype(np.float64)
+            out[axis, k] = own @ Py / np.sqrt(max(float(own @ P @ own), 1e-300))
+    return poses, out

@@ -1,0 +1,113 @@
+"""A given model against a recording: both fitted freely, then compared; physics competes on top of freed numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import f as f_distribution
+
+from trihedron.diagnose.against import (
+    compare_effects,
+    compare_numbers,
+    left_open_by,
+    model_of_calibration,
+    model_of_diagnosis,
+)
+from trihedron.diagnose.against.numbers import SPREAD_DOF
+from trihedron.estimate.verification import verify_calibration
+from trihedron.records import Calibration, Recording, Segments
+from trihedron.records.diagnosis import (
+    Diagnosis,
+    DomainTest,
+    ParameterDifference,
+    Stage,
+    StageDomain,
+    Verdict,
+    Where,
+)
+
+
+def compared(
+    found: Diagnosis,
+    given: Calibration,
+    simulated: Diagnosis | None,
+    recording: Recording,
+    segments: Segments,
+    alpha: float,
+) -> Diagnosis:
+    """The free diagnosis of a recording as the answer to: where does the given model differ?
+
+    ``simulated`` is the free diagnosis of the user's simulated log, where that is the model; else ``given`` is.
+    """
+    model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated)
+    given_effects = () if simulated is None else simulated.effects
+    effects = compare_effects(given_effects, found.effects, found.candidates, alpha=alpha)
+    numbers = compare_numbers(
+        model,
+        model_of_diagnosis(found),
+        alpha=alpha,
+        # A linear calibration was fitted beside effects that it does not know: it is also held against such a fit.
+        linear=model_of_diagnosis(found, with_effects=False) if simulated is None and found.effects else None,
+        left_open=left_open_by((*effects.missing, *effects.surplus)),
+    )
+    parameters = (*numbers.parameters, *effects.parameters)
+    differ = any(p.significant for p in parameters)
+    verdict: Verdict = found.verdict
+    if found.verdict not in ("unexplained", "not-testable"):
+        verdict = "parameters-differ" if differ else "consistent"
+        if effects.missing or effects.surplus:
+            verdict = "missing-physics"
+    elif found.verdict == "unexplained" and effects.surplus:
+        verdict = "missing-physics"
+    return replace(
+        found,
+        verdict=verdict,
+        # Effects that the model has too are no disagreement with it.
+        domains=(*(found.domains if effects.missing else found.remaining), _numbers_test(parameters)),
+        effects=(*effects.missing, *effects.surplus),
+        parameters=parameters,
+        stages=(_as_given(given, recording, segments), *found.stages),
+    )
+
+
+def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
+    """All groups as one domain: the largest squared deviation per degree of freedom and its group's p."""
+    worst = min(parameters, key=lambda p: p.p_value)
+    members = [p for p in parameters if p.id == worst.id]
+    n = len(members)
+    significant = [p for p in parameters if p.significant]
+    channels = tuple(dict.fromkeys(f"{p.id} {p.name}" for p in significant))
+    return DomainTest(
+        "numbers",
+        float(f_distribution.isf(max(worst.p_value, 1e-300), n, SPREAD_DOF)),
+        float(n),
+        worst.p_value,
+        bool(significant),
+        Where(channels),
+    )
+
+
+def _as_given(given: Calibration, recording: Recording, segments: Segments) -> Stage:
+    """The given numbers with one zero for the session, nothing fitted: what the recording looks like to them."""
+    checked = verify_calibration(given, recording, segments, given.gravity_m_s2, given.gravity_source)
+    domains = [
+        StageDomain(
+            "static-accel",
+            float(np.sqrt(np.mean(checked.norm_error**2))),
+            float(np.mean((checked.norm_error / checked.norm_noise) ** 2)),
+            "m/s^2",
+        )
+    ]
+    if len(checked.rest_rate):
+        domains.append(StageDomain("static-gyro", float(np.sqrt(np.mean(checked.rest_rate**2))), None, "rad/s"))
+    if len(checked.angle_deg):
+        domains.append(
+            StageDomain(
+                "moves",
+                float(np.sqrt(np.mean(checked.angle_deg**2))),
+                float(np.mean((checked.angle_deg / checked.angle_noise_deg) ** 2)),
+                "deg",
+            )
+        )
+    return Stage("as-given", tuple(domains))

@@ -1,0 +1,136 @@
+"""Several devices or sensors in one table: told apart, listed with their counts, and never merged without a word."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.errors import ReadError
+from trihedron.read.table import Table
+from trihedron.records import Finding, FindingCode, Severity
+
+MAX_DEVICES = 16
+_DEVICE_NAMES = frozenset(
+    {"i", "instance", "imu", "imuid", "imunr", "imunumber", "id", "device", "deviceid", "devicename", "devicenr"}
+    | {"sensor", "sensorid", "sensorname", "unit", "unitid", "node", "nodeid", "mac", "macaddress", "address"}
+    | {"source", "topic", "topicname", "frameid", "headerframeid"}
+)
+_ACCELEROMETER = re.compile(r"(uncal|type|raw|imu|sensor|android)?\W*acc(el\w*)?(\W*(uncal\w*|raw|data|sensor))?", re.I)
+_GYROSCOPE = re.compile(
+    r"(uncal|type|raw|imu|sensor|android)?\W*(gyr\w*|angular\W*(velocity|rate))(\W*(uncal\w*|raw|data))?", re.I
+)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the user chose among what a file offers: device of an archive (from 1), topic or member, instance."""
+
+    device: int | None = None
+    topic: str | None = None
+    instance: str | None = None
+
+
+def kind_of(word: str) -> str:
+    """``accelerometer``, ``gyroscope`` or "": whose readings a record of this name holds."""
+    text = word.strip().replace("_", " ").strip("$:")
+    if _ACCELEROMETER.fullmatch(text):
+        return "accelerometer"
+    return "gyroscope" if _GYROSCOPE.fullmatch(text) else ""
+
+
+def pick_kind(words: list[str], kind: str) -> str | None:
+    """The record name to take for a sensor: uncorrected readings before corrected ones."""
+    fitting = [word for word in words if kind_of(word) == kind]
+    return max(fitting, key=lambda w: ("uncal" in w.lower(), -words.index(w)), default=None)
+
+
+def one_device(table: Table, choice: Choice, used: set[int]) -> Table:
+    """The rows of one device, where a column (none of those ``used`` as readings) tells several apart.
+
+    Raises
+    ------
+    ReadError
+        When there are several and none was chosen, or the chosen one is not there.
+    """
+    column, words, codes = _device_column(table, used)
+    if column < 0:
+        if choice.instance is not None:
+            raise ReadError(
+                f"{table.path}: instance {choice.instance} was asked for, but no column tells devices apart; leave "
+                "--instance out."
+            )
+        return table
+    counts = np.bincount(codes, minlength=len(words))
+    listed = ", ".join(f"{word} ({count} rows)" for word, count in zip(words, counts, strict=True))
+    if choice.instance is None:
+        raise ReadError(
+            f"{table.path}: column {table.label(column)} tells {len(words)} devices apart: {listed}; read one of them "
+            f"with --instance {words[0]}."
+        )
+    if choice.instance not in words:
+        raise ReadError(
+            f"{table.path}: there is no instance {choice.instance}; column {table.label(column)} has {listed}."
+        )
+    rows = np.flatnonzero(codes == words.index(choice.instance)).astype(np.int64)
+    left = table.n_rows - len(rows)
+    return table.take(rows, table.n_in_file, chosen(f"column {table.label(column)}", choice.instance, listed, left))
+
+
+def chosen(where: str, what: str, listed: str, rows_left_out: int) -> Finding:
+    """The statement that one of several was taken."""
+    return Finding(
+        FindingCode.DEVICE_CHOSEN,
+        Severity.NOTE,
+        f"{where} offers {listed}; {what} was read.",
+        numbers=MappingProxyType({"rows_left_out": float(rows_left_out)} if rows_left_out else {}),
+    )
+
+
+def _device_column(table: Table, used: set[int]) -> tuple[int, list[str], npt.NDArray[np.int64]]:
+    none = np.zeros(0, dtype=np.int64)
+    if table.names is None:
+        return -1, [], none
+    for i, name in enumerate(table.names):
+        plain = re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(].*", "", name.lower()))
+        if i in used or plain not in _DEVICE_NAMES:
+            continue
+        if i in table.labels:
+            words, codes = table.labels[i]
+            present, inverse = np.unique(codes, return_inverse=True)
+            if 2 <= len(present) <= MAX_DEVICES:
+                return i, [words[k] for k in present], inverse.astype(np.int64)
+            continue
+        values = table.columns[i]
+        if not len(values) or not np.isfinite(values).all() or not np.all(values == np.rint(values)):
+            continue
+        different = np.unique(values[: 1 << 16])
+        if len(different) > MAX_DEVICES:
+            continue
+        different, codes = np.unique(values, return_inverse=True)
+        if 2 <= len(different) <= MAX_DEVICES:
+            return i, [f"{value:.0f}" for value in different], codes.astype(np.int64)
+    return -1, [], none
+
+
+def by_sensor(table: Table) -> tuple[Table, ...]:
+    """Accelerometer and gyro of a table in long form, where a column of words says whose row it is; else the table."""
+    for i, (words, codes) in table.labels.items():
+        names = {kind: pick_kind(list(words), kind) for kind in ("accelerometer", "gyroscope")}
+        acc, gyr = names["accelerometer"], names["gyroscope"]
+        if acc is None or gyr is None:
+            continue
+        rows = {name: np.flatnonzero(codes == words.index(name)).astype(np.int64) for name in (acc, gyr)}
+        if min(len(r) for r in rows.values()) < 2:
+            continue
+        left = len(codes) - sum(len(r) for r in rows.values())
+        counts = ", ".join(f"{word} ({int(np.count_nonzero(codes == k))})" for k, word in enumerate(words))
+        note = chosen(f"column {table.label(i)}", f"{acc} and {gyr}", counts, left)
+        reported = table.n_in_file - table.n_rows
+        first = table.take(rows[acc], len(rows[acc]) + left + reported, note)
+        second = replace(table.take(rows[gyr], len(rows[gyr])), findings=())
+        return replace(first, sensor="accelerometer"), replace(second, sensor="gyroscope")
+    return (table,)

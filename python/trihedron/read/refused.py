@@ -1,0 +1,69 @@
+"""What is not read: named by its first bytes, with the way in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from trihedron.read.errors import ReadError
+
+_CSV = "export it as CSV or Parquet"
+_FOREIGN: tuple[tuple[bytes, str, str], ...] = (
+    (b"SQLite", "a database", _CSV),
+    (b"\x89HDF", "an HDF5 (or MATLAB 7.3) file", "export the log as CSV or Parquet"),
+    (b"MATLAB", "a MATLAB file", _CSV),
+    (b"#ROSBA", "a ROS bag", _CSV),
+    (b"\x89MCAP", "an MCAP file", _CSV),
+    (b"ULog", "a ULog file", _CSV),
+    (b"%PDF", "a PDF document", "ask for the numbers as CSV"),
+    (b"\x28\xb5\x2f\xfd", "zstd-compressed", "unpack it with `zstd -d` first"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7-Zip archive", "unpack it first"),
+    (b"Rar!", "a RAR archive", "unpack it first"),
+    (b"\x89PNG", "a picture", "name the log itself"),
+    (b"\xff\xd8\xff", "a picture", "name the log itself"),
+    (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook (.xls)", "save the sheet as CSV"),
+    (b"H Product:Blackbox", "a Betaflight or INAV blackbox log", "decode it with `blackbox_decode` and read the CSV"),
+    (b"\xfa\xff", "an Xsens MT binary log (.mtb)", "export it as text in MT Manager"),
+    (b"\xb5b", "a u-blox binary log", "convert its ESF messages to CSV"),
+    (b"MD\xfc\x03", "an Axivity .cwa log", "export it as CSV in OmGui"),
+    (b"\x7fELF", "a program", "name the log itself"),
+    (b"\xaaD\x12", "a NovAtel binary log", "convert RAWIMU to ASCII with NovAtel Convert"),
+    (b"HDF", "an HDF4 file", "convert it to HDF5 or CSV"),
+    (b"ply\n", "a point cloud", "name the log of the IMU"),
+    (b"bplist00", "a property list", "export the log as CSV"),
+)
+_ROW_MARKS = b"0123456789+-."
+
+
+def refuse_foreign(path: Path, magic: bytes) -> None:
+    """Name a format that is not read.
+
+    Raises
+    ------
+    ReadError
+        What the file is, and what to do to get at its numbers.
+    """
+    for start, kind, remedy in _FOREIGN:
+        if magic.startswith(start):
+            raise ReadError(f"{path}: this is {kind}, which is not read here; {remedy}.")
+    if magic[4:8] == b"ftyp":
+        raise ReadError(
+            f"{path}: this is a video, which is not read here; extract its motion data (GoPro's GPMF) as CSV."
+        )
+    text = magic.removeprefix(b"\xef\xbb\xbf").lstrip()
+    if text[:1] in (b"{", b"[") and _is_json(text):
+        raise ReadError(
+            f"{path}: this is JSON, which is not read here because every program nests it otherwise; write its "
+            "readings as CSV, or pass them from Python: trihedron.read({'t': ..., 'ax': ...})."
+        )
+    if text[:15].lower().startswith((b"<!doctype html", b"<html")):
+        raise ReadError(f"{path}: this is a web page (no line of numbers), not a log; download the file itself.")
+    if text.startswith(b"<?xml"):
+        raise ReadError(f"{path}: this is XML, which is not read here; {_CSV}.")
+
+
+def _is_json(text: bytes) -> bool:
+    """A brace or bracket that opens a value; a monitor's ``[12:34:56.789]`` opens a stamp."""
+    rest = text[1:].lstrip()
+    if text[:1] == b"{":
+        return rest[:1] in (b'"', b"}", b"")
+    return rest[:1] in (b"{", b"[", b'"', b"]")

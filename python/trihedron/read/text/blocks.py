@@ -1,0 +1,100 @@
+"""The bytes of a text log: decompressed, in blocks of whole lines, as plain UTF-8."""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import io
+import lzma
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from trihedron.read.errors import ReadError, from_os_error
+
+BLOCK_BYTES = 1 << 25
+"""Text parsed at a time: large enough for polars to use every core, small enough not to matter."""
+
+_PIECE_BYTES = 1 << 18
+_COMPRESSED = {b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ": "xz"}
+
+
+@dataclass
+class Cursor:
+    """Where in the file the reader is: lines consumed so far, and whether this block is the last."""
+
+    lines: int = 0
+    is_last: bool = False
+
+
+def compression_of(magic: bytes) -> str | None:
+    """Name of the compression a file starts with."""
+    return next((name for start, name in _COMPRESSED.items() if magic.startswith(start)), None)
+
+
+def open_binary(path: Path, compression: str | None) -> io.BufferedIOBase:
+    """The (decompressed) bytes of a file."""
+    if compression == "gzip":
+        return gzip.open(path, "rb")
+    if compression == "bzip2":
+        return bz2.open(path, "rb")
+    if compression == "xz":
+        return lzma.open(path, "rb")
+    return path.open("rb")
+
+
+def blocks(path: Path, compression: str | None, cursor: Cursor, content: bytes | None = None) -> Iterator[bytes]:
+    """Blocks that end with a complete line; ``content`` stands for the file's bytes where it was unpacked already.
+
+    Raises
+    ------
+    ReadError
+        When the file is damaged, or has no line ends.
+    """
+    rest, lines = b"", 0
+    try:
+        with open_binary(path, compression) if content is None else io.BytesIO(content) as stream:
+            while True:
+                pieces = [rest]
+                size = 0
+                # Piecewise, so that a damaged archive can be said to break off after so many lines.
+                while size < BLOCK_BYTES and (piece := stream.read1(_PIECE_BYTES)):
+                    pieces.append(piece)
+                    size += len(piece)
+                    lines += piece.count(b"\n") if compression else 0
+                data = b"".join(pieces)
+                cursor.is_last = size < BLOCK_BYTES
+                if cursor.is_last:
+                    if data:
+                        yield data
+                    return
+                cut = data.rfind(b"\n") + 1
+                if cut == 0:
+                    raise ReadError(f"{path}: no line end in {len(data) / 1e6:.0f} MB: this is not a text log.")
+                rest = data[cut:]
+                yield data[:cut]
+    except (EOFError, zlib.error, lzma.LZMAError, gzip.BadGzipFile) as error:
+        raise ReadError(
+            f"{path}: the {compression} data is damaged or ends too early, after about {lines} lines "
+            f"({error}); copy the file again or unpack what is left of it."
+        ) from None
+    except OSError as error:
+        if compression is not None and error.errno is None:
+            raise ReadError(f"{path}: the {compression} data is damaged ({error}); copy the file again.") from None
+        raise from_os_error(path, error) from None
+
+
+def as_utf8(path: Path, data: bytes, first_line: int) -> bytes:
+    """Text with a byte order mark or in UTF-16 as plain UTF-8; junk refused by its first zero byte."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return data.decode("utf-16", errors="replace").encode()
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    zero = data.find(b"\x00")
+    if zero >= 0:
+        line = first_line + data.count(b"\n", 0, zero)
+        raise ReadError(
+            f"{path}: line {line} holds binary data (a zero byte), so this is not a text log; "
+            "convert it to CSV, or delete the damaged lines."
+        )
+    return data

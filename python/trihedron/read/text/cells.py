@@ -1,0 +1,133 @@
+"""Cells of a block of text as numbers, dates or words; polars does the parsing."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+
+from trihedron.read.errors import ReadError
+from trihedron.read.table import FloatArray
+from trihedron.read.text.dates import form_of, seconds
+from trihedron.read.text.layout import MISSING, Layout
+
+MAX_WORDS = 64
+"""A column of words with more different ones is text, not a label that tells sensors or devices apart."""
+
+
+@dataclass
+class TextColumn:
+    """A column without numbers: ``form`` of its dates or "", and the different ``words`` met so far, in order."""
+
+    example: str
+    form: str = ""
+    words: dict[str, int] = field(default_factory=dict)
+    codes: list[npt.NDArray[np.int64]] = field(default_factory=list)
+
+    def encode(self, cells: pl.Series) -> None:
+        """Remember which word stands in each row, unless there are too many to be labels."""
+        if len(self.words) > MAX_WORDS:
+            return
+        text = cells.fill_null("").str.strip_chars(' "')
+        for word in text.unique(maintain_order=True):
+            self.words.setdefault(word, len(self.words))
+        if len(self.words) > MAX_WORDS:
+            self.codes.clear()
+            return
+        mapped = text.replace_strict(list(self.words), list(self.words.values()), return_dtype=pl.Int64)
+        self.codes.append(np.asarray(mapped.to_numpy(), dtype=np.int64))
+
+
+def find_text_columns(rows: list[list[str]], layout: Layout) -> dict[int, TextColumn]:
+    """Which columns hold words or dates instead of numbers, judged on the first rows."""
+    if not rows:
+        return {}
+    probe = pl.DataFrame({str(i): [r[i] for r in rows] for i in range(layout.n_fields)})
+    found: dict[int, TextColumn] = {}
+    for i, series in enumerate(probe.get_columns()):
+        are_words = _words(series, layout.decimal_comma)
+        if are_words.sum() > 0.5 * len(rows):
+            cells = series.filter(are_words)
+            found[i] = TextColumn(cells[0], form_of(cells) or "")
+    return found
+
+
+def parse(
+    path: Path, data: bytes, schema: Mapping[str, type[pl.DataType]], layout: Layout, first_line: int
+) -> pl.DataFrame:
+    """A block as a frame; cells that do not fit their column's type are null.
+
+    Raises
+    ------
+    ReadError
+        When the block is no table.
+    """
+    try:
+        return pl.read_csv(
+            io.BytesIO(data),
+            has_header=False,
+            separator=layout.separator,
+            schema=schema,
+            ignore_errors=True,
+            truncate_ragged_lines=True,
+            quote_char='"' if b'"' in data else None,
+            decimal_comma=layout.decimal_comma,
+            encoding="utf8-lossy",
+        )
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+        first = str(error).strip().split("\n")[0]
+        raise ReadError(
+            f"{path}: the text from line {first_line} on cannot be read as a table ({first[:160]})."
+        ) from None
+
+
+def refuse_words(
+    path: Path,
+    frame: pl.DataFrame,
+    as_text: pl.DataFrame,
+    lines: npt.NDArray[np.int64],
+    layout: Layout,
+) -> None:
+    """Cells that are no numbers: words for "missing" become NaN, anything else is refused.
+
+    Raises
+    ------
+    ReadError
+        Naming line, column and cell of the first.
+    """
+    first: tuple[int, int, str] | None = None
+    for name in as_text.columns:
+        text = as_text[name].fill_null("").str.strip_chars()
+        bad = frame[name].is_null() & ~text.str.to_lowercase().is_in(list(MISSING))
+        row = bad.arg_max()
+        if row is not None and bad[row] and (first is None or row < first[0]):
+            first = (row, int(name), text[row])
+    if first is not None:
+        row, column, cell = first
+        name = f"'{layout.names[column]}'" if layout.names and layout.names[column] else f"{column + 1}"
+        raise ReadError(
+            f"{path}: line {lines[row]}, column {name}: {cell[:40]!r} is not a number; mend or delete that line."
+        )
+
+
+def numbers(series: pl.Series, column: TextColumn | None) -> FloatArray:
+    """A column as (n,) float64: numbers, seconds of dates, or nothing where it holds words."""
+    if column is None:
+        return np.asarray(series.to_numpy(), dtype=np.float64)
+    if column.form and column.form != "date":
+        return seconds(series, column.form)
+    column.encode(series)
+    return np.empty(0)
+
+
+def _words(series: pl.Series, decimal_comma: bool) -> pl.Series:
+    """Which cells are neither a number nor a word for "missing"."""
+    text = series.fill_null("").str.strip_chars()
+    if decimal_comma:
+        text = text.str.replace(",", ".", literal=True)
+    return text.cast(pl.Float64, strict=False).is_null() & ~text.str.to_lowercase().is_in(list(MISSING))

@@ -1,0 +1,103 @@
+"""Lines of a block made regular, counted and sorted into rows and remarks: passes over bytes, no loop over rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.text.layout import Layout
+
+Counts = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Rows of a block: ``number`` (n,) their lines, ``fields`` (n,) their fields; ``comments`` (k,) remarks."""
+
+    number: Counts
+    fields: Counts
+    text: bytes
+    comments: Counts
+    last: int
+    unclosed: int = 0
+    """First line that opens a quote and does not close it; 0 where there is none."""
+
+
+def regular(data: bytes, layout: Layout) -> bytes:
+    """One separator between fields, none around lines, line ends as ``\\n``."""
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    separator = layout.separator.encode()
+    if layout.separator == " ":
+        data = data.replace(b"\t", b" ")
+    if b" " not in data and not layout.trailing_separator:
+        return data
+    while b"  " in data:
+        data = data.replace(b"    ", b" ").replace(b"  ", b" ")
+    data = data.replace(b"\n ", b"\n").replace(b" \n", b"\n").strip(b" ")
+    if layout.separator != " ":
+        data = data.replace(b" " + separator, separator).replace(separator + b" ", separator)
+    if layout.trailing_separator:
+        data = (data if data.endswith(b"\n") else data + b"\n").replace(separator + b"\n", b"\n")
+    return data
+
+
+def offset_of_line(data: bytes, line: int) -> int:
+    """Byte where a line (from 1) starts."""
+    offset = 0
+    for _ in range(line - 1):
+        offset = data.find(b"\n", offset) + 1
+    return offset
+
+
+def data_lines(data: bytes, layout: Layout, lines_before: int) -> Lines:
+    """The rows of a block without blank lines and comments; quotes protect the separators between them."""
+    raw = np.frombuffer(data, dtype=np.uint8)
+    ends = np.flatnonzero(raw == 10)
+    starts = np.concatenate([np.zeros(1, dtype=ends.dtype), ends[:-1] + 1])
+    numbers = np.arange(lines_before + 1, lines_before + 1 + len(starts), dtype=np.int64)
+    first = raw[starts]
+    is_blank = first == 10
+    # What a two-letter mark starts is judged by both letters: a lone '/' begins no comment.
+    second = raw[np.minimum(starts + 1, len(raw) - 1)]
+    is_comment = (first == ord("#")) | (first == ord("%")) | ((first == ord("/")) & (second == ord("/")))
+    is_separator = raw == ord(layout.separator)
+    unclosed = 0
+    if b'"' in data:
+        inside = _quoted(raw, starts, ends)
+        is_separator &= ~inside
+        unclosed = int(numbers[np.argmax(inside[ends])]) if inside[ends].any() else 0
+    counts = _fields_per_line(is_separator, starts, ends, layout.n_fields)
+    keep = ~(is_blank | is_comment)
+    comments = numbers[is_comment]
+    last = int(numbers[-1])
+    if keep.all():
+        return Lines(numbers, counts, data, comments, last, unclosed)
+    if not keep.any():
+        return Lines(numbers[:0], counts[:0], b"", comments, last, unclosed)
+    kept = raw[np.repeat(keep, ends - starts + 1)].tobytes()
+    return Lines(numbers[keep], counts[keep], kept, comments, last, unclosed)
+
+
+def _quoted(
+    raw: npt.NDArray[np.uint8], starts: npt.NDArray[np.intp], ends: npt.NDArray[np.intp]
+) -> npt.NDArray[np.bool_]:
+    """Bytes between quotes; every line starts outside, so that a quote never closed harms its own line only."""
+    opened = np.cumsum(raw == ord('"'))
+    before = np.concatenate([np.zeros(1, dtype=opened.dtype), opened[starts[1:] - 1]])
+    return np.asarray((opened - np.repeat(before, ends - starts + 1)) % 2 == 1)
+
+
+def _fields_per_line(
+    is_separator: npt.NDArray[np.bool_], starts: npt.NDArray[np.intp], ends: npt.NDArray[np.intp], expected: int
+) -> Counts:
+    """Fields of each line; the usual case, that all lines have the expected number, is settled four times faster."""
+    if expected > 1:
+        at = np.flatnonzero(is_separator)
+        if len(at) == len(starts) * (expected - 1):
+            grid = at.reshape(len(starts), expected - 1)
+            if np.all(grid[:, 0] >= starts) and np.all(grid[:, -1] < ends):
+                return np.full(len(starts), expected, dtype=np.int64)
+    return np.add.reduceat(is_separator.view(np.int8), starts, dtype=np.int64) + 1

@@ -1,0 +1,96 @@
+"""A text log of any dialect as one table, or as one table per sensor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+
+from trihedron.read.errors import ReadError
+from trihedron.read.table import Progress, Table, check_memory
+from trihedron.read.text.blocks import Cursor, as_utf8, blocks
+from trihedron.read.text.dialect import Rewritten, rewrite
+from trihedron.read.text.reader import TextReader
+from trihedron.read.text.records import split_records
+from trihedron.records import Finding, FindingCode, Severity
+
+_SAMPLE_BYTES = 1 << 17
+
+
+def read_text(
+    path: Path,
+    compression: str | None,
+    size: int,
+    progress: Progress | None = None,
+    content: bytes | None = None,
+    sha256: str | None = None,
+) -> tuple[Table, ...]:
+    """One table, or the accelerometer's and the gyro's where each line says whose it is.
+
+    ``content`` stands for the file's bytes where they were unpacked already (a member of a zip).
+
+    Raises
+    ------
+    ReadError
+        As :class:`TextReader`.
+    """
+    cursor = Cursor()
+    first = next(blocks(path, compression, cursor, content), b"")
+    # A zero byte is complained about by the reader, with its line.
+    sample = first[:_SAMPLE_BYTES] if b"\x00" in first else as_utf8(path, first, 1)[:_SAMPLE_BYTES]
+    head = sample.decode("utf-8", errors="replace")
+    head = head[: head.rfind("\n") + 1] or head
+    if split_records(head) is not None:
+        found = split_records(_whole(path, compression, size, content))
+        if found is not None:
+            tables, counts = found
+            return _of_records(path, size, progress, tables, dict(counts), sha256)
+    if rewrite(head) is not None:
+        rewritten = rewrite(_whole(path, compression, size, content))
+        if rewritten is not None:
+            return (_of_rewritten(path, size, progress, rewritten, sha256),)
+    return (TextReader(path, compression, size, progress, content, None, sha256).read(),)
+
+
+def _whole(path: Path, compression: str | None, size: int, content: bytes | None) -> str:
+    # Lines as Python strings take about ten times their bytes; counted as cells of 24.
+    check_memory(path, size // 2, 1)
+    cursor = Cursor()
+    parts = [as_utf8(path, part, 1) for part in blocks(path, compression, cursor, content)]
+    return b"".join(parts).decode("utf-8", errors="replace")
+
+
+def _of_rewritten(path: Path, size: int, progress: Progress | None, rewritten: Rewritten, sha256: str | None) -> Table:
+    return TextReader(path, None, size, progress, rewritten.text, rewritten.lines, sha256).read()
+
+
+def _of_records(
+    path: Path,
+    size: int,
+    progress: Progress | None,
+    found: dict[str, Rewritten],
+    counts: dict[str, int],
+    sha256: str | None,
+) -> tuple[Table, ...]:
+    tables = {kind: _of_rewritten(path, size, progress, part, sha256) for kind, part in found.items()}
+    taken = sum(table.n_in_file for table in tables.values())
+    left = sum(counts.values()) - taken
+    if left < 0:
+        raise ReadError(f"{path}: the records of this file cannot be told apart; split it by sensor.")
+    listed = ", ".join(f"{word} ({count})" for word, count in sorted(counts.items(), key=lambda kv: -kv[1])[:12])
+    note = Finding(
+        FindingCode.DEVICE_CHOSEN,
+        Severity.NOTE,
+        f"Each line names its record: {listed}; those of the accelerometer and the gyro were read.",
+        numbers=MappingProxyType({"rows_left_out": float(left)}),
+    )
+    accelerometer = tables["accelerometer"]
+    return (
+        replace(
+            accelerometer,
+            sensor="accelerometer",
+            rows_in_file=accelerometer.n_in_file + left,
+            findings=(*accelerometer.findings, note),
+        ),
+        replace(tables["gyroscope"], sensor="gyroscope"),
+    )

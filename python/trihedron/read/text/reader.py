@@ -1,0 +1,258 @@
+"""One text log, block by block, as a table: every line becomes a row or is accounted for in a finding."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+
+from trihedron.read.errors import ReadError
+from trihedron.read.table import FloatArray, Progress, Table, check_memory, file_sha256
+from trihedron.read.text.blocks import Cursor, as_utf8, blocks
+from trihedron.read.text.cells import MAX_WORDS, TextColumn, find_text_columns, numbers, parse, refuse_words
+from trihedron.read.text.dates import past_midnight
+from trihedron.read.text.layout import MAX_STRAY_LINES, Layout, detect, is_comment, split
+from trihedron.read.text.lines import Lines, data_lines, offset_of_line, regular
+from trihedron.records import Finding, FindingCode, Severity
+
+_SAMPLE_BYTES = 1 << 18
+
+
+class TextReader:
+    """Reads one text log block by block; complaints name file, line and column.
+
+    ``content`` stands for the bytes of the file where they were unpacked or rewritten already; ``lines`` (n,) then
+    gives the line in the file of each of its lines.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        compression: str | None,
+        size: int,
+        progress: Progress | None,
+        content: bytes | None = None,
+        lines: npt.NDArray[np.int64] | None = None,
+        sha256: str | None = None,
+    ) -> None:
+        self.path, self.compression, self.size, self.progress = path, compression, size, progress
+        self.content, self.true_lines, self.sha256 = content, lines, sha256
+        self.cursor = Cursor()
+        self.parts: list[list[FloatArray]] = []
+        self.lines: list[npt.NDArray[np.int64]] = []
+        self.text_columns: dict[int, TextColumn] = {}
+        self.findings: list[Finding] = []
+        self.n_rows = 0
+        self.n_bytes = 0
+        self.comments: list[npt.NDArray[np.int64]] = []
+        self.n_left_out = 0
+
+    def read(self) -> Table:
+        """The whole file as a table."""
+        layout: Layout | None = None
+        for raw in blocks(self.path, self.compression, self.cursor, self.content):
+            data = as_utf8(self.path, raw, self.cursor.lines + 1)
+            if b"\n" not in data and b"\r" in data:
+                data = data.replace(b"\r", b"\n")
+            if layout is None:
+                layout = self._layout(data)
+                start = offset_of_line(data, layout.first_line)
+                self.cursor.lines = layout.first_line - 1
+                self._first_block(data, layout)
+                data = data[start:]
+            self._block(data, layout)
+            self.n_bytes += len(raw)
+            if self.progress is not None:
+                done = min(self.n_bytes / self.size, 1.0) if self.compression is None else 0.5
+                self.progress(done, f"reading {self.path.name}: {self.n_rows} rows")
+        if layout is None:
+            raise ReadError(f"{self.path}: the file holds no text after unpacking; record or copy it again.")
+        return self._table(layout)
+
+    def line(self, number: int) -> int:
+        """Line of the file for a line of the content that is read."""
+        return int(self.true_lines[number - 1]) if self.true_lines is not None else number
+
+    def _layout(self, data: bytes) -> Layout:
+        sample = data[:_SAMPLE_BYTES]
+        if len(sample) < len(data):
+            sample = sample[: sample.rfind(b"\n") + 1] or sample
+        layout = detect(sample.decode("utf-8", errors="replace"))
+        if layout is None:
+            raise ReadError(
+                f"{self.path}: no line of numbers in the first {sample.count(10) or 1} lines; "
+                "a log needs rows of time, acceleration and angular rate."
+            )
+        if layout.header_ignored:
+            self.findings.append(
+                Finding(
+                    FindingCode.COLUMNS_ASSUMED,
+                    Severity.WARNING,
+                    f"The line '{layout.header_ignored[:80]}' above the numbers does not name their "
+                    f"{layout.n_fields} columns, so it was passed over.",
+                    "A header with another number of names than there are columns.",
+                    "Name the columns with --columns.",
+                )
+            )
+        self._account_for_stray(layout)
+        self.parts = [[] for _ in range(layout.n_fields)]
+        return layout
+
+    def _account_for_stray(self, layout: Layout) -> None:
+        if len(layout.stray) > MAX_STRAY_LINES:
+            raise ReadError(
+                f"{self.path}: {len(layout.stray)} lines of numbers from line {self.line(layout.stray[0])} on have "
+                f"another layout than those from line {self.line(layout.first_line)} on ({layout.n_fields} fields): "
+                "the separator or the columns change inside the file; cut it there and read the parts one by one."
+            )
+        if layout.stray:
+            self._leave_out(
+                len(layout.stray),
+                f"{len(layout.stray)} lines above the first row of {layout.n_fields} numbers were passed over (first: "
+                f"line {self.line(layout.stray[0])}).",
+                "Rows of another layout, damaged rows, or numbers that belong to a preamble.",
+            )
+
+    def _leave_out(self, count: int, seen: str, cause: str, severity: Severity = Severity.WARNING) -> None:
+        self.n_left_out += count
+        self.findings.append(
+            Finding(
+                FindingCode.ROWS_LEFT_OUT,
+                severity,
+                seen,
+                cause,
+                "Look at these lines; nothing else of the file was left out." if severity is Severity.WARNING else "",
+                MappingProxyType({"rows_left_out": float(count)}),
+            )
+        )
+
+    def _first_block(self, data: bytes, layout: Layout) -> None:
+        """Which columns hold words instead of numbers (labels, dates), judged on the first lines."""
+        head = data[offset_of_line(data, layout.first_line) :][: 1 << 16].decode("utf-8", errors="replace")
+        rows = [split(line, layout.separator) for line in head.split("\n")[:-1] or [head] if line.strip()]
+        rows = [r[: layout.n_fields] for r in rows if len(r) >= layout.n_fields and not is_comment(r[0])][:200]
+        self.text_columns = find_text_columns(rows, layout)
+
+    def _block(self, data: bytes, layout: Layout) -> None:
+        ends_with_line_end = data.endswith(b"\n")
+        data = regular(data, layout)
+        if not data.strip():
+            self.cursor.lines += data.count(b"\n")
+            return
+        if not data.endswith(b"\n"):
+            data += b"\n"
+        found = data_lines(data, layout, self.cursor.lines)
+        self.cursor.lines = found.last
+        self.comments.append(found.comments)
+        if found.unclosed:
+            raise ReadError(
+                f"{self.path}: line {self.line(found.unclosed)} opens a quote and does not close it; mend that line."
+            )
+        if not len(found.number):
+            return
+        lines, text = found.number, found.text
+        odd = np.flatnonzero(found.fields != layout.n_fields)
+        if len(odd):
+            lines, text = self._incomplete(found, int(odd[0]), ends_with_line_end, layout)
+        if len(lines):
+            self._parse(text, lines, layout)
+
+    def _incomplete(
+        self, found: Lines, i: int, ends_with_line_end: bool, layout: Layout
+    ) -> tuple[npt.NDArray[np.int64], bytes]:
+        """The block without its last line where that breaks off; any other odd line is refused."""
+        fields = int(found.fields[i])
+        is_end = i == len(found.number) - 1 and self.cursor.is_last
+        line = self.line(int(found.number[i]))
+        if not (is_end and fields < layout.n_fields and self.n_rows + i > 0):
+            raise ReadError(
+                f"{self.path}: line {line} has {fields} fields where the others have "
+                f"{layout.n_fields}; complete or delete that line."
+            )
+        self.n_left_out += 1
+        self.findings.append(
+            Finding(
+                FindingCode.LINE_INCOMPLETE,
+                Severity.NOTE if not ends_with_line_end else Severity.WARNING,
+                f"The last line ({line}) breaks off in the middle and was left out.",
+                "The logger was stopped while it wrote.",
+                "Nothing is lost but one sample.",
+                MappingProxyType({"rows_left_out": 1.0}),
+            )
+        )
+        return found.number[:-1], found.text[: found.text.rfind(b"\n", 0, -1) + 1]
+
+    def _parse(self, data: bytes, lines: npt.NDArray[np.int64], layout: Layout) -> None:
+        schema: dict[str, type[pl.DataType]] = {
+            str(i): pl.String if i in self.text_columns else pl.Float64 for i in range(layout.n_fields)
+        }
+        if self.true_lines is not None:
+            lines = self.true_lines[lines - 1]
+        frame = parse(self.path, data, schema, layout, int(lines[0]))
+        if frame.height != len(lines):
+            raise ReadError(
+                f"{self.path}: {len(lines)} lines from line {lines[0]} on give {frame.height} rows; "
+                "look for quotes that are opened and never closed."
+            )
+        suspects = [name for name in frame.columns if schema[name] == pl.Float64 and frame[name].null_count()]
+        if suspects:
+            as_text = parse(self.path, data, dict.fromkeys(frame.columns, pl.String), layout, int(lines[0]))
+            refuse_words(self.path, frame, as_text.select(suspects), lines, layout)
+        for i in range(layout.n_fields):
+            self.parts[i].append(numbers(frame[str(i)], self.text_columns.get(i)))
+        self.lines.append(lines)
+        self.n_rows += len(lines)
+        rows_per_byte = self.n_rows / max(self.n_bytes + len(data), 1)
+        expected = int(self.size * rows_per_byte) if self.compression is None else self.n_rows
+        if expected > 1_000_000:
+            check_memory(self.path, expected, layout.n_fields, n_held=self.n_rows)
+
+    def _table(self, layout: Layout) -> Table:
+        if self.n_rows == 0:
+            raise ReadError(f"{self.path}: the file has a header but no row of numbers; record or copy it again.")
+        remarks = np.concatenate(self.comments) if self.comments else np.zeros(0, dtype=np.int64)
+        if len(remarks):
+            self._leave_out(
+                len(remarks),
+                f"{len(remarks)} lines between the rows begin like remarks and were passed over (first: line "
+                f"{self.line(int(remarks[0]))}).",
+                "Remarks of the logger, or rows that somebody took out.",
+                Severity.NOTE,
+            )
+        columns: list[FloatArray] = []
+        names: list[str] = []
+        words: dict[int, str] = {}
+        labels: dict[int, tuple[tuple[str, ...], npt.NDArray[np.int64]]] = {}
+        dated = {i for i, column in self.text_columns.items() if column.form and column.form != "date"}
+        for i in range(layout.n_fields):
+            parts, self.parts[i] = self.parts[i], []
+            values = np.concatenate(parts) if len(parts) != 1 else parts[0]
+            name = layout.names[i] if layout.names else ""
+            text = self.text_columns.get(i)
+            if text is not None and i not in dated:
+                words[i] = text.example
+                if text.codes and len(text.words) <= MAX_WORDS:
+                    labels[i] = (tuple(text.words), np.concatenate(text.codes))
+            elif text is not None:
+                name = f"{name} [s]" if name else "time [s]"
+                values = past_midnight(values) if text.form == "time-of-day" else values
+            columns.append(values)
+            names.append(name)
+        lines = np.concatenate(self.lines)
+        contiguous = int(lines[-1]) - int(lines[0]) == len(lines) - 1
+        return Table(
+            path=self.path,
+            names=tuple(names) if layout.names or dated else None,
+            columns=tuple(columns),
+            sha256=file_sha256(self.path) if self.sha256 is None else self.sha256,
+            metadata=layout.metadata,
+            first_line=int(lines[0]),
+            line_of_row=None if contiguous else lines,
+            findings=tuple(self.findings),
+            words=words,
+            labels=labels,
+            rows_in_file=self.n_rows + self.n_left_out,
+        )

@@ -1,0 +1,130 @@
+"""Zip archives as phone apps export them: one text file per sensor inside, joined on their common clock."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+import zlib
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+
+from trihedron.read.archive import read_npz
+from trihedron.read.devices import Choice, by_sensor
+from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.table import Progress, Table, check_memory, file_sha256
+from trihedron.records import Finding, FindingCode, Severity
+
+_TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")
+_KINDS = {
+    "accelerometer": re.compile(r"acc(el(erometer|eration)?)?(uncalibrated)?|totalacceleration|imu"),
+    "gyroscope": re.compile(r"gyr(o(scope)?)?(uncalibrated)?|angularvelocity|rotationrate"),
+}
+_WITHOUT_GRAVITY = re.compile(r"linear|withoutg|user|gravity|meta")
+
+
+def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
+    """Tables of a zip: a NumPy archive, one text file, or the accelerometer's and the gyro's.
+
+    Raises
+    ------
+    ReadError
+        When the archive is damaged, is another program's container, or does not tell which members to read.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = [info.filename for info in archive.infolist() if not info.is_dir()]
+            if not names or any(name.endswith(".npy") for name in names):
+                return (read_npz(path, choice.device),)
+            if choice.device is not None:
+                raise ReadError(f"{path}: a device was asked for but this is not an .npz archive; leave --device out.")
+            _refuse_containers(path, names)
+            members = [n for n in names if n.lower().endswith(_TEXT) and not n.startswith(("__MACOSX", "meta/"))]
+            picked = _chosen(path, members, choice.topic) or _by_name(members)
+            if not picked:
+                raise ReadError(
+                    f"{path}: a zip with {', '.join(names[:12])}; none of these is a log known by its name: choose one "
+                    "with --topic NAME, or unpack it and give --accel and --gyro."
+                )
+            sha256 = file_sha256(path)
+            tables = [
+                table for name in picked for table in _member(path, archive, name, sha256, progress, len(picked) > 1)
+            ]
+    except OSError as error:
+        raise from_os_error(path, error) from None
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, KeyError) as error:
+        if isinstance(error, ReadError):
+            raise
+        first = (str(error).strip().split("\n")[0] or type(error).__name__)[:120]
+        raise ReadError(f"{path}: this zip archive is damaged or locked ({first}); export it again.") from None
+    others = [name for name in names if name not in picked]
+    if others:
+        note = Finding(
+            FindingCode.DEVICE_CHOSEN,
+            Severity.NOTE,
+            f"Of the archive {' and '.join(picked)} {'were' if len(picked) > 1 else 'was'} read; not read: "
+            f"{', '.join(others[:12])}{' ...' if len(others) > 12 else ''}.",
+        )
+        tables[0] = replace(tables[0], findings=(note, *tables[0].findings))
+    return tuple(tables)
+
+
+def _refuse_containers(path: Path, names: list[str]) -> None:
+    known = {
+        "xl/workbook.xml": ("an Excel workbook (.xlsx)", "save the sheet as CSV"),
+        "word/document.xml": ("a Word document", "name the log itself"),
+        "content.xml": ("an OpenDocument file", "save the sheet as CSV"),
+        "log.bin": ("an ActiGraph .gt3x archive", "export its IMU as CSV in ActiLife"),
+        "AndroidManifest.xml": ("an Android program", "name the log itself"),
+    }
+    for member, (kind, remedy) in known.items():
+        if member in names:
+            raise ReadError(f"{path}: this is {kind}, which is not read here; {remedy}.")
+
+
+def _chosen(path: Path, members: list[str], topic: str | None) -> list[str]:
+    if topic is None:
+        return []
+    found = [n for n in members if topic.lower() in (n.lower(), PurePosixPath(n).stem.lower())]
+    if len(found) != 1:
+        raise ReadError(f"{path}: there is no member {topic!r}; the archive holds {', '.join(members) or 'no texts'}.")
+    return found
+
+
+def _by_name(members: list[str]) -> list[str]:
+    """The members of both sensors, else the only text; readings with gravity and without corrections before others."""
+    if len(members) == 1:
+        return members
+    picked: list[str] = []
+    for pattern in _KINDS.values():
+        ranked = []
+        for name in members:
+            plain = re.sub(r"[^a-z]", "", PurePosixPath(name).stem.lower())
+            if pattern.fullmatch(plain) and not _WITHOUT_GRAVITY.search(plain):
+                # Sensor Logger's Accelerometer is without gravity where a TotalAcceleration stands beside it.
+                ranked.append((plain.endswith("uncalibrated") + 2 * plain.startswith("total"), name))
+        if ranked:
+            picked.append(max(ranked, key=lambda r: r[0])[1])
+    if not picked:
+        raw = [n for n in members if re.sub(r"[^a-z]", "", PurePosixPath(n).stem.lower()) == "rawdata"]
+        return raw[:1]
+    return picked
+
+
+def _member(
+    path: Path, archive: zipfile.ZipFile, name: str, sha256: str, progress: Progress | None, is_of_several: bool
+) -> tuple[Table, ...]:
+    # Parsing brings a large library with it, which a NumPy archive does not need.
+    from trihedron.read.columns import sensor_of_file_name
+    from trihedron.read.text import read_text
+
+    check_memory(path, archive.getinfo(name).file_size // 2, 1)
+    content = archive.read(name)
+    if not content.strip():
+        raise ReadError(f"{path}: its member {name} is empty; record or export again.")
+    tables = read_text(path / name, None, len(content), progress, content, sha256)
+    if len(tables) == 1:
+        tables = by_sensor(tables[0])
+    if is_of_several and len(tables) == 1:
+        sensor = sensor_of_file_name(PurePosixPath(name).name)
+        return (replace(tables[0], sensor=sensor),)
+    return tables

@@ -1,0 +1,186 @@
+"""A given model against a recording in words: which numbers differ, which noise, and how the fit improves by stages."""
+
+from __future__ import annotations
+
+from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
+from trihedron.report.document import Block, Facts, Paragraph, Table
+from trihedron.report.numbers import MINUS, plain_number, unit_in_print, with_sigma
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
+
+NAMED_SIGMAS = 3.0
+"""Components of a group that differs are named from here on; the largest always is."""
+_WORDS = {
+    "accel-zero": "accelerometer {} zero",
+    "accel-scale": "accelerometer {} scale",
+    "accel-misalignment": "accelerometer angle {}",
+    "gyro-zero": "gyro {} zero",
+    "gyro-scale": "gyro {} scale",
+    "gyro-misalignment": "gyro angle {}",
+    "triad-alignment": "gyro triad turned about {}",
+    "gravity": "gravity (or all three accelerometer scales)",
+}
+_GROUPS = {
+    "accel-zero": "accelerometer zeros",
+    "accel-scale": "accelerometer scales",
+    "accel-misalignment": "accelerometer angles",
+    "gyro-zero": "gyro zeros",
+    "gyro-scale": "gyro scales",
+    "gyro-misalignment": "gyro angles",
+    "triad-alignment": "the gyro triad's alignment",
+    "gravity": "gravity",
+}
+MOST_NAMED = 5
+_STAGES = {
+    "as-given": "as given",
+    "numbers": "numbers re-estimated",
+    "noise": "with the recording's noise",
+    "effects": "with the effects",
+}
+
+
+def differing_numbers(diagnosis: Diagnosis) -> list[str]:
+    """``gyro z zero +0.31 ± 0.01 °/s`` for every number that differs."""
+    said = []
+    groups: dict[str, list[ParameterDifference]] = {}
+    for p in diagnosis.parameters:
+        if p.significant:
+            groups.setdefault(p.id, []).append(p)
+    for members in groups.values():
+        size = [abs(p.difference) / max(p.std, 1e-300) for p in members]
+        said += [
+            f"{_named(p)} {_difference(p)}"
+            for p, s in zip(members, size, strict=True)
+            if s > NAMED_SIGMAS or s == max(size)
+        ]
+    return said
+
+
+def differing_in_short(diagnosis: Diagnosis) -> list[str]:
+    """What differs for one sentence: every number while they are few, else the groups with their largest."""
+    numbers, noise = differing_numbers(diagnosis), differing_noise(diagnosis)
+    if len(numbers) <= MOST_NAMED:
+        return [*numbers, *noise]
+    largest: dict[str, ParameterDifference] = {}
+    for p in diagnosis.parameters:
+        if p.significant and abs(p.difference) >= abs(largest.get(p.id, p).difference):
+            largest[p.id] = p
+    return [*(f"{_GROUPS.get(p.id, p.id)} (up to {_size(p)})" for p in largest.values()), *noise]
+
+
+def differing_noise(diagnosis: Diagnosis) -> list[str]:
+    """One sentence for every figure of noise or sampling that differs."""
+    said: dict[str, None] = {}
+    for n in diagnosis.noise_compared:
+        if n.significant:
+            said.setdefault(n.remark or f"{_sensor(n)} {n.term} is {_ratio(n)} times the recording's", None)
+    return list(said)
+
+
+def numbers_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Every number of the model beside the recording's, groups that differ first."""
+    shown = sorted(diagnosis.parameters, key=lambda p: (not p.significant, p.p_value, p.id))
+    rows = tuple(
+        (p.id, p.name, _value(p, p.model), _value(p, p.recording), _difference(p), plain_number(p.p_value, 2), _mark(p))
+        for p in shown
+    )
+    head = ("number", "", "model", "recording", "recording − model", "p of the group", "")
+    return (Table(head, rows, "Numbers of the given model against those that the recording has"),)
+
+
+def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Noise and sampling of the model beside the recording's."""
+    rows = tuple(
+        (
+            f"{_sensor(n)} {n.axis}".strip(),
+            n.term,
+            _plain(n.model),
+            _plain(n.recording),
+            _ratio(n),
+            unit_in_print(n.unit),
+            "differs" if n.significant else "",
+        )
+        for n in diagnosis.noise_compared
+    )
+    blocks: list[Block] = [Table(("", "term", "model", "recording", "ratio (95 %)", "unit", ""), rows)]
+    remarks = tuple(("", n.remark) for n in diagnosis.noise_compared if n.remark and n.significant)
+    if remarks:
+        blocks.append(Facts(tuple(dict.fromkeys(remarks))))
+    return tuple(blocks)
+
+
+def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ...]:
+    """Stage by stage how well the recording is predicted; ``size`` names the domains."""
+    domains = list(dict.fromkeys(d.domain for stage in diagnosis.stages for d in stage.domains))
+    rows = tuple((_STAGES[stage.stage], *(_stage(stage, d) for d in domains)) for stage in diagnosis.stages)
+    head = ("stage", *(size.get(d, d) for d in domains))
+    if not rows:
+        return (Paragraph("No stages: the model was fitted to this recording."),)
+    return (Table(head, rows, "Rms in physical units"),)
+
+
+def _stage(stage: Stage, domain: str) -> str:
+    for d in stage.domains:
+        if d.domain == domain:
+            chi2 = "" if d.chi2_per_dof is None else f" (χ² {plain_number(d.chi2_per_dof)})"
+            return f"{_si(d.rms, d.unit)}{chi2}"
+    return "–"
+
+
+def _si(value: float, unit: str) -> str:
+    if unit == "m/s^2":
+        return f"{plain_number(mm_s2_from_m_s2(value))} mm/s²"
+    if unit == "rad/s":
+        return f"{plain_number(degrees_from_radians(value))} °/s"
+    return f"{plain_number(value)} {'°' if unit == 'deg' else unit_in_print(unit)}"
+
+
+def _named(p: ParameterDifference) -> str:
+    return _WORDS[p.id].format(p.name) if p.id in _WORDS else f"{p.id} {p.name}"
+
+
+def _difference(p: ParameterDifference) -> str:
+    scale, unit = _unit(p, is_difference=True)
+    text = with_sigma(scale * p.difference, scale * p.std)
+    return ("" if text.startswith(MINUS) else "+") + text + (f" {unit}" if unit else "")
+
+
+def _size(p: ParameterDifference) -> str:
+    scale, unit = _unit(p, is_difference=True)
+    return f"{plain_number(abs(scale * p.difference), 2)}{' ' + unit if unit else ''}"
+
+
+def _value(p: ParameterDifference, value: float) -> str:
+    scale, unit = _unit(p, is_difference=False)
+    return f"{plain_number(scale * value, 6)}{' ' + unit if unit else ''}"
+
+
+def _unit(p: ParameterDifference, *, is_difference: bool) -> tuple[float, str]:
+    """The unit that people use for a number of this kind, and what it takes to get there from SI."""
+    if p.id not in _WORDS:
+        return 1.0, "" if p.unit == "1" else unit_in_print(p.unit)
+    if p.unit == "1":
+        return (100.0, "%") if is_difference else (1.0, "")
+    if p.unit == "rad/s":
+        return degrees_from_radians(1.0), "°/s"
+    if p.unit == "m/s^2":
+        return mm_s2_from_m_s2(1.0), "mm/s²"
+    return (mrad_from_radians(1.0), "mrad") if is_difference else (degrees_from_radians(1.0), "°")
+
+
+def _mark(p: ParameterDifference) -> str:
+    return "differs" if p.significant else ""
+
+
+def _sensor(n: NoiseDifference) -> str:
+    return {"gyroscope": "gyro", "both": "sampling"}.get(n.sensor, n.sensor)
+
+
+def _plain(value: float | None) -> str:
+    return "–" if value is None else plain_number(value)
+
+
+def _ratio(n: NoiseDifference) -> str:
+    if n.ratio is None:
+        return "–"
+    words = plain_number(n.ratio)
+    return words if n.interval is None else f"{words} ({plain_number(n.interval[0])} to {plain_number(n.interval[1])})"

@@ -1,0 +1,218 @@
+"""Every row of a file is a reading or in a finding; what cannot be read right is refused, not read otherwise."""
+
+import numpy as np
+import pytest
+
+from test_read import HEADER, codes, finding, readings, write
+from trihedron.estimate.gyroscope.findings import scale_findings
+from trihedron.read import ReadError, read_recording
+from trihedron.records import FindingCode, Severity
+from trihedron.units import AccelerationUnit, RateUnit
+
+
+def rows_of(table, separator=",") -> list[str]:
+    return [separator.join(map(repr, map(float, row))) for row in table]
+
+
+def accounts(recording) -> bool:
+    return recording.rows_in_file == recording.rows_read + recording.rows_reported
+
+
+def text(tmp_path, content: str, name: str = "log.csv"):
+    path = tmp_path / name
+    path.write_text(content)
+    return path
+
+
+def test_movella_dot_counts_microseconds_where_xsens_mti_counts_hundreds_of_them(tmp_path):
+    table = readings(300, rate_hz=60.0)
+    names = "PacketCounter,SampleTimeFine,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n"
+    preamble = "DeviceTag:,Xsens DOT 1\nOutputRate:,60Hz\nStartTime:,2024-03-01_12-00-00\n \n"
+    lines = []
+    for k, row in enumerate(table):
+        stamp = 4_294_000_000 + round(k * 1e6 / 60) - 4_293_000_000
+        lines.append(",".join([str(k), str(stamp), *map(repr, map(float, row[1:]))]))
+    dot = read_recording(text(tmp_path, preamble + names + "\n".join(lines) + "\n"))
+    assert dot.rate_hz == pytest.approx(60.0, rel=1e-4)
+    mti = [",".join([str(k), str(1000 + 100 * k), *line.split(",")[2:]]) for k, line in enumerate(lines)]
+    recording = read_recording(text(tmp_path, "// Firmware Version: 2.5\n" + names + "\n".join(mti) + "\n", "mti.txt"))
+    assert recording.rate_hz == pytest.approx(100.0, rel=1e-6)
+
+
+def test_two_devices_in_one_table_are_listed_and_chosen_and_never_merged(tmp_path):
+    table = readings(200)
+    lines = [
+        f"{k * 10000},{i},{','.join(map(repr, map(float, row[1:] + i)))}" for k, row in enumerate(table) for i in (0, 1)
+    ]
+    path = text(tmp_path, "TimeUS,I,AccX,AccY,AccZ,GyrX,GyrY,GyrZ\n" + "\n".join(lines) + "\n")
+    with pytest.raises(
+        ReadError, match=r"column 'I' tells 2 devices apart: 0 \(200 rows\), 1 \(200 rows\).*--instance 0"
+    ):
+        read_recording(path)
+    recording = read_recording(path, instance=1)
+    np.testing.assert_allclose(recording.accelerometer, table[:, 1:4] + 1, atol=1e-12)
+    assert recording.rate_hz == pytest.approx(100.0)
+    assert recording.n_samples == 200
+    assert recording.rows_in_file == 400
+    assert accounts(recording)
+    with pytest.raises(ReadError, match="there is no instance 7"):
+        read_recording(path, instance=7)
+
+
+def test_one_device_in_such_a_column_is_read_without_a_question(tmp_path):
+    table = readings(50)
+    lines = [f"{k * 10000},0,{','.join(map(repr, map(float, row[1:])))}" for k, row in enumerate(table)]
+    recording = read_recording(text(tmp_path, "TimeUS,I,AccX,AccY,AccZ,GyrX,GyrY,GyrZ\n" + "\n".join(lines) + "\n"))
+    assert recording.n_samples == 50
+
+
+@pytest.mark.parametrize("cut", [2999, 100, 30])
+@pytest.mark.parametrize("change", ["separator", "column"])
+def test_a_layout_that_changes_inside_the_file_is_refused_with_its_lines(tmp_path, cut, change):
+    table = readings(6000)
+    if change == "separator":
+        lines = rows_of(table[:cut]) + rows_of(table[cut:], ";")
+    else:
+        lines = rows_of(table[:cut]) + rows_of(table[cut:, :6])
+    with pytest.raises(ReadError, match=r"line|layout"):
+        read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
+
+
+def test_a_few_lines_of_numbers_above_the_table_are_reported_and_counted(tmp_path):
+    table = readings(100)
+    recording = read_recording(text(tmp_path, "1.0 0.0 0.0\n0.0 1.0 0.0\n" + HEADER + "\n".join(rows_of(table)) + "\n"))
+    assert recording.n_samples == 100
+    assert recording.rows_in_file == 102
+    assert finding(recording, FindingCode.ROWS_LEFT_OUT).numbers["rows_left_out"] == 2
+    assert accounts(recording)
+
+
+def test_a_damaged_first_row_is_not_taken_for_a_preamble(tmp_path):
+    lines = rows_of(readings(50))
+    lines[0] = "0.0;garbage"
+    recording = read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
+    assert recording.rows_in_file == 50
+    assert recording.rows_reported == 1
+    assert accounts(recording)
+
+
+def test_rows_behind_a_remark_sign_are_counted(tmp_path):
+    lines = rows_of(readings(50))
+    lines[20] = "#" + lines[20]
+    recording = read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
+    assert (recording.n_samples, recording.rows_reported, recording.rows_in_file) == (49, 1, 50)
+
+
+def test_a_quote_never_hides_a_missing_field(tmp_path):
+    lines = [f'"{row.split(",")[0]}",' + row.partition(",")[2] for row in rows_of(readings(50))]
+    lines[10] = lines[10].rpartition(",")[0]
+    with pytest.raises(ReadError, match="line 12 has 6 fields"):
+        read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
+    lines[10] = lines[10] + ',"1'
+    with pytest.raises(ReadError, match="line 12 opens a quote"):
+        read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
+
+
+@pytest.mark.parametrize(
+    "form",
+    ["%d-%b-%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S.%f", "%Y-%m-%dT%H:%M:%S.%fZ", "%Y-%m-%dT%H.%M.%S.%f", "%H:%M:%S.%f"],
+)
+def test_dates_as_loggers_write_them_give_the_clock(tmp_path, form):
+    import datetime
+
+    start = datetime.datetime(2024, 3, 1, 23, 59, 59)
+    table = readings(300)
+    lines = [
+        (start + datetime.timedelta(milliseconds=10 * k)).strftime(form)
+        + ","
+        + ",".join(map(repr, map(float, row[1:])))
+        for k, row in enumerate(table)
+    ]
+    recording = read_recording(text(tmp_path, "Timestamp,ax,ay,az,gx,gy,gz\n" + "\n".join(lines) + "\n"))
+    assert recording.rate_hz == pytest.approx(100.0, rel=1e-4)
+    # Microseconds as text; seconds since 1970 in a double resolve a quarter of one.
+    np.testing.assert_allclose(recording.time_s, 0.01 * np.arange(300), atol=1e-6)
+
+
+def test_a_time_that_is_not_understood_is_refused_instead_of_a_rate_assumed(tmp_path):
+    lines = [f"tick {k}," + row.partition(",")[2] for k, row in enumerate(rows_of(readings(50)))]
+    path = text(tmp_path, "Timestamp,ax,ay,az,gx,gy,gz\n" + "\n".join(lines) + "\n")
+    with pytest.raises(ReadError, match=r"'tick 0', which is no time known here.*--columns time=none --rate"):
+        read_recording(path)
+    assert read_recording(path, columns="time=none", rate_hz=50).rate_hz == 50
+
+
+def test_a_gyro_whose_time_base_is_a_hundred_times_off_is_not_believed():
+    S = np.diag([1.74e-4, 1.75e-4, 1.76e-4])
+    (found,) = scale_findings(S, RateUnit.DEG_S)
+    assert found.severity is Severity.SERIOUS
+    assert found.numbers["scale_ratio"] == pytest.approx(0.01, rel=0.01)
+    assert scale_findings(100.0 * S, RateUnit.DEG_S) == []
+    assert scale_findings(S, RateUnit.COUNTS) == []
+
+
+def test_an_incomplete_last_line_and_copied_rows_are_in_the_account(tmp_path):
+    lines = rows_of(readings(50))
+    lines.insert(20, lines[19])
+    recording = read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n0.5,1.0"))
+    assert recording.rows_in_file == 52
+    assert recording.n_samples == 50
+    assert accounts(recording)
+
+
+def test_two_files_account_for_the_rows_of_both(tmp_path):
+    table = readings(200)
+    acc = write(tmp_path / "acc.csv", table[:150, :4], "t,x,y,z\n")
+    gyr = write(tmp_path / "gyr.csv", table[20:, [0, 4, 5, 6]], "t,x,y,z\n")
+    recording = read_recording(accelerometer_path=acc, gyroscope_path=gyr)
+    assert recording.rows_in_file == 330
+    assert accounts(recording)
+
+
+REFUSED = {
+    "workbook": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), "Excel workbook.*save the sheet as CSV"),
+    "blackbox": (b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n" * 5, "blackbox_decode"),
+    "json": (b'{"accel": [[1, 2, 3]]}', "this is JSON.*from Python"),
+    "json-list": (b'[{"t": 0}]', "this is JSON"),
+    "video": (b"\x00\x00\x00\x18ftypmp42" + bytes(500), "a video.*GPMF"),
+    "7z": (b"7z\xbc\xaf\x27\x1c" + bytes(500), "7-Zip archive.*unpack"),
+    "xml": (b"<?xml version='1.0'?><a/>", "XML"),
+    "mtb": (b"\xfa\xff\x36" + bytes(500), "Xsens MT binary.*MT Manager"),
+}
+
+
+@pytest.mark.parametrize("content, complaint", REFUSED.values(), ids=REFUSED.keys())  # noqa: PT006
+def test_a_foreign_format_is_named_with_the_way_in(tmp_path, content, complaint):
+    path = tmp_path / "log.bin"
+    path.write_bytes(content)
+    with pytest.raises(ReadError, match=complaint) as caught:
+        read_recording(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_readings_in_si_that_step_like_counts_say_their_step(tmp_path):
+    rng = np.random.default_rng(3)
+    table = readings(2000)
+    counts = np.rint(rng.normal([0, 0, 16384], 20, (2000, 3)))
+    table[:, 1:4] = counts * 9.80665 / 16384
+    recording = read_recording(write(tmp_path / "log.csv", table))
+    steps = [f for f in recording.findings if f.code is FindingCode.RAW_STEP]
+    assert [f.severity for f in steps] == [Severity.NOTE]
+    assert steps[0].numbers["x_step"] == pytest.approx(9.80665 / 16384, rel=1e-3)
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    # Fine readings have no step, and whole numbers need no word about theirs.
+    fine = np.column_stack([np.arange(2000) / 100, rng.normal([0, 0, 9.8, 0, 0, 0], 0.02, (2000, 6))])
+    assert FindingCode.RAW_STEP not in codes(read_recording(write(tmp_path / "fine.csv", fine)))
+
+
+def test_counts_that_were_interpolated_onto_the_other_clock_are_still_counts(tmp_path):
+    rng = np.random.default_rng(5)
+    time_s = np.arange(400) / 100
+    acc = np.column_stack([time_s, np.rint(rng.normal([0, 0, 8192], 20, (400, 3)))])
+    gyr = np.column_stack([time_s + 0.003, np.rint(rng.normal([300, -200, 40], 20, (400, 3)))])
+    recording = read_recording(
+        accelerometer_path=write(tmp_path / "a.csv", acc, "t,x,y,z\n"),
+        gyroscope_path=write(tmp_path / "g.csv", gyr, "t,x,y,z\n"),
+    )
+    assert recording.gyroscope_unit is RateUnit.COUNTS
+    assert recording.accelerometer_unit is AccelerationUnit.COUNTS

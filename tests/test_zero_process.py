@@ -1,0 +1,130 @@
+"""Zeros from pose to pose: the kernel against dense matrices, the tests on sessions drawn second by second."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
+
+from trihedron import _core
+from trihedron.diagnose.zeros.curve import smooth_curve
+from trihedron.diagnose.zeros.evidence import examine
+from trihedron.diagnose.zeros.process import ZeroProcess, ZeroReadings
+from zero_process import readings_of
+from zero_sessions import Session, draw
+
+ALL = [0, 1, 2, 3, 4]
+
+
+def dense_covariance(t, length, pose, variance, direction, strengths):
+    """The process integrated on a fine grid: averages of a walk and an integrated walk, scatter, noise."""
+    scatter, walk, drift, slope, noise = strengths
+    fine = [a + b * ((np.arange(201) + 0.5) / 201 - 0.5) for a, b in zip(t, length, strict=True)]
+    origin = t[0] - length[0] / 2
+    n = len(t)
+    V = np.zeros((n, n))
+    for i in range(n):
+        for j in range(n):
+            low = np.minimum.outer(fine[i], fine[j]) - origin
+            middle = sorted((t[i] - origin, t[j] - origin))
+            # Of the integrated walk the middle stands for the stretch.
+            bent = middle[0] ** 2 * (3 * middle[1] - middle[0]) / 6 * drift + slope * middle[0] * middle[1]
+            V[i, j] = (walk * low.mean() + bent) * (direction[i] @ direction[j]) + scatter * (pose[i] == pose[j])
+    return V + np.diag(noise * variance)
+
+
+@pytest.mark.parametrize("directions", [1, 3])
+def test_the_filter_whitens_as_the_dense_covariance_does(directions):
+    rng = np.random.default_rng(4)
+    length = rng.uniform(0.01, 0.03, 14)
+    t = np.cumsum(length + rng.uniform(0, 0.05, 14)) - length / 2
+    pose = np.repeat(np.arange(7), 2)
+    direction = np.ones((14, 1)) if directions == 1 else rng.normal(size=(14, 3))
+    columns, variance = rng.normal(size=(14, 4)), rng.uniform(0.5, 2.0, 14) * 1e-2
+    strengths = np.array([[0.02, 0.3, 0.5, 2.0, 1.5], [0.0, 0.0, 0.0, 0.0, 1.0], [0.1, 0.0, 0.3, 0.0, 0.5]])
+    log_det, gram = _core.zero_process_grams(columns, variance, t, length, pose, direction, strengths)
+    for k, row in enumerate(strengths):
+        V = dense_covariance(t, length, pose, variance, direction, row)
+        # The drift within a stretch is read in its middle: good to 1e-3 of the noise of these long stretches.
+        assert log_det[k] == pytest.approx(np.linalg.slogdet(V)[1], abs=5e-3)
+        np.testing.assert_allclose(gram[k], columns.T @ np.linalg.solve(V, columns), rtol=3e-3, atol=1e-2)
+
+
+def test_a_question_out_of_order_is_refused():
+    one = np.ones(3)
+    with pytest.raises(ValueError, match="order of time"):
+        _core.zero_process_grams(
+            np.ones((3, 1)), one, one[::-1] * [3, 2, 1], 0 * one, np.arange(3), np.ones((3, 1)), np.ones((1, 5))
+        )
+
+
+def test_scatter_is_found_sized_and_not_taken_for_anything_else():
+    session = Session(scatter=0.02, n_poses=20)
+    inside, claimed = [], 0
+    for seed in range(12):
+        found = examine(readings_of(session, seed), thermal=[4], gravity=[1, 2, 3])
+        assert found.p_scatter_spared < 1e-3
+        inside.append(np.abs(found.scatter - 0.02) < 2.0 * found.scatter_std)
+        claimed += (found.p_slow < 0.01) + sum(group.p_value < 0.01 for group in found.groups.values())
+    # 36 sizes within two standard errors at 95 %: fewer than 30 once in a thousand runs.
+    assert np.sum(inside) >= 30
+    # 36 tests at 1 %: more than three once in two thousand runs.
+    assert claimed <= 3
+
+
+@pytest.mark.parametrize("session", [Session(walk=0.05), Session(smooth=0.05), Session()])
+def test_what_changes_slowly_or_not_at_all_is_no_scatter(session):
+    for seed in range(5):
+        found = examine(readings_of(session, seed), thermal=[4], gravity=[1, 2, 3])
+        assert found.p_scatter_spared > 1e-3
+        assert (found.p_slow < 0.01) == (session != Session())
+
+
+def test_a_bumped_pose_is_scatter_no_longer_once_it_is_spared():
+    found = examine(readings_of(Session(bump=0.1), 3), gravity=[1, 2, 3])
+    assert found.p_scatter < 1e-6
+    assert found.worst_pose == 8
+    assert found.p_scatter_spared > 0.01
+
+
+def test_a_wrong_error_of_the_means_is_no_walk_and_no_scatter():
+    for stated in (0.5, 2.0):
+        for seed in range(4):
+            found = examine(readings_of(Session(stated=stated), seed), gravity=[1, 2, 3])
+            assert found.p_slow > 1e-3
+            assert found.p_scatter_spared > 1e-3
+
+
+def test_gravity_and_temperature_stand_out_of_scatter():
+    session = Session(scatter=0.02, gravity=0.03, thermal=0.1, n_poses=25)
+    found = examine(readings_of(session, 11), thermal=[4], gravity=[1, 2, 3])
+    assert found.groups["gravity"].p_value < 1e-4
+    assert found.groups["thermal"].p_value < 1e-6
+    # The temperature of the generator has unit rms: its coefficient is the rms it was drawn with.
+    values = found.groups["thermal"].values[:, 0]
+    errors = np.sqrt(found.groups["thermal"].covariance[:, 0, 0])
+    assert (np.abs(np.abs(values) - 0.1) < 4.0 * errors).all()
+
+
+def test_the_curve_of_a_hidden_swing_is_drawn_within_its_band():
+    session = Session(scatter=0.005, swing=0.1, n_poses=30)
+    zeros = draw(session, 5)
+    process = ZeroProcess.of(readings_of(session, 5))
+    _, sigma = process.maximum((0, 1, 2), ALL, restricted=True)
+    t = zeros.time_s
+    curve = smooth_curve(process, [0], sigma, t)
+    # The truth is not told by the session's numbers but by averages free of noise.
+    quiet = draw(Session(swing=0.1, n_poses=30, noise=1e-9), 5)
+    truth = quiet.values - quiet.values.mean(axis=1, keepdims=True)
+    away = (curve.values - truth) / curve.sigma
+    # 5 % of the points of a band of two standard errors may lie outside; they come in groups.
+    assert np.mean(np.abs(away) < 2.0) > 0.8
+    assert np.all(curve.range > 0.2)
+
+
+def test_one_pose_less_leaves_the_others():
+    readings: ZeroReadings = readings_of(Session(n_poses=8), 1)
+    assert readings.without(3).n_poses == 7
+    assert 3 not in readings.without(3).pose
