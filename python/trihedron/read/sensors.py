@@ -97,7 +97,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
     """
     path = table.path
     chosen = find_columns(table, options.columns, sensor or table.sensor)
-    table = one_device(table, options.choice, chosen.used())
+    table = table if table.is_chosen else one_device(table, options.choice, chosen.used())
     if table.n_rows < 2:
         raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
     findings = [*table.findings, *chosen.findings, *_words_left_out(table)]

@@ -15,7 +15,6 @@ from trihedron.diagnose.selection.score import Scored, dispersion
 from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import (
     N_DOMAINS,
-    RELATIVE_RIDGE,
     Fit,
     Prediction,
     extend,
@@ -27,9 +26,6 @@ from trihedron.diagnose.session.solve import (
 from trihedron.diagnose.session.twin import (
     DYNAMICS,
     MOVES,
-    N_ACCEL,
-    N_GYRO,
-    N_HOLD,
     PRIOR,
     STATIC_ACCEL,
     STATIC_GYRO,
@@ -261,13 +257,7 @@ def profile(fitted: Fit) -> float:
 
     Marginal likelihoods over everything differ by the flat prior of the new parameters; theirs is left out.
     """
-    first, last = N_ACCEL + N_GYRO, N_ACCEL + N_GYRO + N_HOLD * fitted.line.obs.n_holds
-    hidden = fitted.jacobian[:, first:last] / fitted.scale[first:last]
-    normal = hidden.T @ hidden
-    normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE
-    log_det = 2.0 * float(np.log(np.diag(np.linalg.cholesky(normal))).sum())
-    log_det += 2.0 * float(np.log(fitted.scale[first:last]).sum())
-    return -0.5 * fitted.chi2 - 0.5 * log_det + fitted.system.log_weight
+    return fitted.log_profile
 
 
 def excess(fitted: Fit) -> float:

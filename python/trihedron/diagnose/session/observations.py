@@ -30,6 +30,7 @@ class Observations:
     their stamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
     ``unresolved`` maps a move's two holds to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
     by motion faster than the samples.
+    ``is_scatter_free`` lets zeros scatter from hold to hold beside their walk, as far as the evidence goes.
     The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
     """
 
@@ -55,6 +56,7 @@ class Observations:
     unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
     moves_inflation: float = 1.0
     dynamics_inflation: float = 1.0
+    is_scatter_free: bool = False
 
     @property
     def n_holds(self) -> int:
