@@ -21,6 +21,7 @@ from trihedron.cli.demo import demo
 from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
 from trihedron.cli.kalman import kalman
+from trihedron.cli.plan import plan
 from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
 from trihedron.cli.verify import verify
@@ -28,6 +29,7 @@ from trihedron.cli.verify import verify
 # In the order in which they are used.
 COMMANDS = (
     demo,
+    plan,
     check,
     segment,
     calibrate,
