@@ -22,7 +22,7 @@ FEWEST = 4
 CHANCE = 1e-3
 """Long steps, and chance of so many more of them than of short ones, below which nothing is said. A jolt or a bend
 lengthens as often as it shortens: 17 real sessions show 5 to 121 long steps, 5 to 124 short ones, the most uneven 27 to
-11; healthy simulated ones (three grades, 50 to 400 Hz, moves of 0.3 to 2 s) hardly any of either. None of them is named."""
+11; healthy simulated ones (three grades, 50 to 400 Hz, moves of 0.3 to 2 s) hardly any. None is named."""
 SERIOUS_SHARE = 0.002
 """Share of turning steps lost above which a scale factor, short by as much, is beyond its error bars of usual size."""
 
