@@ -1,0 +1,72 @@
+"""What the zeros of one session show, per sensor: asked by several effects, computed once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.zeros.evidence import FEWEST_POSES, ZeroEvidence, examine
+from trihedron.diagnose.zeros.readings import SessionZeros, accel_zeros, gyro_zeros
+from trihedron.records.diagnosis import EffectParameter
+
+FEWEST_FOR_SIZE = 6
+"""Poses from which the size of the gyro's scatter is told at all."""
+FEWEST_NORM_POSES = FEWEST_POSES
+"""|f| is one number a pose and nine of them are spent on S and b: below this nothing is said of the accelerometer."""
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class SessionEvidence:
+    """Zeros of one sensor with their tests."""
+
+    zeros: SessionZeros
+    evidence: ZeroEvidence
+
+
+@lru_cache(maxsize=4)
+def gyro_evidence(context: Context) -> SessionEvidence | None:
+    """Tests of the gyro's zeros; ``None`` without a gyro or with fewer than six poses."""
+    if context.obs.n_holds < FEWEST_FOR_SIZE:
+        return None
+    zeros = gyro_zeros(context)
+    if zeros is None or zeros.readings.n_poses < FEWEST_FOR_SIZE:
+        return None
+    found = examine(zeros.readings, list(zeros.thermal), list(zeros.gravity))
+    return SessionEvidence(zeros, found)
+
+
+@lru_cache(maxsize=4)
+def accel_evidence(context: Context) -> SessionEvidence | None:
+    """Tests of the accelerometer's zeros, as its poses' lengths show them; ``None`` with fewer than 15 poses."""
+    if context.obs.n_holds < FEWEST_NORM_POSES:
+        return None
+    zeros = accel_zeros(context)
+    if zeros is None or zeros.readings.n_poses < FEWEST_NORM_POSES:
+        return None
+    return SessionEvidence(zeros, examine(zeros.readings, list(zeros.thermal), None, is_norm=True))
+
+
+def scatter_parameters(found: SessionEvidence, unit: str) -> tuple[EffectParameter, ...]:
+    """Size of the scatter, per axis of a gyro, one of an accelerometer."""
+    sizes, errors = found.evidence.scatter, found.evidence.scatter_std
+    names = ("sigma",) if len(sizes) == 1 else tuple(f"sigma_{axis}" for axis in AXES)
+    return tuple(
+        EffectParameter(name, float(size), float(error), unit)
+        for name, size, error in zip(names, sizes, errors, strict=True)
+    )
+
+
+def with_gyro_scatter(obs: Observations, sigma: FloatArray, si_per_raw: FloatArray) -> Observations:
+    """Means of rates at rest as uncertain as zeros that scatter by ``sigma`` (3,) rad/s make them."""
+    assert obs.hold_rate_sigma is not None
+    return replace(obs, hold_rate_sigma=np.hypot(obs.hold_rate_sigma, sigma / si_per_raw))
+
+
+def with_accel_scatter(obs: Observations, sigma: float, si_per_raw: FloatArray) -> Observations:
+    """Means of forces at rest as uncertain as zeros that scatter by ``sigma`` m/s² per axis make them."""
+    return replace(obs, hold_force_sigma=np.hypot(obs.hold_force_sigma, sigma / si_per_raw))
