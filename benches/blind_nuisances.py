@@ -30,8 +30,8 @@ from nuisance_trial.draw import ALLOWED_BESIDE, ALSO_RIGHT, FLAWS, G, draw
 
 
 def trial(job):
-    flaw, seed, size, nuisances, flicker = job
-    columns, answer = draw(flaw, seed, size, nuisances, flicker)
+    flaw, seed, size, nuisances, flicker, without = job
+    columns, answer = draw(flaw, seed, size, nuisances, flicker, without)
     with tempfile.TemporaryDirectory() as folder:
         log, seal = Path(folder) / "log.csv", Path(folder) / "answer.json"
         pl.DataFrame(columns).write_csv(log)
@@ -110,6 +110,7 @@ def main():
     parser.add_argument("--seed", type=int, default=11)
     parser.add_argument("--size", type=float, default=1.0)
     parser.add_argument("--clean", action="store_true", help="no nuisances")
+    parser.add_argument("--without", action="append", default=[], help="leave this nuisance out, all else the same")
     parser.add_argument("--flicker", action="store_true", help="1/f noise as consumer parts have it (0.3 mg, 20 deg/h)")
     parser.add_argument("--only", action="append", choices=FLAWS)
     parser.add_argument("--only-seed", type=int)
@@ -122,7 +123,7 @@ def main():
             if not options.only or flaw in options.only:
                 seed = options.seed * 100_000 + k * 100 + i
                 if options.only_seed in (None, seed):
-                    jobs.append((flaw, seed, options.size, not options.clean, options.flicker))
+                    jobs.append((flaw, seed, options.size, not options.clean, options.flicker, options.without))
     results = []
     with ProcessPoolExecutor(options.jobs) as pool:
         for r in pool.map(trial, jobs) if options.jobs > 1 else map(trial, jobs):

@@ -70,8 +70,22 @@ def test_the_manuals_eight_half_turns_in_counts_are_recognised_with_a_nominal_sc
     found, findings = calibrate_turns(recording, turns, zeros, nominal_scale=1.03e-3)
     assert not findings
     assert np.abs(z_scores(found, truth)).max() < 4.0
-    alone, _ = calibrate_turns(recording, turns, zeros)
-    np.testing.assert_allclose(alone.S, found.S, rtol=1e-9)
+    # The angles stated instead: the same answer, whatever nominal scale is claimed beside them.
+    stated = [
+        replace(turn, axis=axis, angle_rad=angle * DEG)
+        for turn, axis, angle in zip(turns, np.repeat((2, 0, 1), 6), (90, -90, 360, -360, 1440, -1440) * 3, strict=True)
+    ]
+    said, _ = calibrate_turns(recording, stated, zeros, nominal_scale=2.2e-3)
+    np.testing.assert_allclose(said.S, found.S, rtol=1e-9)
+
+
+@pytest.mark.parametrize("turn_deg", [90.0, 180.0, 360.0])
+def test_turns_of_unknown_size_in_counts_are_a_question_not_a_common_divisor(turn_deg):
+    gyroscope = Gyroscope(S=tuple(map(tuple, np.array(SCALE) * 1e-3)), b=BIAS, unit="counts")
+    recording, truth = simulate(Scenario(motion=table_turns(turns_deg=(turn_deg, -turn_deg)), gyroscope=gyroscope), 3)
+    turns, zeros = turns_from_segments(segments_from_truth(recording, truth))
+    with pytest.raises(ValueError, match="90, 180 or 360°"):
+        calibrate_turns(recording, turns, zeros)
 
 
 @pytest.mark.parametrize("error_deg", [2.0, 5.0])

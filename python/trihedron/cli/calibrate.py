@@ -36,7 +36,8 @@ def calibrate(
     turns: Annotated[
         Optional[str],  # noqa: UP045
         typer.Option(
-            metavar="LIST", help="With --method faces: angle of each turn in degrees, '90,-90,360'; 0 leaves one out."
+            metavar="LIST",
+            help="Angle of each turn on a table in degrees, '90,-90,360', in any pose; 0 leaves one out.",
         ),
     ] = None,
     axis_signs: Annotated[

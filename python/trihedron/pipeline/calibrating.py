@@ -13,14 +13,23 @@ from scipy import stats
 
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm
 from trihedron.estimate.accelerometer.face_poses import identify
-from trihedron.estimate.gyroscope import MoveOptions, Turn, calibrate_moves, calibrate_turns
+from trihedron.estimate.gyroscope import (
+    MoveOptions,
+    Turn,
+    calibrate_moves,
+    calibrate_turns,
+    scale_by_gravity,
+    stated_turns,
+)
 from trihedron.estimate.gyroscope.findings import scale_findings
+from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import Progress, segment
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.sensor_model import in_frame
+from trihedron.units import rate_to_si
 
 Method = Literal["joint", "separate", "faces"]
 METHODS: tuple[Method, ...] = get_args(Method)
@@ -68,8 +77,9 @@ def calibrate(
     faces : sequence of ±1, ±2, ±3 or 0
         Method 1: the axis of the case that points up in every still pose; 0 leaves a pose out.
     turns_deg : sequence of float
-        Method 1: the angle of every turn between poses on the same face, about the axis that points up; 0 leaves a turn
-        out. Multiples of 90° are recognised when nothing is said.
+        The angle of every turn on a table, about the axis that points up; 0 leaves a turn out. Method 1: of the turns
+        between poses on the same face, where multiples of 90° are recognised when nothing is said and the scale is
+        known. Method 2: of the turns between poses of the same tilt, in any pose; the gyro is then calibrated by them.
     axis_signs : three of ±1
         Method 2: the sign with which each raw axis follows its axis of Mz, by the board's documentation.
     loss : "linear", "huber", "soft_l1" or "cauchy"
@@ -91,11 +101,13 @@ def calibrate(
         calibration = _by_faces(recording, segments, gravity, source, faces, turns_deg, gyroscope_nominal)
         wanted: Frame = frame or "case"
     else:
-        if faces is not None or turns_deg is not None:
-            raise ValueError(f"faces and turns belong to method 1: say --method faces, or leave them out of {method}.")
+        if faces is not None:
+            raise ValueError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
         wanted = frame or "lower"
         options = MoveOptions(nominal_scale=gyroscope_nominal)
-        calibration = _by_poses(recording, segments, gravity, source, method, wanted, axis_signs, loss, options)
+        calibration = _by_poses(
+            recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
+        )
     calibration = in_frame(calibration, wanted)
     scale = [] if calibration.gyroscope is None else scale_findings(calibration.gyroscope.S, recording.gyroscope_unit)
     findings = (*said, *recording.findings, *segments.findings, *calibration.findings, *scale)
@@ -130,6 +142,7 @@ def _by_poses(
     axis_signs: Sequence[int] | None,
     loss: Loss,
     options: MoveOptions,
+    turns_deg: Sequence[float] | None,
 ) -> Calibration:
     assert segments.accelerometer_mean is not None
     assert segments.accelerometer_sigma_mean is not None
@@ -145,6 +158,9 @@ def _by_poses(
     alone = _alone(accelerometer, found, frame, gravity, source, recording)
     if recording.gyroscope is None:
         return alone
+    if turns_deg is not None:
+        turns = stated_turns(recording, segments, accelerometer, gravity, turns_deg)
+        return _together(alone, *calibrate_turns(recording, turns, _zero_turns(segments)))
     try:
         # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's error bars.
         if method == "joint" and alone.is_trustworthy:
@@ -209,14 +225,25 @@ def _by_faces(
     if recording.gyroscope is None:
         return alone
     turns = _turns_on_faces(segments, up, turns_deg)
-    zeros = [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2]
+    scale: float | np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None = nominal
+    tolerance = SCALE_TOLERANCE
+    if nominal is None and turns_deg is None and rate_to_si(recording.gyroscope_unit) is None:
+        by_gravity = scale_by_gravity(recording, segments, accelerometer, gravity)
+        if by_gravity is not None:
+            scale, tolerance = by_gravity.S, by_gravity.tolerance
     try:
-        gyroscope, more = calibrate_turns(recording, turns, zeros, nominal_scale=nominal)
+        gyroscope, more = calibrate_turns(
+            recording, turns, _zero_turns(segments), nominal_scale=scale, nominal_tolerance=tolerance
+        )
     except ValueError as error:
         if turns_deg is not None:
             raise
         return _without_gyroscope(alone, str(error))
     return _together(alone, gyroscope, more)
+
+
+def _zero_turns(segments: Segments) -> list[tuple[int, int]]:
+    return [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2]
 
 
 def _turns_on_faces(
@@ -273,11 +300,22 @@ def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) ->
 
 
 def _without_gyroscope(alone: Calibration, why: str) -> Calibration:
-    finding = Finding(
-        FindingCode.GYROSCOPE_LEFT_OUT,
-        Severity.WARNING,
-        f"The gyro was not calibrated: {why.rstrip('.')}.",
-        "The recording does not hold what the gyro needs.",
-        "Turn the sensor about all three axes between still poses; docs/procedure.md shows how.",
-    )
+    if why == AMBIGUOUS:
+        finding = Finding(
+            FindingCode.TURN_ANGLE_UNKNOWN,
+            Severity.SERIOUS,
+            "The gyro was not calibrated: its readings are counts, and its turns would fit 90°, 180° and 360° alike. "
+            "90, 180 or 360°? say --turns",
+            "Nothing in the log tells the gyro's scale: no unit, no nominal scale, and no moves that turn gravity well "
+            "enough to exclude half and twice.",
+            "Say --turns 180,-180,... (one angle a turn, 0 leaves it out), or --gyro-nominal.",
+        )
+    else:
+        finding = Finding(
+            FindingCode.GYROSCOPE_LEFT_OUT,
+            Severity.WARNING,
+            f"The gyro was not calibrated: {why.rstrip('.')}.",
+            "The recording does not hold what the gyro needs.",
+            "Turn the sensor about all three axes between still poses; docs/procedure.md shows how.",
+        )
     return replace(alone, findings=(*alone.findings, finding))

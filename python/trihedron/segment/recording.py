@@ -14,6 +14,8 @@ from trihedron.segment.judge import judge_log, judge_runs
 from trihedron.segment.means import average_holds
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.runs import (
+    MIN_HOLD_S,
+    SWAY_RAD,
     Run,
     close_gaps,
     find_unsteady,
@@ -24,9 +26,14 @@ from trihedron.segment.runs import (
     turning_blocks,
     widen,
 )
+from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks
+from trihedron.segment.turn_scale import centre_of, radians_per_reading
 from trihedron.units import AccelerationUnit
 
 Progress = Callable[[float, str], None]
+
+LONG_S = 4.0
+"""A quiet stretch this long has a middle that still shows noise over seconds."""
 
 
 def segment_recording(recording: Recording, *, progress: Progress | None = None) -> Segments:
@@ -58,8 +65,20 @@ def segment_recording(recording: Recording, *, progress: Progress | None = None)
         return _nothing_found(recording, channels)
     report(0.4, "still stretches")
     quiet = widen(close_gaps(activity.is_quiet, channels.is_valid), channels.is_valid)
-    turning = turning_blocks(channels, quiet, _gravity_reading(recording, channels))
-    quiet &= ~turning
+    gravity = _gravity_reading(recording, channels)
+    if gravity is None:
+        turning = turning_blocks(channels, quiet, None, None)
+        quiet &= ~turning
+    else:
+        is_counts = recording.accelerometer_unit is AccelerationUnit.COUNTS
+        centre = centre_of(is_counts, channels, quiet)
+        scale = radians_per_reading(recording, channels, ranges_of(quiet), centre)
+        turning = turning_blocks(channels, quiet, gravity, scale)
+        quiet &= ~turning
+        drifting = drifting_blocks(channels, quiet, ranges_of(quiet), centre, activity.white_variance)
+        quiet = cut_slow_motion(
+            channels, quiet, ranges_of(quiet), drifting, SWAY_RAD * gravity, channels.blocks(MIN_HOLD_S)
+        )
     loose = loose_blocks(activity, channels.is_valid) & ~turning
     runs = _find_runs(recording, channels, quiet, loose)
     report(0.7, "means and their errors")
@@ -70,7 +89,10 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
     seen = [r for r in ranges_of(quiet) if r[1] - r[0] >= WINDOW_BLOCKS] or ranges_of(quiet)
     if not seen:
         return []
-    noise = pool_mean_noise(channels, seen, is_robust=True)
+    # The ends of soft moves reach into the stretches: what is to be found there may not be taken for noise.
+    long = channels.blocks(LONG_S)
+    core = [(a + (b - a) // 4, b - (b - a) // 4) if b - a >= long else (a, b) for a, b in seen]
+    noise = pool_mean_noise(channels, core, is_robust=True)
     steady = [trim_edges(channels, run, noise) for run in join_quiet(channels, quiet, loose, noise)]
     unsteady = find_unsteady(channels, loose, steady, _gravity_reading(recording, channels))
     return sorted([*steady, *unsteady], key=lambda run: run.first)

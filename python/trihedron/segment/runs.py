@@ -25,6 +25,9 @@ SAME_POSE = 1e-3
 """Chance that two stretches of one pose are called two poses."""
 SWAY_RAD = 0.02
 """About one degree, the tremor and sway of a hand that tries to hold still: an unsteady hold keeps within it."""
+ONE_WAY = 0.5
+"""Share of a hand's mean square rate above which its mean makes it a turn: all of it in a slow move, next to nothing in
+a tremor of several swings."""
 TURN_SIGMAS = 6.0
 """A quiet gyro that reads further than this from the common zero, in robust standard deviations, is turning."""
 
@@ -92,12 +95,15 @@ def widen(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
     return out
 
 
-def turning_blocks(channels: Channels, quiet: BoolArray, gravity: float | None) -> BoolArray:
+def turning_blocks(
+    channels: Channels, quiet: BoolArray, gravity: float | None, radians_per_reading: float | None
+) -> BoolArray:
     """Quiet blocks in which the gyro reads far from its common zero: a slow steady turn, gravity says nothing of.
 
     The zero is where the windows of one second are densest, for turns may take most of the time; its scatter is theirs,
     or that of the holds' nearest windows where that is larger: a zero that depends on the pose is no turn. Where the
-    accelerometer sees the tilt too, and it stays within ``SWAY_RAD``, the hold creeps and remains a hold.
+    accelerometer sees the tilt too, and the whole turn stays within ``SWAY_RAD`` by both sensors, the hold creeps and
+    remains a hold: a table that leans a little shows as small a tilt, but the gyro tells how far it turns.
     """
     out = np.zeros(len(quiet), dtype=bool)
     gyro = np.flatnonzero(channels.is_gyroscope)
@@ -130,6 +136,10 @@ def turning_blocks(channels: Channels, quiet: BoolArray, gravity: float | None) 
         if not len(flagged):
             continue
         is_slow = bool((np.abs(second[flagged] - zero).max(axis=0) < CREEP_PART * top).all())
+        if radians_per_reading is not None:
+            # Within a factor of two, which is what is known of the scale.
+            turned = (reading[flagged] - zero).sum(axis=0) * channels.step_s * radians_per_reading
+            is_slow = is_slow and float(np.linalg.norm(turned)) < 2.0 * SWAY_RAD
         if gravity is not None and is_slow and _tilts_a_little(channels, flagged[0], flagged[-1] + 1, gravity):
             out[a:b] = False
         for first, last in ranges_of(out[a:b]):
@@ -254,11 +264,18 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
             b += 1
         free[a:b] = False
     attitude = channels.mean[:, accelerometer] / gravity
+    zero = (
+        np.median(np.vstack([channels.mean[a:b] for run in steady for a, b in run.quiet_ranges()]), axis=0)
+        if (steady)
+        else None
+    )
     shortest, bump = channels.blocks(MIN_HOLD_S), channels.blocks(BUMP_S)
     found: list[Run] = []
     for first, last in ranges_of(free):
         run = Run(first, last, (), True)
         if last - first < shortest or _sway(attitude, [run]) > SWAY_RAD:
+            continue
+        if zero is not None and _turns_on(channels, first, last, zero):
             continue
         if any(
             max(first - near.last, near.first - last) < bump and _sway(attitude, [near, run]) < SWAY_RAD
@@ -271,6 +288,16 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
             run = Run(before.first, last, (*before.bumps, (before.last, first)), True)
         found.append(run)
     return found
+
+
+def _turns_on(channels: Channels, first: int, last: int, zero: FloatArray) -> bool:
+    """The gyro turns one way throughout: a slow move, where a hand that tries to hold still goes to and fro."""
+    gyro = channels.is_gyroscope
+    if not gyro.any():
+        return False
+    rate = channels.mean[first:last][:, gyro] - zero[gyro]
+    rate = rate[channels.is_valid[first:last]]
+    return len(rate) > 0 and float(np.sum(rate.mean(axis=0) ** 2)) > ONE_WAY * float(np.mean(np.sum(rate**2, axis=1)))
 
 
 def _sway(attitude: FloatArray, runs: list[Run]) -> float:

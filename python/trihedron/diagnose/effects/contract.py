@@ -6,7 +6,7 @@ To add one: write a file in this folder with a subclass of :class:`Effect` and n
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.twin import Distortion
-from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.diagnosis import Domain, EffectParameter
 
 AXES = ("x", "y", "z")
 SHAPE_NAMES = ("time_constant", "half_width", "pose")
@@ -48,6 +48,12 @@ class Effect(ABC):
     repeatable: ClassVar[bool] = False
     """Whether it may be accepted more than once (another pose, another line)."""
 
+    precedence: ClassVar[int] = 0
+    """Among effects with evidence of their own the lowest is settled first: what spoils every other look at the samples
+    (a range that ends) before the others."""
+    accounts_for: ClassVar[tuple[Domain, ...]] = ()
+    """Domains of samples whose disagreement is this effect itself, seen from another side."""
+
     is_of_session: ClassVar[bool] = False
     """Whether it belongs to one experiment (a pushed pose, a tilted table) and to no instrument."""
     is_local: ClassVar[bool] = False
@@ -64,6 +70,19 @@ class Effect(ABC):
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:  # noqa: ARG002
         """The same variant at another value of its one shape number; ``None`` where the shape is not continuous."""
         return None
+
+    def made_again(self, context: Context, variant: Variant) -> Variant | None:
+        """The same variant on other observations (samples put back or taken out); ``None`` where it does not exist."""
+        same = [v for v in self.variants(context) if v.label == variant.label and v.names == variant.names]
+        if not same:
+            return None
+        if len(variant.shape) == 1:
+            name, (value, unit) = next(iter(variant.shape.items()))
+            again = self.reshaped(context, same[0], value)
+            if again is not None:
+                return replace(again, shape={name: (value, unit)}, shape_sigma=variant.shape_sigma)
+            same = [v for v in same if v.shape == variant.shape]
+        return same[0] if same else None
 
     def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
         """Whether the fitted parameters are ones that the mechanism can have."""

@@ -25,6 +25,8 @@ class Evidence:
     ``p_value`` before payment for the search over effects; ``held_out`` the effect's own before/after on data its
     parameters were not fitted to; ``variant`` columns that join the model, or None; ``reweigh`` changes what the
     observations claim (noise, excluded moves), or None; ``strength`` is the gain in 2 log-likelihood, for ranking.
+    ``touched`` are the moves whose readings ``reweigh`` changes, ``None`` for all: there the change must help.
+    ``share`` is the part of its domain's misfit that it explains, where that is not a matter of poses and moves.
     ``restate`` gives the parameters once more from the twin that was fitted with the evidence taken into account.
     """
 
@@ -39,6 +41,8 @@ class Evidence:
     reweigh: Callable[[Observations], Observations] | None = None
     confounded_with: tuple[str, ...] = ()
     restate: Callable[[Context], tuple[EffectParameter, ...]] | None = None
+    share: float | None = None
+    touched: tuple[int, ...] | None = None
 
 
 class DirectEffect(Effect):

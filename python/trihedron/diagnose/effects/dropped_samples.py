@@ -147,5 +147,5 @@ class DroppedSamples(DirectEffect):
         p = float(np.clip(np.exp(-0.5 * weakest) * n_intervals * 60, 1e-300, 1.0))
         return Evidence(
             p, gain, parameters, f"Samples are missing though the time stamps run on: {places}{more}.", "timing", where,
-            reweigh=reweigh,
+            reweigh=reweigh, touched=tuple(sorted({loss.move for loss in losses})),
         )  # fmt: skip

@@ -50,5 +50,5 @@ class PeriodicInterference(DirectEffect):
             strongest.p_value, float(-2 * np.log(strongest.p_value)), tuple(parameters),
             f"A line at {strongest.frequency_hz:.3f} Hz stands in {', '.join(line.channel for line in same)} while the "
             "sensor is still.",
-            "within-static", where, (held,),
+            "within-static", where, (held,), share=min(max(line.share for line in same), 1.0),
         )  # fmt: skip

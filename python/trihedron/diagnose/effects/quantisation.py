@@ -153,6 +153,7 @@ class Quantisation(DirectEffect):
 
         worst = max(found, key=lambda one: one.step / one.sigma)
         strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_holds)
+        grid = worst.step**2 / 12.0  # variance of the staircase, beside that of the noise in front of it
         names = tuple(CHANNELS[one.channel] for one in found)
         what = (
             f"do not move within {worst.dead:.4g} raw units of zero"
@@ -162,7 +163,7 @@ class Quantisation(DirectEffect):
         return Evidence(
             1e-300, strength, tuple(parameters),
             f"Readings of {', '.join(names)} {what}: averaging does not resolve between steps.",
-            "within-static", Where(names), reweigh=reweigh,
+            "within-static", Where(names), reweigh=reweigh, share=grid / (grid + worst.sigma**2),
         )  # fmt: skip
 
     def _channel(self, obs: Observations, c: int) -> Lattice | None:

@@ -152,6 +152,7 @@ def _rails(
 class _Saturation(DirectEffect):
     sensor: ClassVar[str]
     is_proof = True
+    precedence = -1
     experiment = "repeat the moves more slowly, or choose a wider range"
 
     def find(self, context: Context) -> Evidence | None:

@@ -14,6 +14,7 @@ class VibrationRectification(Effect):
     id = "vibration-rectification"
     mechanism = "bias follows the power of vibration"
     experiment = "hold one pose with the vibration on and off"
+    accounts_for = ("within-static",)  # the shaking that it follows
 
     def unavailable(self, context: Context) -> str | None:
         power = context.hold_power("accelerometer").sum(axis=1)

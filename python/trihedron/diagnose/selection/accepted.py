@@ -7,40 +7,51 @@ from types import MappingProxyType
 import numpy as np
 
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.selection.model import Found, GrowingModel
+from trihedron.diagnose.selection.compare import excess
+from trihedron.diagnose.selection.model import Accepted, StepwiseModel
 from trihedron.records.diagnosis import AcceptedEffect, EffectParameter
 
 
-def worded(model: GrowingModel) -> tuple[AcceptedEffect, ...]:
+def accepted_effects(model: StepwiseModel) -> tuple[AcceptedEffect, ...]:
+    """Every accepted effect with its parameters, the one that explains most of the misfit first."""
     covariance = model.fitted.covariance()
     n = model.fitted.n_effect
     effect_cov = covariance[len(covariance) - n :, len(covariance) - n :]
     first = 0
-    spans: dict[int, slice] = {}
-    for k, found in enumerate(model.found):
-        if found.variant is not None:
-            k_parameters = found.variant.distortion.n_parameters
-            spans[k] = slice(first, first + k_parameters)
-            first += k_parameters
     out = []
-    for k, found in enumerate(model.found):
-        values = model.fitted.twin.effect[spans[k]] if k in spans else np.zeros(0)
-        cov = effect_cov[spans[k], spans[k]] if k in spans else np.zeros((0, 0))
+    for found, share in zip(model.accepted, shares(model), strict=True):
+        k = 0 if found.variant is None else found.variant.distortion.n_parameters
+        span = slice(first, first + k)
+        first += k
+        values, cov = model.fitted.twin.effect[span], effect_cov[span, span]
         if found.evidence is not None:
-            parameters = found.evidence.parameters
-            statement = found.evidence.statement
+            parameters, statement = found.evidence.parameters, found.evidence.statement
         else:
             assert found.variant is not None
             parameters = found.effect.parameters(found.variant, values, cov)
             statement = found.effect.statement(parameters)
-        out.append((found, values, parameters, statement))
-    # What the recording gains most by comes first; a range that ends is no matter of degree.
-    out.sort(key=lambda item: ("saturation" not in item[0].effect.id, -item[0].delta_bic))
-    return tuple(_accepted(*item) for item in out)
+        out.append((share, _accepted(found, values, parameters, statement)))
+    return tuple(one for _, one in sorted(out, key=lambda pair: -pair[0]))
+
+
+def shares(model: StepwiseModel) -> tuple[float, ...]:
+    """Part of the misfit that each accepted effect explains: its gain over all gains and what is left unexplained.
+
+    An effect that is not a matter of poses and moves (a line in the samples, one bumped pose) states its own share.
+    """
+    gains = [0.0 if _stated(one) is not None else max(one.gain, 0.0) for one in model.accepted]
+    whole = max(sum(gains) + excess(model.fitted), 1e-9)
+    return tuple(
+        gain / whole if (own := _stated(one)) is None else own for one, gain in zip(model.accepted, gains, strict=True)
+    )
+
+
+def _stated(one: Accepted) -> float | None:
+    return None if one.evidence is None else one.evidence.share
 
 
 def _accepted(
-    found: Found, values: np.ndarray, parameters: tuple[EffectParameter, ...], statement: str
+    found: Accepted, values: np.ndarray, parameters: tuple[EffectParameter, ...], statement: str
 ) -> AcceptedEffect:
     shape = {} if found.variant is None else {name: v for name, (v, _) in found.variant.shape.items()}
     by_id = {effect.id: effect for effect in catalogue()}

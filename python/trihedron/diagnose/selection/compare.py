@@ -1,208 +1,226 @@
-"""Effects compete: score test, joint refit, blocked cross-validation; one is added at a time (eq. 8.7-8.10)."""
+"""Two models of one session compared: information criterion, held-out prediction, and that in physical units."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from scipy.special import chdtrc
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects import Effect, catalogue
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
+from trihedron.diagnose.selection.model import StepwiseModel, held_out
+from trihedron.diagnose.selection.score import Scored, dispersion
 from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import (
     N_DOMAINS,
+    RELATIVE_RIDGE,
     Fit,
     Prediction,
     extend,
-    folds_of,
     held_out_gain,
     leverage,
-    predict_held_out,
     reduce,
     score,
 )
-from trihedron.diagnose.session.twin import PRIOR, Distortion, stacked
+from trihedron.diagnose.session.twin import (
+    DYNAMICS,
+    MOVES,
+    N_ACCEL,
+    N_GYRO,
+    N_HOLD,
+    PRIOR,
+    STATIC_ACCEL,
+    STATIC_GYRO,
+    Distortion,
+    stacked,
+)
+from trihedron.records.diagnosis import HeldOut
 
-MAX_EFFECTS = 4
-"""Effects accepted at most: a recording of one session does not carry evidence for more."""
 VISIBLE = 0.98
 """An effect must lower the held-out misfit of some domain by at least this factor to be worth a name."""
-MIN_DELTA_BIC = 10.0
-"""Kass and Raftery's bound for very strong evidence."""
-CONFOUNDED_DELTA_BIC = 6.0
-"""Below a difference of 6 (strong evidence) two explanations are named together."""
+OF_ACCELEROMETER = (STATIC_ACCEL, DYNAMICS)
+OF_GYROSCOPE = (STATIC_GYRO, MOVES, DYNAMICS)
+"""Domains in which a flaw of one sensor must show: velocity needs both, a tilted force being half of it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Scored:
-    """One candidate's best variant under the score test."""
-
-    effect: Effect
-    variant: Variant
-    gain: float
-    rank: int
-    p_value: float
-    merit: float
-    merits: tuple[float, ...] = ()
+def own_domains(distortion: Distortion) -> tuple[int, ...]:
+    """Row domains of the sensors that an effect adds to."""
+    own: tuple[int, ...] = ()
+    if distortion.force is not None:
+        own += OF_ACCELEROMETER
+    if distortion.rate is not None:
+        own += OF_GYROSCOPE
+    return tuple(dict.fromkeys(own))
 
 
-def mends(before: Prediction, after: Prediction) -> bool:
-    """Whether readings that were changed (samples put back, stamps made even) are predicted better when held out."""
+def mends(
+    before_fit: Fit, before: Prediction, after_fit: Fit, after: Prediction, touched: tuple[int, ...] | None = None
+) -> bool:
+    """Whether readings that were changed (samples put back, stamps made even) are predicted better when held out.
+
+    Where only some moves were ``touched``, gravity and rest after those very moves must say so, in the dispersion that
+    the others have: a jolt that looks like a loss leaves them as they were.
+    """
     stays = np.maximum(after.per_row, 1.0)
     gain = float(((before.per_row - after.per_row) * after.n_rows / stays).sum())
-    return gain > 0.0 and bool((after.per_row < VISIBLE * before.per_row).any())
+    if gain <= 0.0 or not (after.per_row < VISIBLE * before.per_row).any():
+        return False
+    if touched is None:
+        return True
+    (there, others), (there_after, _) = (
+        _of_moves(fitted, prediction, touched) for fitted, prediction in ((before_fit, before), (after_fit, after))
+    )
+    usual = max(float(np.mean(others)) if len(others) else 1.0, 1.0)
+    fall = float(there.sum() - there_after.sum())
+    return fall > MIN_FALL * usual and float(there_after.mean()) < MUST_HALVE * float(there.mean())
 
 
-def dispersion(residual: FloatArray, fitted: Fit, used: FloatArray) -> FloatArray:
-    """(domains,) how far each domain's misfit exceeds its noise, at least 1."""
-    out = np.ones(N_DOMAINS)
-    for d in range(N_DOMAINS):
-        rows = fitted.system.domain == d
-        dof = float((1.0 - used[rows]).sum())
-        if dof >= 1.0:
-            out[d] = max(1.0, float((residual[rows] ** 2).sum()) / dof)
-    return out
+MIN_FALL = 15.0
+"""Chi-square that moves must gain by samples put back: as one of two numbers (place and count) paid for by a search."""
+MUST_HALVE = 0.5
+"""Share of the misfit of such moves that may stay: a loss explains its move, a jolt does not."""
 
 
-def score_all(context: Context, exclude: set[str]) -> tuple[list[Scored], list[tuple[str, str]]]:
-    """Score test of every applicable effect; the gain is judged against what remains after it.
-
-    Returns the scored candidates, best first, and ``(id, reason)`` of those that do not apply.
-    """
-    fitted = context.fitted
-    reduced = reduce(fitted)
-    used = leverage(fitted)
-    residual = fitted.system.residual
-    n_rows = int((fitted.system.domain != PRIOR).sum())
-    out, missing = [], []
-    for effect in catalogue():
-        if effect.id in exclude:
-            continue
-        reason = effect.unavailable(context)
-        if reason is not None:
-            missing.append((effect.id, reason))
-            continue
-        best: Scored | None = None
-        merits: list[float] = []
-        variants = effect.variants(context)
-        if not variants:
-            continue  # judged by its own evidence
-        for variant in variants:
-            columns = fitted.line.columns(variant.distortion)
-            result = score(reduced, columns)
-            if result.rank == 0:
-                continue
-            after = residual + reduced.project(columns) @ result.estimate
-            scale = dispersion(after, fitted, used)
-            gain = 0.0
-            for d in range(N_DOMAINS):
-                rows = fitted.system.domain == d
-                gain += float((residual[rows] ** 2).sum() - (after[rows] ** 2).sum()) / scale[d]
-            prior_rows = fitted.system.domain == PRIOR
-            gain += float((residual[prior_rows] ** 2).sum() - (after[prior_rows] ** 2).sum())
-            gain = max(gain, 0.0)
-            n_shape = len(variant.shape)
-            merit = gain - np.log(n_rows) * (result.rank + n_shape) - 2.0 * np.log(len(variants))
-            merits.append(float(merit))
-            p = min(1.0, float(chdtrc(result.rank, gain)) * len(variants))
-            scored = Scored(effect, variant, gain, result.rank, p, merit)
-            if best is None or merit > best.merit:
-                best = scored
-        if best is None:
-            missing.append((effect.id, "the calibration itself imitates it in this recording"))
-        else:
-            out.append(replace(best, merits=tuple(merits)))
-    out.sort(key=lambda s: -s.merit)
-    return out, missing
+def _of_moves(fitted: Fit, prediction: Prediction, moves: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+    """Squared held-out residuals of the rows of some moves, and those of all other moves."""
+    system = fitted.system
+    rows = np.isin(system.domain, (MOVES, DYNAMICS)) & (system.walk == 0)
+    named = np.isin(system.segment, moves)
+    squared = prediction.residual**2
+    return squared[rows & named], squared[rows & ~named]
 
 
 @dataclass(frozen=True, eq=False)
-class Refit:
-    """A candidate fitted jointly with everything accepted before."""
+class Comparison:
+    """A model with one effect (``fitted``) against the model without it (``base``), on the same observations.
 
-    scored: Scored
-    base_fit: Fit
+    ``cost`` is what the effect's parameters pay, ``n_new`` how many linear ones it has at ``first`` among the fit's.
+    """
+
+    variant: Variant
+    is_local: bool
+    base: Fit
+    base_prediction: Prediction
     fitted: Fit
-    likelihood_gain: float
-    drop: FloatArray
-    stays: FloatArray
     prediction: Prediction
-    base: Prediction
+    cost: float
+    first: int
+
+    @property
+    def n_new(self) -> int:
+        """Number of linear parameters of the effect."""
+        return self.variant.distortion.n_parameters
+
+    @cached_property
+    def likelihood_gain(self) -> float:
+        """Twice the gain in log-likelihood, the states between holds integrated out and noise tuned on either side."""
+        return 2.0 * (profile(self.fitted) - profile(self.base))
+
+    @cached_property
+    def drop(self) -> FloatArray:
+        """(domains,) how far chi-square falls."""
+        return _domain_chi2(self.base) - _domain_chi2(self.fitted)
+
+    @cached_property
+    def stays(self) -> FloatArray:
+        """(domains,) dispersion that is left: noise to the effect, which must beat that and not the sensor's alone."""
+        return dispersion(self.fitted.system.residual, self.fitted, leverage(self.fitted))
 
     @property
     def bic_gain(self) -> float:
-        """ΔBIC against what stays unexplained after this candidate."""
+        """ΔBIC against what stays unexplained with the effect."""
         return self.bic_gain_at(self.stays)
 
     def bic_gain_at(self, stays: FloatArray) -> float:
         """ΔBIC with each domain's drop of chi-square over the dispersion ``stays`` (at least 1)."""
+        return self.gain_at(stays) - self.cost
+
+    def gain_at(self, stays: FloatArray) -> float:
+        """Likelihood gain with each domain's drop of chi-square over the dispersion ``stays``."""
         return min(self.likelihood_gain, self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum()))
 
     @property
     def predicts(self) -> bool:
-        """Whether poses and moves that were held out are predicted better: on the whole, not by one block alone, and
-        visibly in some domain.
-        """
-        gain = held_out_gain(self.base, self.prediction)
-        if gain.sum() <= 0.0 or (gain.sum() - gain.max() <= 0.0 and not self.scored.effect.is_local):
-            return False
-        before, after = self.base.per_row, self.prediction.per_row
-        if (after < VISIBLE * before).any():
-            return True
-        rms_before, _ = physical_rms(self.base_fit, self.base.residual)
-        rms_after, _ = physical_rms(self.fitted, self.prediction.residual)
-        return any(rms_after[d] < VISIBLE * rms_before[d] for d in rms_after if d in rms_before)
+        """Whether poses and moves that were held out are predicted better: on the whole and not by one block alone."""
+        gain = held_out_gain(self.base_prediction, self.prediction)
+        return bool(gain.sum() > 0.0 and (gain.sum() - gain.max() > 0.0 or self.is_local))
+
+    @property
+    def falls(self) -> bool:
+        """Whether held-out rms in physical units falls visibly in a domain of the effect's own sensor."""
+        before, _ = physical_rms(self.base, self.base_prediction.innovation)
+        after, _ = physical_rms(self.fitted, self.prediction.innovation)
+        own = own_domains(self.variant.distortion)
+        return any(after[d] < VISIBLE * before[d] for d in own if d in after and d in before)
+
+    @property
+    def has_size(self) -> bool:
+        """Whether some parameter of the effect exceeds its own standard error: else nothing is known of its size."""
+        value = self.fitted.twin.effect[self.first : self.first + self.n_new]
+        return bool((np.abs(value) > np.sqrt(np.maximum(np.diag(self.covariance), 0.0))).any())
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """(n_new, n_new) covariance of the effect's linear parameters."""
+        n_effects = self.fitted.n_effect
+        whole = self.fitted.covariance()
+        first = len(whole) - n_effects + self.first
+        return whole[first : first + self.n_new, first : first + self.n_new]
+
+    @property
+    def value(self) -> FloatArray:
+        """(n_new,) the effect's linear parameters."""
+        return self.fitted.twin.effect[self.first : self.first + self.n_new]
+
+    def held_out(self) -> tuple[HeldOut, ...]:
+        """Held-out prediction per domain, that of its largest gain first."""
+        return held_out_records(self.base, self.base_prediction, self.fitted, self.prediction)
 
 
-def refit(context: Context, accepted: list[Distortion], scored: Scored, base_prediction: Prediction) -> Refit:
-    """Joint fit of a candidate: BIC and held-out prediction against the model without it."""
-    base = context.fitted
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A candidate fitted jointly with everything accepted before, and what came of it."""
+
+    scored: Scored
+    against: Comparison
+
+
+def cost_of(fitted: Fit, rank: int, n_shape: int) -> float:
+    """What parameters pay in 2 log-likelihood: Schwarz's log n each."""
+    return float(np.log(max(int((fitted.system.domain != PRIOR).sum()), 2)) * (rank + n_shape))
+
+
+def refit(model: StepwiseModel, scored: Scored) -> Refit:
+    """Joint fit of a candidate beside the accepted effects."""
+    base = model.fitted
     # The base is at its optimum and effects are small: two steps settle the sum.
-    fitted = extend(base, stacked(accepted), scored.variant.distortion)
-    n_rows = int((base.system.domain != PRIOR).sum())
-    cost = np.log(n_rows) * (scored.rank + len(scored.variant.shape))
-    # Marginal likelihoods differ by the flat prior of the new parameters; their own log-determinant is taken out so
-    # that the difference is that of the profile likelihoods with noise tuned on either side.
-    gain = 2.0 * (profile(fitted) - profile(base))
-    # What stays unexplained is noise to the candidate: it must beat that, not the sensor's noise alone.
-    stays = dispersion(fitted.system.residual, fitted, leverage(fitted))
-    drop = _domain_chi2(base) - _domain_chi2(fitted)
-    prediction = predict_held_out(fitted, folds_of(fitted), N_DOMAINS)
-    return Refit(scored, base, fitted, gain - cost, drop, stays, prediction, base_prediction)
+    fitted = extend(base, stacked(model.distortions), scored.variant.distortion)
+    cost = cost_of(base, scored.rank, len(scored.variant.shape))
+    return Refit(
+        scored,
+        Comparison(
+            scored.variant, scored.effect.is_local, base, model.prediction, fitted, held_out(fitted), cost,
+            base.n_effect,
+        ),
+    )  # fmt: skip
 
 
-def _domain_chi2(fitted: Fit) -> FloatArray:
-    squared = fitted.system.residual**2
-    return np.array([squared[fitted.system.domain == d].sum() for d in range(N_DOMAINS)])
-
-
-def profile(fitted: Fit) -> float:
-    """Marginal log-likelihood over the hidden states with the model's parameters at their optimum."""
-    from trihedron.diagnose.session.twin import N_ACCEL, N_GYRO, N_HOLD
-
-    first, last = N_ACCEL + N_GYRO, N_ACCEL + N_GYRO + N_HOLD * fitted.line.obs.n_holds
-    hidden = fitted.jacobian[:, first:last] / fitted.scale[first:last]
-    normal = hidden.T @ hidden
-    normal[np.diag_indices_from(normal)] += 1e-12
-    log_det = 2.0 * float(np.log(np.diag(np.linalg.cholesky(normal))).sum())
-    log_det += 2.0 * float(np.log(fitted.scale[first:last]).sum())
-    return -0.5 * fitted.chi2 - 0.5 * log_det + fitted.system.log_weight
-
-
-def refined(context: Context, accepted: list[Distortion], best: Refit) -> Refit:
+def refined(model: StepwiseModel, best: Refit) -> Refit:
     """The shape number at the top of the profile likelihood, with the standard error its curvature gives.
 
-    A parabola through log-spaced values around the grid's best; done twice so that a far optimum is reached.
+    A parabola through log-spaced values around the grid's best; done again so that a far optimum is reached.
     """
+    context: Context = model.context
     variant = best.scored.variant
     if len(variant.shape) != 1:
         return best
     name, (value, unit) = next(iter(variant.shape.items()))
     effect = best.scored.effect
-    spread = 0.5
+    if effect.reshaped(context, variant, value) is None:
+        return best
+    spread = WIDEST_LOG
     reduced = reduce(context.fitted)
 
     def gain(v: float) -> float:
@@ -210,8 +228,6 @@ def refined(context: Context, accepted: list[Distortion], best: Refit) -> Refit:
         assert made is not None
         return score(reduced, context.fitted.line.columns(made.distortion)).chi2
 
-    if effect.reshaped(context, variant, value) is None:
-        return best
     sigma_log = float("inf")
     for _ in range(3):
         x = np.linspace(-spread, spread, 5)
@@ -223,9 +239,68 @@ def refined(context: Context, accepted: list[Distortion], best: Refit) -> Refit:
         else:
             move = float(x[g.argmax()])
         value *= float(np.exp(move))
-        spread = float(np.clip(2.0 * sigma_log, 0.05, 0.5))
+        spread = float(np.clip(2.0 * sigma_log, NARROWEST_LOG, WIDEST_LOG))
     made = effect.reshaped(context, variant, value)
     assert made is not None
     final = replace(made, shape={name: (value, unit)}, shape_sigma=float(value * min(sigma_log, 10.0)))
-    again = refit(context, accepted, replace(best.scored, variant=final), best.base)
-    return again if again.bic_gain >= best.bic_gain else best
+    again = refit(model, replace(best.scored, variant=final))
+    return again if again.against.bic_gain >= best.against.bic_gain else best
+
+
+WIDEST_LOG, NARROWEST_LOG = 0.5, 0.05
+"""Half-width, in the logarithm of the shape, over which a parabola is laid: one grid step, and the finest worth it."""
+
+
+def _domain_chi2(fitted: Fit) -> FloatArray:
+    squared = fitted.system.residual**2
+    return np.array([squared[fitted.system.domain == d].sum() for d in range(N_DOMAINS)])
+
+
+def profile(fitted: Fit) -> float:
+    """Log-likelihood with the hidden states integrated out and the model's parameters at their optimum.
+
+    Marginal likelihoods over everything differ by the flat prior of the new parameters; theirs is left out.
+    """
+    first, last = N_ACCEL + N_GYRO, N_ACCEL + N_GYRO + N_HOLD * fitted.line.obs.n_holds
+    hidden = fitted.jacobian[:, first:last] / fitted.scale[first:last]
+    normal = hidden.T @ hidden
+    normal[np.diag_indices_from(normal)] += RELATIVE_RIDGE
+    log_det = 2.0 * float(np.log(np.diag(np.linalg.cholesky(normal))).sum())
+    log_det += 2.0 * float(np.log(fitted.scale[first:last]).sum())
+    return -0.5 * fitted.chi2 - 0.5 * log_det + fitted.system.log_weight
+
+
+def excess(fitted: Fit) -> float:
+    """Chi-square beyond its degrees of freedom, over the domains that have more than they should.
+
+    In the noise that was predicted: where it was widened for what nothing explained, the widening is taken out.
+    """
+    used = leverage(fitted)
+    obs = fitted.line.obs
+    total = 0.0
+    for d in ROW_DOMAINS:
+        rows = fitted.system.domain == d
+        widened = {MOVES: obs.moves_inflation, DYNAMICS: obs.dynamics_inflation}.get(d, 1.0)
+        chi2 = float((fitted.system.residual[rows] ** 2).sum()) * widened**2
+        total += max(chi2 - float((1.0 - used[rows]).sum()), 0.0)
+    return total
+
+
+def held_out_records(before_fit: Fit, before: Prediction, after_fit: Fit, after: Prediction) -> tuple[HeldOut, ...]:
+    """Held-out chi-square and physical rms per domain of two models, the largest gain first."""
+    rms_before, unit = physical_rms(before_fit, before.innovation)
+    rms_after, _ = physical_rms(after_fit, after.innovation)
+    out = []
+    for d, name in ROW_DOMAINS.items():
+        if before.n_rows[d] < 1.0 or d not in rms_before or d not in rms_after:
+            continue
+        out.append(
+            (
+                before.chi2[d] - after.chi2[d],
+                HeldOut(
+                    name, float(before.chi2[d] / before.n_rows[d]), float(after.chi2[d] / max(after.n_rows[d], 1e-9)),
+                    rms_before[d], rms_after[d], unit[d],
+                ),
+            )
+        )  # fmt: skip
+    return tuple(h for _, h in sorted(out, key=lambda pair: -pair[0]))

@@ -1,73 +1,86 @@
-"""What is taken out again once everything is accepted: effects that leave their domains as they were."""
+"""Backward elimination: everything accepted is judged once more beside everything else, the weakest first."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS
-from trihedron.diagnose.selection.model import Found, GrowingModel
-from trihedron.diagnose.session.solve import N_DOMAINS, folds_of, predict_held_out, tune_noise
-from trihedron.diagnose.session.twin import Prior, stacked
-from trihedron.records.diagnosis import Domain, DomainTest
+from trihedron.diagnose.selection.compare import (
+    Comparison,
+    cost_of,
+    excess,
+    held_out_records,
+    mends,
+    own_domains,
+)
+from trihedron.diagnose.selection.model import Accepted, StepwiseModel, with_only
+from trihedron.diagnose.selection.stepwise import MIN_DELTA_BIC
 
-KEPT_EXCESS = 0.5
-"""An effect whose domain keeps more than half of its misfit after everything is accepted explains nothing."""
-KEPT_NATURAL = 0.3
-"""Nor does an effect of one sensor if the domains of that sensor together keep this share."""
-
-
-def drop_hollow(
-    model: GrowingModel, domains: tuple[DomainTest, ...], remaining: tuple[DomainTest, ...], prior: Prior | None
-) -> bool:
-    """Take out effects whose domain still carries most of its misfit: a least bad guess is not an answer."""
-    before = {d.domain: d for d in domains}
-    after = {d.domain: d for d in remaining}
-    hollow = []
-    for found in model.found:
-        if found.evidence is not None or found.primary < 0:
-            continue
-        name: Domain = ROW_DOMAINS[found.primary]
-        if name not in before or name not in after or not after[name].disagrees:
-            continue
-        excess_before = before[name].chi2_per_dof - 1.0
-        excess_after = after[name].chi2_per_dof - 1.0
-        if excess_before > 0 and excess_after > KEPT_EXCESS * excess_before:
-            hollow.append(found)
-    hollow += [f for f in model.found if f not in hollow and _keeps_misfit(f, before, after)]
-    if not hollow:
-        return False
-    model.found = [f for f in model.found if f not in hollow]
-    model.distortions = [f.variant.distortion for f in model.found if f.variant is not None]
-    start = replace(model.fitted.twin, effect=np.zeros(sum(d.n_parameters for d in model.distortions)))
-    model.fitted = tune_noise(model.obs, start, stacked(model.distortions), prior)
-    model.prediction = predict_held_out(model.fitted, folds_of(model.fitted), N_DOMAINS)
-    return True
+LEAST_SHARE = 0.25
+"""Of the held-out misfit in some domain of its sensor an effect must remove this share, all else being in the model:
+what removes less is the least bad guess at a mechanism that is not in the catalogue."""
+AGREES = 2.0
+"""Held-out chi-square per row at which a domain holds so little misfit that no share of it is asked for."""
 
 
-def _keeps_misfit(found: Found, before: Mapping[Domain, DomainTest], after: Mapping[Domain, DomainTest]) -> bool:
-    """Whether the domains where an effect of one sensor must show keep much of their misfit after everything."""
-    if found.evidence is not None or found.variant is None:
-        return False
-    distortion = found.variant.distortion
-    if (distortion.force is None) == (distortion.rate is None):
-        return False
-    natural: tuple[Domain, ...] = ("static-gyro", "moves") if distortion.force is None else ("static-accel", "dynamics")
-    pairs = [(before[name], after[name]) for name in natural if name in before and name in after]
-    if not any(b.disagrees and a.disagrees for b, a in pairs):
-        return False
-    excess = [sum(max(t[k].chi2_per_dof - 1.0, 0.0) * t[k].dof for t in pairs) for k in (0, 1)]
-    return bool(excess[1] > KEPT_NATURAL * excess[0])
+def judged_again(model: StepwiseModel) -> StepwiseModel:
+    """The model without the effects that what came after them has made needless, with every gain as it now stands.
+
+    One goes at a time, the one with least to show, and the others are judged anew without it: none pays for another.
+    """
+    while True:
+        judged = [_judged(model, k) for k in range(len(model.accepted))]
+        failed = [k for k, (_, stands) in enumerate(judged) if not stands]
+        if not failed:
+            return replace(model, accepted=tuple(one for one, _ in judged))
+        weakest = min(failed, key=lambda k: judged[k][0].delta_bic)
+        effect_id = model.accepted[weakest].effect.id
+        model = with_only(model, tuple(one for k, one in enumerate(model.accepted) if k != weakest))
+        model = model.refusing(effect_id)
 
 
-def settle_direct(model: GrowingModel, remaining: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
-    """Sample-level domains whose disagreement an accepted direct effect accounts for agree afterwards."""
-    explained = {f.evidence.domain for f in model.found if f.evidence is not None}
-    if any(f.effect.id == "vibration-rectification" for f in model.found):
-        explained.add("within-static")  # the shaking that the effect follows is the disagreement seen there
-    return tuple(
-        replace(d, disagrees=False) if d.domain in explained and d.domain in ("within-static", "timing") else d
-        for d in remaining
+def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
+    """One accepted effect with its gain beside the others, and whether it stands."""
+    one = model.accepted[k]
+    if one.variant is None and not one.reobserves:
+        return one, True  # seen in the samples themselves; nothing in the model hangs on it
+    without = with_only(model, tuple(other for j, other in enumerate(model.accepted) if j != k))
+    held = held_out_records(without.fitted, without.prediction, model.fitted, model.prediction)
+    if one.reobserves:
+        assert one.evidence is not None
+        gain = max(excess(without.fitted) - excess(model.fitted), 0.0)
+        stands = getattr(one.effect, "is_proof", False) or mends(
+            without.fitted, without.prediction, model.fitted, model.prediction, one.evidence.touched
+        )
+        return replace(one, gain=gain, held_out=one.evidence.held_out or held), stands
+    assert one.variant is not None
+    first = sum(o.variant.distortion.n_parameters for o in model.accepted[:k] if o.variant is not None)
+    against = Comparison(
+        one.variant, one.effect.is_local, without.fitted, without.prediction, model.fitted, model.prediction,
+        cost_of(model.fitted, one.rank, len(one.variant.shape)), first,
+    )  # fmt: skip
+    bic = against.bic_gain
+    now = replace(one, delta_bic=bic, gain=max(against.gain_at(against.stays), 0.0), held_out=held)
+    stands = (
+        bic > MIN_DELTA_BIC
+        and against.predicts
+        and against.falls
+        and against.has_size
+        and one.effect.is_plausible(against.value, against.covariance)
+        and explains(against)
     )
+    return now, stands
+
+
+def explains(against: Comparison) -> bool:
+    """Whether the effect removes its share of the held-out misfit of a domain of its own sensor."""
+    before, after = against.base_prediction.per_row, against.prediction.per_row
+    for d in own_domains(against.variant.distortion):
+        if d not in ROW_DOMAINS or before[d] <= 1.0:
+            continue
+        share = (before[d] - after[d]) / (before[d] - 1.0)
+        if share > LEAST_SHARE or (share > 0.0 and after[d] < AGREES):
+            return True
+    return bool(np.all(before < AGREES))

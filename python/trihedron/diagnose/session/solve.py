@@ -242,13 +242,15 @@ class Prediction:
     """Held-out prediction of rows: innovation chi-square per fold and domain, its volume, and the innovations.
 
     ``fold_chi2`` (folds, domains), ``fold_log_det`` (folds,) log-determinant of the predicted covariance, ``n_rows``
-    (domains,), ``residual`` (rows,) whitened innovations.
+    (domains,), ``residual`` (rows,) whitened innovations; ``innovation`` (rows,) the same over each row's own noise
+    alone, so that a model which merely predicts less sharply does not look better in physical units.
     """
 
     fold_chi2: FloatArray
     fold_log_det: FloatArray
     n_rows: FloatArray
     residual: FloatArray
+    innovation: FloatArray
 
     @property
     def chi2(self) -> FloatArray:
@@ -301,7 +303,7 @@ def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains:
     chi2 = np.zeros((len(folds), n_domains))
     log_det = np.zeros(len(folds))
     count = np.zeros(n_domains)
-    out = np.zeros_like(residual)
+    out, plain = np.zeros_like(residual), np.zeros_like(residual)
     for fold, held in enumerate(folds):
         rows = scaled[held]
         train = normal - rows.T @ rows
@@ -319,11 +321,12 @@ def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains:
         whitened = vector[:, known] @ (along[known] / np.sqrt(value[known]))
         share = (vector[:, known] ** 2).sum(axis=1)
         out[held] = whitened
+        plain[held] = vector[:, known] @ along[known]
         domain = fitted.system.domain[held]
         for d in range(n_domains):
             chi2[fold, d] = float((whitened[domain == d] ** 2).sum())
             count[d] += float(share[domain == d].sum())
-    return Prediction(chi2, log_det, count, out)
+    return Prediction(chi2, log_det, count, out, plain)
 
 
 def tune_noise(

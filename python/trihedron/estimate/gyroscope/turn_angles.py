@@ -21,18 +21,28 @@ QUARTER = math.pi / 2.0
 SCALE_TOLERANCE = 0.05
 """How far a nominal scale may be from the truth: data sheets promise 1 to 3 %."""
 
+MIN_SPREAD = 0.2
+"""Smallest singular value of three or more unit axes that are called not parallel: three axes some 10° from one plane
+have less."""
+
 SLACK_RAD = math.radians(10.0)
 """A turn further than this from every multiple was not made against a wall at all."""
 
 
 @dataclass(frozen=True)
 class Turn:
-    """Samples ``[start, stop)`` of a turn; ``axis`` 0, 1, 2 of the case and the signed ``angle_rad`` where known."""
+    """Samples ``[start, stop)`` of a turn; ``axis`` 0, 1, 2 of the case and the signed ``angle_rad`` where known.
+
+    ``direction`` (3,) is the turn's axis in the body where it is no axis of the case, ``sigma_direction_rad`` the
+    standard error of each of its two components.
+    """
 
     start: int
     stop: int
     axis: int | None = None
     angle_rad: float | None = None
+    direction: tuple[float, float, float] | None = None
+    sigma_direction_rad: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop - 1:
@@ -41,6 +51,15 @@ class Turn:
             raise ValueError(f"the axis of a turn is 0, 1 or 2, got {self.axis}")
         if self.angle_rad is not None and not math.isfinite(self.angle_rad):
             raise ValueError("the angle of a turn must be finite")
+        if self.direction is not None and not 0.99 < math.hypot(*self.direction) < 1.01:
+            raise ValueError("the direction of a turn must be a unit vector")
+
+    @property
+    def stated(self) -> FloatArray | None:
+        """Rotation vector (3,) [rad] where both angle and axis are said."""
+        if self.angle_rad is None or (self.axis is None and self.direction is None):
+            return None
+        return self.angle_rad * _unit(self.axis or 0, self.direction)
 
 
 @dataclass(frozen=True)
@@ -48,6 +67,7 @@ class KnownTurn:
     """What a turn was taken for: ``angle_rad`` about ``axis``; ``is_used`` is false when it is no such turn.
 
     ``seen_rad`` is the angle by the nominal scale, ``off_axis_rad`` how far its axis lies from the case axis.
+    ``direction`` is the axis where it is none of the case's, ``axis`` then the nearest one.
     """
 
     axis: int
@@ -56,13 +76,20 @@ class KnownTurn:
     seen_rad: float
     off_axis_rad: float
     was_given: bool
+    direction: tuple[float, float, float] | None = None
 
     @property
     def vector(self) -> FloatArray:
-        """Rotation about the case axis, (3,), rad."""
-        vector = np.zeros(3)
-        vector[self.axis] = self.angle_rad
-        return vector
+        """Rotation about the turn's axis, (3,), rad."""
+        return self.angle_rad * _unit(self.axis, self.direction)
+
+
+def _unit(axis: int, direction: tuple[float, float, float] | None) -> FloatArray:
+    if direction is not None:
+        return np.array(direction, dtype=np.float64)
+    unit = np.zeros(3)
+    unit[axis] = 1.0
+    return unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,18 +151,31 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
     return MeasuredTurns(raw_angle, np.array(duration), zero_angle, zero_s, var_rate, spread, excess, mean)
 
 
-def nominal_matrix(
-    recording: Recording, measured: MeasuredTurns, nominal_scale: FloatArray | float | None, quantum_rad: float
-) -> FloatArray:
-    """Nominal scale (3, 3), rad/s per raw unit: as given, from the unit, or from the turns themselves.
+AMBIGUOUS = (
+    "the readings are counts, and turns of 90, 180 or 360° differ by their scale alone: was each turn 90, 180 or 360°? "
+    "Say --turns 90,-90,... (one angle a turn, 0 leaves it out), or the nominal scale (--gyro-nominal, rad/s per count)"
+)
 
-    For counts without a scale, the turns are taken for the smallest whole numbers of ``quantum_rad`` that fit all.
+
+def nominal_matrix(
+    recording: Recording,
+    measured: MeasuredTurns,
+    turns: Sequence[Turn],
+    nominal_scale: FloatArray | float | None,
+) -> FloatArray:
+    """Nominal scale (3, 3), rad/s per raw unit: from stated turns, else as given, else from the unit.
+
+    What the user says of the turns wins over everything that is guessed. Turns of unknown size show no scale: every
+    divisor of them would do.
 
     Raises
     ------
     ValueError
-        When they fit no such numbers.
+        With the question to the user, when readings are counts and neither angles nor a scale are known.
     """
+    stated = scale_of_stated(measured, turns)
+    if stated is not None:
+        return stated
     if nominal_scale is not None:
         value = np.asarray(nominal_scale, dtype=np.float64)
         if value.shape not in ((), (3, 3)) or not np.all(np.isfinite(value)):
@@ -144,49 +184,78 @@ def nominal_matrix(
     unit = rate_to_si(recording.gyroscope_unit)
     if unit is not None:
         return unit * np.eye(3)
-    sizes = np.linalg.norm(measured.raw_angle - np.outer(measured.duration_s, measured.zero_mean), axis=1)
-    for divisor in range(1, 17):
-        quantum_raw = float(sizes.min()) / divisor
-        ratio = sizes / quantum_raw
-        # Large turns are read once small ones have refined the scale; small ones must fit as they are.
-        small = ratio[ratio < 0.3 / SCALE_TOLERANCE]
-        if len(small) > 0 and np.all(np.abs(small - np.round(small)) < SCALE_TOLERANCE * small):
-            return quantum_rad / quantum_raw * np.eye(3)
-    raise ValueError(
-        "the readings are counts and the turns are no small multiples of one angle: give nominal_scale, rad/s per count"
-    )
+    raise ValueError(AMBIGUOUS)
+
+
+def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArray | None:
+    """Scale (3, 3) that the stated turns show, ``None`` where they do not span three axes; deaf to a few wrong ones.
+
+    Least absolute deviations (reweighted least squares) of ``φ'_i - z̄ Δt_i = S_w φ_i``.
+    """
+    rows = [(index, turn.stated) for index, turn in enumerate(turns)]
+    known = [(index, vector) for index, vector in rows if vector is not None and np.any(vector != 0.0)]
+    if len(known) < 3:
+        return None
+    index = np.array([i for i, _ in known])
+    angles = np.array([vector for _, vector in known])
+    directions = angles / np.linalg.norm(angles, axis=1, keepdims=True)
+    if np.linalg.svd(directions, compute_uv=False)[-1] < MIN_SPREAD:
+        return None
+    raw = (measured.raw_angle - np.outer(measured.duration_s, measured.zero_mean))[index]
+    # Every turn counts alike, whatever its size, until they contradict each other.
+    size = np.linalg.norm(angles, axis=1)
+    weight: FloatArray = 1.0 / size
+    solution = np.zeros((3, 3))
+    for _ in range(30):
+        solution, *_ = np.linalg.lstsq(angles * weight[:, None], raw * weight[:, None], rcond=None)
+        miss = np.linalg.norm(raw - angles @ solution, axis=1) / size
+        weight = 1.0 / (size * np.sqrt(np.maximum(miss, 1e-6 * max(float(miss.max()), 1e-300))))
+    if np.linalg.cond(solution) > 1.0 / MIN_SPREAD:
+        return None
+    return np.asarray(np.linalg.inv(solution.T), dtype=np.float64)
 
 
 def identify_turns(
-    measured: MeasuredTurns, turns: Sequence[Turn], nominal: FloatArray, quantum_rad: float
+    measured: MeasuredTurns,
+    turns: Sequence[Turn],
+    nominal: FloatArray,
+    quantum_rad: float,
+    tolerance: float = SCALE_TOLERANCE,
 ) -> list[KnownTurn]:
     """Nearest case axis and nearest multiple of ``quantum_rad`` for every turn that does not say.
 
     Small turns come first: each refines the scale by which the next larger one is read, so that eight whole turns are
-    recognised although the nominal scale is off by some per cent.
+    recognised although the nominal scale is off by ``tolerance``.
     """
     seen = (measured.raw_angle - np.outer(measured.duration_s, measured.zero_mean)) @ nominal.T
     size = np.linalg.norm(seen, axis=1)
-    axes = [
-        turn.axis if turn.axis is not None else int(np.argmax(np.abs(v))) for turn, v in zip(turns, seen, strict=True)
-    ]
+    axes = [_axis_of(turn, vector) for turn, vector in zip(turns, seen, strict=True)]
     sums = np.zeros((3, 2))
     known: list[KnownTurn | None] = [None] * len(turns)
     for index in sorted(range(len(turns)), key=lambda i: size[i]):
         turn, axis, vector = turns[index], axes[index], seen[index]
         scale = sums[axis, 0] / sums[axis, 1] if sums[axis, 1] > 0.0 else 1.0
-        along = float(vector[axis]) / scale
-        off_axis = math.atan2(float(np.linalg.norm(np.delete(vector, axis))), abs(float(vector[axis])))
+        unit = _unit(axis, turn.direction)
+        along = float(vector @ unit) / scale
+        off_axis = math.atan2(float(np.linalg.norm(np.cross(vector, unit))), abs(float(vector @ unit)))
         angle = turn.angle_rad if turn.angle_rad is not None else quantum_rad * round(along / quantum_rad)
         if turn.angle_rad is None:
-            unsure = abs(along) * (SCALE_TOLERANCE if sums[axis, 1] == 0.0 else 0.1 * SCALE_TOLERANCE)
+            unsure = abs(along) * (tolerance if sums[axis, 1] == 0.0 else 0.1 * tolerance)
             # A turn of unknown size can only be read when the doubt about the scale is below half a multiple.
             is_used = angle != 0.0 and abs(along - angle) < SLACK_RAD + min(unsure, 0.2 * quantum_rad)
             is_used = is_used and unsure < 0.5 * quantum_rad
         else:
             is_used = angle != 0.0 and abs(along - angle) < max(SLACK_RAD, 0.3 * abs(angle))
         is_used = is_used and off_axis < 2.0 * SLACK_RAD
-        known[index] = KnownTurn(axis, float(angle), bool(is_used), float(along), off_axis, turn.angle_rad is not None)
+        known[index] = KnownTurn(
+            axis, float(angle), bool(is_used), float(along), off_axis, turn.angle_rad is not None, turn.direction
+        )
         if is_used:
-            sums[axis] += (float(vector[axis]) * angle, angle * angle)
+            sums[axis] += (float(vector @ unit) * angle, angle * angle)
     return [turn for turn in known if turn is not None]
+
+
+def _axis_of(turn: Turn, seen: FloatArray) -> int:
+    if turn.axis is not None:
+        return turn.axis
+    return int(np.argmax(np.abs(seen if turn.direction is None else turn.direction)))

@@ -25,6 +25,7 @@ class TurnSystem:
     """Turns with known ``angles`` (k, 3), rad; a rough ``S_w`` (3, 3) turns ``sigma_turn`` (rad) into raw units.
 
     ``sigma_turn`` is the standard error of a turn's size, ``sigma_tilt`` that of its axis times the turn (table, case).
+    ``sigma_directions`` (k,) rad is the standard error of each turn's axis as it was measured, across itself.
     """
 
     measured: MeasuredTurns
@@ -32,12 +33,17 @@ class TurnSystem:
     S_w: FloatArray
     sigma_turn: float = 0.0
     sigma_tilt: float = 0.0
+    sigma_directions: FloatArray | None = None
 
     def covariances(self) -> FloatArray:
         """(k, 3, 3) of the raw turns: rate noise ``N² Δt``, a zero that wanders between holds, the turn's own error."""
         axis = self.axes @ self.S_w.T
         along = (self.sigma_turn**2 - self.sigma_tilt**2) * axis[:, :, None] * axis[:, None, :]
         covariance: FloatArray = self.noise() + along + self.sigma_tilt**2 * self.S_w @ self.S_w.T
+        if self.sigma_directions is not None:
+            across = np.eye(3) - self.axes[:, :, None] * self.axes[:, None, :]
+            size = (self.sigma_directions * np.linalg.norm(self.angles, axis=1)) ** 2
+            covariance += size[:, None, None] * (self.S_w @ across @ self.S_w.T)
         return covariance
 
     @property

@@ -11,7 +11,9 @@ import numpy.typing as npt
 from scipy.stats import chi2 as chi2_distribution
 
 from trihedron.estimate.gyroscope.turn_angles import (
+    MIN_SPREAD,
     QUARTER,
+    SCALE_TOLERANCE,
     KnownTurn,
     Turn,
     identify_turns,
@@ -66,6 +68,7 @@ def calibrate_turns(
     zeros: Sequence[tuple[int, int]],
     *,
     nominal_scale: FloatArray | float | None = None,
+    nominal_tolerance: float = SCALE_TOLERANCE,
     quantum_rad: float = QUARTER,
     route: Route = "least-squares",
     sigma_turn_rad: float | None = None,
@@ -82,6 +85,9 @@ def calibrate_turns(
         Stretches without rotation: zero turns.
     nominal_scale : (3, 3) or float, optional
         rad/s per raw unit, to recognise the multiples of ``quantum_rad``; the unit tells it unless readings are counts.
+        Turns whose angle and axis are given need none, and are believed where they span three axes.
+    nominal_tolerance : float
+        How far, relatively, the nominal scale may be from the truth.
     route : "least-squares" or "zero-turn-first"
         All rows at once (default), or ``b_w`` from the zero turns alone, then ``S_w`` from ``Δw' = w' − b_w``.
     sigma_turn_rad : float, optional
@@ -95,8 +101,8 @@ def calibrate_turns(
     Raises
     ------
     ValueError
-        When an axis was never turned, no zero turn and no second duration fixes the bias, or counts come without any
-        way to recognise the angles.
+        When an axis was never turned, no zero turn and no second duration fixes the bias; or, with the question to the
+        user, when readings are counts and neither the angles nor a nominal scale are given.
 
     Notes
     -----
@@ -104,12 +110,13 @@ def calibrate_turns(
     never smaller: it does not use the turns for ``b_w``.
     """
     measured = measure_turns(recording, turns, zeros)
-    nominal = nominal_matrix(recording, measured, nominal_scale, quantum_rad)
-    known = identify_turns(measured, turns, nominal, quantum_rad)
+    nominal = nominal_matrix(recording, measured, turns, nominal_scale)
+    known = identify_turns(measured, turns, nominal, quantum_rad, nominal_tolerance)
     used = np.array([turn.is_used for turn in known], dtype=bool)
     _require_every_axis(known, used)
     roughly = np.asarray(np.linalg.inv(nominal), dtype=np.float64)
-    system = TurnSystem(measured, np.array([turn.vector for turn in known]), roughly)
+    sigmas = np.array([turn.sigma_direction_rad for turn in turns])
+    system = TurnSystem(measured, np.array([turn.vector for turn in known]), roughly, sigma_directions=sigmas)
     screened = screen(system, used, sigma_turn_rad)
     system, used = screened.system, screened.used
     fit = solve_zero_first(system, used) if route == "zero-turn-first" else solve(system, used)
@@ -136,6 +143,15 @@ def calibrate_turns(
 
 
 def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_]) -> None:
+    if any(turn.direction is not None for turn in known):
+        vectors = np.array([turn.vector for turn in known])[used]
+        directions = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+        if len(vectors) < 3 or np.linalg.svd(directions, compute_uv=False)[-1] < MIN_SPREAD:
+            raise ValueError(
+                f"the {len(vectors)} usable turns are about fewer than three directions that are not parallel: turn "
+                "the sensor on a table by known angles on three of its sides"
+            )
+        return
     missing = [axis for axis in range(3) if not any(t.axis == axis and u for t, u in zip(known, used, strict=True))]
     if missing:
         names = " and ".join(str(axis + 1) for axis in missing)

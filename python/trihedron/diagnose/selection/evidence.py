@@ -1,0 +1,69 @@
+"""Effects that bring their own evidence: what their tests find joins the model one by one, each held to its promise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.selection.compare import excess, held_out_records, mends
+from trihedron.diagnose.selection.model import Accepted, StepwiseModel, held_out
+from trihedron.diagnose.session.solve import tune_noise
+from trihedron.diagnose.session.twin import stacked
+from trihedron.records.diagnosis import Candidate
+
+
+def with_evidence(model: StepwiseModel, alpha: float) -> tuple[StepwiseModel, dict[str, Candidate]]:
+    """The model with every effect whose own test finds it, and what every such test said."""
+    found, candidates = _looked_for(model.context, alpha)
+    for effect, evidence in found:
+        model = _with_one(model, effect, evidence)
+    return model, candidates
+
+
+def _looked_for(context: Context, alpha: float) -> tuple[list[tuple[DirectEffect, Evidence]], dict[str, Candidate]]:
+    n_effects = len(catalogue())
+    candidates: dict[str, Candidate] = {}
+    found: list[tuple[DirectEffect, Evidence]] = []
+    for effect in catalogue():
+        if not isinstance(effect, DirectEffect):
+            continue
+        reason = effect.unavailable(context)
+        if reason is not None:
+            candidates[effect.id] = Candidate(effect.id, None, False, reason)
+            continue
+        evidence = effect.find(context)
+        if not effect.repeatable or evidence is not None:
+            candidates[effect.id] = Candidate(effect.id, 1.0 if evidence is None else evidence.p_value, True)
+        # Half of the rate of false alarms belongs to these tests, half to the competition of curves.
+        if evidence is not None and evidence.p_value * n_effects < alpha / 2.0:
+            found.append((effect, evidence))
+    found.sort(key=lambda pair: (pair[0].precedence, -pair[1].strength))
+    return found, candidates
+
+
+def _with_one(model: StepwiseModel, effect: DirectEffect, evidence: Evidence) -> StepwiseModel:
+    p_adjusted = min(1.0, evidence.p_value * len(catalogue()))
+    gain = float(evidence.strength)
+    after = model
+    if evidence.reweigh is not None or evidence.variant is not None:
+        obs = model.obs if evidence.reweigh is None else evidence.reweigh(model.obs)
+        added = [] if evidence.variant is None else [evidence.variant.distortion]
+        distortion = stacked([*model.distortions, *added])
+        n_new = sum(d.n_parameters for d in added)
+        start = replace(model.fitted.twin, effect=np.concatenate([model.fitted.twin.effect, np.zeros(n_new)]))
+        fitted = tune_noise(obs, start, distortion, model.prior)
+        after = replace(model, obs=obs, fitted=fitted, prediction=held_out(fitted))
+        if not effect.is_proof and not mends(
+            model.fitted, model.prediction, fitted, after.prediction, evidence.touched
+        ):
+            return model.refusing(effect.id)
+        gain = max(gain, excess(model.fitted) - excess(fitted))
+        if evidence.restate is not None:
+            evidence = replace(evidence, parameters=evidence.restate(after.context))
+    held = evidence.held_out or held_out_records(model.fitted, model.prediction, after.fitted, after.prediction)
+    one = Accepted(effect, evidence.variant, evidence, p_adjusted, gain, gain, held, evidence.confounded_with)
+    return replace(after, accepted=(*after.accepted, one))

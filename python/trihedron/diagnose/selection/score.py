@@ -1,0 +1,92 @@
+"""Rao's score test of every candidate against the model as it stands (eq. 8.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects import Effect, catalogue
+from trihedron.diagnose.effects.contract import Variant
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.solve import N_DOMAINS, Fit, leverage, reduce, score
+from trihedron.diagnose.session.twin import PRIOR
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """One candidate's best variant under the score test."""
+
+    effect: Effect
+    variant: Variant
+    gain: float
+    rank: int
+    p_value: float
+    merit: float
+    merits: tuple[float, ...] = ()
+
+
+def dispersion(residual: FloatArray, fitted: Fit, used: FloatArray) -> FloatArray:
+    """(domains,) how far each domain's misfit exceeds its noise, at least 1."""
+    out = np.ones(N_DOMAINS)
+    for d in range(N_DOMAINS):
+        rows = fitted.system.domain == d
+        dof = float((1.0 - used[rows]).sum())
+        if dof >= 1.0:
+            out[d] = max(1.0, float((residual[rows] ** 2).sum()) / dof)
+    return out
+
+
+def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored], list[tuple[str, str]]]:
+    """Score test of every applicable effect; the gain is judged against what remains after it.
+
+    Returns the scored candidates, best first, and ``(id, reason)`` of those that do not apply.
+    """
+    fitted = context.fitted
+    reduced = reduce(fitted)
+    used = leverage(fitted)
+    residual = fitted.system.residual
+    n_rows = int((fitted.system.domain != PRIOR).sum())
+    out, missing = [], []
+    for effect in catalogue():
+        if effect.id in exclude:
+            continue
+        reason = effect.unavailable(context)
+        if reason is not None:
+            missing.append((effect.id, reason))
+            continue
+        best: Scored | None = None
+        merits: list[float] = []
+        variants = effect.variants(context)
+        if not variants:
+            continue  # judged by its own evidence
+        for variant in variants:
+            columns = fitted.line.columns(variant.distortion)
+            result = score(reduced, columns)
+            if result.rank == 0:
+                continue
+            after = residual + reduced.project(columns) @ result.estimate
+            scale = dispersion(after, fitted, used)
+            gain = 0.0
+            for d in range(N_DOMAINS):
+                rows = fitted.system.domain == d
+                gain += float((residual[rows] ** 2).sum() - (after[rows] ** 2).sum()) / scale[d]
+            prior_rows = fitted.system.domain == PRIOR
+            gain += float((residual[prior_rows] ** 2).sum() - (after[prior_rows] ** 2).sum())
+            gain = max(gain, 0.0)
+            n_shape = len(variant.shape)
+            merit = gain - np.log(n_rows) * (result.rank + n_shape) - 2.0 * np.log(len(variants))
+            merits.append(float(merit))
+            p = min(1.0, float(chdtrc(result.rank, gain)) * len(variants))
+            scored = Scored(effect, variant, gain, result.rank, p, merit)
+            if best is None or merit > best.merit:
+                best = scored
+        if best is None:
+            missing.append((effect.id, "the calibration itself imitates it in this recording"))
+        else:
+            out.append(replace(best, merits=tuple(merits)))
+    out.sort(key=lambda s: -s.merit)
+    return out, missing

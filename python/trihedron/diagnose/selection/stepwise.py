@@ -1,0 +1,101 @@
+"""Forward selection: every effect of the catalogue competes, the best one joins, and again (eq. 8.7-8.10)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.selection.compare import Refit, refined, refit
+from trihedron.diagnose.selection.model import Accepted, StepwiseModel
+from trihedron.diagnose.selection.score import Scored, score_all
+from trihedron.records.diagnosis import Candidate
+
+MAX_EFFECTS = 4
+"""Effects accepted at most: a recording of one session does not carry evidence for more."""
+MIN_DELTA_BIC = 10.0
+"""Kass and Raftery's bound for very strong evidence."""
+CONFOUNDED_DELTA_BIC = 6.0
+"""Below a difference of 6 (strong evidence) two explanations are named together."""
+N_REFITS = 4
+"""Candidates fitted jointly at each step: the leaders of the score test."""
+FAR_AHEAD = 4.0
+"""A sound candidate whose score is this many times another's is not caught up by a joint fit."""
+
+
+def scores(model: StepwiseModel, exclude: Collection[str] = ()) -> tuple[list[Scored], list[tuple[str, str]]]:
+    """Score tests of the effects that the model does not hold yet, best first, and what does not apply."""
+    taken = {one.effect.id for one in model.accepted if not one.effect.repeatable}
+    return score_all(model.context, taken | set(exclude))
+
+
+def candidates_of(
+    scored: list[Scored], missing: list[tuple[str, str]], known: dict[str, Candidate]
+) -> dict[str, Candidate]:
+    """What every effect's test on the baseline said, with what was known from effects' own evidence."""
+    out = dict(known) | {effect_id: Candidate(effect_id, None, False, reason) for effect_id, reason in missing}
+    for s in scored:
+        before = known.get(s.effect.id)
+        p = s.p_value if before is None or before.p_value is None else min(s.p_value, before.p_value)
+        out[s.effect.id] = Candidate(s.effect.id, p, True)
+    return out
+
+
+def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> StepwiseModel | None:
+    """The model with the effect that explains most of what is left; ``None`` where none is demanded."""
+    n_effects = len(catalogue())
+    leaders = [s for s in scored[:N_REFITS] if s.p_value * n_effects < alpha / 2.0]
+    refits: list[Refit] = []
+    sound: list[Refit] = []
+    for s in leaders:
+        if any(r.scored.merit > FAR_AHEAD * s.merit for r in sound):
+            break
+        refits.append(refit(model, s))
+        if is_sound(refits[-1]):
+            sound.append(refits[-1])
+    if not sound:
+        return None
+    # Rivals are compared against one rest, that of the best explained: else its small differences weigh large gains.
+    rest = np.min([r.against.stays for r in sound], axis=0)
+    best = max(sound, key=lambda r: r.against.bic_gain_at(rest))
+    # What another mechanism explains as well: by its joint fit, or, for all of its shapes, by the score test.
+    enough = best.against.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
+    close = [r.scored.effect.id for r in refits if r is not best and r.against.bic_gain_at(rest) > enough]
+    close += [
+        s.effect.id
+        for s in scored
+        if s.effect is not best.scored.effect and max(s.merits) > best.scored.merit - CONFOUNDED_DELTA_BIC
+    ]
+    best = refined(model, best)
+    one = Accepted(
+        best.scored.effect, best.scored.variant, None, _p_adjusted(best, n_effects), best.against.bic_gain,
+        best.against.gain_at(best.against.stays), best.against.held_out(), tuple(dict.fromkeys(close)),
+        best.scored.rank,
+    )  # fmt: skip
+    return replace(
+        model,
+        fitted=best.against.fitted,
+        prediction=best.against.prediction,
+        accepted=(*model.accepted, one),
+    )
+
+
+def is_sound(one: Refit) -> bool:
+    """The rules of acceptance: evidence, prediction, a fall in physical units, a size, a possible one."""
+    a = one.against
+    return (
+        a.bic_gain > MIN_DELTA_BIC
+        and a.predicts
+        and a.falls
+        and a.has_size
+        and one.scored.effect.is_plausible(a.value, a.covariance)
+    )
+
+
+def _p_adjusted(best: Refit, n_effects: int) -> float:
+    gain = best.against.bic_gain + best.against.cost
+    p = min(best.scored.p_value, float(chdtrc(best.scored.rank, max(gain, 0.0)))) if gain > 0 else best.scored.p_value
+    return float(min(1.0, max(p, 1e-300) * n_effects))

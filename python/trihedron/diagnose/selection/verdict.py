@@ -1,0 +1,36 @@
+"""What the whole comes to: which domains could be tested at all, what is left, and the one word for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from trihedron.diagnose.selection.model import StepwiseModel
+from trihedron.records.diagnosis import DomainTest, Verdict
+
+SAMPLE_DOMAINS = ("within-static", "timing")
+"""Domains of the samples themselves, which no parameter of the model is fitted to."""
+POSE_DOMAINS = ("static-accel", "moves", "dynamics")
+"""Domains that hold the model against gravity or rest: without one of them there is nothing to contradict it."""
+LEAST_DOF = 1.0
+"""Degrees of freedom below which a domain's rows are used up by the fit itself."""
+
+
+def accounted_for(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
+    """Sample-level domains whose disagreement an accepted effect is, seen from another side, agree afterwards."""
+    explained = {one.evidence.domain for one in model.accepted if one.evidence is not None}
+    explained |= {domain for one in model.accepted for domain in one.effect.accounts_for}
+    return tuple(
+        replace(d, disagrees=False) if d.domain in explained and d.domain in SAMPLE_DOMAINS else d for d in remaining
+    )
+
+
+def verdict_of(model: StepwiseModel, domains: tuple[DomainTest, ...]) -> Verdict:
+    """One word; ``not-testable`` where neither gravity nor rest had a say and the samples show nothing either."""
+    if model.accepted:
+        return "missing-physics"
+    if any(d.disagrees for d in domains):
+        return "unexplained"
+    # A weak prior fills what the poses leave open; rows that it alone decides test nothing.
+    if not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in domains):
+        return "not-testable"
+    return "consistent"

@@ -1,0 +1,176 @@
+"""Motion too slow for half a second: told by gravity turning on over seconds, with the gyro as the second witness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from trihedron.segment.channels import BoolArray, Channels, FloatArray
+from trihedron.segment.noise import Range
+
+HALVES_S = (0.5, 1.0, 2.0)
+"""Half lengths of the windows compared: a turn's trace grows with time as its noise falls, and a hold may be this
+short on either side of where it is cut."""
+FALSE_ALARM = 1e-5
+"""Chance that the halves of a still window are called different; of a hundred overlapping ones, once in some hours."""
+FEWEST_WINDOWS = 24
+"""Fewer windows than twice the twelve unknowns of the gyro's share do not tell noise from motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """Windows ``[first, first + 2 half)`` of blocks: ``first`` (n,), ``change`` (n, 3) from half to half of the
+    accelerometer's reading, and the twelve columns (n, 3, 12) by which the gyro predicts it."""
+
+    first: np.ndarray[tuple[int], np.dtype[np.int64]]
+    change: FloatArray
+    design: FloatArray
+
+
+def drifting_blocks(
+    channels: Channels, quiet: BoolArray, ranges: list[Range], centre: FloatArray, white_variance: FloatArray
+) -> list[BoolArray]:
+    """Blocks (m,) at which the accelerometer's reading moves on, for every window length of ``HALVES_S``.
+
+    Over a window the reading changes by noise, and by ``∫ f × ω dt`` if the body turns. The gyro's part is fitted over
+    all windows at once (nine numbers of scale, three of zero: whatever its unit, signs and axes) and the rest is the
+    noise of a still sensor, also where nothing in the log is still for as long. A change beyond that noise is motion.
+    Marked is the first block of the second half of each window that moves.
+    """
+    out = []
+    for half_s in HALVES_S:
+        half = max(channels.blocks(half_s), 2)
+        moving = np.zeros(len(quiet), dtype=bool)
+        windows = _windows(channels, ranges, half, centre)
+        if windows is not None:
+            variance = _noise_of_change(channels, windows, half, white_variance)
+            live = variance > 0.0
+            statistic = (windows.change[:, live] ** 2 / variance[live]).sum(axis=1)
+            limit = float(special.chdtri(max(int(live.sum()), 1), FALSE_ALARM))
+            moving[windows.first[statistic > limit] + half] = True
+        out.append(moving)
+    return out
+
+
+def _windows(channels: Channels, ranges: list[Range], half: int, centre: FloatArray) -> _Windows | None:
+    starts = [np.arange(a, b - 2 * half + 1) for a, b in ranges if b - a >= 2 * half]
+    first = np.concatenate(starts) if starts else np.zeros(0, dtype=np.int64)
+    if len(first) < FEWEST_WINDOWS:
+        return None
+    reading = np.where(channels.is_valid[:, None], channels.mean, 0.0)
+    force = reading[:, ~channels.is_gyroscope] - centre
+    rate = reading[:, channels.is_gyroscope]
+    sums = np.vstack([np.zeros(3), np.cumsum(force, axis=0)])
+    middle = first + half
+    before = (sums[middle] - sums[first]) / half
+    after = (sums[middle + half] - sums[middle]) / half
+    design = np.zeros((len(first), 3, 0))
+    if rate.shape[1]:
+        # The change of means weighs the rate by a triangle about the middle.
+        weight = np.concatenate([np.arange(1, half + 1), np.arange(half - 1, 0, -1)]) / half**2
+        offsets = np.arange(2 * half - 1)
+        seen = np.zeros((len(first), 3))
+        for offset, w in zip(offsets, weight, strict=True):
+            seen += w * 0.5 * (rate[first + offset] + rate[first + offset + 1])
+        mean = 0.5 * (before + after)
+        cross = np.zeros((len(first), 3, 3))
+        cross[:, 0, 1], cross[:, 0, 2] = -mean[:, 2], mean[:, 1]
+        cross[:, 1, 0], cross[:, 1, 2] = mean[:, 2], -mean[:, 0]
+        cross[:, 2, 0], cross[:, 2, 1] = -mean[:, 1], mean[:, 0]
+        by_scale = cross[:, :, :, None] * seen[:, None, None, :]
+        design = np.concatenate([by_scale.reshape(len(first), 3, 9), cross], axis=2)
+    return _Windows(first, after - before, design)
+
+
+def _noise_of_change(channels: Channels, windows: _Windows, half: int, white_variance: FloatArray) -> FloatArray:
+    """(3,) variance of the change without motion: the median of what the gyro leaves of it, at least white noise."""
+    accelerometer = np.flatnonzero(~channels.is_gyroscope)
+    white = 2.0 * white_variance[accelerometer] / (half * channels.length)
+    rest = windows.change
+    if windows.design.shape[2] and len(windows.first) >= 2 * FEWEST_WINDOWS:
+        weight = np.ones(len(rest))
+        # A channel that never changes has no noise to be weighed by.
+        scale = np.sqrt(np.where(white > 0.0, white, max(float(white.max()), 1.0)))
+        for _ in range(6):
+            rows = windows.design * (weight[:, None, None] / scale[:, None])
+            flat = rows.reshape(-1, windows.design.shape[2])
+            size = np.linalg.norm(flat, axis=0)
+            size = np.where(size > 0.0, size, 1.0)
+            side = (windows.change * weight[:, None] / scale).ravel()
+            solution, *_ = np.linalg.lstsq(flat / size, side, rcond=1e-9)
+            rest = windows.change - windows.design @ (solution / size)
+            far = np.sqrt(((rest / scale) ** 2).sum(axis=1))
+            # Reweighted to least absolute deviations: pushes and settling are not rotation.
+            weight = 1.0 / np.sqrt(np.maximum(far, max(float(np.median(far)), 1e-12)))
+    seen = np.median(rest**2, axis=0) / float(special.chdtri(1, 0.5))
+    floor = 2.0 * channels.quantisation_variance[accelerometer] / (half * channels.length)
+    out: FloatArray = np.maximum(np.maximum(seen, white), floor)
+    return out
+
+
+def cut_slow_motion(
+    channels: Channels,
+    quiet: BoolArray,
+    ranges: list[Range],
+    drifting: list[BoolArray],
+    limit_raw: float,
+    shortest: int,
+) -> BoolArray:
+    """Quiet blocks without the slow motion in them.
+
+    The stretch of a range that drifts is motion if it runs on to the end of the range, where a move begins, or changes
+    the reading by more than ``limit_raw`` (a hand's sway). What is left inside a range is a hold where it lasts
+    ``shortest`` blocks; a range of which nothing is left, and that keeps within ``limit_raw``, is a hold that creeps.
+    """
+    out = quiet.copy()
+    for first, last in ranges:
+        size = last - first
+        moving = np.zeros(size, dtype=bool)
+        for half_s, marks in zip(HALVES_S, drifting, strict=True):
+            half = max(channels.blocks(half_s), 2)
+            inside = np.flatnonzero(marks[first:last])
+            for start, stop in _stretches(inside):
+                # The change lies between the middles of the halves; an end that drifts is given away whole.
+                lower = 0 if start <= half else start - half // 2
+                upper = size if stop + half >= size else stop + half // 2
+                moving[lower:upper] = True
+        if not moving.any():
+            continue
+        kept = np.zeros(size, dtype=bool)
+        for start, stop in _stretches(np.flatnonzero(~moving)):
+            kept[start:stop] = stop - start >= shortest
+        excursion = _excursion(channels, first, last)
+        if excursion < limit_raw and not kept.any():
+            continue
+        out[first:last] &= kept if excursion >= limit_raw else _without_ends(moving)
+    return out
+
+
+def _without_ends(moving: BoolArray) -> BoolArray:
+    """All but the moving stretches at either end: inside, what stays within a hand's sway is a disturbance."""
+    still = np.flatnonzero(~moving)
+    out = np.zeros(len(moving), dtype=bool)
+    if len(still):
+        out[still[0] : still[-1] + 1] = True
+    return out
+
+
+def _stretches(indices: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[Range]:
+    """Runs of consecutive numbers as ``[first, last)``."""
+    if not len(indices):
+        return []
+    cuts = np.flatnonzero(np.diff(indices) > 1)
+    begins = np.concatenate([[0], cuts + 1])
+    ends = np.concatenate([cuts, [len(indices) - 1]])
+    return [(int(indices[a]), int(indices[b]) + 1) for a, b in zip(begins, ends, strict=True)]
+
+
+def _excursion(channels: Channels, first: int, last: int) -> float:
+    """Largest change of the accelerometer's half-second means over a range, raw unit."""
+    attitude = channels.mean[first:last, ~channels.is_gyroscope]
+    width = min(channels.blocks(0.5), len(attitude))
+    sums = np.vstack([np.zeros(attitude.shape[1]), np.cumsum(attitude, axis=0)])
+    smooth = (sums[width:] - sums[:-width]) / width
+    return float(np.linalg.norm(np.ptp(smooth, axis=0)))

@@ -1,0 +1,84 @@
+"""Sessions of an independent generator (benches/confidence): within their bars, or marked, whatever the motion."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
+
+from confidence.motion import G
+from confidence.sensor import lower
+from confidence.sessions import hand, manual, table
+from trihedron import calibrate
+from trihedron.records import FindingCode, Recording
+
+
+def recording_of(f, w, rate):
+    return Recording(np.arange(len(f)) / rate, f, w, rate, accelerometer_unit="counts", gyroscope_unit="counts")
+
+
+def gyro_z(result, truth):
+    """Errors of the gyro's scale in standard errors, and the largest in parts of the scale."""
+    error = result.gyroscope.S - truth.S_w
+    return error / result.gyroscope.sigma_S, np.abs(error).max() / np.abs(np.diag(truth.S_w)).mean()
+
+
+@pytest.mark.parametrize(("move_s", "part"), [(2.0, 5e-4), (30.0, 1e-3), (60.0, 2e-3)])
+def test_the_gyro_scale_is_the_same_however_slowly_the_sensor_is_turned(move_s, part):
+    f, w, rate, truth, motion = hand(21, n_poses=12, move_s=move_s)
+    result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
+    z, relative = gyro_z(result, lower(truth))
+    assert result.segments.n_holds == len(motion.rests)
+    # Nine numbers, each within four standard errors; the rate noise over a minute is 0.04° in 90°.
+    assert np.abs(z).max() < 4.0
+    assert relative < part
+
+
+@pytest.mark.parametrize("rate_deg_s", [2.0, 10.0])
+def test_slow_turns_of_a_table_that_leans_are_no_part_of_the_holds(rate_deg_s):
+    f, w, rate, truth, motion = table(5, turns=(180.0,), rate_deg_s=rate_deg_s, hold_s=5.0)
+    result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
+    assert result.segments.n_holds == len(motion.rests)
+    error = np.degrees(result.gyroscope.b - lower(truth).b_w)
+    # The zero of a 16-bit gyro with 20°/h of noise: hundredths of a degree per second; turns in holds gave 0.1 to 8.
+    assert np.abs(error).max() < 0.02
+
+
+@pytest.mark.parametrize("turn_deg", [180.0, 360.0])
+def test_unstated_turns_on_faces_are_read_by_gravity_not_by_a_common_divisor(turn_deg):
+    f, w, rate, truth, _ = table(6, turns=(turn_deg, -turn_deg))
+    result = calibrate(recording_of(f, w, rate), gravity_m_s2=G, method="faces")
+    if result.gyroscope is None:
+        assert FindingCode.TURN_ANGLE_UNKNOWN in {finding.code for finding in result.findings}
+        assert not result.is_trustworthy
+    else:
+        assert np.abs(result.gyroscope.S - truth.S_w).max() < 1e-3 * truth.S_w[0, 0]
+
+
+def test_stated_turns_on_faces_win_over_a_wrong_nominal_scale():
+    f, w, rate, truth, motion = table(7, turns=(180.0, -180.0))
+    stated = [angle for _, _, angle in motion.turns]
+    result = calibrate(
+        recording_of(f, w, rate),
+        gravity_m_s2=G,
+        method="faces",
+        turns_deg=stated,
+        gyroscope_nominal=2.0 * truth.S_w[0, 0],
+    )
+    z, relative = gyro_z(result, truth)
+    assert np.abs(z).max() < 4.0
+    assert relative < 1e-3
+
+
+def test_the_manuals_session_by_stated_turns_about_any_axis_lies_inside_its_bars():
+    f, w, rate, truth, motion = manual(3)
+    stated = [angle for _, _, angle in motion.turns]
+    result = calibrate(recording_of(f, w, rate), gravity_m_s2=G, turns_deg=stated)
+    z, relative = gyro_z(result, lower(truth))
+    assert np.abs(z).max() < 4.0
+    # Four whole turns: the scale to a few parts in ten thousand, as far as the axes are known.
+    assert relative < 5e-4
+    with pytest.raises(ValueError, match="5 turns were stated and 6 were found"):
+        calibrate(recording_of(f, w, rate), gravity_m_s2=G, turns_deg=stated[:5])
