@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.laws.find import MOST_FOLLOWS, accel_zero_laws
 from trihedron.diagnose.zeros.of_session import (
     FEWEST_NORM_POSES,
     accel_evidence,
+    exceeds_noise,
     scatter_parameters,
+    share_of_zeros,
     with_accel_scatter,
 )
 from trihedron.units import mm_s2_from_m_s2
@@ -28,15 +31,16 @@ class AccelZeroScatter(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         found = accel_evidence(context)
-        if found is None:
-            return None
+        if found is None or not exceeds_noise(found) or accel_zero_laws(context).share > MOST_FOLLOWS:
+            return None  # what follows something is a law, not scatter
         sigma, si = float(found.evidence.scatter[0]), context.si_per_raw("accelerometer")
         return Evidence(
-            found.evidence.p_scatter,
+            found.evidence.p_scatter_spared,
             0.0,
             scatter_parameters(found, "m/s^2"),
             f"The accelerometer's zero is another in every pose, by {mm_s2_from_m_s2(sigma):.2g} mm/s² per axis (one "
             "standard deviation), beyond noise and drift; no pose or temperature accounts for it.",
             "static-accel",
             reweigh=lambda obs: with_accel_scatter(obs, sigma, si),
+            share=share_of_zeros(found),
         )

@@ -48,6 +48,8 @@ class Evidence:
 class DirectEffect(Effect):
     """An effect with a test of its own."""
 
+    is_late: ClassVar[bool] = False
+    """Whether it is looked for after the competition, in what the effects of other mechanisms leave (scatter)."""
     is_proof: ClassVar[bool] = False
     """Whether the samples alone prove it (a range that ends): else mending it must predict held-out moves better."""
 

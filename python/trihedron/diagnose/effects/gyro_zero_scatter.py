@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.laws.find import MOST_FOLLOWS, gyro_zero_laws
 from trihedron.diagnose.zeros.of_session import (
     FEWEST_FOR_SIZE,
+    exceeds_noise,
     gyro_evidence,
     scatter_parameters,
+    share_of_zeros,
     with_gyro_scatter,
 )
 from trihedron.units import degrees_from_radians
@@ -29,16 +32,17 @@ class GyroZeroScatter(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         found = gyro_evidence(context)
-        if found is None:
-            return None
+        if found is None or not exceeds_noise(found) or gyro_zero_laws(context).share > MOST_FOLLOWS:
+            return None  # what follows something is a law, not scatter
         sigma, si = found.evidence.scatter, context.si_per_raw("gyroscope")
         sizes = ", ".join(f"{degrees_from_radians(s):.2g}" for s in sigma)
         return Evidence(
-            found.evidence.p_scatter,
+            found.evidence.p_scatter_spared,
             0.0,
             scatter_parameters(found, "rad/s"),
             f"The gyro's zero is another in every pose, by {sizes} °/s (x, y, z; one standard deviation), beyond noise "
             "and drift; it follows neither gravity nor a logged temperature.",
             "static-gyro",
             reweigh=lambda obs: with_gyro_scatter(obs, sigma, si),
+            share=share_of_zeros(found),
         )

@@ -10,12 +10,13 @@ from typing import Literal
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.laws.misfit import Judged
+from trihedron.diagnose.laws.misfit import Judged, Misfit
 from trihedron.diagnose.laws.moves import move_misfit
 from trihedron.diagnose.laws.poses import Zeros, accel_misfits, gyro_misfits
 from trihedron.diagnose.laws.room import RoomLaw, search_room
 from trihedron.diagnose.laws.search import Accepted, search
-from trihedron.records.diagnosis import Domain, EffectParameter, HeldOut, Law
+from trihedron.diagnose.zeros.of_session import accel_evidence, gyro_evidence
+from trihedron.records.diagnosis import Domain, DomainTest, EffectParameter, HeldOut, Law
 
 Sensor = Literal["accelerometer", "gyroscope"]
 OUT: dict[Sensor, str] = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
@@ -46,6 +47,7 @@ RESEMBLES = {
     "angular acceleration": ("a lever arm",),
     "force": ("unequal stiffness",),
 }
+ROOM_VECTOR = "vector fixed in the room"
 EARTH_RATE_RAD_S = 7.292115e-5
 
 
@@ -67,6 +69,25 @@ def find_laws(context: Context, domains: Collection[Domain]) -> tuple[Law, ...]:
     if "moves" in domains or "dynamics" in domains:
         out += _motion_laws(context, is_gyro_only="moves" in domains and "dynamics" not in domains)
     return tuple(sorted(out, key=lambda law: -law.share))
+
+
+MOST_FOLLOWS = 0.4
+"""Share of the held-out misfit at rest that a law may remove before the rest is still called scatter."""
+SCATTERS = 1e-4
+"""p-value of a zero that differs from pose to pose, from which its law is looked for even where the session's walk has
+swallowed it."""
+
+
+def laws_of_rest(context: Context, remaining: tuple[DomainTest, ...]) -> tuple[Law, ...]:
+    """Laws of what remains: of domains that disagree, and of zeros that differ from pose to pose."""
+    domains: set[Domain] = {d.domain for d in remaining if d.disagrees}
+    gyro = None if "static-gyro" in domains else gyro_evidence(context)
+    if gyro is not None and gyro.evidence.p_scatter_spared < SCATTERS:
+        domains.add("static-gyro")
+    accel = None if "static-accel" in domains else accel_evidence(context)
+    if accel is not None and accel.evidence.p_scatter_spared < SCATTERS:
+        domains.add("static-accel")
+    return find_laws(context, domains)
 
 
 @lru_cache(maxsize=4)
@@ -98,12 +119,9 @@ def _of_zeros(zeros: Zeros | None) -> ZeroLaws:
     return ZeroLaws(laws, sum(law.share for law in laws))
 
 
-def _squares_before(misfit: object) -> float:
-    from trihedron.diagnose.laws.misfit import Misfit
-
-    assert isinstance(misfit, Misfit)
-    total, _, n = misfit._held_out(misfit.P, misfit.Py)
-    return total / n
+def _squares_before(misfit: Misfit) -> float:
+    total, _, n = misfit.held_out()
+    return misfit.variance * total / n
 
 
 def _laws_of(sensor: Sensor, domain: Domain, found: list[Accepted], before: float) -> tuple[Law, ...]:
@@ -128,8 +146,7 @@ def _laws_of(sensor: Sensor, domain: Domain, found: list[Accepted], before: floa
         depends = tuple(dict.fromkeys(name for _, names, *_ in terms for name in names))
         axes = ", ".join(dict.fromkeys(t[0] for t in terms))
         rms = [float(np.sqrt(sum(getattr(j, side) for j in judged))) for side in ("held_before", "held_after")]
-        chi = [sum(getattr(j, side) for j in judged) / len(judged) for side in ("held_before", "held_after")]
-        held = HeldOut(domain, chi[0], chi[1], rms[0], rms[1], "sigma")
+        held = HeldOut(domain, 1.0, (rms[1] / max(rms[0], 1e-300)) ** 2, rms[0], rms[1], _unit_of_misfit(domain))
         what = "zero" if domain.startswith("static") else "reading in motion"
         out.append(
             Law(
@@ -140,6 +157,10 @@ def _laws_of(sensor: Sensor, domain: Domain, found: list[Accepted], before: floa
             )
         )  # fmt: skip
     return tuple(out)
+
+
+def _unit_of_misfit(domain: Domain) -> str:
+    return {"static-gyro": "rad/s", "static-accel": "m/s^2"}.get(domain, "sigma")
 
 
 def _form(axes: str, depends: tuple[str, ...]) -> str:
@@ -168,12 +189,12 @@ def _room_law(room: RoomLaw) -> Law:
     )
     before = sum(j.held_before for j in room.judged)
     after = sum(j.held_after for j in room.judged)
-    held = HeldOut("static-gyro", before / len(room.judged), after / len(room.judged), before**0.5, after**0.5, "sigma")
+    held = HeldOut("static-gyro", 1.0, after / before, before**0.5, after**0.5, "rad/s")
     words: tuple[str, ...] = ("a magnetic field",)
     if _is_rotation(room):
         words = ("the Earth's turn",)
     return Law(
-        "gyroscope", ("vector fixed in the room",), "zero = K Rᵀ m, m a unit vector fixed in the room",
+        "gyroscope", (ROOM_VECTOR,), "zero = K Rᵀ m, m a unit vector fixed in the room",
         tuple(coefficients), room.share, held, words, EXPERIMENTS["room"],
         f"The gyro's zero follows a vector fixed in the room, {room.inclination_deg:.0f}° ± "
         f"{room.inclination_sigma_deg:.0f}° from the vertical: {100.0 * room.share:.0f} % of the held-out misfit.",

@@ -1,6 +1,6 @@
 """A misfit and what columns would take out of it, in sample and on blocks left out (docs/laws.md, eq. L.1-L.4).
 
-Everything is in terms of ``P = V⁻¹ − V⁻¹B(BᵀV⁻¹B)⁻¹BᵀV⁻¹``: V the noise with its slow part, B the columns that the model
+Everything is in terms of ``P = V⁻¹ − V⁻¹B(BᵀV⁻¹B)⁻¹BᵀV⁻¹``: V the noise with its slow part, B columns that the model
 fits anyway. The residual of a block b that nothing of the fit has seen is ``P_bb⁻¹ (P y)_b``, with precision ``P_bb``.
 """
 
@@ -57,6 +57,7 @@ class Judged:
     value: FloatArray
     covariance: FloatArray
     squares: float
+    """What is left of yᵀPy; ``held_before`` and ``held_after`` are held-out mean squares in the reading's unit."""
     held_before: float
     held_after: float
 
@@ -65,7 +66,8 @@ class Judged:
 class Misfit:
     """``P`` (n, n) on the rows of a domain, ``Py`` (n,), ``square`` = yᵀPy, ``dof``, and the ``unit`` of every row.
 
-    ``unit`` (n,) numbers the pose or move that a row belongs to, in the order of time.
+    ``unit`` (n,) numbers the pose or move that a row belongs to, in the order of time; ``variance`` is that of a row in
+    the reading's own unit, SI squared (1 where rows are whitened numbers of several units).
     """
 
     P: FloatArray
@@ -73,6 +75,7 @@ class Misfit:
     square: float
     dof: float
     unit: npt.NDArray[np.intp]
+    variance: float = 1.0
 
     def columns(self, phi: FloatArray) -> Columns:
         """Columns given as they add to the rows (n, k)."""
@@ -98,15 +101,19 @@ class Misfit:
             return None
         spread = left / dof
         p = float(fdtrc(k, dof, max(taken, 0.0) / k / spread))
-        before = self._held_out(self.P, self.Py)
+        before = self.held_out()
         P = self.P - columns.projected @ inverse @ columns.projected.T
         after = self._held_out(P, self.Py - columns.projected @ estimate)
         n = before[2]
         gain = 0.5 * n * np.log(before[0] / max(after[0], 1e-300)) + 0.5 * (before[1] - after[1])
         return Judged(
             taken / spread, k, max(p, 1e-300), float(gain), 1.0 - after[0] / before[0], estimate, inverse * spread,
-            left, before[0] / n, after[0] / n,
+            left, self.variance * before[0] / n, self.variance * after[0] / n,
         )  # fmt: skip
+
+    def held_out(self) -> tuple[float, float, float]:
+        """Sum of squares, log-determinant and number of blocks left out, predicted by the rest without a law."""
+        return self._held_out(self.P, self.Py)
 
     def squares_with(self, columns: Columns) -> float:
         """What is left of the square with these columns."""
@@ -143,4 +150,4 @@ def misfit_of(y: FloatArray, base: FloatArray, V: FloatArray, unit: npt.NDArray[
         - side @ (np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-10) / np.outer(scale, scale)) @ side.T
     )
     rank = np.linalg.matrix_rank(base / np.maximum(np.linalg.norm(base, axis=0), 1e-300))
-    return Misfit(P, P @ y, float(y @ P @ y), float(len(y) - rank), unit)
+    return Misfit(P, P @ y, float(y @ P @ y), float(len(y) - rank), unit, float(np.mean(np.diag(V))))

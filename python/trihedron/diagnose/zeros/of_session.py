@@ -17,6 +17,11 @@ FEWEST_FOR_SIZE = 6
 """Poses from which the size of the gyro's scatter is told at all."""
 FEWEST_NORM_POSES = FEWEST_POSES
 """|f| is one number a pose and nine of them are spent on S and b: below this nothing is said of the accelerometer."""
+STANDS_OUT = 1e-3
+"""Largest p-value, beside scatter, walk and drift, of an effect that the session's fit has found already."""
+LEAST_OVER_NOISE = 1.0
+"""Scatter over the error of a pose's mean, in variance. That error is itself measured, to 10 or 20 %, and flicker makes
+zeros wander between poses by a part of it: less than this is the sensor's noise, not a flaw."""
 AXES = ("x", "y", "z")
 
 
@@ -59,6 +64,18 @@ def scatter_parameters(found: SessionEvidence, unit: str) -> tuple[EffectParamet
         EffectParameter(name, float(size), float(error), unit)
         for name, size, error in zip(names, sizes, errors, strict=True)
     )
+
+
+def exceeds_noise(found: SessionEvidence) -> bool:
+    """Whether the scatter is at least as large as the errors of the poses' means."""
+    noise = float(np.mean(found.zeros.readings.sigma**2)) / 2.0
+    return float(np.mean(found.evidence.scatter**2)) > LEAST_OVER_NOISE * noise
+
+
+def share_of_zeros(found: SessionEvidence) -> float:
+    """Variance of the scatter over all that zeros vary by from pose to pose, effects of the catalogue included."""
+    scatter = float(np.sum(found.evidence.scatter**2))
+    return scatter / max(float(found.zeros.varied.sum()), scatter, 1e-300)
 
 
 def with_gyro_scatter(obs: Observations, sigma: FloatArray, si_per_raw: FloatArray) -> Observations:
