@@ -128,3 +128,67 @@ def test_an_effect_that_both_have_is_compared_as_numbers(unit):
     found = trihedron.diagnose(recording, against=simulated, gravity_m_s2=9.80665)
     assert found.verdict == "parameters-differ"
     assert {p.id for p in found.parameters if p.significant} == {"accel-quadratic"}
+
+
+SCENARIO = """# My first sensor model.
+name = "student"
+profile = "mpu"   # the data sheet's noise
+
+[session]
+kind = "hand"
+
+[gyroscope]  # the wider range
+S = [[2.66e-4, 0, 0], [0, 2.66e-4, 0], [0, 0, 2.66e-4]]
+b = [0.0, 0.0, 0.0]  # no zero yet
+
+[[effect]]
+id = "gyro-g-sensitivity"  # heard of it, switched it on
+matrix = [[0.0, 0.0, 0.0], [3e-4, 0.0, 0.0], [0.0, 0.0, 0.0]]
+"""
+
+
+def test_a_scenario_is_driven_compared_and_improved_until_it_cannot_be_told_from_the_recording(unit, tmp_path, capsys):
+    from trihedron.cli import main
+    from trihedron.files.log import write_recording
+
+    profile, accel, gyro = unit
+    real, given, better = tmp_path / "real.csv", tmp_path / "student.toml", tmp_path / "better.toml"
+    write_recording(log(profile, accel, gyro, 7, 7, "accel-quadratic", k2=(3e-4, -2e-4, 2e-4)), real)
+    given.write_text(SCENARIO)
+    words = ["diagnose", str(real), "--gravity", "9.80665", "--against"]
+    assert main([*words, str(given), "--improved", str(better)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "accel-quadratic was left out of the model" in said
+    assert "the model has gyro-g-sensitivity, which the recording lacks" in said
+    text = better.read_text()
+    assert "# the data sheet's noise" in text
+    assert "gyro-g-sensitivity" not in text
+    assert "accel-quadratic" in text
+    assert main([*words, str(better)]) == 0
+    assert "CONSISTENT" in capsys.readouterr().out
+
+
+def test_improving_is_refused_where_it_would_overwrite_or_has_nothing_to_improve(tmp_path, capsys):
+    from trihedron.cli import main
+
+    given = tmp_path / "student.toml"
+    given.write_text(SCENARIO)
+    assert main(["diagnose", "log.csv", "--against", str(given), "--improved", str(given)]) == 1
+    assert "overwrite" in capsys.readouterr().err
+    assert main(["diagnose", "log.csv", "--against", "sim.csv", "--improved", str(given)]) == 1
+    assert ".toml" in capsys.readouterr().err
+    given.write_text(SCENARIO.replace("profile", "profil"))
+    (tmp_path / "log.csv").write_text("t,ax,ay,az\n" + "".join(f"{k / 100},0,0,9.81\n" for k in range(400)))
+    assert main(["diagnose", str(tmp_path / "log.csv"), "--gravity", "9.81", "--against", str(given)]) == 1
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_the_second_act_finds_what_was_sealed_and_mends_the_simulation(seed, tmp_path):
+    from trihedron.pipeline.disagreeing import disagree
+
+    done = disagree(tmp_path, seed)
+    assert done.found.verdict == "missing-physics"
+    first = done.found.effects[0]
+    assert done.sealed["effect"] in (first.id, *first.confounded_with)
+    assert done.improved.verdict == "consistent"
+    assert (tmp_path / "improved.toml").read_text().startswith("# The simulation of an ordinary sensor")

@@ -70,6 +70,8 @@ __all__ = [
 ]
 
 _VERBS = ("apply", "calibrate", "check", "diagnose", "kalman", "noise", "read", "segment", "verify")
+_ROOMS = ("capture",)
+"""Rooms of which people use more than one name: ``trihedron.capture.Recorder``."""
 _HOME = dict.fromkeys(_VERBS, "trihedron.pipeline")
 _HOME |= {"Diagnosis": "trihedron.records.diagnosis"}
 _HOME |= dict.fromkeys(("allan_deviation", "identify_noise"), "trihedron.estimate.noise")
@@ -90,6 +92,8 @@ class _Front(ModuleType):
         super().__setattr__(name, value)
 
     def __getattr__(self, name: str) -> Any:
+        if name in _ROOMS:
+            return import_module(f"trihedron.{name}")
         if name not in _HOME:
             raise AttributeError(f"module 'trihedron' has no attribute {name!r}")
         value = getattr(import_module(_HOME[name]), name)

@@ -16,11 +16,13 @@ import typer
 from trihedron.cli.allan import allan
 from trihedron.cli.apply import apply
 from trihedron.cli.calibrate import calibrate
+from trihedron.cli.capture import capture
 from trihedron.cli.check import check
 from trihedron.cli.demo import demo
 from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
 from trihedron.cli.kalman import kalman
+from trihedron.cli.ports import ports
 from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
 from trihedron.cli.verify import verify
@@ -28,6 +30,8 @@ from trihedron.cli.verify import verify
 # In the order in which they are used.
 COMMANDS = (
     demo,
+    ports,
+    capture,
     check,
     segment,
     calibrate,

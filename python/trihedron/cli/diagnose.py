@@ -23,7 +23,15 @@ def diagnose(
     ] = None,
     against: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Option("--against", metavar="SIMULATED_LOG", help="Your own simulation of the same protocol, as model."),
+        typer.Option(
+            "--against",
+            metavar="SIM",
+            help="Your simulation as model: a log or a scenario (.toml).",
+        ),
+    ] = None,
+    improved: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says."),
     ] = None,
     updated: Annotated[
         Optional[Path],  # noqa: UP045
@@ -44,7 +52,11 @@ def diagnose(
         raise typer.BadParameter(f"--alpha is a small probability such as 0.01, not {alpha:g}")
     if updated is not None and calibration is None:
         raise typer.BadParameter("--updated goes with --calibration OLD; without one, use trihedron calibrate")
-    check_outputs(json, updated, force=force, report=report)
+    if improved is not None and (against is None or against.suffix.lower() != ".toml"):
+        raise typer.BadParameter("--improved goes with --against SCENARIO.toml: that file is what is improved")
+    if improved is not None and against is not None and improved.resolve() == against.resolve():
+        raise typer.BadParameter("--improved would overwrite the scenario that it improves; give it another name")
+    check_outputs(json, updated, improved, force=force, report=report)
     from trihedron.files.calibration import read_calibration, write_calibration
 
     known = None if calibration is None else read_calibration(calibration)
@@ -70,6 +82,14 @@ def diagnose(
     show(document, json, sections=None if full else first_screen(result))
     write_json(machine, json, force=force)
     write_report(document, machine, report, force=force)
+    if improved is not None and against is not None:
+        from trihedron.files.scenario import write_scenario
+
+        better = pipeline.improve(against, result)
+        for effect_id, why in better.left_out.items():
+            say(f"effect {effect_id} is not in the scenario: {why}.")
+        write_scenario(better.text, improved, overwrite=force)
+        say(f"improved scenario: {improved}")
     if updated is not None:
         if result.updated is None:
             say(f"{updated}: not written, the poses of this log do not carry a calibration of their own.")

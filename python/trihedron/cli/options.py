@@ -33,7 +33,9 @@ class LogSource:
 
     log: Annotated[
         Optional[Path],  # noqa: UP045
-        typer.Argument(metavar="[LOG]", help="Log: CSV, TSV, text (also compressed), .npz, .npy or Parquet."),
+        typer.Argument(
+            metavar="[LOG]", help="Log: text of any layout, .npz, .npy, Parquet, zip; bags and others with extras."
+        ),
     ] = None
     accel: Annotated[
         Optional[Path],  # noqa: UP045
@@ -68,14 +70,24 @@ class LogSource:
         typer.Option("--device", metavar="N", help="Which device (from 1) of an archive of several."),
     ] = None
 
+    topic: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--topic", metavar="NAME", help="Which topic, dataset or member of a file that holds several."),
+    ] = None
+    instance: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--instance", metavar="N", help="Which of several IMUs whose readings one file holds."),
+    ] = None
+
     def read(self) -> Recording:
         """The audited recording, with progress shown when it takes long."""
         if self.log is None and self.accel is None and self.gyro is None:
             raise typer.BadParameter("no log was named: give LOG, or --accel F and --gyro F")
-        from trihedron.pipeline import read
+        # Not the pipeline's verb: here sentences name flags, there parameters.
+        from trihedron.read import read_recording
 
         with progress("reading") as report:
-            return read(
+            return read_recording(
                 self.log,
                 accelerometer_path=self.accel,
                 gyroscope_path=self.gyro,
@@ -85,6 +97,8 @@ class LogSource:
                 gyroscope_unit=self.gyro_unit,
                 time_unit=self.time_unit,
                 device=self.device,
+                topic=self.topic,
+                instance=self.instance,
                 progress=report,
             )
 

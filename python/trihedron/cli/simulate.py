@@ -36,6 +36,26 @@ def simulate(
         Optional[Path],  # noqa: UP045
         typer.Option("--with-effects", metavar="DIAGNOSIS", help="Add the effects that this diagnosis accepted."),
     ] = None,
+    serve: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--serve", metavar="PTY|TCP", help="Send it as a board would; prints what to open. TCP:PORT too."),
+    ] = None,
+    protocol: Annotated[
+        str, typer.Option("--protocol", metavar="NAME", help="With --serve: what the board speaks, or a .toml.")
+    ] = "lines",
+    faults: Annotated[
+        str, typer.Option("--faults", metavar="LIST", help="With --serve: '1%' or 'cut=1%,drift=50ppm,disconnect=20'.")
+    ] = "",
+    speed: Annotated[
+        float, typer.Option("--speed", metavar="X", min=0.0, help="With --serve: times real time; 0 is at once.")
+    ] = 1.0,
+    baud: Annotated[
+        int, typer.Option("--baud", metavar="N", min=0, help="With --serve PTY: garbage for readers at another baud.")
+    ] = 0,
+    link: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--link", metavar="PATH", help="With --serve PTY: a name that outlives disconnections."),
+    ] = None,
     list_them: Annotated[bool, typer.Option("--list", help="List the ready-made scenarios.")] = False,
     force: Force = False,
 ) -> None:
@@ -52,15 +72,15 @@ def simulate(
         raise typer.BadParameter("--like and --calibration go together")
     if with_effects is not None and scenario is None:
         raise typer.BadParameter("--with-effects belongs to a SCENARIO; a twin repeats its recording as it is")
-    if output is None:
-        raise typer.BadParameter("say where the log goes with -o LOG")
+    if output is None and serve is None:
+        raise typer.BadParameter("say where the log goes with -o LOG, or send it with --serve PTY")
     from trihedron.files.log import LOG_SUFFIXES, write_recording
     from trihedron.files.output import OutputError, check_free
     from trihedron.files.truth import write_truth
     from trihedron.pipeline import read, twin
     from trihedron.pipeline import simulate as run
 
-    if output.suffix.lower() not in LOG_SUFFIXES:
+    if output is not None and output.suffix.lower() not in LOG_SUFFIXES:
         raise OutputError(f"{output}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
     if truth is not None and truth.suffix.lower() not in (".npz", ".json"):
         raise OutputError(f"{truth}: truth is written as .npz (everything) or .json (no samples).")
@@ -71,9 +91,15 @@ def simulate(
         recording, known = twin(read(like), read_calibration(calibration), seed)
     else:
         recording, known = run(_scenario(str(scenario), with_effects), seed)
-    write_recording(recording, output, overwrite=force)
+    if output is not None:
+        write_recording(recording, output, overwrite=force)
     if truth is not None:
         write_truth(known, truth, overwrite=force)
+    if serve is not None:
+        from trihedron.cli.serve import serve_recording
+
+        serve_recording(recording, known, serve, protocol, faults, speed=speed, baud=baud, link=link)
+        return
     typer.echo(f"{output}: {recording.n_samples} samples, {recording.duration_s:.1f} s at {recording.rate_hz:.4g} Hz")
     typer.echo(f"{len(known.holds)} holds, {len(known.moves)} moves, |g| {known.gravity_m_s2:.6g} m/s²")
     for name, parameters in known.effects.items():

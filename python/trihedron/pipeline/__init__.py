@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.diagnosing import diagnose, extend
     from trihedron.pipeline.filtering import KalmanResult, kalman
     from trihedron.pipeline.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
+    from trihedron.pipeline.improving import driven, improve
     from trihedron.pipeline.reading import read, segment
     from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
     from trihedron.pipeline.simulating import simulate, twin, with_effects
@@ -29,7 +30,9 @@ __all__ = [
     "calibrate",
     "check",
     "diagnose",
+    "driven",
     "extend",
+    "improve",
     "kalman",
     "noise",
     "noise_of_curve",
@@ -59,6 +62,8 @@ _HOME = {
     "noise_of_curve": "trihedron.pipeline.identifying",
     "noise_of_file": "trihedron.pipeline.identifying",
     "recording_lengths": "trihedron.pipeline.identifying",
+    "driven": "trihedron.pipeline.improving",
+    "improve": "trihedron.pipeline.improving",
     "read": "trihedron.pipeline.reading",
     "segment": "trihedron.pipeline.reading",
     "CalibrationResult": "trihedron.pipeline.results",

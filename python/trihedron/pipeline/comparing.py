@@ -8,13 +8,13 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from trihedron.diagnose.against import (
-    FittedModel,
     compare_effects,
     compare_numbers,
+    left_open_by,
     model_of_calibration,
     model_of_diagnosis,
 )
-from trihedron.diagnose.against.numbers import SPREAD_DOF, ComparedNumbers
+from trihedron.diagnose.against.numbers import SPREAD_DOF
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import (
@@ -41,9 +41,15 @@ def compared(
     ``simulated`` is the free diagnosis of the user's simulated log, where that is the model; else ``given`` is.
     """
     model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated)
-    numbers = _numbers(found, model, is_linear=simulated is None, alpha=alpha)
-    effects = compare_effects(
-        () if simulated is None else simulated.effects, found.effects, found.candidates, alpha=alpha
+    given_effects = () if simulated is None else simulated.effects
+    effects = compare_effects(given_effects, found.effects, found.candidates, alpha=alpha)
+    numbers = compare_numbers(
+        model,
+        model_of_diagnosis(found),
+        alpha=alpha,
+        # A linear calibration was fitted beside effects that it does not know: it is also held against such a fit.
+        linear=model_of_diagnosis(found, with_effects=False) if simulated is None and found.effects else None,
+        left_open=left_open_by((*effects.missing, *effects.surplus)),
     )
     parameters = (*numbers.parameters, *effects.parameters)
     differ = any(p.significant for p in parameters)
@@ -57,18 +63,12 @@ def compared(
     return replace(
         found,
         verdict=verdict,
-        domains=(*found.domains, _numbers_test(parameters)),
+        # Effects that the model has too are no disagreement with it.
+        domains=(*(found.domains if effects.missing else found.remaining), _numbers_test(parameters)),
         effects=(*effects.missing, *effects.surplus),
         parameters=parameters,
         stages=(_as_given(given, recording, segments), *found.stages),
     )
-
-
-def _numbers(found: Diagnosis, model: FittedModel, *, is_linear: bool, alpha: float) -> ComparedNumbers:
-    recording = model_of_diagnosis(found)
-    # A linear calibration was fitted beside effects that it does not know: it is also held against such a fit.
-    linear = model_of_diagnosis(found, with_effects=False) if is_linear and found.effects else None
-    return compare_numbers(model, recording, alpha=alpha, linear=linear)
 
 
 def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:

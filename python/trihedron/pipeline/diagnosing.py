@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -16,11 +17,13 @@ from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_un
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
+from trihedron.pipeline.improving import driven
 from trihedron.pipeline.reading import Progress, read, segment
 from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.segment import resegment
+from trihedron.simulate import Scenario, read_scenario
 
 AnyRecording = Recording | str | os.PathLike[str]
 
@@ -33,7 +36,7 @@ def diagnose(
     height_m: float | None = None,
     segments: Segments | None = None,
     calibration: AnyCalibration | None = None,
-    against: AnyRecording | None = None,
+    against: AnyRecording | Scenario | None = None,
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
@@ -49,9 +52,9 @@ def diagnose(
         Still poses and moves; found when not given.
     calibration : calibration or path, optional
         The model to be held against the recording, with its error bars. Without it one is fitted to the recording.
-    against : Recording or path, optional
-        A simulated recording of the same protocol as the model: it is calibrated, and that calibration, with the error
-        bars it has, is the model.
+    against : Recording, Scenario or path, optional
+        The user's simulation as the model: a simulated recording, with everything that it contains, or a scenario
+        (``.toml``), whose instrument is moved as the recording was.
     alpha : float
         Chance that a healthy recording is called anything but consistent.
 
@@ -85,7 +88,8 @@ def diagnose(
     simulated: _Free | None = None
     if against is not None:
         tell(0.05, "diagnosing the simulated recording")
-        simulated = _simulation(against, gravity, alpha, lambda fraction, text: tell(0.05 + 0.4 * fraction, text))
+        log = _simulated_log(against, recording, segments, gravity)
+        simulated = _simulation(log, gravity, alpha, lambda fraction, text: tell(0.05 + 0.4 * fraction, text))
         known = simulated.calibration
         findings += _protocol(simulated.segments, segments)
     begun = 0.05 if simulated is None else 0.45
@@ -104,7 +108,7 @@ def diagnose(
         alpha=alpha,
         progress=lambda fraction, text: tell(begun + (1.0 - begun) * fraction, text),
     )
-    updated = None
+    updated, own_effects = None, found.effects
     if known is not None and free:
         given = replace(known, gravity_m_s2=gravity)
         found = compared(
@@ -119,6 +123,7 @@ def diagnose(
         model_is_given=known is not None,
         calibration=used,
         updated=updated,
+        own_effects=own_effects,
         segments=segments,
         recording=recording,
     )
@@ -151,8 +156,20 @@ def _start(
     return (replace(known, gravity_m_s2=gravity), False) if is_poor else (own, True)
 
 
-def _simulation(against: AnyRecording, gravity: float, alpha: float, tell: Progress) -> _Free:
-    recording = against if isinstance(against, Recording) else read(against)
+def _simulated_log(
+    against: AnyRecording | Scenario, recording: Recording, segments: Segments, gravity: float
+) -> Recording:
+    if isinstance(against, Recording):
+        return against
+    if not isinstance(against, Scenario):
+        if Path(against).suffix.lower() != ".toml":
+            return read(against)
+        against = read_scenario(Path(against))
+    own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+    return driven(against, recording, segments, own)
+
+
+def _simulation(recording: Recording, gravity: float, alpha: float, tell: Progress) -> _Free:
     try:
         result = calibrate(recording, gravity_m_s2=gravity)
     except ValueError as error:

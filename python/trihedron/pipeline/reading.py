@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
-from trihedron.read import read_recording
+import numpy.typing as npt
+
+from trihedron.pipeline.wording import finding_in_python, in_python
+from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording, Segments
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -13,7 +18,7 @@ Progress = Callable[[float, str], None]
 
 
 def read(
-    path: str | os.PathLike[str] | None = None,
+    path: Any = None,
     *,
     accelerometer_path: str | os.PathLike[str] | None = None,
     gyroscope_path: str | os.PathLike[str] | None = None,
@@ -23,26 +28,87 @@ def read(
     gyroscope_unit: str | RateUnit | None = None,
     time_unit: str | None = None,
     device: int | None = None,
+    topic: str | None = None,
+    instance: int | str | None = None,
     progress: Progress | None = None,
 ) -> Recording:
     """Read and audit a log; the parameters are those of :func:`trihedron.read.read_recording`.
+
+    ``path`` is a file name, or readings in memory: an array (n, columns), also structured or masked; a dictionary of
+    arrays (n,) or (n, 3); a data frame of pandas, polars or Arrow. Names of columns are understood as in a file; masked
+    cells are missing readings.
 
     Raises
     ------
     ReadError
         (a ``ValueError``) one sentence naming file, line and remedy.
+
+    Examples
+    --------
+    >>> import numpy as np, trihedron
+    >>> rng = np.random.default_rng(1)
+    >>> a = rng.normal([0, 0, 9.8], 0.02, (500, 3))
+    >>> trihedron.read({"t": np.arange(500) / 100, "acc": a}).rate_hz
+    100.0
     """
-    return read_recording(
-        path,
-        accelerometer_path=accelerometer_path,
-        gyroscope_path=gyroscope_path,
-        columns=columns,
+    try:
+        recording = read_recording(
+            path,
+            accelerometer_path=accelerometer_path,
+            gyroscope_path=gyroscope_path,
+            columns=columns,
+            rate_hz=rate_hz,
+            accelerometer_unit=accelerometer_unit,
+            gyroscope_unit=gyroscope_unit,
+            time_unit=time_unit,
+            device=device,
+            topic=topic,
+            instance=instance,
+            progress=progress,
+        )
+    except ReadError as error:
+        raise ReadError(in_python(str(error))) from None
+    return replace(recording, findings=tuple(finding_in_python(finding) for finding in recording.findings))
+
+
+def of_arrays(
+    time_s: npt.ArrayLike | None,
+    accelerometer: npt.ArrayLike | None,
+    gyroscope: npt.ArrayLike | None,
+    *,
+    accelerometer_unit: str | AccelerationUnit,
+    gyroscope_unit: str | RateUnit,
+    rate_hz: float | None,
+    temperature_degc: npt.ArrayLike | None,
+    supply_v: npt.ArrayLike | None,
+) -> Recording:
+    """See :meth:`trihedron.Recording.from_arrays`."""
+    if time_s is None and rate_hz is None:
+        raise ReadError("from_arrays needs time_s (n,) in seconds, or rate_hz where the samples are evenly spaced.")
+    if accelerometer is None and gyroscope is None:
+        raise ReadError("from_arrays needs accelerometer (n, 3) or gyroscope (n, 3).")
+    import numpy as np
+
+    columns: dict[str, Any] = {} if time_s is None else {"time [s]": time_s}
+    mapping = ["time=time [s]"] if time_s is not None else ["time=none"]
+    for name, letter, readings in (("accelerometer", "a", accelerometer), ("gyroscope", "g", gyroscope)):
+        if readings is None:
+            continue
+        array: Any = np.ma.asanyarray(readings)
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise ReadError(f"{name} must have shape (n, 3), got {array.shape}.")
+        columns |= {f"{name} {axis}": array[:, k] for k, axis in enumerate("xyz")}
+        mapping += [f"{letter}{axis}={name} {axis}" for axis in "xyz"]
+    for name, role, values in (("temperature", "temperature", temperature_degc), ("supply", "supply", supply_v)):
+        if values is not None:
+            columns[name] = values
+            mapping.append(f"{role}={name}")
+    return read(
+        columns,
+        columns=",".join(mapping),
         rate_hz=rate_hz,
-        accelerometer_unit=accelerometer_unit,
-        gyroscope_unit=gyroscope_unit,
-        time_unit=time_unit,
-        device=device,
-        progress=progress,
+        accelerometer_unit=None if accelerometer is None else accelerometer_unit,
+        gyroscope_unit=None if gyroscope is None else gyroscope_unit,
     )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
-from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -104,13 +104,15 @@ class DiagnosisResult(Diagnosis):
     """A diagnosis with what it was made from. ``print`` gives a short laboratory report.
 
     ``calibration`` is the linear model at the start: fitted to this recording, or given (``model_is_given``);
-    ``updated`` the recording's own calibration where one was given and the recording can carry another.
+    ``updated`` the recording's own calibration where one was given and the recording can carry another;
+    ``own_effects`` every effect that the recording has, those that the given model has too included.
     """
 
     recording: Recording = field(kw_only=True)
     segments: Segments = field(kw_only=True)
     calibration: Calibration = field(kw_only=True)
     updated: Calibration | None = None
+    own_effects: tuple[AcceptedEffect, ...] = ()
     gravity_source: str = ""
     model_is_given: bool = False
     findings: tuple[Finding, ...] = ()

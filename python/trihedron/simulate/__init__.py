@@ -1,7 +1,7 @@
 """Simulation of the instrument: motion, mechanism, noise, converter. Produces the same records as reading a file."""
 
 from trihedron.simulate.accelerometer import Accelerometer, Hysteresis, ProofMass
-from trihedron.simulate.diagnosed import with_diagnosed_effects
+from trihedron.simulate.diagnosed import diagnosed_sizes, with_diagnosed_effects
 from trihedron.simulate.effects import EFFECT_IDS, effects_of, with_effect
 from trihedron.simulate.gyroscope import Gyroscope, SenseMode
 from trihedron.simulate.motion import Disturb, Hold, Motion, MoveTo, Oscillate, Replay, Turn, Vibrate
@@ -21,7 +21,7 @@ from trihedron.simulate.sessions import (
     six_faces,
     table_turns,
 )
-from trihedron.simulate.twin import twin_scenario
+from trihedron.simulate.twin import converter_step, twin_scenario
 
 __all__ = [
     "EFFECT_IDS",
@@ -54,6 +54,8 @@ __all__ = [
     "Thermal",
     "Turn",
     "Vibrate",
+    "converter_step",
+    "diagnosed_sizes",
     "dividing_head",
     "effects_of",
     "hand_session",

@@ -25,19 +25,27 @@ def with_diagnosed_effects(
 
     Returns the scenario, the ids switched on, and for every other id why it was left out.
     """
+    sizes, left_out = diagnosed_sizes(effects)
     done: list[str] = []
+    for effect_id, size in sizes:
+        scenario = with_effect(scenario, effect_id, **size)
+        done.append(effect_id)
+    return scenario, tuple(dict.fromkeys(done)), left_out
+
+
+def diagnosed_sizes(effects: Sequence[Mapping[str, Any]]) -> tuple[list[tuple[str, Size]], dict[str, str]]:
+    """Accepted effects as ids and sizes of mechanisms (keys of :func:`with_effect`), and why others were left out."""
+    out: list[tuple[str, Size]] = []
     left_out: dict[str, str] = {}
     for effect in effects:
         effect_id = str(effect["id"])
         values = {str(p["name"]): float(p["value"]) for p in effect["parameters"] if p["value"] is not None}
         variant = str(effect.get("model", {}).get("variant", ""))
         try:
-            for size in _sizes(effect_id, values, variant):
-                scenario = with_effect(scenario, effect_id, **size)
-            done.append(effect_id)
+            out += [(effect_id, size) for size in _sizes(effect_id, values, variant)]
         except _NotSimulated as why:
             left_out[effect_id] = str(why)
-    return scenario, tuple(done), left_out
+    return out, left_out
 
 
 def _sizes(effect_id: str, values: Parameters, variant: str) -> list[Size]:

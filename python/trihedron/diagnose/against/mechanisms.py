@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -15,6 +16,21 @@ from trihedron.records.diagnosis import AcceptedEffect, Candidate, ParameterDiff
 FRAME_TOLERANCE = 0.03
 """Parameters of one effect are stated along the axes of each side's own fit: 3 % (the angle between the two frames and
 the first order of the mechanisms) is no difference."""
+
+
+def left_open_by(effects: Iterable[AcceptedEffect]) -> dict[str, float]:
+    """Ids of numbers that these effects leave open, and by how much (SI): where they are counted from is a convention.
+
+    The size is that of the effect's own parameters where they are of the number's unit, else not known: infinite.
+    """
+    named = {effect.id: effect.leaves_open for effect in catalogue()}
+    out: dict[str, float] = {}
+    for effect in effects:
+        for number in named.get(effect.id, ()):
+            unit = {"accel-zero": "m/s^2", "gyro-zero": "rad/s"}.get(number, "")
+            size = max((abs(p.value) for p in effect.parameters if p.unit == unit), default=math.inf)
+            out[number] = out.get(number, 0.0) + size
+    return out
 
 
 @dataclass(frozen=True)

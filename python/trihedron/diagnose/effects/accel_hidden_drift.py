@@ -11,6 +11,7 @@ class AccelHiddenDrift(Effect):
     """Warm-up exponential, straight line or slow curve per axis."""
 
     id = "accel-hidden-drift"
+    leaves_open = ("accel-zero",)
     mechanism = "accelerometer bias drifts smoothly in time though no logged channel explains it"
     experiment = "log the temperature, or let the sensor warm up and repeat the first poses at the end"
 

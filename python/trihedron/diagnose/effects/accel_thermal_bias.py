@@ -12,6 +12,7 @@ class AccelThermalBias(Effect):
     """Bias linear, then quadratic, in temperature (about its mean over the holds)."""
 
     id = "accel-thermal-bias"
+    leaves_open = ("accel-zero",)
     mechanism = "accelerometer bias follows the temperature"
     experiment = (
         "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"

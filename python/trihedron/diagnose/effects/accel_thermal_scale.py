@@ -12,6 +12,7 @@ class AccelThermalScale(Effect):
     """Relative scale linear in temperature (about its mean over the holds)."""
 
     id = "accel-thermal-scale"
+    leaves_open = ("accel-zero", "accel-scale")
     mechanism = "accelerometer scale follows the temperature"
     experiment = "repeat the same faces and turns at two temperatures"
     applies_elsewhere = True

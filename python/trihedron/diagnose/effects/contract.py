@@ -26,6 +26,7 @@ class Variant:
     """One shape of an effect: the distortion per unit of each parameter, and the shape numbers it was made with.
 
     ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; each costs as a parameter does.
+    ``scale`` is what one of a linear parameter stands for in the unit that is reported.
     """
 
     distortion: Distortion
@@ -34,6 +35,7 @@ class Variant:
     shape: dict[str, tuple[float, str]] = field(default_factory=dict)
     label: str = ""
     shape_sigma: float = 0.0
+    scale: float = 1.0
 
 
 class Effect(ABC):
@@ -56,6 +58,9 @@ class Effect(ABC):
 
     is_of_session: ClassVar[bool] = False
     """Whether it belongs to one experiment (a pushed pose, a tilted table) and to no instrument."""
+    leaves_open: ClassVar[tuple[str, ...]] = ()
+    """Numbers (ids) whose level depends on where the effect is counted from: a zero at the session's mean temperature
+    is no other zero than one at 25 °C."""
     is_local: ClassVar[bool] = False
     """Whether it concerns one pose or move only: its gain may then come from one block of held-out data."""
 
@@ -69,6 +74,10 @@ class Effect(ABC):
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:  # noqa: ARG002
         """The same variant at another value of its one shape number; ``None`` where the shape is not continuous."""
+        return None
+
+    def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:  # noqa: ARG002
+        """A scaled variant made again for the size it was found to have; ``None`` where columns do not depend on it."""
         return None
 
     def made_again(self, context: Context, variant: Variant) -> Variant | None:
@@ -92,11 +101,15 @@ class Effect(ABC):
         """Whether the fitted parameters are ones that the mechanism can have."""
         return True
 
+    def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+        """The same where it depends on the shape."""
+        return self.is_plausible(value, covariance)
+
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         """Physical parameters from the linear ones; shape numbers follow without a standard error of their own."""
-        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        sigma = abs(variant.scale) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
         linear = tuple(
-            EffectParameter(name, float(v), float(s), unit)
+            EffectParameter(name, variant.scale * float(v), float(s), unit)
             for name, v, s, unit in zip(variant.names, value, sigma, variant.units, strict=True)
         )
         shape = tuple(EffectParameter(name, v, variant.shape_sigma, unit) for name, (v, unit) in variant.shape.items())

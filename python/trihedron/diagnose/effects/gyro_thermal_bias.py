@@ -13,6 +13,7 @@ class GyroThermalBias(Effect):
     """Bias linear, then quadratic, in temperature (about its mean over the holds)."""
 
     id = "gyro-thermal-bias"
+    leaves_open = ("gyro-zero",)
     mechanism = "gyro bias follows the temperature"
     experiment = (
         "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"

@@ -12,6 +12,7 @@ class GyroThermalScale(Effect):
     """Relative scale linear in temperature (about its mean over the holds)."""
 
     id = "gyro-thermal-scale"
+    leaves_open = ("gyro-zero", "gyro-scale")
     mechanism = "gyro scale follows the temperature"
     experiment = "repeat the same faces and turns at two temperatures"
     applies_elsewhere = True

@@ -45,10 +45,10 @@ def move_misfit(context: Context) -> Motion | None:
         # One variance per domain: what stays unexplained is noise to a law.
         spread = float((system.residual[own] ** 2).sum()) / max(free, 1.0)
         scale[system.domain[rows] == domain] = np.sqrt(max(spread, 1e-12))
-    scaled = (fitted.jacobian / fitted.scale)[rows]
-    normal = reduced.scaled.T @ reduced.scaled
-    normal[np.diag_indices_from(normal)] += 1e-12
-    P = np.eye(len(rows)) - scaled @ np.linalg.solve(normal, scaled.T)
+    chosen = np.zeros((len(system.residual), len(rows)))
+    chosen[rows, np.arange(len(rows))] = 1.0
+    P = reduced.project(chosen)[rows]
+    P = 0.5 * (P + P.T)
     residual = system.residual[rows] / scale
     misfit = Misfit(P, residual, float(residual @ residual), dof, system.segment[rows].astype(np.intp))
     gyro = _candidates(context, reduced, misfit, rows, scale, is_gyro=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.solve import CORNER_GRID_S
 from trihedron.diagnose.zeros.evidence import FEWEST_POSES, ZeroEvidence, examine
 from trihedron.diagnose.zeros.readings import SessionZeros, accel_zeros, gyro_zeros
 from trihedron.records.diagnosis import EffectParameter
@@ -76,6 +77,22 @@ def share_of_zeros(found: SessionEvidence) -> float:
     """Variance of the scatter over all that zeros vary by from pose to pose, effects of the catalogue included."""
     scatter = float(np.sum(found.evidence.scatter**2))
     return scatter / max(float(found.zeros.varied.sum()), scatter, 1e-300)
+
+
+def share_of_curve(found: SessionEvidence, rms: FloatArray) -> float:
+    """Variance of a drift's curve over all that zeros vary by from pose to pose."""
+    drift = float(np.sum(rms**2))
+    return drift / max(float(found.zeros.varied.sum()), drift, 1e-300)
+
+
+def walk_of_noise(context: Context) -> float:
+    """rms, rad/s, that the gyros' white noise could walk about its mean in the session, at the earliest corner."""
+    obs, twin = context.obs, context.fitted.twin
+    assert obs.rate_density is not None
+    density = float(np.sqrt(((twin.gyro_S**2) @ obs.rate_density**2).mean()))
+    span = max(float(obs.hold_time_s[-1] - obs.hold_time_s[0]), 1.0)
+    # K = √3 N/τ (eq. 8.3), and a walk has a sixth of K² T about its mean.
+    return float(np.sqrt(3.0) * density / CORNER_GRID_S[0] * np.sqrt(span / 6.0))
 
 
 def with_gyro_scatter(obs: Observations, sigma: FloatArray, si_per_raw: FloatArray) -> Observations:

@@ -1,0 +1,19 @@
+"""What can go wrong between a board and a file, each as one sentence."""
+
+from __future__ import annotations
+
+
+class CaptureError(ValueError):
+    """The question cannot be answered: one sentence says what, where and what to do."""
+
+
+class SourceLostError(CaptureError):
+    """The device went away while it was read; it may come back."""
+
+
+class SourceEndedError(CaptureError):
+    """A file or a pipe was read to its end."""
+
+
+class DiskError(CaptureError):
+    """The log could not be written on; what stands on the disk before stays readable."""

@@ -1,0 +1,166 @@
+"""The log of a capture: text that grows row by row, whole after every write, readable whenever it stops."""
+
+from __future__ import annotations
+
+import errno
+import os
+import time
+from pathlib import Path
+
+from trihedron.capture.errors import CaptureError, DiskError
+
+FLUSH_S = 0.25
+"""What a killed process loses at most, with the pieces that wait for their successors (docs/capture.md, section 4)."""
+
+SYNC_S = 5.0
+"""How often the disk itself is asked to write, against a loss of power."""
+
+_LINE = 240
+"""Bytes of each line of the header that is written again while the log grows."""
+
+FORMAT = "trihedron capture 1"
+
+
+class GrowingLog:
+    """Appends rows; nothing is rewritten but two lines of fixed length in the header.
+
+    Raises
+    ------
+    CaptureError
+        When the file exists and ``overwrite`` is not said, or its folder cannot be written to.
+    """
+
+    def __init__(self, path: Path, *, overwrite: bool = False) -> None:
+        self.path = path
+        flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if overwrite else os.O_EXCL)
+        try:
+            self._handle = os.open(path, flags, 0o666)
+        except FileExistsError:
+            raise CaptureError(
+                f"{path}: the file exists and was left alone; choose another name or add --force."
+            ) from None
+        except OSError as error:
+            raise CaptureError(f"{path}: the log cannot be written there ({error.strerror}).") from None
+        self._waiting: list[str] = []
+        self._size = 0
+        self._places: dict[str, int] = {}
+        self._flushed_s = self._synced_s = time.monotonic()
+        self.rows_saved = 0
+        self._rows_waiting = 0
+        self.duration_s = 0.0
+        self._time_waiting = 0.0
+
+    def begin(self, facts: dict[str, str], columns: list[str]) -> None:
+        """The header: facts that stay, two lines to be filled, the names of the columns."""
+        lines = [f"# {FORMAT}"]
+        lines += [f"# {key}: {_plain(value)}" for key, value in facts.items()]
+        text = "".join(f"{line}\n" for line in lines)
+        size = len(text.encode())
+        for key in ("frames", "clock"):
+            self._places[key] = size
+            line = f"# {key}: not known yet".ljust(_LINE - 1) + "\n"
+            text += line
+            size += len(line)
+        self._write(text + ",".join(columns) + "\n")
+
+    def fill(self, key: str, value: str) -> None:
+        """Say anew one of the two lines of the header."""
+        if key not in self._places:
+            return
+        line = f"# {key}: {_plain(value)}".encode("ascii", "replace")[: _LINE - 1].ljust(_LINE - 1) + b"\n"
+        try:
+            os.pwrite(self._handle, line, self._places[key])
+        except OSError as error:
+            raise self._refused(error) from None
+
+    def row(self, text: str, time_s: float) -> None:
+        """One row, without its end of line."""
+        self._waiting.append(text)
+        self._rows_waiting += 1
+        self._time_waiting = time_s
+
+    def remark(self, text: str) -> None:
+        """A line that readers pass over."""
+        self._waiting.append(f"# {_plain(text)}")
+
+    def flush(self, *, force: bool = False) -> None:
+        """Give to the system what waits, if it is time to.
+
+        Raises
+        ------
+        DiskError
+            When the disk is full or gone; the rows before stay whole.
+        """
+        now = time.monotonic()
+        if not (force or now - self._flushed_s >= FLUSH_S):
+            return
+        if self._waiting:
+            text = "\n".join(self._waiting) + "\n"
+            self._write(text)
+            self.rows_saved += self._rows_waiting
+            self.duration_s = self._time_waiting
+            self._waiting.clear()
+            self._rows_waiting = 0
+        # From the end of the write: a slow disk gets fewer and larger pieces.
+        self._flushed_s = time.monotonic()
+        if now - self._synced_s >= SYNC_S:
+            self._synced_s = now
+            try:
+                os.fdatasync(self._handle)
+            except OSError as error:
+                raise self._refused(error) from None
+
+    def close(self) -> None:
+        """Write what waits, and let the file go."""
+        if self._handle < 0:
+            return
+        try:
+            self.flush(force=True)
+        finally:
+            os.close(self._handle)
+            self._handle = -1
+
+    def abandon(self) -> None:
+        """Let the file go as it stands."""
+        if self._handle >= 0:
+            os.close(self._handle)
+            self._handle = -1
+
+    def _write(self, text: str) -> None:
+        data = memoryview(text.encode())
+        start = self._size
+        while data:
+            try:
+                n = os.write(self._handle, data)
+            except InterruptedError:
+                continue
+            except OSError as error:
+                self._cut(start, bytes(text.encode())[: self._size - start])
+                raise self._refused(error) from None
+            self._size += n
+            data = data[n:]
+
+    def _cut(self, start: int, written: bytes) -> None:
+        """Half a row at the end is taken back; whole rows of the piece stay and count."""
+        whole = written.rfind(b"\n") + 1
+        kept = written[:whole]
+        self.rows_saved += sum(1 for line in kept.split(b"\n") if line and not line.startswith(b"#"))
+        self._size = start + whole
+        try:
+            os.ftruncate(self._handle, self._size)
+        except OSError:
+            # The reader reports an incomplete last line; nothing more can be done here.
+            return
+
+    def _refused(self, error: OSError) -> DiskError:
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+        why = "the disk is full" if full else f"the disk refuses to write ({error.strerror})"
+        remedy = "free some space and capture anew" if full else "check the disk"
+        return DiskError(
+            f"{self.path}: {why}; {self.rows_saved} rows are saved and readable, nothing after them: {remedy}."
+        )
+
+
+def _plain(text: str) -> str:
+    """No commas, semicolons or ends of line: a header line must not look like a row of names."""
+    return " ".join(text.replace(",", " ").replace(";", " ").split())

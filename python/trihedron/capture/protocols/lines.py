@@ -1,0 +1,303 @@
+"""Lines of text: numbers between commas, semicolons, tabs or blanks, or with a label each."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from trihedron.capture.protocols.contract import Frame
+
+LEARN_LINES = 12
+"""Lines of numbers from which the layout is learned."""
+
+_LONGEST = 4096
+_LONGEST_LINE = 600
+"""Characters: thirty numbers with their labels; longer lines are binary."""
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|NaN"
+_LABELLED = re.compile(rf"([A-Za-zµ°_][^:=,;|\t]*?)\s*[:=]\s*({_NUMBER})(?=[\s,;|]|$)")
+# The Arduino monitor's own clock in front of a line, or a terminal program's in brackets.
+_MONITOR = re.compile(r"^\s*\[?(\d{1,2}):(\d{2}):(\d{2})[.,](\d{1,6})\]?\s*(?:->)?\s*")
+_DAY_MS = 86_400_000
+
+
+@dataclass(frozen=True)
+class LineColumns:
+    """What the fields of a line are: names of all, and which is the device's clock (seconds per unit of it) and which
+    its frame counter, where there are such."""
+
+    names: tuple[str, ...]
+    time: int | None = None
+    time_unit_s: float = 0.0
+    counter: int | None = None
+
+
+NameColumns = Callable[[tuple[str, ...] | None, list[list[str]]], LineColumns]
+"""From the names that the device sent (or None) and some lines of numbers."""
+
+
+def name_by_position(names: tuple[str, ...] | None, rows: list[list[str]]) -> LineColumns:
+    """Without a reader's knowledge: names as they are; 3 = x y z, 6 = two triads, one more in front is ms."""
+    n = len(rows[0])
+    triads = ("ax", "ay", "az", "gx", "gy", "gz")
+    if names is None:
+        has_time = n in (4, 7)
+        plain = triads[: n - has_time] if n - has_time in (3, 6) else tuple(f"column_{i + 1}" for i in range(n))
+        return LineColumns((("time",) if has_time else ()) + plain, 0 if has_time else None, 1e-3)
+    time = next((i for i, name in enumerate(names) if name.lower().strip() in ("t", "time", "millis", "micros")), None)
+    unit = 1e-6 if time is not None and names[time].lower() == "micros" else 1e-3
+    return LineColumns(names, time, unit)
+
+
+class LinesDecoder:
+    """Learns the layout from the first lines, then takes every line of that layout.
+
+    A line of another number of fields, or with a field that is no number, is counted as corrupt; lines of words only
+    are what the device says (``said``). The first line of a stream is expected to be cut and counts as nothing.
+    """
+
+    name = "lines"
+    counter_modulus = 0
+
+    def __init__(self, name_columns: NameColumns = name_by_position) -> None:
+        self.columns: tuple[str, ...] = ()
+        self.clock_modulus = 0
+        self.tick_s = 0.0
+        self.corrupt = 0
+        self.skipped_bytes = 0
+        self.said: list[str] = []
+        self._name_columns = name_columns
+        self._buffer = bytearray()
+        self._first: list[str] = []
+        self._n_first = 0
+        self._is_first = True
+        self._labels: tuple[str, ...] | None = None
+        self._separator: str | None = ","
+        self._n = 0
+        self._time: int | None = None
+        self._counter: int | None = None
+        self._keep: tuple[int, ...] = ()
+        self._per_unit = 1
+        self._monitor = False
+        self._pattern: re.Pattern[str] | None = None
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Frames of the lines that are complete with these bytes."""
+        self._buffer += data
+        if b"\n" not in data:
+            if b"\r" in data and b"\n" not in self._buffer:
+                self._buffer = self._buffer.replace(b"\r", b"\n")
+            elif len(self._buffer) > _LONGEST:
+                self.skipped_bytes += len(self._buffer)
+                self._buffer.clear()
+                return []
+        *lines, rest = self._buffer.split(b"\n")
+        self._buffer = rest
+        return self._take(lines)
+
+    def finish(self) -> list[Frame]:
+        """What was learned until now must do; a line without its end is none."""
+        self.skipped_bytes += len(self._buffer)
+        self._buffer.clear()
+        return self._learn() if self._n == 0 and self._first else []
+
+    def adopt(self, other: LinesDecoder) -> None:
+        """Go on with what another one learned: the same device, connected again."""
+        for name in (
+            *("columns", "clock_modulus", "tick_s", "_labels", "_separator", "_n", "_time", "_counter", "_keep"),
+            *("_per_unit", "_monitor", "_pattern"),
+        ):
+            setattr(self, name, getattr(other, name))
+
+    def _take(self, lines: list[bytearray]) -> list[Frame]:
+        out: list[Frame] = []
+        for raw in lines:
+            try:
+                line = raw.decode("ascii").strip("\r\x00 ")
+            except UnicodeDecodeError:
+                line = raw.decode("utf-8", "replace").strip("\r\x00 ")
+            if len(line) > _LONGEST_LINE:
+                self.corrupt += self._n > 0
+                self.skipped_bytes += len(raw) + 1
+                continue
+            if self._n == 0:
+                if self._is_first:
+                    # A stream is joined in the middle of a line; the start of a file is not known from that.
+                    self._is_first = False
+                if line:
+                    self._first.append(line)
+                    self._n_first += line.replace("\t", " ").isprintable() and _fields_of_numbers(_unprefixed(line)) > 0
+                    if self._n_first >= LEARN_LINES:
+                        out += self._learn()
+                    elif len(self._first) > 50 * LEARN_LINES:
+                        self.skipped_bytes += sum(len(text) + 1 for text in self._first)
+                        self._first.clear()
+                        self._n_first = 0
+                continue
+            frame = self._frame(line)
+            if frame is not None:
+                out.append(frame)
+            elif line:
+                self._reject(line)
+        return out
+
+    def _reject(self, line: str) -> None:
+        if not any(c.isdigit() for c in line) or line.startswith("#"):
+            if len(self.said) < 20 and line.isprintable():
+                self.said.append(line[:200])
+            self.skipped_bytes += len(line) + 1
+        else:
+            self.corrupt += 1
+            self.skipped_bytes += len(line) + 1
+
+    def _learn(self) -> list[Frame]:
+        lines, self._first, self._n_first = self._first, [], 0
+        plain = [_unprefixed(line) for line in lines]
+        counts = Counter(n for line in plain if (n := _fields_of_numbers(line)) > 1)
+        if not counts:
+            for line in lines:
+                self._reject(line)
+            return []
+        n = counts.most_common(1)[0][0]
+        usual = [line for line in plain if _fields_of_numbers(line) == n]
+        labels = Counter(tuple(label for label, _ in _LABELLED.findall(line)) for line in usual).most_common(1)[0][0]
+        names: tuple[str, ...] | None = None
+        if len(labels) == n:
+            self._labels = labels
+            self._pattern = re.compile(
+                r".*?"
+                + r".*?".join(rf"(?<![A-Za-z]){re.escape(label)}\s*[:=]\s*({_NUMBER})(?=[\s,;|]|$)" for label in labels)
+            )
+            names = labels
+            rows = [[value for _, value in _LABELLED.findall(line)] for line in usual]
+        else:
+            self._separator = _separator(usual)
+            rows = [self._split(line) for line in usual]
+            names = self._header(plain, n)
+        self._monitor = all(_MONITOR.match(line) for line in lines if _fields_of_numbers(_unprefixed(line)) == n)
+        self._settle(self._name_columns(names, [row for row in rows if len(row) == n]), n, rows)
+        out: list[Frame] = []
+        for line in lines:
+            frame = self._frame(line)
+            if frame is not None:
+                out.append(frame)
+            elif out:
+                self._reject(line)
+            else:
+                # Before the first frame: a line that was joined in its middle, a greeting, the names.
+                self.skipped_bytes += len(line) + 1
+                self.said += [line[:200]] if len(self.said) < 20 else []
+        return out
+
+    def _settle(self, columns: LineColumns, n: int, rows: list[list[str]]) -> None:
+        self._n = n
+        self._time, self._counter = columns.time, columns.counter
+        special = {self._counter, self._time} - {None}
+        self._keep = tuple(i for i in range(n) if i not in special)
+        self.columns = tuple(columns.names[i] for i in self._keep)
+        if self._time is not None:
+            at, unit = self._time, columns.time_unit_s
+            digits = max((len(row[at].partition(".")[2]) for row in rows if len(row) == n), default=0)
+            # Decimals are ticks: 12.345 s is 12345 of a millisecond.
+            self._per_unit = 10 ** min(digits, 9)
+            self.tick_s = unit / self._per_unit
+            self.clock_modulus = 1 << 32 if digits == 0 and unit < 1.0 else 0
+        elif self._monitor:
+            self.tick_s, self.clock_modulus = 1e-3, _DAY_MS
+
+    def _split(self, line: str) -> list[str]:
+        return [field.strip() for field in line.rstrip(" ,;\t").split(self._separator)]
+
+    def _header(self, lines: list[str], n: int) -> tuple[str, ...] | None:
+        for line in lines:
+            fields = self._split(line.lstrip("#% "))
+            if len(fields) == n and all(field and not _is_number(field) for field in fields):
+                return tuple(fields)
+        return None
+
+    def _frame(self, line: str) -> Frame | None:
+        ticks: int | None = None
+        if self._monitor:
+            found = _MONITOR.match(line)
+            if found is None:
+                return None
+            hours, minutes, seconds, part = found.groups()
+            ticks = (int(hours) * 60 + int(minutes)) * 60_000 + int(seconds) * 1000 + int(part[:3].ljust(3, "0"))
+            line = line[found.end() :]
+        if self._pattern is not None:
+            labelled = self._pattern.fullmatch(line.rstrip(" ,;|\t"))
+            if labelled is None:
+                return None
+            tokens: list[str] = list(labelled.groups())
+        else:
+            tokens = line.rstrip(" ,;\t").split(self._separator)
+        if len(tokens) != self._n:
+            return None
+        try:
+            numbers = list(map(float, tokens))
+            counter = None if self._counter is None else int(tokens[self._counter])
+            if self._time is not None:
+                ticks = round(numbers[self._time] * self._per_unit)
+        except (ValueError, OverflowError):
+            return None
+        keep = self._keep
+        if len(keep) == len(tokens):
+            return Frame(counter, ticks, tuple(numbers), ",".join(tokens).replace(" ", ""))
+        text = ",".join([tokens[i].strip() for i in keep])
+        return Frame(counter, ticks, tuple([numbers[i] for i in keep]), text)
+
+
+class SixDofTextDecoder(LinesDecoder):
+    """The 6DOF v4's text: ``A``, count, six readings, ``Z`` between tabs."""
+
+    name = "sparkfun-6dof-text"
+
+    def __init__(self) -> None:
+        columns = (
+            *("count", "acc_x [counts]", "acc_y [counts]", "acc_z [counts]"),
+            *("gyr_y [counts]", "gyr_x [counts]", "gyr_z [counts]"),
+        )
+        super().__init__(lambda _names, rows: LineColumns(columns[: len(rows[0])], counter=0))
+        self.counter_modulus = 1 << 15
+
+    def _take(self, lines: list[bytearray]) -> list[Frame]:
+        inner: list[bytearray] = []
+        for line in lines:
+            fields = line.strip().split(b"\t")
+            if len(fields) == 9 and fields[0] == b"A" and fields[-1] == b"Z":
+                inner.append(bytearray(b"\t".join(fields[1:-1])))
+            elif line.strip():
+                self.corrupt += 1
+                self.skipped_bytes += len(line) + 1
+        return super()._take(inner)
+
+
+def _unprefixed(line: str) -> str:
+    return _MONITOR.sub("", line)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _separator(lines: list[str]) -> str | None:
+    for separator in (",", ";", "\t"):
+        if sum(separator in line for line in lines) > len(lines) // 2:
+            return separator
+    return None
+
+
+def _fields_of_numbers(line: str) -> int:
+    """How many fields a line of numbers has; 0 where some field is none."""
+    labelled = _LABELLED.findall(line)
+    if labelled:
+        return len(labelled)
+    line = line.rstrip(" ,;\t")
+    fields = line.split(_separator([line]))
+    return len(fields) if len(fields) > 1 and all(_is_number(field.strip()) for field in fields) else 0

@@ -1,0 +1,124 @@
+"""SparkFun boards: the 6DOF v4's binary frame and its text, and the Razor's tagged text lines.
+
+6DOF v4: the letter A, a sample count, three accelerometers, pitch, roll and yaw rate, the letter Z; two bytes each,
+high byte first, readings of a ten-bit converter. There is no checksum. Razor: one line per sensor, ``#A-R=x,y,z``.
+"""
+
+from __future__ import annotations
+
+import struct
+
+from trihedron.capture.protocols.contract import Frame
+from trihedron.capture.protocols.framing import MORE, FramedDecoder
+
+_LENGTH = 16
+_FRAME = struct.Struct(">x7Hx")
+_HIGHEST = 1023
+"""Of a ten-bit converter: what exceeds it is no frame."""
+
+# The count wraps at 2^15 in some firmware and at 2^16 in other: modulo 2^15 it is right for both.
+_COUNT_MODULUS = 1 << 15
+
+SIX_DOF_COLUMNS = (
+    *("acc_x [counts]", "acc_y [counts]", "acc_z [counts]"),
+    *("gyr_y [counts]", "gyr_x [counts]", "gyr_z [counts]"),
+)
+
+
+class SixDofDecoder(FramedDecoder):
+    """Binary frames ``A … Z`` of 16 bytes."""
+
+    name = "sparkfun-6dof"
+    columns: tuple[str, ...] = SIX_DOF_COLUMNS
+    counter_modulus = _COUNT_MODULUS
+
+    def __init__(self) -> None:
+        super().__init__(b"A")
+
+    def length_at(self, data: bytearray, at: int) -> int:
+        """Always the same."""
+        return _LENGTH if len(data) - at >= _LENGTH else MORE
+
+    def is_sound(self, data: bytearray, at: int, length: int) -> bool:
+        """Z at its place and nothing above the converter's range."""
+        return data[at + length - 1] == 0x5A and max(data[at + 3 : at + length - 1 : 2]) <= _HIGHEST >> 8
+
+    def decode(self, frame: bytes) -> Frame:
+        """Counts."""
+        numbers = _FRAME.unpack(frame)
+        return Frame(numbers[0] % _COUNT_MODULUS, None, numbers[1:], ",".join(map(str, numbers[1:])))
+
+
+class RazorDecoder:
+    """Tagged lines of one sample: A (acceleration), M (magnetometer, optional), G (rates); R raw or C corrected."""
+
+    name = "razor"
+    counter_modulus = 0
+    clock_modulus = 0
+    tick_s = 0.0
+
+    def __init__(self) -> None:
+        self.columns: tuple[str, ...] = ()
+        self.corrupt = 0
+        self.skipped_bytes = 0
+        self._buffer = bytearray()
+        self._parts: dict[str, list[str]] = {}
+        self._order: tuple[str, ...] = ()
+
+    def adopt(self, other: RazorDecoder) -> None:
+        """Go on with the columns of the connection before."""
+        self.columns, self._order = other.columns, other._order
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Samples whose last line is complete."""
+        self._buffer += data
+        *lines, rest = self._buffer.split(b"\n")
+        self._buffer = rest
+        if len(rest) > 4096:
+            self.skipped_bytes += len(rest)
+            self._buffer = bytearray()
+        return [frame for line in lines if (frame := self._line(bytes(line))) is not None]
+
+    def finish(self) -> list[Frame]:
+        """An incomplete line is no sample."""
+        self.skipped_bytes += len(self._buffer)
+        self._buffer.clear()
+        return []
+
+    def _line(self, line: bytes) -> Frame | None:
+        line = line.strip(b"\r\x00 ")
+        tag = line[:5]
+        fields = line[5:].split(b",")
+        if tag[:1] != b"#" or tag[2:3] != b"-" or tag[4:5] != b"=" or tag[1:2] not in b"AMG" or len(fields) != 3:
+            if line:
+                self.skipped_bytes += len(line)
+                # The rest of this sample is not whole any more.
+                self.corrupt += bool(self._parts)
+                self._parts = {}
+            return None
+        sensor = tag[1:2].decode()
+        if sensor == "A" and self._parts:
+            self.corrupt += 1
+            self._parts = {}
+        try:
+            texts = [field.decode("ascii").strip() for field in fields]
+            _ = [float(text) for text in texts]
+        except ValueError:
+            self.corrupt += 1
+            self._parts = {}
+            return None
+        self._parts[sensor] = texts
+        if sensor != "G":
+            return None
+        parts, self._parts = self._parts, {}
+        if not self.columns:
+            if "A" not in parts:
+                return None
+            names = {"A": "acc", "M": "mag", "G": "gyr"}
+            self._order = tuple(letter for letter in "AGM" if letter in parts)
+            self.columns = tuple(f"{names[letter]}_{axis}" for letter in self._order for axis in "xyz")
+        if any(letter not in parts for letter in self._order):
+            self.corrupt += 1
+            return None
+        tokens = [text for letter in self._order for text in parts[letter]]
+        return Frame(None, None, tuple(map(float, tokens)), ",".join(tokens))

@@ -1,0 +1,96 @@
+"""xio x-IMU3: messages that end in a line feed, text or binary, with a time stamp in microseconds.
+
+Layout after the maker's user manual: text ``I,time,gx,gy,gz,ax,ay,az``; binary 0x80 + "I", 64-bit time, six floats,
+little-endian, line feeds and escapes inside replaced as in SLIP (0xDB 0xDC, 0xDB 0xDD). There is no checksum.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+
+from trihedron.capture.protocols.contract import Frame
+
+_INERTIAL = 0x80 + ord("I")
+_BODY = struct.Struct("<xQ6f")
+_TEXT = ",".join(["%.9g"] * 6)
+_ESCAPE = b"\xdb"
+_COLUMNS = (
+    *("gyr_x [deg/s]", "gyr_y [deg/s]", "gyr_z [deg/s]"),
+    *("acc_x [g]", "acc_y [g]", "acc_z [g]"),
+)
+_LARGEST = 1e5
+"""deg/s or g: no such sensor goes there, but a bit that flipped in the exponent of a float does."""
+
+
+class XioDecoder:
+    """Inertial messages; all other kinds pass by."""
+
+    name = "xio"
+    columns: tuple[str, ...] = _COLUMNS
+    counter_modulus = 0
+    clock_modulus = 0
+    tick_s = 1e-6
+
+    def __init__(self) -> None:
+        self.corrupt = 0
+        self.skipped_bytes = 0
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Messages that are complete with these bytes."""
+        self._buffer += data
+        *messages, rest = self._buffer.split(b"\n")
+        self._buffer = rest
+        if len(rest) > 4096:
+            self.skipped_bytes += len(rest)
+            self._buffer = bytearray()
+        return [frame for message in messages if (frame := self._message(bytes(message))) is not None]
+
+    def finish(self) -> list[Frame]:
+        """A message without its end is none."""
+        self.skipped_bytes += len(self._buffer)
+        self._buffer.clear()
+        return []
+
+    def _message(self, message: bytes) -> Frame | None:
+        if not message:
+            return None
+        first = message[0]
+        if first == _INERTIAL:
+            frame = self._binary(message)
+        elif first == 0x49 and message[1:2] == b",":
+            frame = self._text(message)
+        else:
+            # Another kind is a letter (or 0x80 and a letter); anything else is what is left of a message.
+            if not 0x41 <= first & 0x7F <= 0x5A:
+                self.corrupt += 1
+                self.skipped_bytes += len(message) + 1
+            return None
+        if frame is None:
+            self.corrupt += 1
+            self.skipped_bytes += len(message) + 1
+        return frame
+
+    def _binary(self, message: bytes) -> Frame | None:
+        if _ESCAPE in message:
+            message = message.replace(b"\xdb\xdc", b"\n").replace(b"\xdb\xdd", b"\xdb")
+        if len(message) != _BODY.size:
+            return None
+        ticks, *values = _BODY.unpack(message)
+        if not all(-_LARGEST < v < _LARGEST for v in values):
+            return None
+        return Frame(None, ticks, tuple(values), _TEXT % tuple(values))
+
+    def _text(self, message: bytes) -> Frame | None:
+        fields = message.rstrip(b"\r").split(b",")
+        if len(fields) != 8:
+            return None
+        try:
+            ticks = int(fields[1])
+            values = tuple(map(float, fields[2:]))
+        except ValueError:
+            return None
+        if not all(math.isfinite(v) and abs(v) < _LARGEST for v in values):
+            return None
+        return Frame(None, ticks, values, b",".join(fields[2:]).decode("ascii"))

@@ -1,0 +1,315 @@
+"""Which frame is which: indices from the device's own counter or clock, losses counted and placed.
+
+Most cheap protocols have no checksum, so a counter may itself be garbled. A frame that does not follow the last one
+by one step therefore waits until its successors say whether frames are missing before it, or its counter is wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from statistics import median
+from typing import NamedTuple
+
+from trihedron.capture.protocols.contract import Frame
+
+LEARN = 8
+"""Frames from which the clock's step is first taken (their median)."""
+
+MOST_WAITING = 12
+"""Frames that may contradict each other before the longest run of increasing ones is believed."""
+
+MOST_LOST = 10_000
+"""Frames: a counter that jumps further was reset, not overrun."""
+
+MOST_SILENT_S = 3600.0
+"""A clock that jumps further was set, not overrun."""
+
+LONG_GAP = 50
+"""Steps after which the error of the step itself hides where a stamp should stand."""
+
+AGREEMENT = 0.35
+"""Of a step: how far the difference of two stamps may be from one step and still confirm both."""
+
+COARSE = 2.4
+"""Ticks per frame below which rounding moves a stamp by a good part of a frame: a step of two may then be one, and
+single losses are not countable (only holes longer than ``COARSE_SPAN`` ticks)."""
+
+COARSE_SPAN = 8
+
+_WRAPS = (1 << 8, 1 << 16, 1 << 32)
+
+
+class Placed(NamedTuple):
+    """A frame with its place in the stream; ``lost`` frames are missing before it, unless the device ``restarted``."""
+
+    place: int
+    lost: int
+    restarted: bool
+    host_s: float
+    frame: Frame
+
+
+@dataclass
+class Tally:
+    """What became of frames: ``lost`` are missing by the device's own counter or clock; ``garbled`` were whole but
+    contradicted their neighbours' (they are among the lost); ``repeated`` came twice."""
+
+    saved: int = 0
+    lost: int = 0
+    garbled: int = 0
+    repeated: int = 0
+    restarts: int = 0
+
+
+class Sequence:
+    """Gives every frame its index.
+
+    Parameters
+    ----------
+    by_counter, by_clock : bool
+        What to count by; by neither every frame follows the one before.
+    modulus : int
+        Where counter or clock wraps; 0 where it does not.
+    tick_s : float
+        One tick of the clock.
+    """
+
+    def __init__(self, *, by_counter: bool = False, by_clock: bool = False, modulus: int = 0, tick_s: float = 0.0):
+        self._by_counter, self._by_clock = by_counter, by_clock and not by_counter
+        self._modulus = modulus
+        self._tick_s = tick_s
+        self._period = 0.0
+        self.is_coarse = False
+        self._last: int | None = None
+        self._newest: Frame | None = None
+        # How far the last stamp stood after where a steady clock would have put it, in ticks.
+        self._late = 0.0
+        self._index = -1
+        self._waiting: list[tuple[float, Frame]] = []
+        self.tally = Tally()
+
+    def push(self, frames: list[Frame], host_s: float) -> list[Placed]:
+        """Place frames that arrived at one instant of the host's clock; some may wait for the next ones."""
+        out: list[Placed] = []
+        if not (self._by_counter or self._by_clock):
+            for frame in frames:
+                self._index += 1
+                out.append(Placed(self._index, 0, False, host_s, frame))
+            self.tally.saved += len(out)
+            return out
+        for frame in frames:
+            before = self._waiting[-1][1] if self._waiting else self._newest
+            if frame == before and not self.is_coarse:
+                self.tally.repeated += 1
+                continue
+            self._waiting.append((host_s, frame))
+            if self._last is None or (self._by_clock and self._period == 0.0):
+                if len(self._waiting) >= LEARN:
+                    self._begin(out)
+            elif len(self._waiting) == 1 and self._ahead(self._key(frame)) == 1:
+                self._accept(1, out)
+            else:
+                self._resolve(out)
+        return out
+
+    def finish(self) -> list[Placed]:
+        """Place what still waits: no more frames will come."""
+        out: list[Placed] = []
+        if self._last is None and self._waiting:
+            self._begin(out)
+        if self._waiting:
+            self._longest(out)
+        return out
+
+    @property
+    def period_s(self) -> float:
+        """Step of the device's clock, 0 while unknown."""
+        return self._period * self._tick_s
+
+    def _key(self, frame: Frame) -> int:
+        key = frame.counter if self._by_counter else frame.ticks
+        return 0 if key is None else key
+
+    def _difference(self, a: int, b: int) -> int:
+        difference = b - a
+        modulus = self._modulus
+        if modulus:
+            difference %= modulus
+            return difference - modulus if difference > modulus // 2 else difference
+        if difference < 0 and self._by_counter:
+            # A number printed as text does not say where it wraps.
+            for wrap in _WRAPS:
+                if 0 < difference + wrap <= 64:
+                    return difference + wrap
+        return difference
+
+    def _steps(self, a: int, b: int) -> int:
+        difference = self._difference(a, b)
+        if self._by_counter or (difference == 0 and not self.is_coarse):
+            return difference
+        if self.is_coarse and 0 <= difference <= COARSE_SPAN:
+            return 1
+        steps = round(difference / self._period)
+        return steps if steps else (1 if difference > 0 else -1)
+
+    def _follows(self, a: int, b: int) -> bool:
+        """Whether two frames agree that none is missing between them: the evidence that both counts are right."""
+        if self._by_counter or self.is_coarse:
+            return self._steps(a, b) == 1
+        return abs(self._difference(a, b) / self._period - 1.0) < AGREEMENT
+
+    def _agree_of_three(self) -> bool:
+        """Where equal stamps are usual, a frame sent twice would confirm itself: a third one has to go on."""
+        if len(self._waiting) < 3:
+            return False
+        first, second, third = (self._key(frame) for _, frame in self._waiting[-3:])
+        return self._follows(first, second) and self._difference(first, third) > 0
+
+    def _ahead(self, key: int) -> int:
+        """Steps from the last frame placed, whose own stamp may have been early or late."""
+        assert self._last is not None
+        difference = self._difference(self._last, key)
+        if self._by_counter or self.is_coarse or difference == 0:
+            return self._steps(self._last, key)
+        steps = round((difference + self._late) / self._period)
+        return steps if steps > 0 else (1 if difference > 0 else min(steps, -1))
+
+    @property
+    def _most(self) -> int:
+        if self._by_counter:
+            return min(MOST_LOST, self._modulus // 2 or MOST_LOST)
+        return int(MOST_SILENT_S / max(self.period_s, 1e-9))
+
+    def _begin(self, out: list[Placed]) -> None:
+        keys = [self._key(frame) for _, frame in self._waiting]
+        differences = [self._difference(a, b) for a, b in pairwise(keys)]
+        if self._by_clock and self._period == 0.0:
+            forward = [d for d in differences if d > 0] or [1]
+            usual = [d for d in forward if d <= 1.6 * median(forward)]
+            # Equal stamps are neighbours within one tick, not repeats.
+            n = len(usual) + sum(d == 0 for d in differences)
+            self._period = sum(usual) / n
+            self.is_coarse = self._period < COARSE
+        # Start with the first frame that its successor, or the next but one, continues.
+        steps = [[self._steps(a, b) for b in keys[i + 1 : i + 4]] for i, a in enumerate(keys)]
+        first = next((i for i, ahead in enumerate(steps) if any(0 < s <= 4 for s in ahead)), 0)
+        self.tally.garbled += first
+        del self._waiting[:first]
+        host_s, frame = self._waiting.pop(0)
+        self._place(host_s, frame, 1, False, out)
+        rest, self._waiting = self._waiting, []
+        for host_s, frame in rest:
+            self._waiting.append((host_s, frame))
+            self._resolve(out)
+
+    def _resolve(self, out: list[Placed]) -> None:
+        """Decide what can be decided of the frames that wait; the newest has just been added."""
+        waiting = self._waiting
+        newest = self._key(waiting[-1][1])
+        if self._ahead(newest) == len(waiting):
+            # Where it belongs if those between only have a wrong count, or a stamp early or late.
+            self._in_place(out)
+            return
+        if len(waiting) >= 2:
+            before = self._key(waiting[-2][1])
+            if self._follows(before, newest) and (not self.is_coarse or self._agree_of_three()):
+                ahead = self._ahead(before)
+                if 0 < ahead <= self._most:
+                    self._between(len(waiting) - 2, before, out)
+                    self._accept(max(self._ahead(before), 1), out)
+                    self._accept(1, out)
+                    return
+                if len(waiting) >= 3 and self._follows(self._key(waiting[-3][1]), before):
+                    self._restart(len(waiting) - 3, ahead, out)
+                    return
+        if len(waiting) > MOST_WAITING:
+            self._longest(out)
+
+    def _in_place(self, out: list[Placed]) -> None:
+        """As many frames wait as there are steps to the newest: each has its own place."""
+        first, n = self._index, len(self._waiting)
+        newest = self._key(self._waiting[-1][1])
+        for place in range(1, n):
+            key = self._key(self._waiting[0][1])
+            ahead = first + place - self._index if self._by_clock else self._ahead(key)
+            if self._ahead(key) > 0 and self._difference(key, newest) > 0 and ahead <= first + n - 1 - self._index:
+                self._accept(ahead, out)
+            else:
+                self._drop()
+        self._accept(first + n - self._index, out)
+
+    def _between(self, n: int, until: int, out: list[Placed]) -> None:
+        """Of the first ``n`` that wait, keep those that lie in order between the last and ``until``."""
+        for _ in range(n):
+            key = self._key(self._waiting[0][1])
+            ahead, left = self._ahead(key), self._steps(key, until)
+            if 0 < ahead <= self._most and left > 0 and ahead < self._ahead(until):
+                self._accept(ahead, out)
+            else:
+                self._drop()
+
+    def _drop(self) -> None:
+        _, frame = self._waiting.pop(0)
+        assert self._last is not None
+        if self._difference(self._last, self._key(frame)) == 0:
+            self.tally.repeated += 1
+        else:
+            self.tally.garbled += 1
+
+    def _restart(self, n: int, ahead: int, out: list[Placed]) -> None:
+        """Three frames in a row say that the count began anew (or that a stretch came twice)."""
+        if -64 <= ahead <= 0:
+            self.tally.repeated += len(self._waiting)
+            self._waiting.clear()
+            return
+        for _ in range(n):
+            self._drop()
+        self.tally.restarts += 1
+        host_s, frame = self._waiting.pop(0)
+        self._place(host_s, frame, 1, True, out)
+        while self._waiting:
+            self._accept(1, out)
+
+    def _longest(self, out: list[Placed]) -> None:
+        """Believe the longest run of increasing keys, drop the rest."""
+        keys = [self._key(frame) for _, frame in self._waiting]
+        best: list[list[int]] = []
+        for i, key in enumerate(keys):
+            if not 0 < self._ahead(key) <= self._most:
+                best.append([])
+                continue
+            fits = [run for run in best if run and 0 < self._steps(keys[run[-1]], key) <= self._most]
+            best.append([*_longest_of(fits), i])
+        chosen = set(_longest_of(best))
+        for i in range(len(keys)):
+            if i in chosen:
+                self._accept(max(self._ahead(keys[i]), 1), out)
+            else:
+                self._drop()
+
+    def _accept(self, ahead: int, out: list[Placed]) -> None:
+        host_s, frame = self._waiting.pop(0)
+        self._place(host_s, frame, ahead, False, out)
+
+    def _place(self, host_s: float, frame: Frame, ahead: int, restarted: bool, out: list[Placed]) -> None:
+        self._index += ahead
+        key = self._key(frame)
+        if self._by_clock and self._last is not None:
+            surprise = self._difference(self._last, key) + self._late - ahead * self._period
+            if restarted or ahead > LONG_GAP:
+                self._late = 0.0
+            else:
+                # The step follows the clock slowly, the phase faster; a single stamp moves neither much.
+                limit = 0.3 * self._period
+                gain = max(1e-3, 1.0 / (LEARN + self.tally.saved))
+                self._period += gain * min(max(surprise / ahead, -limit), limit)
+                self._late = 0.8 * surprise
+        self._last, self._newest = key, frame
+        self.tally.saved += 1
+        self.tally.lost += ahead - 1
+        out.append(Placed(self._index, ahead - 1, restarted, host_s, frame))
+
+
+def _longest_of(runs: list[list[int]]) -> list[int]:
+    return max(runs, key=len) if runs else []

@@ -1,0 +1,312 @@
+"""Where bytes come from: a serial port, a TCP connection, a file, standard input."""
+
+from __future__ import annotations
+
+import errno
+import os
+import select
+import socket
+import stat
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
+
+if TYPE_CHECKING:
+    import serial
+
+GATHER_S = 0.008
+"""After the first byte of a piece, how long to wait for more: at 1 kHz it saves nine wake-ups of ten."""
+
+POLL_S = 0.1
+
+
+class Source(Protocol):
+    """Bytes as they come. ``is_live`` says that the moment of arrival means something."""
+
+    name: str
+    is_live: bool
+
+    def read(self) -> bytes:
+        """The next piece; empty when nothing came for ``POLL_S``. Raises SourceLostError or SourceEndedError."""
+        ...
+
+    def reopen(self) -> bool:
+        """Try once to have it back after it was lost."""
+        ...
+
+    def close(self) -> None:
+        """Let it go."""
+        ...
+
+
+def import_serial() -> type[serial.Serial]:
+    """pyserial's port.
+
+    Raises
+    ------
+    CaptureError
+        When pyserial is not installed.
+    """
+    try:
+        import serial
+    except ImportError:
+        raise CaptureError("serial ports need pyserial; install it with `pip install pyserial`.") from None
+    return serial.Serial
+
+
+class SerialSource:
+    """A serial port, or a pseudo-terminal."""
+
+    is_live = True
+
+    def __init__(self, port: str, baud: int = 115_200) -> None:
+        self.port, self.baud = port, baud
+        self.name = f"{port} at {baud} baud"
+        self._identity = _usb_identity(port)
+        self._serial = _open_serial(port, baud)
+
+    def set_baud(self, baud: int) -> bool:
+        """Change the rate and forget what came at the old one; False where the port cannot go that fast."""
+        try:
+            self._serial.baudrate = baud
+            self._serial.reset_input_buffer()
+        except (OSError, ValueError):
+            return False
+        self.baud = baud
+        self.name = f"{self.port} at {baud} baud"
+        return True
+
+    def read(self) -> bytes:
+        """The next piece of bytes."""
+        port = self._serial
+        try:
+            first: bytes = port.read(1)
+            if not first:
+                # A pseudo-terminal or an adapter that is gone may read as silence.
+                _ = port.in_waiting
+                return b""
+            time.sleep(GATHER_S)
+            waiting = port.in_waiting
+            return first + port.read(waiting) if waiting else first
+        except (OSError, TypeError) as error:
+            raise SourceLostError(f"{self.port} went away ({_reason(error)}).") from None
+
+    def reopen(self) -> bool:
+        """The same name again, or the same USB device under another name."""
+        self.close()
+        for port in dict.fromkeys([self.port, *_same_device(self._identity)]):
+            if not os.path.exists(port) and not port.upper().startswith("COM"):
+                continue
+            try:
+                self._serial = _open_serial(port, self.baud)
+            except CaptureError:
+                continue
+            self.port = port
+            self.name = f"{port} at {self.baud} baud"
+            return True
+        return False
+
+    def close(self) -> None:
+        """Let the port go."""
+        try:
+            self._serial.close()
+        except OSError:
+            # It is gone already.
+            return
+
+
+def _reason(error: Exception) -> str:
+    text = str(getattr(error, "strerror", None) or error)
+    # pyserial says so in many words when a port reads as ready and gives nothing.
+    is_gone = isinstance(error, TypeError) or "disconnected" in text or getattr(error, "errno", None) == errno.EIO
+    return "unplugged" if is_gone else text[:80]
+
+
+def _open_serial(port: str, baud: int) -> serial.Serial:
+    made = import_serial()
+    try:
+        return made(port, baud, timeout=POLL_S, exclusive=True)
+    except ValueError as error:
+        raise CaptureError(f"{port}: {error}.") from None
+    except OSError as error:
+        raise CaptureError(_why_not_open(port, error)) from None
+
+
+def _why_not_open(port: str, error: OSError) -> str:
+    number = error.errno
+    if number is None:
+        # pyserial wraps some errors without their number.
+        text = str(error)
+        number = next((n for n in (errno.ENOENT, errno.EACCES, errno.EBUSY, errno.EAGAIN) if f"[Errno {n}]" in text), 0)
+        number = number or (errno.EBUSY if "exclusively lock" in text else 0)
+    if number == errno.ENOENT or not os.path.exists(port):
+        return f"there is no port {port}; `trihedron ports` lists what is plugged in."
+    if number == errno.EACCES:
+        return f"no permission to open {port}; {_group_advice(port)}"
+    if number in (errno.EBUSY, errno.EAGAIN):
+        return f"{port} is in use by another program; close the serial monitor (or other program) that holds it."
+    return f"{port} cannot be opened as a serial port ({error.strerror or error})."
+
+
+def _group_advice(port: str) -> str:
+    try:
+        import grp
+
+        group = grp.getgrgid(os.stat(port).st_gid).gr_name
+    except (ImportError, KeyError, OSError):
+        return "run as a user who may use serial ports."
+    return f"join its group with `sudo usermod -aG {group} $USER`, then log out and in again."
+
+
+def _usb_identity(port: str) -> tuple[object, ...] | None:
+    try:
+        from serial.tools.list_ports import comports
+    except ImportError:
+        return None
+    for found in comports():
+        if found.device == port and found.vid is not None:
+            return (found.vid, found.pid, found.serial_number)
+    return None
+
+
+def _same_device(identity: tuple[object, ...] | None) -> list[str]:
+    if identity is None:
+        return []
+    from serial.tools.list_ports import comports
+
+    return [p.device for p in comports() if (p.vid, p.pid, p.serial_number) == identity]
+
+
+class TcpSource:
+    """A TCP server that sends bytes: ``tcp://host:port``."""
+
+    is_live = True
+
+    def __init__(self, address: str) -> None:
+        self.name = address
+        host, _, port = address.removeprefix("tcp://").removeprefix("tcp:").rpartition(":")
+        if not host or not port.isdigit() or not 0 < int(port) < 65_536:
+            raise CaptureError(f"{address}: a TCP source is written tcp://host:port, for example tcp://127.0.0.1:5000.")
+        self._address = (host.strip("[]"), int(port))
+        try:
+            self._socket = socket.create_connection(self._address, timeout=5.0)
+        except OSError as error:
+            why = error.strerror or error
+            raise CaptureError(f"{address}: no connection ({why}); is the device on, and is the port right?") from None
+        self._socket.settimeout(POLL_S)
+
+    def read(self) -> bytes:
+        """The next piece of bytes."""
+        try:
+            data = self._socket.recv(65_536)
+        except TimeoutError:
+            return b""
+        except OSError as error:
+            raise SourceLostError(f"{self.name} went away ({_reason(error)}).") from None
+        if not data:
+            raise SourceLostError(f"{self.name} closed the connection.")
+        return data
+
+    def reopen(self) -> bool:
+        """Connect again."""
+        self.close()
+        try:
+            self._socket = socket.create_connection(self._address, timeout=1.0)
+        except OSError:
+            return False
+        self._socket.settimeout(POLL_S)
+        return True
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+
+class FileSource:
+    """A file of bytes as a device sent them, or a named pipe."""
+
+    def __init__(self, path: Path) -> None:
+        self.name = str(path)
+        try:
+            self._stream = path.open("rb", buffering=0)
+        except PermissionError:
+            raise CaptureError(f"{path}: no permission to read this file.") from None
+        except OSError as error:
+            raise CaptureError(f"{path}: cannot be read ({error.strerror}).") from None
+        self.is_live = stat.S_ISFIFO(os.fstat(self._stream.fileno()).st_mode)
+
+    def read(self) -> bytes:
+        """The next piece of bytes."""
+        data = self._stream.read(65_536)
+        if not data:
+            raise SourceEndedError(f"{self.name} ended.")
+        return bytes(data)
+
+    def reopen(self) -> bool:
+        """A file does not come back."""
+        return False
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+
+
+class StdinSource:
+    """Standard input."""
+
+    name = "standard input"
+    is_live = True
+
+    def __init__(self) -> None:
+        self._handle = sys.stdin.fileno()
+        if os.isatty(self._handle):
+            raise CaptureError("standard input is a keyboard; pipe the bytes of a device into it.")
+
+    def read(self) -> bytes:
+        """The next piece of bytes."""
+        ready, _, _ = select.select([self._handle], [], [], POLL_S)
+        if not ready:
+            return b""
+        data = os.read(self._handle, 65_536)
+        if not data:
+            raise SourceEndedError("standard input ended.")
+        return data
+
+    def reopen(self) -> bool:
+        """A pipe does not come back."""
+        return False
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+def open_source(where: str, baud: int | None = None) -> Source:
+    """A port (``/dev/ttyUSB0``, ``COM3``), ``tcp://host:port``, a file, or ``-`` for standard input.
+
+    Raises
+    ------
+    CaptureError
+        One sentence: which, why not, and what to do.
+    """
+    if where == "-":
+        return StdinSource()
+    if where.startswith("tcp:"):
+        return TcpSource(where)
+    if where.upper().startswith("COM") and where[3:].isdigit():
+        return SerialSource(where, baud or 115_200)
+    path = Path(where)
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        what = "port" if where.startswith("/dev/") else "port or file"
+        raise CaptureError(f"there is no {what} {where}; `trihedron ports` lists what is plugged in.") from None
+    except OSError as error:
+        raise CaptureError(f"{where}: cannot be opened ({error.strerror}).") from None
+    if stat.S_ISCHR(mode):
+        return SerialSource(where, baud or 115_200)
+    if stat.S_ISDIR(mode):
+        raise CaptureError(f"{where}: this is a directory; name a port or a file.")
+    return FileSource(path)

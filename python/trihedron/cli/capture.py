@@ -1,0 +1,165 @@
+"""``trihedron capture``."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Optional
+
+import typer
+
+from trihedron.cli.options import Force
+
+if TYPE_CHECKING:
+    from trihedron.capture import Block, Recorder
+
+SAY_EVERY_S = 1.0
+LOSSES_NOT_TRUSTED = 0.05
+"""Share of lost frames above which `read` calls a log's gaps serious."""
+
+
+def capture(
+    port: Annotated[str, typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin).")],
+    output: Annotated[
+        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+        typer.Option("--output", "-o", metavar="LOG", help="Log to write (text; every command reads it)."),
+    ] = None,
+    protocol: Annotated[
+        str, typer.Option("--protocol", metavar="NAME", help="Protocol, or a .toml that declares a frame; else found.")
+    ] = "auto",
+    baud: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--baud", metavar="N", min=1, help="Baud rate; found by trying otherwise."),
+    ] = None,
+    seconds: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--seconds", metavar="S", min=0.0, help="Stop after so long; Ctrl-C stops any time."),
+    ] = None,
+    rate: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--rate", metavar="HZ", help="Rate of a board that sends no time."),
+    ] = None,
+    columns: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--columns", metavar="LIST", help="Columns of text lines, as in the other commands."),
+    ] = None,
+    time_unit: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--time-unit", metavar="UNIT", help="Unit of the board's time: s, ms, us or ns."),
+    ] = None,
+    wait: Annotated[
+        float, typer.Option("--wait", metavar="S", min=0.0, help="How long to wait for a board that was unplugged.")
+    ] = 60.0,
+    list_them: Annotated[bool, typer.Option("--list", help="List the protocols and stop.")] = False,
+    force: Force = False,
+) -> None:
+    """Record what a board sends into a log: nothing lost silently, on disk as it comes."""
+    from trihedron.capture import PROTOCOLS, Recorder
+
+    if list_them:
+        for name, sentence in PROTOCOLS.items():
+            typer.echo(f"{name:20s}{sentence}")
+        return
+    if output is None:
+        raise typer.BadParameter("say where the log goes with -o LOG")
+    from trihedron.files.output import check_free
+    from trihedron.pipeline.capturing import open_device
+
+    check_free([output], overwrite=force)
+    source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
+    _say(f"{source.name}: {found.protocol}. Recording to {output}; Ctrl-C stops.")
+    recorder = Recorder(
+        source,
+        found.make_decoder,
+        output,
+        overwrite=force,
+        rate_hz=rate,
+        wait_for_return_s=wait,
+        first_bytes=found.first_bytes,
+    )
+    record(recorder, output, seconds)
+
+
+def record(recorder: Recorder, output: Path, seconds: float | None) -> None:
+    """Run a recorder to its end and say what was saved; status 2 where that is not what was wanted."""
+    from trihedron.capture import DiskError
+
+    stop_on_signals(recorder)
+    progress = Progress()
+    try:
+        for block in recorder:
+            progress.show(recorder, block)
+            if seconds is not None and progress.elapsed_s >= seconds:
+                recorder.stop()
+    except DiskError as error:
+        progress.clear()
+        _say(f"trihedron: {error}")
+        raise typer.Exit(2 if progress.n else 1) from None
+    progress.clear()
+    conclude(recorder, output, progress.n)
+
+
+def conclude(recorder: Recorder, output: Path, n: int) -> None:
+    """What was saved, from which clock, and whether that is to be trusted."""
+    count = recorder.count
+    typer.echo(f"{output}: {n} frames; {count.sentence().replace(' / ', ', ')}")
+    if recorder.clock is not None:
+        typer.echo(f"clocks: {recorder.clock_text().replace(' / ', ', ')}")
+    if recorder.ended_because:
+        _say(f"trihedron: {recorder.ended_because}; what came before is saved in {output}.")
+        raise typer.Exit(2)
+    if count.lost > LOSSES_NOT_TRUSTED * (n + count.lost):
+        _say(f"trihedron: {count.lost} of {n + count.lost} frames were lost; check cable, baud rate and the board.")
+        raise typer.Exit(2)
+
+
+def stop_on_signals(recorder: Recorder) -> None:
+    """Ctrl-C ends the recording in order; a second one ends the program."""
+
+    def end(number: int, _frame: Any) -> None:
+        recorder.stop()
+        signal.signal(number, signal.default_int_handler)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, end)
+
+
+class Progress:
+    """One line on stderr, once a second; nothing where stderr is no terminal but at changes."""
+
+    def __init__(self) -> None:
+        self.n = 0
+        self._start_s = time.monotonic()
+        self._said_s = 0.0
+        self._is_terminal = sys.stderr.isatty()
+
+    @property
+    def elapsed_s(self) -> float:
+        """Since the recording began."""
+        return time.monotonic() - self._start_s
+
+    def show(self, recorder: Recorder, block: Block) -> None:
+        """Count a block, and say where things stand."""
+        self.n += len(block.time_s)
+        for remark in block.remarks:
+            if "lost" not in remark:
+                self.clear()
+                _say(remark)
+        if self._is_terminal and self.elapsed_s - self._said_s >= SAY_EVERY_S:
+            self._said_s = self.elapsed_s
+            rate = self.n / max(self.elapsed_s, 1e-9)
+            text = f"{self.elapsed_s:7.1f} s  {self.n} frames  {rate:.1f} Hz  {recorder.count.lost} lost"
+            sys.stderr.write(f"\r{text:70s}")
+            sys.stderr.flush()
+
+    def clear(self) -> None:
+        """Leave no half line behind."""
+        if self._is_terminal and self._said_s > 0.0:
+            sys.stderr.write("\r" + " " * 70 + "\r")
+            sys.stderr.flush()
+
+
+def _say(sentence: str) -> None:
+    typer.echo(sentence, err=True)

@@ -1,0 +1,112 @@
+"""A declared binary protocol, read from TOML (docs/capture.md, section 3)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from trihedron.records.frame_declaration import (
+    CHECKSUM_SIZES,
+    CHECKSUMS,
+    FIELD_TYPES,
+    SIZES,
+    FrameDeclaration,
+    FrameField,
+    Role,
+)
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+_TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_KEYS = {"name", "sync", "length", "endian", "checksum", "field"}
+_FIELD_KEYS = {"name", "type", "at", "scale", "unit", "role", "tick_s"}
+_CHECKSUM_KEYS = {"kind", "at", "from", "to"}
+
+
+def read_frame_declaration(path: str | Path) -> FrameDeclaration:
+    """The frame that a TOML file declares.
+
+    Raises
+    ------
+    ValueError
+        One sentence that names the file and the key that is wrong or missing.
+    """
+    path = Path(path)
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ValueError(f"{path}: there is no such protocol file.") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} is not TOML: {error}.") from None
+    try:
+        return _declaration(table, path.stem)
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"{path}: {_said(error)}; docs/capture.md shows a whole declaration.") from None
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def _said(error: Exception) -> str:
+    return f"the key {error} is missing" if isinstance(error, KeyError) else f"a value has the wrong type ({error})"
+
+
+def _known(table: dict[str, Any], allowed: set[str], where: str) -> None:
+    for key in table:
+        if key not in allowed:
+            raise ValueError(f"{where} has no key '{key}'; there are {', '.join(sorted(allowed))}.")
+
+
+def _declaration(table: dict[str, Any], stem: str) -> FrameDeclaration:
+    _known(table, _KEYS, "a declaration")
+    try:
+        sync = bytes.fromhex(str(table["sync"]).replace("0x", "").replace(",", " "))
+    except ValueError:
+        raise ValueError(f'sync = "{table["sync"]}" is not hexadecimal; write for example "AA 55".') from None
+    endian = table.get("endian", "little")
+    if endian not in ("little", "big"):
+        raise ValueError(f"endian is 'little' or 'big', not '{endian}'.")
+    fields: list[FrameField] = []
+    at = len(sync)
+    for entry in table["field"]:
+        fields.append(_field(entry, at))
+        at = fields[-1].at + SIZES[fields[-1].type]
+    check = table.get("checksum", {"kind": "none"})
+    _known(check, _CHECKSUM_KEYS, "[checksum]")
+    kind = check["kind"]
+    if kind not in CHECKSUMS:
+        raise ValueError(f"there is no checksum '{kind}'; choose one of {', '.join(CHECKSUMS)}.")
+    size = CHECKSUM_SIZES[kind]
+    length = int(table.get("length", at + size))
+    place = int(check.get("at", length - size))
+    return FrameDeclaration(
+        name=str(table.get("name", stem)),
+        sync=sync,
+        length=length,
+        fields=tuple(fields),
+        little_endian=endian == "little",
+        checksum=kind,
+        checksum_at=place,
+        covers_from=int(check.get("from", len(sync))),
+        covers_to=int(check.get("to", place)),
+    )
+
+
+def _field(entry: dict[str, Any], at: int) -> FrameField:
+    _known(entry, _FIELD_KEYS, "a [[field]]")
+    name, kind, unit = str(entry["name"]), entry["type"], str(entry.get("unit", ""))
+    if kind not in FIELD_TYPES:
+        raise ValueError(f"field {name} has no type '{kind}'; choose one of {', '.join(FIELD_TYPES)}.")
+    usual: dict[str, Role] = {"counter": "counter", "time": "clock", "clock": "clock"}
+    role: Role = entry.get("role") or usual.get(name, "value")
+    if role not in ("value", "counter", "clock"):
+        raise ValueError(f"field {name} has no role '{role}'; choose value, counter or clock.")
+    tick = float(entry.get("tick_s", _TICKS.get(unit, 0.0) * float(entry.get("scale", 1.0))))
+    if role == "clock" and not tick > 0:
+        raise ValueError(f'the clock {name} needs its step: unit = "us", "ms" or "s", or tick_s = 0.0001.')
+    if role != "value" and kind in ("f32", "f64"):
+        raise ValueError(f"the {role} {name} must be a whole number, not {kind}.")
+    return FrameField(name, kind, int(entry.get("at", at)), float(entry.get("scale", 1.0)), unit, role, tick)

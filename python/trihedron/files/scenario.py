@@ -1,0 +1,102 @@
+"""A user's scenario file, changed where a diagnosis says so: comments, order and everything else stay as they were."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import AoT, Item
+
+from trihedron.files.output import write_whole
+
+
+def improved_scenario(
+    path: str | os.PathLike[str],
+    tables: Mapping[str, Mapping[str, Any]],
+    effects: Sequence[tuple[str, Mapping[str, Any]]],
+    removed: Collection[str] = (),
+) -> str:
+    """The text of a scenario file with new values.
+
+    Parameters
+    ----------
+    path : path
+        The file as the user wrote it.
+    tables : mapping
+        ``{"accelerometer": {"b": [...], "noise": {"N": [...]}}, ...}``: values that replace those of the file.
+    effects : sequence of (id, size)
+        Effects to have, each with the keys of ``[[effect]]``; entries of the same id are replaced.
+    removed : ids
+        Effects to take out.
+
+    Raises
+    ------
+    ValueError
+        When the file is not TOML.
+    """
+    try:
+        document = tomlkit.parse(Path(path).read_text(encoding="utf-8"))
+    except (TOMLKitError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: this is not a TOML file: {error}") from None
+    for name, values in tables.items():
+        if values:
+            _merge(document, name, values)
+    gone = {effect_id for effect_id, _ in effects} | set(removed)
+    kept = [entry for entry in document.get("effect", []) if str(entry.get("id", "")) not in gone]
+    if "effect" in document:
+        del document["effect"]
+    entries: AoT = tomlkit.aot()
+    for entry in kept:
+        entries.append(entry)
+    for effect_id, size in effects:
+        table = tomlkit.table()
+        table.add("id", effect_id)
+        for key, value in size.items():
+            table.add(key, _item(value))
+        entries.append(table)
+    if len(entries):
+        document.add("effect", entries)
+    return tomlkit.dumps(document)
+
+
+def write_scenario(text: str, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Put an improved scenario in place.
+
+    Raises
+    ------
+    OutputError
+        When the file exists and may not be replaced.
+    """
+    write_whole(path, text, overwrite=overwrite)
+
+
+def _merge(parent: Any, name: str, values: Mapping[str, Any]) -> None:
+    if name not in parent:
+        parent.add(name, tomlkit.table())
+    table = parent[name]
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            _merge(table, key, value)
+        else:
+            table[key] = _item(value)
+
+
+def _item(value: Any) -> Item:
+    """Plain TOML of a number, text, or nested sequence of them; eight digits, as many as any error bar leaves."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    item: Item = tomlkit.item(_rounded(value))
+    return item
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, (list, tuple)):
+        return [_rounded(v) for v in value]
+    if isinstance(value, (float, np.floating)):
+        return float(f"{float(value):.8g}") + 0.0  # no minus zero
+    return value

@@ -1,0 +1,129 @@
+"""Capture composed with reading: columns of a stream get the names that :func:`trihedron.read` would give them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.capture import Found, LineColumns, NameColumns, Source, find_protocol, open_source
+from trihedron.files.frame_declaration import read_frame_declaration
+from trihedron.read.clock import SECONDS, parse_time_unit
+from trihedron.read.columns import Columns, find_columns
+from trihedron.read.table import Table
+from trihedron.records.frame_declaration import FrameDeclaration
+
+Cells = npt.NDArray[np.float64]
+
+PLAUSIBLE_HZ = (2.0, 20_000.0)
+"""What a board streams: slower or faster than that its step is in another unit."""
+
+USUAL_HZ = 100.0
+"""A step that fits two units is taken for the one whose rate is nearer to this, in ratio."""
+
+
+def protocol_of(text: str | None) -> str | FrameDeclaration | None:
+    """A protocol by name, a frame declared in a .toml file, or None to have it found."""
+    if text is None or text == "auto":
+        return None
+    return read_frame_declaration(text) if text.lower().endswith(".toml") else text
+
+
+def open_device(
+    where: str,
+    *,
+    protocol: str | None = None,
+    baud: int | None = None,
+    columns: str | None = None,
+    time_unit: str | None = None,
+    silence_s: float = 5.0,
+) -> tuple[Source, Found]:
+    """Open a source and find out what it speaks.
+
+    Raises
+    ------
+    CaptureError
+        When it cannot be opened, is silent, or is not understood; nothing stays open.
+    """
+    wanted = protocol_of(protocol)
+    namer = column_namer(columns, time_unit)
+    source = open_source(where, baud)
+    try:
+        return source, find_protocol(source, protocol=wanted, baud=baud, name_columns=namer, silence_s=silence_s)
+    except BaseException:
+        source.close()
+        raise
+
+
+def column_namer(mapping: str | None = None, time_unit: str | None = None) -> NameColumns:
+    """Roles of the fields of text lines, as in a log; ``mapping`` and ``time_unit`` are those of ``read``."""
+    given = None if time_unit is None else parse_time_unit(time_unit)
+
+    def name(names: tuple[str, ...] | None, rows: list[list[str]]) -> LineColumns:
+        cells = np.array([[_number(cell) for cell in row] for row in rows])
+        table = Table(Path("the stream"), names, tuple(np.ascontiguousarray(column) for column in cells.T))
+        try:
+            columns = find_columns(table, mapping, None)
+        except ValueError:
+            if mapping is not None:
+                raise
+            columns = _by_content(cells) if names is None else Columns()
+        unit = given or columns.time_unit or _unit_of_step(cells, columns.time)
+        labels = _labels(columns, names, cells.shape[1], is_mapped=mapping is not None)
+        return LineColumns(labels, columns.time, SECONDS.get(unit, 1e-3), columns.counter)
+
+    return name
+
+
+def _labels(columns: Columns, names: tuple[str, ...] | None, n: int, *, is_mapped: bool) -> tuple[str, ...]:
+    labels = [f"column_{i + 1}" for i in range(n)] if names is None else [name.replace(",", " ") for name in names]
+    if names is not None and not is_mapped:
+        return tuple(labels)
+    for letter, triad in (("a", columns.accelerometer), ("g", columns.gyroscope)):
+        for axis, column in zip("xyz", triad or (), strict=False):
+            labels[column] = f"{letter}{axis}"
+    for label, place in (("temperature", columns.temperature), ("supply", columns.supply)):
+        if place is not None:
+            labels[place] = label
+    return tuple(labels)
+
+
+def _by_content(cells: Cells) -> Columns:
+    """Joined after the names were sent: what counts is a counter, what only grows is the time, the next six are triads.
+
+    What remains without a role keeps its place; how the log is understood is said when it is read.
+    """
+    steps = np.diff(cells, axis=0)
+    growing = [i for i in range(cells.shape[1]) if len(steps) and np.all(steps[:, i] > 0)]
+    counter = next((i for i in growing if np.median(steps[:, i]) == 1.0), None)
+    time = next((i for i in growing if i != counter), None)
+    rest = [i for i in range(cells.shape[1]) if i not in growing]
+    triads = [(rest[k], rest[k + 1], rest[k + 2]) for k in (0, 3) if len(rest) >= k + 3]
+    return Columns(
+        time=time,
+        counter=counter,
+        accelerometer=triads[0] if triads else None,
+        gyroscope=triads[1] if len(triads) > 1 else None,
+    )
+
+
+def _unit_of_step(cells: Cells, column: int | None) -> str:
+    if column is None:
+        return ""
+    steps = np.diff(cells[:, column])
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    if len(steps) == 0:
+        return ""
+    step = float(np.median(steps))
+    rates = {unit: 1.0 / (step * SECONDS[unit]) for unit in ("s", "ms", "us", "ns")}
+    fitting = {u: hz for u, hz in rates.items() if PLAUSIBLE_HZ[0] <= hz <= PLAUSIBLE_HZ[1]}
+    return min(fitting or rates, key=lambda unit: abs(math.log(rates[unit] / USUAL_HZ)))
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan

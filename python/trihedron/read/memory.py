@@ -1,0 +1,183 @@
+"""Readings that are in memory already, as a table: arrays, structured and masked arrays, data frames, dictionaries."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.errors import ReadError
+from trihedron.read.table import FloatArray, Table
+
+_ACCEPTED = "a file name, an array (n, columns), a dictionary of arrays, or a data frame"
+
+
+def table_of(data: object) -> Table:
+    """A table from what a program holds; masked cells, NaT and nulls are missing readings (NaN).
+
+    ``data`` is an array (n, k) or (n,) structured, anything with the array interface, a mapping of names to arrays (n,)
+    or (n, 3), or a data frame (pandas, polars, Arrow, or whatever speaks the data frame interchange).
+
+    Raises
+    ------
+    ReadError
+        (a ``ValueError``) when it is none of these, or lengths disagree.
+    """
+    if isinstance(data, Mapping):
+        return columns_table("dict", list(data.items()))
+    if _is_frame(data):
+        return columns_table(type(data).__name__, _frame_columns(data))
+    array = _as_array(data)
+    if array.dtype.names:
+        return columns_table("array", [(name, array[name]) for name in array.dtype.names])
+    if array.ndim != 2:
+        raise ReadError(
+            f"an array of readings has rows and columns, got shape {array.shape}; give (n, columns), or a dictionary "
+            "of columns."
+        )
+    if array.dtype.kind not in "iufb":
+        raise ReadError(f"an array of readings holds numbers, got dtype {array.dtype}.")
+    columns = tuple(_floats("array", f"column {k + 1}", array[:, k]) for k in range(array.shape[1]))
+    return _table("array", None, columns)
+
+
+def _as_array(data: object) -> npt.NDArray[Any]:
+    if isinstance(data, np.ndarray):
+        return data
+    has_interface = any(hasattr(data, name) for name in ("__array__", "__array_interface__", "__dlpack__"))
+    if not (has_interface or isinstance(data, list | tuple)):
+        raise ReadError(f"trihedron.read takes {_ACCEPTED}, got {type(data).__name__}.")
+    try:
+        array = np.asarray(data)
+    except (ValueError, TypeError) as error:
+        raise ReadError(f"this {type(data).__name__} does not make an array of numbers ({error}).") from None
+    return array
+
+
+def _is_frame(data: object) -> bool:
+    return (
+        hasattr(data, "__dataframe__")
+        or hasattr(data, "__arrow_c_stream__")
+        or (hasattr(data, "columns") and hasattr(data, "dtypes"))
+    )
+
+
+def _frame_columns(frame: Any) -> list[tuple[str, Any]]:
+    """Names and columns; an index of pandas that holds times is a column too."""
+    columns: list[tuple[str, Any]] = []
+    index = getattr(frame, "index", None)
+    if index is not None and hasattr(index, "to_numpy"):
+        values = index.to_numpy()
+        if values.dtype.kind in "Mm" or (index.name is not None and values.dtype.kind in "iuf"):
+            columns.append((str(index.name or "time"), values))
+    if hasattr(frame, "columns") and hasattr(frame, "__getitem__") and hasattr(frame, "dtypes"):
+        return columns + [(str(name), _series(frame[name])) for name in frame.columns]
+    import polars
+
+    known = polars.DataFrame(frame) if hasattr(frame, "__arrow_c_stream__") else polars.from_dataframe(frame)
+    return [(name, _series(known[name])) for name in known.columns]
+
+
+def _series(series: Any) -> Any:
+    values = series.to_numpy()
+    if values.dtype == object and hasattr(series, "isna"):
+        try:
+            return series.to_numpy(dtype=np.float64, na_value=np.nan)
+        except (ValueError, TypeError):
+            return values
+    return values
+
+
+def columns_table(kind: str, items: list[tuple[Any, Any]]) -> Table:
+    """Named arrays (n,) or (n, k) as a table; single values are metadata.
+
+    Raises
+    ------
+    ReadError
+        When lengths disagree, or there is no column of numbers.
+    """
+    names: list[str] = []
+    columns: list[FloatArray] = []
+    words: dict[int, str] = {}
+    metadata: dict[str, str] = {}
+    for key, value in items:
+        name = str(key)
+        array = np.ma.asanyarray(value) if isinstance(value, np.ma.MaskedArray) else np.asanyarray(value)
+        if array.ndim == 0:
+            metadata[name] = str(array)
+        elif array.ndim == 1 and array.dtype.kind in "OUS" and not _is_numeric_object(array):
+            words[len(names)] = str(array[0]) if len(array) else ""
+            names.append(name)
+            columns.append(np.empty(0))
+        elif array.ndim == 1:
+            is_time = array.dtype.kind in "Mm"
+            names.append(f"{name} [s]" if is_time else name)
+            columns.append(_floats(kind, name, array))
+        elif array.ndim == 2:
+            if array.shape[1] > 16:
+                raise ReadError(
+                    f"{kind}: '{name}' has shape {array.shape}; rows are samples, so give its transpose if it is 3 x n."
+                )
+            names += [f"{name}[{k}]" for k in range(array.shape[1])]
+            columns += [_floats(kind, name, array[:, k]) for k in range(array.shape[1])]
+        else:
+            raise ReadError(f"{kind}: '{name}' has {array.ndim} dimensions; give (n,) or (n, 3).")
+    lengths = {name: len(column) for name, column in zip(names, columns, strict=True) if len(column)}
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"'{name}' {length}" for name, length in lengths.items())
+        raise ReadError(f"{kind}: its columns differ in length ({listed[:300]}); give one value of each per sample.")
+    if not lengths:
+        raise ReadError(f"{kind}: there is no column of numbers in it.")
+    return _table(kind, tuple(names), tuple(columns), words, metadata)
+
+
+def _is_numeric_object(array: npt.NDArray[Any]) -> bool:
+    if array.dtype.kind != "O":
+        return False
+    return all(value is None or isinstance(value, int | float | np.number) for value in array[:1000])
+
+
+def _floats(kind: str, name: str, array: npt.NDArray[Any]) -> FloatArray:
+    """A column as float64: what is masked, NaT or None is NaN; dates are seconds since 1970."""
+    mask = np.ma.getmaskarray(array) if isinstance(array, np.ma.MaskedArray) else None
+    plain = np.asarray(np.ma.getdata(array))
+    try:
+        if plain.dtype.kind == "M":
+            values = _seconds(plain.astype("datetime64[ns]"))
+        elif plain.dtype.kind == "m":
+            values = _seconds(plain.astype("timedelta64[ns]"))
+        elif plain.dtype.kind == "c":
+            raise ReadError(f"{kind}: '{name}' holds complex numbers; readings are real.")
+        else:
+            values = np.array(plain, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, ReadError):
+            raise
+        raise ReadError(f"{kind}: '{name}' does not hold numbers ({error}).") from None
+    if mask is not None and mask.any():
+        values[mask] = np.nan
+    return np.ascontiguousarray(values)
+
+
+def _seconds(stamps: npt.NDArray[Any]) -> FloatArray:
+    whole = stamps.astype(np.int64)
+    seconds = np.asarray(whole / 1e9, dtype=np.float64)
+    seconds[np.isnat(stamps)] = np.nan
+    return seconds
+
+
+def _table(
+    kind: str,
+    names: tuple[str, ...] | None,
+    columns: tuple[FloatArray, ...],
+    words: dict[int, str] | None = None,
+    metadata: dict[str, str] | None = None,
+) -> Table:
+    digest = hashlib.sha256()
+    for column in columns:
+        digest.update(column.tobytes())
+    return Table(Path(f"<{kind}>"), names, columns, digest.hexdigest(), metadata or {}, words=words or {})

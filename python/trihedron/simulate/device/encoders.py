@@ -1,0 +1,203 @@
+"""Frames as boards write them, from readings; written apart from the decoders, which know nothing of this file."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from trihedron.records.frame_declaration import SIZES, FrameDeclaration
+
+Reading = Sequence[float]
+Encoder = Callable[[int, float, Reading, Reading], bytes]
+"""(frame number, device seconds, accelerometer (3,), gyro (3,)) → the bytes of one frame."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What one raw unit of the recording is: SI per unit of accelerometer and gyro (1 where it is counts)."""
+
+    to_m_s2: float = 1.0
+    to_rad_s: float = 1.0
+
+
+def _xbus(payload: bytes) -> bytes:
+    head = bytes([0xFF, 0x36])
+    head += bytes([len(payload)]) if len(payload) < 255 else b"\xff" + len(payload).to_bytes(2, "big")
+    total = sum(head) + sum(payload)
+    return b"\xfa" + head + payload + bytes([(256 - total % 256) % 256])
+
+
+def _mtdata2(scales: Scales) -> Encoder:
+    def encode(n: int, t: float, accel: Reading, gyro: Reading) -> bytes:
+        payload = struct.pack(">HBH", 0x1020, 2, n % 65_536)
+        payload += struct.pack(">HBI", 0x1060, 4, round(t * 1e4) % 2**32)
+        payload += struct.pack(">HB3f", 0x4020, 12, *(v * scales.to_m_s2 for v in accel))
+        payload += struct.pack(">HB3f", 0x8020, 12, *(v * scales.to_rad_s for v in gyro))
+        return _xbus(payload)
+
+    return encode
+
+
+def _xio(scales: Scales, *, binary: bool) -> Encoder:
+    per_g, per_degree = scales.to_m_s2 / 9.80665, scales.to_rad_s * 57.29577951308232
+
+    def encode(_n: int, t: float, accel: Reading, gyro: Reading) -> bytes:
+        numbers = [v * per_degree for v in gyro] + [v * per_g for v in accel]
+        micros = round(t * 1e6)
+        if not binary:
+            return ("I,%d," % micros + ",".join(f"{v:.4f}" for v in numbers) + "\r\n").encode()  # noqa: UP031
+        raw = bytes([0xC9]) + micros.to_bytes(8, "little") + struct.pack("<6f", *numbers)
+        out = bytearray()
+        for byte in raw:
+            out += {0x0A: b"\xdb\xdc", 0xDB: b"\xdb\xdd"}.get(byte, bytes([byte]))
+        return bytes(out) + b"\n"
+
+    return encode
+
+
+def _ten_bits(value: float) -> int:
+    return min(max(round(value), 0), 1023)
+
+
+def _sparkfun(*, binary: bool) -> Encoder:
+    def encode(n: int, _t: float, accel: Reading, gyro: Reading) -> bytes:
+        # Pitch comes before roll: the gyro's y before its x.
+        numbers = [_ten_bits(v) for v in (*accel, gyro[1], gyro[0], gyro[2])]
+        if binary:
+            return b"A" + struct.pack(">7H", n % 32_768, *numbers) + b"Z"
+        return ("A\t" + "\t".join(str(v) for v in (n % 32_768, *numbers)) + "\tZ\r\n").encode()
+
+    return encode
+
+
+def _razor(_n: int, _t: float, accel: Reading, gyro: Reading) -> bytes:
+    lines = (("A", accel), ("M", (101.0, -33.0, 240.5)), ("G", gyro))
+    return b"".join((f"#{tag}-R=" + ",".join(f"{v:.2f}" for v in values) + "\r\n").encode() for tag, values in lines)
+
+
+def _number(value: float) -> str:
+    return str(int(value)) if float(value).is_integer() else f"{value:.6g}"
+
+
+def _lines(style: str) -> Encoder:
+    names = ("ax", "ay", "az", "gx", "gy", "gz")
+
+    def encode(n: int, t: float, accel: Reading, gyro: Reading) -> bytes:
+        numbers = [_number(v) for v in (*accel, *gyro)]
+        if style == "comma":
+            text = ",".join([str(n), str(round(t * 1e6)), *numbers])
+        elif style == "space":
+            text = " ".join([str(round(t * 1e6)), *numbers])
+        elif style == "bare":
+            text = ",".join(numbers)
+        elif style == "label":
+            text = ",".join(f"{k}:{v}" for k, v in zip(("n", *names), (str(n), *numbers), strict=True))
+        elif style == "equals":
+            text = " | ".join(f"{k[0]}{k[1].upper()} = {v}" for k, v in zip(names, numbers, strict=True))
+            text = f"seq = {n} | {text}"
+        else:
+            ms = 36_000_000 + round(t * 1e3)
+            clock = f"{ms // 3_600_000:02d}:{ms // 60_000 % 60:02d}:{ms // 1000 % 60:02d}.{ms % 1000:03d}"
+            text = f"{clock} -> " + "\t".join(numbers)
+        return (text + "\r\n").encode()
+
+    return encode
+
+
+ENCODERS: tuple[str, ...] = (
+    *("lines", "lines-space", "lines-bare", "lines-label", "lines-equals", "lines-monitor"),
+    *("sparkfun-6dof", "sparkfun-6dof-text", "razor", "xsens-mtdata2", "xio", "xio-text"),
+)
+"""What a simulated board can speak; a declared frame besides."""
+
+LINE_HEADERS = {"lines": "count,time [us],ax,ay,az,gx,gy,gz\r\n", "lines-space": "micros ax ay az gx gy gz\r\n"}
+"""What a board prints once when it starts."""
+
+
+def encoder_for(protocol: str | FrameDeclaration, scales: Scales | None = None) -> Encoder:
+    """How a board of that protocol writes a frame.
+
+    Raises
+    ------
+    ValueError
+        When no board speaks it.
+    """
+    scales = scales or Scales()
+    if isinstance(protocol, FrameDeclaration):
+        return declared(protocol)
+    if protocol not in ENCODERS:
+        raise ValueError(f"no simulated board speaks {protocol!r}; choose {', '.join(ENCODERS)}, or a .toml file.")
+    if protocol.startswith("lines"):
+        return _lines(protocol.partition("-")[2] or "comma")
+    if protocol.startswith("sparkfun"):
+        return _sparkfun(binary=not protocol.endswith("text"))
+    if protocol.startswith("xio"):
+        return _xio(scales, binary=not protocol.endswith("text"))
+    return _razor if protocol == "razor" else _mtdata2(scales)
+
+
+def declared(frame: FrameDeclaration) -> Encoder:
+    """By the user's declaration; readings go to its values in order, the accelerometer's first."""
+    letters = {1: "b", 2: "h", 4: "i", 8: "q"}
+    order = "<" if frame.little_endian else ">"
+
+    def encode(n: int, t: float, accel: Reading, gyro: Reading) -> bytes:
+        out = bytearray(frame.length)
+        out[: len(frame.sync)] = frame.sync
+        readings = iter((*accel, *gyro))
+        for field in frame.fields:
+            size = SIZES[field.type]
+            if field.role == "value":
+                value = next(readings, 0.0) / field.scale
+            else:
+                value = n if field.role == "counter" else round(t / field.tick_s)
+            if field.type[0] == "f":
+                data = struct.pack(order + ("f" if size == 4 else "d"), value)
+            else:
+                code = letters[size].upper() if field.type[0] == "u" else letters[size]
+                whole = round(value)
+                if field.role != "value":
+                    whole %= 1 << (8 * size)
+                data = struct.pack(order + code, whole)
+            out[field.at : field.at + size] = data
+        if frame.checksum != "none":
+            value, size = _check(frame.checksum, bytes(out[frame.covers_from : frame.covers_to]))
+            place = slice(frame.checksum_at, frame.checksum_at + size)
+            out[place] = value.to_bytes(size, "little" if frame.little_endian else "big")
+        return bytes(out)
+
+    return encode
+
+
+def _check(kind: str, data: bytes) -> tuple[int, int]:
+    if kind.startswith("sum"):
+        total = sum(data)
+        return (total % 65_536, 2) if kind == "sum16" else ((-total if kind == "sum8-zero" else total) % 256, 1)
+    if kind == "xor8":
+        value = 0
+        for byte in data:
+            value ^= byte
+        return value, 1
+    if kind == "crc32":
+        return zlib.crc32(data), 4
+    if kind == "crc16-modbus":
+        return _bitwise(data, 16, 0x8005, 0xFFFF, reflected=True), 2
+    width, polynomial, start = (8, 0x07, 0) if kind == "crc8" else (16, 0x1021, 0xFFFF)
+    return _bitwise(data, width, polynomial, start, reflected=False), width // 8
+
+
+def _bitwise(data: bytes, width: int, polynomial: int, start: int, *, reflected: bool) -> int:
+    """Division of polynomials bit by bit, as the definition says."""
+    register, top, mask = start, 1 << (width - 1), (1 << width) - 1
+    if reflected:
+        register = int(f"{register:0{width}b}"[::-1], 2)
+    for byte in data:
+        bits = f"{byte:08b}"[::-1] if reflected else f"{byte:08b}"
+        for bit in bits:
+            carry = bool(register & top) ^ (bit == "1")
+            register = (register << 1) & mask
+            if carry:
+                register ^= polynomial
+    return int(f"{register:0{width}b}"[::-1], 2) if reflected else register

@@ -1,0 +1,246 @@
+"""A recording sent as a board would, over a pseudo-terminal or a TCP socket."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import select
+import socket
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from trihedron.records import Recording, Truth
+from trihedron.records.frame_declaration import FrameDeclaration
+from trihedron.simulate.device.encoders import LINE_HEADERS, Scales, encoder_for
+from trihedron.simulate.device.faults import Faults, Sent, spoil
+from trihedron.units import acceleration_to_si, rate_to_si
+
+_BOOT_TEXT = b"board v1.2 starting\r\nsensor found at 0x68\r\nranges: 4 g; 500 deg/s\r\nready\r\n"
+
+PIECE_S = 0.004
+"""Frames of this long are written together, as the buffers of USB adapters do."""
+
+
+@dataclass(frozen=True)
+class Device:
+    """A recording on a board: protocol, faults, and how much faster than real time (0: as fast as the line takes).
+
+    ``scales`` turn raw units into SI for protocols that speak SI.
+    """
+
+    recording: Recording
+    protocol: str | FrameDeclaration
+    faults: Faults = field(default_factory=Faults)
+    speed: float = 1.0
+    seed: int = 0
+    baud: int = 0
+    scales: Scales | None = None
+
+    def pieces(self, sent: Sent) -> Iterator[tuple[float, bytes]]:
+        """(device seconds, bytes) piece by piece."""
+        recording, faults = self.recording, self.faults
+        encode = encoder_for(self.protocol, self.scales or scales_of(recording))
+        rng = random.Random(self.seed)
+        zero = (0.0, 0.0, 0.0)
+        accel = [zero] * recording.n_samples if recording.accelerometer is None else recording.accelerometer.tolist()
+        gyro = [zero] * recording.n_samples if recording.gyroscope is None else recording.gyroscope.tolist()
+        fast = 1.0 + faults.drift_ppm * 1e-6
+        if faults.start_text:
+            yield 0.0, _BOOT_TEXT
+        if isinstance(self.protocol, str) and self.protocol in LINE_HEADERS:
+            yield 0.0, LINE_HEADERS[self.protocol].encode()
+        piece, start_s = bytearray(), 0.0
+        for n, t in enumerate(recording.time_s.tolist()):
+            if piece and t - start_s >= PIECE_S:
+                yield t, bytes(piece)
+                piece, start_s = bytearray(), t
+            piece += spoil(encode(n, t * fast, accel[n], gyro[n]), n, faults, rng, sent)
+        yield float(recording.time_s[-1]), bytes(piece)
+
+
+def scales_of(recording: Recording, truth: Truth | None = None) -> Scales:
+    """SI per raw unit: by the unit, or for counts by the truth's mean, as a data sheet would state it."""
+    accel, gyro = acceleration_to_si(recording.accelerometer_unit), rate_to_si(recording.gyroscope_unit)
+    if truth is not None:
+        accel = accel or float(np.mean(np.linalg.norm(truth.accelerometer_S, axis=0)))
+        gyro = gyro or float(np.mean(np.linalg.norm(truth.gyroscope_S, axis=0)))
+    return Scales(accel or 1e-3, gyro or 2e-4)
+
+
+class Line(Protocol):
+    """Where the bytes go. ``name`` is what a reader opens."""
+
+    name: str
+
+    def send(self, data: bytes) -> None:
+        """Write all of it; waits for a reader."""
+        ...
+
+    def disconnect(self) -> None:
+        """As a cable pulled out."""
+        ...
+
+    def connect(self) -> None:
+        """As a cable put in again."""
+        ...
+
+    def close(self) -> None:
+        """The end: what was sent can still be read, then the line is gone."""
+        ...
+
+
+class PseudoTerminal:
+    """A serial port without a cable; ``link`` is a name that stays the same over disconnections.
+
+    A reader that set another baud than the board's receives garbage, as on a real line.
+    """
+
+    def __init__(self, link: Path | None = None, baud: int = 0) -> None:
+        self._link, self._baud = link, baud
+        self.patience_s = math.inf
+        self._wrote_s = time.monotonic()
+        self._master = -1
+        self.connect()
+        self.name = str(link) if link is not None else self._slave_name
+
+    def connect(self) -> None:
+        """A fresh terminal under the same link."""
+        import pty
+        import tty
+
+        self._master, slave = pty.openpty()
+        tty.setraw(slave)
+        self._slave_name = os.ttyname(slave)
+        # The board holds its own end open until somebody reads: a terminal without any reader hangs up.
+        self._slave = slave
+        if self._link is not None:
+            temporary = self._link.with_name(self._link.name + ".new")
+            temporary.unlink(missing_ok=True)
+            temporary.symlink_to(self._slave_name)
+            temporary.replace(self._link)
+
+    def disconnect(self) -> None:
+        """The terminal vanishes under its readers."""
+        if self._link is not None:
+            self._link.unlink(missing_ok=True)
+        os.close(self._slave)
+        os.close(self._master)
+        self._master = -1
+
+    def send(self, data: bytes) -> None:
+        """Write; garbled where the reader listens at another baud."""
+        if self._baud and not self._is_heard():
+            data = bytes((b * 37 + 129) & 0xFF | 0x80 for b in data[::2])
+        while data:
+            # A reader that left would keep the board waiting for ever.
+            _, ready, _ = select.select([], [self._master], [], 0.5)
+            if not ready:
+                if _unread(self._slave) > 0 and time.monotonic() - self._wrote_s > self.patience_s:
+                    raise BrokenPipeError("nobody reads the pseudo-terminal")
+                continue
+            n = os.write(self._master, data[:2048])
+            self._wrote_s = time.monotonic()
+            data = data[n:]
+
+    def _is_heard(self) -> bool:
+        import termios
+
+        speed = termios.tcgetattr(self._slave)[5]
+        wanted = getattr(termios, f"B{self._baud}", None)
+        return wanted is None or speed == wanted
+
+    def close(self) -> None:
+        """Wait until what was sent has been read, then hang up."""
+        until = time.monotonic() + 5.0
+        while time.monotonic() < until and _unread(self._slave) > 0:
+            time.sleep(0.01)
+        time.sleep(0.1)
+        self.disconnect()
+
+
+def _unread(handle: int) -> int:
+    import fcntl
+    import struct
+    import termios
+
+    raw = fcntl.ioctl(handle, termios.FIONREAD, b"\0\0\0\0")
+    return int(struct.unpack("i", raw)[0])
+
+
+class TcpServer:
+    """One reader after another on 127.0.0.1."""
+
+    def __init__(self, port: int = 0) -> None:
+        self._server = socket.create_server(("127.0.0.1", port))
+        self.name = f"tcp://127.0.0.1:{self._server.getsockname()[1]}"
+        self._reader: socket.socket | None = None
+
+    def connect(self) -> None:
+        """Readers are taken when there is something to send."""
+
+    def disconnect(self) -> None:
+        """Close the connection under the reader."""
+        if self._reader is not None:
+            self._reader.close()
+            self._reader = None
+
+    def send(self, data: bytes) -> None:
+        """Write, waiting for a reader where there is none."""
+        while True:
+            if self._reader is None:
+                self._reader, _ = self._server.accept()
+            try:
+                self._reader.sendall(data)
+                return
+            except OSError:
+                self.disconnect()
+
+    def close(self) -> None:
+        """Nothing more will be sent."""
+        if self._reader is not None:
+            self._reader.shutdown(socket.SHUT_WR)
+            # What is on its way is read before the connection goes.
+            select.select([self._reader], [], [], 5.0)
+        self.disconnect()
+        self._server.close()
+
+
+def serve(
+    device: Device,
+    line: Line,
+    said: Callable[[str], None] = lambda _text: None,
+    is_wanted: Callable[[], bool] = lambda: True,
+) -> Sent:
+    """Send the recording once, in real or faster time, with the device's faults; then hang up.
+
+    Ends before its time where ``is_wanted`` says no.
+    """
+    sent = Sent()
+    away = sorted(device.faults.disconnect_s)
+    start = time.monotonic()
+    for time_s, data in device.pieces(sent):
+        if device.speed > 0.0:
+            ahead = start + time_s / device.speed - time.monotonic()
+            if ahead > 0.0:
+                time.sleep(ahead)
+        if not is_wanted():
+            break
+        if away and time_s >= away[0]:
+            away.pop(0)
+            said(f"disconnected at {time_s:.1f} s")
+            time.sleep(0.2)
+            line.disconnect()
+            time.sleep(device.faults.away_s)
+            line.connect()
+            said("connected again")
+            start = time.monotonic() - time_s / device.speed if device.speed > 0.0 else start
+        if data:
+            line.send(data)
+    line.close()
+    return sent

@@ -1,0 +1,186 @@
+"""Bytes to frames: every protocol, every fault, whatever the pieces; encoders of the simulated board are the oracle."""
+
+import random
+import zlib
+
+import numpy as np
+import pytest
+
+from board import DECLARED, counts_recording
+from trihedron.capture import Sequence, decoder_factory
+from trihedron.capture.protocols.checksums import CHECKSUM_OF
+from trihedron.capture.protocols.contract import Frame
+from trihedron.files.frame_declaration import read_frame_declaration
+from trihedron.pipeline.capturing import column_namer
+from trihedron.simulate.device import Device, Faults, Sent, parse_faults
+
+COUNTED = [
+    *(("xsens-mtdata2",) * 2, ("xio",) * 2, ("xio-text", "xio"), ("sparkfun-6dof",) * 2, ("sparkfun-6dof-text",) * 2),
+    *(("lines",) * 2, ("lines-space", "lines"), ("lines-label", "lines"), ("lines-equals", "lines")),
+    ("declared", "declared"),
+]
+UNCOUNTED = [("lines-bare", "lines"), ("razor", "razor"), ("lines-monitor", "lines")]
+
+
+@pytest.fixture
+def declaration(tmp_path):
+    path = tmp_path / "board.toml"
+    path.write_text(DECLARED)
+    return read_frame_declaration(path)
+
+
+def decode(decoder, data, pieces):
+    frames, at = [], 0
+    while at < len(data):
+        n = pieces.randrange(1, 200)
+        frames += decoder.feed(data[at : at + n])
+        at += n
+    return frames + decoder.finish()
+
+
+def placed_frames(decoder, frames):
+    by_counter, by_clock = frames[0].counter is not None, frames[0].ticks is not None
+    modulus = decoder.counter_modulus if by_counter else decoder.clock_modulus
+    sequence = Sequence(by_counter=by_counter, by_clock=by_clock, modulus=modulus, tick_s=decoder.tick_s)
+    return sequence, sequence.push(frames, 0.0) + sequence.finish()
+
+
+def stream(protocol, declaration, n, rate_hz, faults):
+    spoken = declaration if protocol == "declared" else protocol
+    sent = Sent()
+    recording = counts_recording(n, rate_hz)
+    return recording, sent, b"".join(data for _, data in Device(recording, spoken, faults, seed=3).pieces(sent))
+
+
+def decoder_of(name, declaration):
+    return decoder_factory(declaration if name == "declared" else name, column_namer())()
+
+
+@pytest.mark.parametrize(("board", "name"), [*COUNTED, *UNCOUNTED])
+def test_every_frame_of_a_clean_line_is_read_with_its_values(board, name, declaration):
+    recording, _, data = stream(board, declaration, 300, 200.0, Faults())
+    decoder = decoder_of(name, declaration)
+    frames = decode(decoder, data, random.Random(1))
+    assert len(frames) == 300
+    assert decoder.corrupt == 0
+    column = [c.split("[")[0].strip().lower() for c in decoder.columns]
+    z = next(i for i, c in enumerate(column) if c in ("acc_z", "az"))
+    values = np.array([frame.values[z] for frame in frames])
+    truth = recording.accelerometer[:, 2]
+    # SI protocols state the reading times a scale, and round it to their digits.
+    scale = float(values @ truth / (truth @ truth))
+    assert np.allclose(values, scale * truth, atol=1e-4 + 1e-6 * abs(scale) * 1023)
+    # The log keeps the digits: its text is the value again.
+    assert np.allclose([float(frame.text.split(",")[z]) for frame in frames], values, rtol=1e-8)
+
+
+@pytest.mark.parametrize(("board", "name"), COUNTED)
+@pytest.mark.parametrize("rate_hz", [100.0, 1000.0])
+def test_sent_is_saved_plus_lost_under_every_fault(board, name, rate_hz, declaration):
+    n = 3000
+    _, sent, data = stream(board, declaration, n, rate_hz, parse_faults("1%"))
+    decoder = decoder_of(name, declaration)
+    sequence, placed = placed_frames(decoder, decode(decoder, data, random.Random(2)))
+    assert sequence.tally.saved == len(placed)
+    # Frames before the first and after the last one saved are nobody's to count: at most a few.
+    assert 0 <= n - (sequence.tally.saved + sequence.tally.lost) <= 5
+    assert sequence.tally.restarts == 0
+    # A frame that no fault touched is not lost, but for the neighbour of a cut one whose bytes it merged with.
+    assert sequence.tally.saved >= len(sent.untouched) - sent.faults["cut"] - sent.faults["byte_lost"]
+
+
+@pytest.mark.parametrize("name", ["xsens-mtdata2", "declared", "sparkfun-6dof"])
+def test_frames_do_not_depend_on_the_pieces_in_which_bytes_come(name, declaration):
+    _, _, data = stream(name, declaration, 500, 100.0, parse_faults("5%"))
+    whole = decoder_of(name, declaration)
+    expected = [*whole.feed(data), *whole.finish()]
+    for seed in range(3):
+        assert decode(decoder_of(name, declaration), data, random.Random(seed)) == expected
+
+
+def test_a_garbled_counter_is_not_a_thousand_lost_frames():
+    sequence = Sequence(by_counter=True, modulus=1 << 16)
+    counters = [*range(10), 5010, *range(11, 20)]
+    placed = sequence.push([Frame(c, None, (0.0,), str(i)) for i, c in enumerate(counters)], 0.0)
+    placed += sequence.finish()
+    assert (sequence.tally.lost, sequence.tally.garbled) == (1, 1)
+    assert [one.place for one in placed] == [*range(10), *range(11, 20)]
+
+
+def test_a_counter_that_begins_anew_is_a_restart_not_a_loss():
+    sequence = Sequence(by_counter=True, modulus=1 << 32)
+    counters = [*range(1000, 1050), *range(5, 60)]
+    sequence.push([Frame(c, None, (0.0,), str(i)) for i, c in enumerate(counters)], 0.0)
+    sequence.finish()
+    assert (sequence.tally.saved, sequence.tally.lost, sequence.tally.restarts) == (105, 0, 1)
+
+
+@pytest.mark.parametrize("modulus", [0, 1 << 16, 1 << 32])
+def test_a_clock_that_wraps_or_stutters_loses_nothing(modulus):
+    rng = random.Random(4)
+    ticks = [round(60_000 + 10 * i + rng.uniform(-2.5, 2.5)) % (modulus or 1 << 62) for i in range(5000)]
+    sequence = Sequence(by_clock=True, modulus=modulus, tick_s=1e-3)
+    sequence.push([Frame(None, t, (0.0,), str(i)) for i, t in enumerate(ticks)], 0.0)
+    sequence.finish()
+    assert (sequence.tally.saved, sequence.tally.lost, sequence.tally.restarts) == (5000, 0, 0)
+
+
+def test_checksums_have_their_published_check_values():
+    # Values over "123456789" of the catalogue of parametrised CRC algorithms.
+    data = b"123456789"
+    assert CHECKSUM_OF["crc8"](data) == 0xF4
+    assert CHECKSUM_OF["crc16-ccitt"](data) == 0x29B1
+    assert CHECKSUM_OF["crc16-modbus"](data) == 0x4B37
+    assert CHECKSUM_OF["crc32"](data) == 0xCBF43926 == zlib.crc32(data)
+
+
+@pytest.mark.parametrize("kind", list(CHECKSUM_OF))
+@pytest.mark.parametrize("endian", ["little", "big"])
+def test_a_declared_frame_is_read_with_any_checksum_and_byte_order(kind, endian, tmp_path):
+    path = tmp_path / "x.toml"
+    path.write_text(DECLARED.replace('"crc16-ccitt"', f'"{kind}"').replace("sync", f'endian = "{endian}"\nsync'))
+    declaration = read_frame_declaration(path)
+    _, _, data = stream("declared", declaration, 50, 100.0, Faults())
+    assert len(decode(decoder_factory(declaration)(), data, random.Random(0))) == 50
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("sync", "synk"), "no key 'synk'"),
+        (('"AA 55"', '"XY"'), "not hexadecimal"),
+        (('"u16"', '"u17"'), "no type 'u17'"),
+        (('"crc16-ccitt"', '"md5"'), "no checksum 'md5'"),
+        (('unit = "us"', ""), "needs its step"),
+        (('kind = "crc16-ccitt"', 'kind = "crc16-ccitt"\nfrom = 99'), "does not fit"),
+    ],
+)
+def test_a_wrong_declaration_is_refused_in_one_sentence_with_its_file(change, words, tmp_path):
+    path = tmp_path / "x.toml"
+    path.write_text(DECLARED.replace(*change))
+    with pytest.raises(ValueError, match=r"x\.toml") as refusal:
+        read_frame_declaration(path)
+    assert words in str(refusal.value)
+
+
+def test_xsens_fixed_point_and_double_formats_are_understood():
+    def message(form, pack):
+        body = bytes.fromhex("1020020007") + (0x4020 | form).to_bytes(2, "big") + bytes([len(pack)]) + pack
+        head = bytes([0xFF, 0x36, len(body)])
+        return b"\xfa" + head + body + bytes([-(sum(head) + sum(body)) & 0xFF])
+
+    # 1.5 in 12.20 is 0x00180000; in 16.32 the fraction 0x80000000 comes before the whole part 0x0001.
+    for form, one in ((1, bytes.fromhex("00180000")), (2, bytes.fromhex("800000000001"))):
+        decoder = decoder_factory("xsens-mtdata2")()
+        frames = [*decoder.feed(message(form, one * 3)), *decoder.finish()]
+        assert frames[0].values == (1.5, 1.5, 1.5)
+
+
+def test_the_published_example_of_an_inertial_message_is_read():
+    # The example of the maker's manual: one second, one g on z.
+    binary = bytes.fromhex("C940420F0000000000" + "00000000" * 5 + "0000803F" + "0A")
+    decoder = decoder_factory("xio")()
+    text = b"I,1000000,0.0000,0.0000,0.0000,0.0000,0.0000,1.0000\r\n"
+    first, second = decoder.feed(binary + text)
+    assert first.ticks == second.ticks == 1_000_000
+    assert first.values == second.values == (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)

@@ -1,0 +1,310 @@
+"""Bytes to a log over a real pseudo-terminal, a socket, a file and a pipe; faults, clocks, gaps, refusals."""
+
+import errno
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import trihedron
+from board import Board, counts_recording
+from trihedron.capture import (
+    CaptureError,
+    ClockFit,
+    DiskError,
+    GrowingLog,
+    Recorder,
+    decoder_factory,
+    find_protocol,
+    open_source,
+)
+from trihedron.cli import main
+from trihedron.pipeline.capturing import column_namer, open_device
+from trihedron.simulate.device import Device, Faults, Sent, parse_faults
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
+
+
+def capture(port, path, **options):
+    source, found = open_device(port, protocol=options.pop("protocol", None), baud=options.pop("baud", None))
+    recorder = Recorder(source, found.make_decoder, path, first_bytes=found.first_bytes, **options)
+    blocks = list(recorder)
+    return recorder, blocks
+
+
+def header(path):
+    lines = path.read_text().splitlines()
+    return dict(re.match(r"# ([\w ]+): (.*)", line).groups() for line in lines if re.match(r"# [\w ]+: ", line))
+
+
+def test_a_board_on_a_pseudo_terminal_becomes_a_log_that_reads(tmp_path):
+    recording = counts_recording(400, 200.0)
+    with Board(recording, "xsens-mtdata2", speed=1.0) as board:
+        recorder, blocks = capture(board.port, tmp_path / "log.csv", wait_for_return_s=0.0)
+    times = np.concatenate([block.time_s for block in blocks])
+    back = trihedron.read(tmp_path / "log.csv")
+    assert back.n_samples == len(times) == recorder.count.tally.saved
+    assert recorder.count.lost == 0
+    # The start may be lost to the reader that was not there yet; what is saved is in steps of the board's clock.
+    assert back.n_samples >= 300
+    assert np.allclose(np.diff(back.time_s), 0.005, atol=1e-9)
+    assert back.auxiliary.keys() >= {"host_s", "frame", "device_ticks"}
+    assert header(tmp_path / "log.csv")["frames"].startswith(f"{back.n_samples} saved / 0 lost")
+
+
+@pytest.mark.parametrize("where", ["tcp", "file", "stdin"])
+def test_any_stream_of_bytes_is_a_source(where, tmp_path):
+    recording = counts_recording(300, 100.0)
+    log = tmp_path / "log.csv"
+    if where == "tcp":
+        with Board(recording, "xio", tcp=True) as board:
+            recorder, _ = capture(board.port, log, wait_for_return_s=0.0)
+        assert recorder.count.tally.saved == 300
+        return
+    data = b"".join(piece for _, piece in Device(recording, "lines").pieces(Sent()))
+    raw = tmp_path / "raw.txt"
+    raw.write_bytes(data)
+    if where == "file":
+        recorder, _ = capture(str(raw), log)
+        assert recorder.count.tally.saved == 300
+    else:
+        command = [sys.executable, "-m", "trihedron", "capture", "-", "-o", str(log)]
+        subprocess.run(command, input=data, check=True, capture_output=True, timeout=60)
+    back = trihedron.read(log)
+    assert back.n_samples == 300
+    assert np.array_equal(back.accelerometer, recording.accelerometer)
+    assert np.array_equal(back.gyroscope, recording.gyroscope)
+
+
+def test_losses_stand_in_the_log_where_they_were(tmp_path):
+    raw = tmp_path / "raw.bin"
+    frames = [piece for _, piece in Device(counts_recording(200, 100.0), "sparkfun-6dof").pieces(Sent())]
+    raw.write_bytes(b"".join(frames[:50] + frames[53:120] + frames[121:]))
+    recorder, blocks = capture(str(raw), tmp_path / "log.csv", rate_hz=100.0)
+    assert (recorder.count.tally.saved, recorder.count.lost) == (196, 4)
+    remarks = [line for line in (tmp_path / "log.csv").read_text().splitlines() if "lost" in line and "before" in line]
+    assert [re.findall(r"lost (\d+) before frame (\d+)", line)[0] for line in remarks] == [("3", "53"), ("1", "121")]
+    # The time of what follows a loss is right: the hole is in the time column.
+    times = np.concatenate([block.time_s for block in blocks])
+    assert times[-1] == pytest.approx(1.99, abs=1e-9)
+
+
+def test_an_unplugged_board_goes_on_in_the_same_file_with_the_gap_said(tmp_path):
+    link = tmp_path / "tty"
+    faults = Faults(disconnect_s=(0.8,), away_s=0.5)
+    with Board(counts_recording(400, 200.0), "lines", faults=faults, speed=1.0, link=link) as board:
+        recorder, blocks = capture(board.port, tmp_path / "log.csv", wait_for_return_s=1.5)
+    text = (tmp_path / "log.csv").read_text()
+    assert "went away (unplugged)" in text
+    assert "is back at" in text
+    assert recorder.count.disconnections == 2  # the board leaves for good at the end
+    times = np.concatenate([block.time_s for block in blocks])
+    steps = np.diff(times)
+    assert np.all(steps > 0)
+    # The gap is as long as the board was away, to the pace at which a port is looked for again.
+    assert 0.4 < steps.max() < 1.2
+    assert np.sort(steps)[-2] < 0.02
+    assert trihedron.read(tmp_path / "log.csv").n_samples == len(times)
+
+
+def test_the_baud_rate_is_found_by_itself():
+    with Board(counts_recording(1500, 250.0), "lines", speed=1.0, baud=57_600) as board:
+        source, found = open_device(board.port)
+        assert source.baud == 57_600
+        assert found.protocol == "lines"
+        source.close()
+
+
+def test_two_clocks_are_fitted_along_the_earliest_arrivals():
+    rng = np.random.default_rng(0)
+    device = np.arange(0.0, 120.0, 0.01)
+    true_ppm, offset = 80.0, 3.25
+    fit = ClockFit()
+    for d, late in zip(device, rng.exponential(0.004, len(device)), strict=True):
+        fit.add(float(d), offset + float(d) / (1.0 + true_ppm * 1e-6) + float(late))
+    line = fit.line()
+    assert abs(line.rate_ppm - true_ppm) < 4.0 * line.sigma_ppm
+    assert line.sigma_ppm < 2.0
+    assert line.offset_s == pytest.approx(offset, abs=5e-4)
+    assert line.jitter_rms_s == pytest.approx(0.004, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_device_clock_in_error_is_found_within_its_error_bar(seed):
+    rng = np.random.default_rng(seed)
+    ratios = []
+    for _ in range(30):
+        fit = ClockFit()
+        for d in np.arange(0.0, 40.0, 0.02):
+            fit.add(float(d), float(d) * (1 - 50e-6) + float(rng.exponential(0.002)) + 0.02 * (rng.random() < 0.02))
+        line = fit.line()
+        ratios.append((1.0 / (1 - 50e-6) - 1.0 - line.rate_ppm * 1e-6) / (line.sigma_ppm * 1e-6))
+    # Thirty z-scores: their rms is 1 within 26 % (two standard errors); minima are not Gaussian, so half of it more.
+    assert 0.5 < np.sqrt(np.mean(np.square(ratios))) < 1.6
+
+
+class SlowLog(GrowingLog):
+    def _write(self, text):
+        time.sleep(0.4)
+        super()._write(text)
+
+
+def test_a_slow_disk_loses_nothing(tmp_path):
+    with Board(counts_recording(1500, 1000.0), "xsens-mtdata2", speed=1.0) as board:
+        source, found = open_device(board.port)
+        log = SlowLog(tmp_path / "log.csv")
+        recorder = Recorder(source, found.make_decoder, first_bytes=found.first_bytes, log=log, wait_for_return_s=0.0)
+        n = sum(len(block.time_s) for block in recorder)
+    assert recorder.count.lost == 0
+    assert trihedron.read(tmp_path / "log.csv").n_samples == n
+
+
+def test_a_full_disk_says_what_is_saved_and_leaves_a_whole_file(tmp_path):
+    # The limit of the size of a file stands for the disk.
+    raw = tmp_path / "raw.txt"
+    raw.write_bytes(b"".join(p for _, p in Device(counts_recording(5000, 100.0), "lines").pieces(Sent())))
+    code = (
+        "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (60000, 60000));"
+        "from trihedron.cli import main; sys.exit(main(sys.argv[1:]))"
+    )
+    log = tmp_path / "log.csv"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "capture", str(raw), "-o", str(log)], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 2
+    assert "the disk is full" in done.stderr
+    saved = int(re.search(r"(\d+) rows are saved", done.stderr).group(1))
+    assert log.read_bytes().endswith(b"\n")
+    assert trihedron.read(log).n_samples == saved > 500
+
+
+def test_a_write_that_fails_for_another_reason_is_named(tmp_path):
+    log = GrowingLog(tmp_path / "log.csv")
+    log.begin({}, ["a"])
+    handle, log._handle = log._handle, os.open(tmp_path / "log.csv", os.O_RDONLY)
+    os.close(handle)
+    log.row("1", 0.0)
+    with pytest.raises(DiskError, match="refuses to write"):
+        log.flush(force=True)
+    log.abandon()
+    assert errno.EBADF
+
+
+def test_kill_9_loses_at_most_a_second_and_the_file_reads(tmp_path):
+    log = tmp_path / "log.csv"
+    with Board(counts_recording(6000, 1000.0), "xsens-mtdata2", speed=1.0, link=tmp_path / "tty") as board:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "trihedron", "capture", board.port, "-o", str(log), "--protocol", "xsens-mtdata2"],
+            stderr=subprocess.DEVNULL,
+        )
+        until = time.monotonic() + 20
+        while time.monotonic() < until and not (log.exists() and log.stat().st_size > 50_000):
+            time.sleep(0.02)
+        process.kill()
+        process.wait()
+    assert process.returncode == -signal.SIGKILL
+    back = trihedron.read(log)
+    assert back.n_samples > 300
+
+
+REFUSALS = [
+    (["capture", "/dev/ttyUSB97", "-o", "LOG"], "there is no port /dev/ttyUSB97"),
+    (["capture", "tcp://127.0.0.1:1", "-o", "LOG"], "no connection"),
+    (["capture", "tcp://nowhere", "-o", "LOG"], "tcp://host:port"),
+    (["capture", "EMPTY", "-o", "LOG"], "it is empty"),
+    (["capture", "NOISE", "-o", "LOG"], "no known protocol"),
+    (["capture", "NOISE", "--protocol", "morse", "-o", "LOG"], "there is no protocol 'morse'"),
+    (["capture", "NOISE", "--protocol", "none.toml", "-o", "LOG"], "no such protocol file"),
+    (["capture", "NOISE", "-o", "EXISTS"], "the file exists and was left alone"),
+    (["capture", "NOISE", "-o", "missing/log.csv"], "there is no folder"),
+    (["capture", "NOISE"], "say where the log goes"),
+    (["capture", "FOLDER", "-o", "LOG"], "this is a directory"),
+]
+
+
+@pytest.mark.parametrize(("words", "sentence"), REFUSALS)
+def test_bad_input_is_refused_in_one_sentence_with_status_1(words, sentence, tmp_path, capsys):
+    (tmp_path / "empty").write_bytes(b"")
+    (tmp_path / "noise").write_bytes(np.random.default_rng(0).bytes(3000))
+    (tmp_path / "exists.csv").write_text("mine")
+    names = {"LOG": "log.csv", "EMPTY": "empty", "NOISE": "noise", "EXISTS": "exists.csv", "FOLDER": "."}
+    status = main([str(tmp_path / names[word]) if word in names else word for word in words])
+    said = capsys.readouterr().err.strip()
+    assert status == 1
+    assert sentence in said
+    assert "\n" not in said
+    assert (tmp_path / "exists.csv").read_text() == "mine"
+    assert not (tmp_path / "log.csv").exists()
+
+
+def test_a_silent_board_is_told_from_a_wrong_protocol():
+    import pty
+
+    master, slave = pty.openpty()
+    source = open_source(os.ttyname(slave))
+    with pytest.raises(CaptureError, match="not one byte came in"):
+        find_protocol(source, baud=115_200, silence_s=0.5)
+    source.close()
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_busy_port_is_named_as_busy():
+    import pty
+
+    master, slave = pty.openpty()
+    first = open_source(os.ttyname(slave))
+    with pytest.raises(CaptureError, match="in use by another program"):
+        open_source(os.ttyname(slave))
+    first.close()
+    os.close(master)
+    os.close(slave)
+
+
+def test_a_port_without_permission_names_the_group_to_join(monkeypatch):
+    import pty
+
+    master, slave = pty.openpty()
+    name = os.ttyname(slave)
+
+    def refuse(*_args, **_options):
+        raise PermissionError(errno.EACCES, "Permission denied", name)
+
+    monkeypatch.setattr("trihedron.capture.sources.import_serial", lambda: refuse)
+    with pytest.raises(CaptureError, match=r"no permission to open .*usermod -aG \w+"):
+        open_source(name)
+    os.close(master)
+    os.close(slave)
+
+
+def test_what_a_board_says_at_start_is_no_frame(tmp_path):
+    raw = tmp_path / "raw.txt"
+    device = Device(counts_recording(100, 100.0), "lines-label", parse_faults("text"))
+    raw.write_bytes(b"".join(piece for _, piece in device.pieces(Sent())))
+    recorder, _ = capture(str(raw), tmp_path / "log.csv")
+    assert recorder.count.tally.saved == 100
+    assert recorder.count.corrupt <= 1
+
+
+@pytest.mark.parametrize(
+    ("names", "rows", "time", "unit"),
+    [
+        (None, [[str(10 * i), "1", "2", "3", "4", "5", "6"] for i in range(12)], 0, 1e-3),
+        (None, [[str(10_000 * i), "1", "2", "3", "4", "5", "6"] for i in range(12)], 0, 1e-6),
+        (("ax", "ay", "az", "t"), [["1", "2", "3", f"{0.01 * i:.2f}"] for i in range(12)], 3, 1.0),
+        (("micros", "ax", "ay", "az"), [[str(1000 * i), "1", "2", "3"] for i in range(12)], 0, 1e-6),
+    ],
+)
+def test_columns_of_lines_are_recognised_as_in_a_log(names, rows, time, unit):
+    found = column_namer()(names, rows)
+    assert (found.time, found.time_unit_s) == (time, pytest.approx(unit))
+
+
+def test_a_decoder_is_made_for_every_known_name_and_no_other():
+    with pytest.raises(CaptureError, match="no protocol 'x'"):
+        decoder_factory("x")

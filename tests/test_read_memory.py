@@ -1,0 +1,128 @@
+"""Readings in memory are read as a file's are: arrays, masked arrays, dictionaries, data frames."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+import trihedron
+from test_read import readings
+from trihedron.records import FindingCode, Recording
+from trihedron.units import AccelerationUnit, RateUnit
+
+NAMES = ["t", "ax", "ay", "az", "gx", "gy", "gz"]
+
+
+def assert_same(recording: Recording, table: np.ndarray) -> None:
+    np.testing.assert_array_equal(recording.accelerometer, table[:, 1:4])
+    np.testing.assert_array_equal(recording.gyroscope, table[:, 4:])
+    np.testing.assert_allclose(recording.time_s, table[:, 0] - table[0, 0], rtol=0, atol=1e-12)
+
+
+TABLE = readings()
+NAMED = dict(zip(NAMES, TABLE.T, strict=True))
+
+
+def pandas_frame():
+    return pytest.importorskip("pandas").DataFrame(NAMED)
+
+
+CARRIERS = {
+    "array": lambda: TABLE,
+    "list": lambda: TABLE.tolist(),
+    "structured": lambda: np.rec.fromarrays(list(TABLE.T), names=",".join(NAMES)),
+    "masked-without-mask": lambda: np.ma.masked_array(TABLE),
+    "dict-of-columns": lambda: NAMED,
+    "dict-of-triads": lambda: {"t": TABLE[:, 0], "acc": TABLE[:, 1:4], "gyr": TABLE[:, 4:]},
+    "polars": lambda: pl.DataFrame(NAMED),
+    "pandas": pandas_frame,
+    "pandas-with-time-index": lambda: pandas_frame().set_index("t"),
+    "pandas-nullable": lambda: pandas_frame().convert_dtypes(),
+    "arrow": lambda: pytest.importorskip("pyarrow").table({k: v.tolist() for k, v in NAMED.items()}),
+}
+
+
+@pytest.mark.parametrize("carrier", CARRIERS.values(), ids=CARRIERS.keys())
+def test_every_carrier_gives_the_numbers_that_it_holds(carrier):
+    assert_same(trihedron.read(carrier()), TABLE)
+
+
+def test_dates_of_frames_are_the_clock():
+    pandas = pytest.importorskip("pandas")
+    table = readings()
+    frame = pandas.DataFrame(dict(zip(NAMES[1:], table[:, 1:].T, strict=True)))
+    frame.index = pandas.Timestamp("2024-03-01") + pandas.to_timedelta(table[:, 0], unit="s")
+    recording = trihedron.read(frame)
+    assert recording.rate_hz == pytest.approx(100.0, rel=1e-6)
+    assert recording.start_epoch_s == pytest.approx(1709251200.0)
+
+
+def test_masked_readings_are_missing_readings():
+    table = readings()
+    mask = np.zeros(table.shape, dtype=bool)
+    mask[50:60, 3] = True
+    wild = table.copy()
+    wild[50:60, 3] = 1e6
+    for data in (
+        np.ma.masked_array(wild, mask),
+        dict(zip(NAMES, [np.ma.masked_array(wild[:, k], mask[:, k]) for k in range(7)], strict=True)),
+    ):
+        recording = trihedron.read(data)
+        assert np.isnan(recording.accelerometer[50:60, 2]).all()
+        assert np.isfinite(np.delete(recording.accelerometer, np.s_[50:60], axis=0)).all()
+        assert any(f.code is FindingCode.NON_FINITE for f in recording.findings)
+    made = Recording.from_arrays(table[:, 0], np.ma.masked_array(wild, mask)[:, 1:4], table[:, 4:])
+    assert np.isnan(made.accelerometer[50:60, 2]).all()
+
+
+def test_arrays_make_an_audited_recording_in_their_units():
+    table = readings()
+    recording = Recording.from_arrays(
+        table[:, 0], table[:, 1:4], np.degrees(table[:, 4:]), gyroscope_unit="deg/s", temperature_degc=np.arange(200.0)
+    )
+    assert recording.gyroscope_unit is RateUnit.DEG_S
+    assert recording.accelerometer_unit is AccelerationUnit.M_S2
+    assert recording.temperature_degc is not None
+    assert recording.rate_hz == pytest.approx(100.0)
+    wrong = Recording.from_arrays(None, table[:, 1:4], rate_hz=50.0, accelerometer_unit="g")
+    assert wrong.rate_hz == 50.0
+    assert any(f.code is FindingCode.UNIT_CONTRADICTED for f in wrong.findings)
+
+
+@pytest.mark.parametrize(
+    ("data", "complaint"),
+    [
+        (3, "takes a file name, an array .*got int"),
+        (object(), "got object"),
+        (np.zeros((4, 4, 4)), r"got shape \(4, 4, 4\)"),
+        (np.array(["a", "b"]), "got shape"),
+        (np.array([["a", "b"]]), "holds numbers, got dtype"),
+        ({"t": np.arange(5), "ax": np.arange(4)}, "differ in length"),
+        ({"acc": np.zeros((3, 500))}, "give its transpose"),
+        ({"t": ["x", "y"]}, "no column of numbers"),
+        ({"ax": 1j * np.arange(5)}, "complex"),
+        ({"t": np.arange(9.0), "u": np.arange(9.0)}, 'columns="time=1,ax=2'),
+    ],
+)
+def test_what_is_no_log_is_a_value_error_in_the_words_of_python(data, complaint):
+    with pytest.raises(ValueError, match=complaint) as caught:
+        trihedron.read(data)
+    assert "--" not in str(caught.value)
+
+
+def test_from_arrays_says_what_it_lacks():
+    table = readings()
+    with pytest.raises(ValueError, match="needs time_s"):
+        Recording.from_arrays(None, table[:, 1:4])
+    with pytest.raises(ValueError, match="needs accelerometer"):
+        Recording.from_arrays(table[:, 0])
+    with pytest.raises(ValueError, match=r"must have shape \(n, 3\), got \(200, 2\)"):
+        Recording.from_arrays(table[:, 0], table[:, 1:3])
+    with pytest.raises(ValueError, match="differ in length"):
+        Recording.from_arrays(table[:100, 0], table[:, 1:4])
+
+
+def test_findings_of_a_recording_name_parameters_and_not_flags():
+    table = readings()
+    recording = trihedron.read(table[:, 1:])
+    assert not any("--" in finding.action for finding in recording.findings)
+    assert any("rate_hz" in finding.action for finding in recording.findings)
