@@ -21,6 +21,7 @@ from trihedron.cli.check import check
 from trihedron.cli.demo import demo
 from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
+from trihedron.cli.guide import guide
 from trihedron.cli.kalman import kalman
 from trihedron.cli.ports import ports
 from trihedron.cli.segment import segment
@@ -32,6 +33,7 @@ COMMANDS = (
     demo,
     ports,
     capture,
+    guide,
     check,
     segment,
     calibrate,
