@@ -4,6 +4,7 @@ import allantools
 import numpy as np
 import pytest
 
+from trihedron import _core
 from trihedron.estimate.noise import allan_deviation, default_clusters, degrees_of_freedom, stream_allan_deviation
 from twins_noise import overlapping_variance, running_sum_in_long_double, weighted_hadamard, weighted_variance
 
@@ -101,11 +102,30 @@ def test_missing_readings_are_weighted_as_defined():
     x = rng.normal(size=400).cumsum()
     x[rng.random(400) < 0.1] = np.nan
     x[200:260] = np.nan
+    # The kernel weighs; what means of a few readings scatter is taken off afterwards (the next two tests).
+    column = x[:, np.newaxis]
     for m in (1, 5, 40, 120):
-        curve = allan_deviation(x, 1.0, [m])
-        assert curve.variance[0, 0] == pytest.approx(weighted_variance(x, m), rel=1e-11)
-        hadamard = allan_deviation(x, 1.0, [m], "hadamard")
-        assert hadamard.variance[0, 0] == pytest.approx(weighted_hadamard(x, m), rel=1e-11)
+        weighted = _core.allan_variance(column, [m], _core.AllanKind.Overlapping)[0]
+        assert weighted[0, 0] == pytest.approx(weighted_variance(x, m), rel=1e-11)
+        hadamard = _core.allan_variance(column, [m], _core.AllanKind.Hadamard)[0]
+        assert hadamard[0, 0] == pytest.approx(weighted_hadamard(x, m), rel=1e-11)
+
+
+@pytest.mark.parametrize("kind", ["overlapping", "non-overlapping", "hadamard"])
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.6])
+def test_readings_lost_here_and_there_bias_neither_white_noise_nor_a_random_walk(share, kind):
+    rng = np.random.default_rng(9)
+    clusters = [1, 2, 5, 20, 100, 500]
+    for make in (lambda: rng.normal(size=20_000), lambda: 0.02 * np.cumsum(rng.normal(size=20_000))):
+        ratio = []
+        for _ in range(25):
+            x = make()
+            whole = allan_deviation(x, 1.0, clusters, kind).variance[:, 0]
+            x[rng.random(len(x)) < share] = np.nan
+            ratio.append(allan_deviation(x, 1.0, clusters, kind).variance[:, 0] / whole)
+        error = np.std(ratio, axis=0, ddof=1) / 5.0
+        # Against the same readings with none lost: before, 1/(1 - share) for white noise.
+        assert np.all(np.abs(np.mean(ratio, axis=0) - 1.0) < 4.5 * error + 0.02), (np.mean(ratio, axis=0), error)
 
 
 def test_a_gap_biases_neither_white_noise_nor_a_random_walk():
@@ -232,3 +252,16 @@ def test_default_clusters_reach_the_longest_with_a_term():
     assert default_clusters(1000)[0] == 1
     assert default_clusters(1000)[-1] <= 500
     assert allan_deviation(np.arange(1000.0), 1.0).n_terms[-1, 0] >= 1
+
+
+def test_intervals_of_the_total_deviation_hold_the_allan_deviation_under_quantisation_noise():
+    rng = np.random.default_rng(10)
+    n, clusters = 1024, np.array([16, 64, 256, 500])
+    truth = 3.0 / clusters.astype(float) ** 2
+    inside = np.zeros(len(clusters))
+    runs = 200
+    for _ in range(runs):
+        curve = allan_deviation(np.diff(rng.normal(size=n + 1)), 1.0, clusters, "total")
+        inside += (curve.lower[:, 0] ** 2 <= truth) & (truth <= curve.upper[:, 0] ** 2)
+    # 95 % of 200, four binomial errors of 1.5 % either way; before, 40 % at the longest.
+    assert np.all(np.abs(inside / runs - 0.95) < 0.062), inside / runs

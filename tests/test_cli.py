@@ -169,7 +169,9 @@ def test_the_demonstration_writes_its_files_and_never_over_others(tmp_path, monk
     assert main(["demo"]) == 0
     out = capsys.readouterr().out
     assert "Compare with the truth" in out
+    assert "The seal, opened now" in out
     names = {"session.csv", "second-session.csv", "calibration.json", "report.html", "verification.html", "truth.json"}
+    names |= {"unit.csv", "simulation.toml", "improved.toml", "disagreement.html", "sealed.json"}
     assert {p.name for p in Path("trihedron-demo").iterdir()} == names
     (Path("trihedron-demo") / "calibration.json").write_text("precious")
     assert main(["demo"]) == 0

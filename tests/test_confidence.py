@@ -82,3 +82,22 @@ def test_the_manuals_session_by_stated_turns_about_any_axis_lies_inside_its_bars
     assert relative < 5e-4
     with pytest.raises(ValueError, match="5 turns were stated and 6 were found"):
         calibrate(recording_of(f, w, rate), gravity_m_s2=G, turns_deg=stated[:5])
+
+
+@pytest.mark.parametrize("bits", [8, 10])
+def test_a_coarse_gyro_has_the_error_bars_of_its_rounding(bits):
+    z = []
+    for seed in (31, 32, 33):
+        f, w, rate, truth, _ = hand(seed, gyro_bits=bits)
+        result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
+        if not result.is_trustworthy:
+            # Marked as not to be trusted, which is the other honest answer.
+            continue
+        scores, relative = gyro_z(result, lower(truth))
+        # A step of 4 °/s at 8 bit: three parts in a thousand are what its moves of 2 s show.
+        assert relative < (6e-3 if bits == 8 else 2e-3)
+        z.append(scores)
+    assert len(z) >= 2
+    # At most 27 scores: none beyond four, nor larger together than chance allows once in a thousand.
+    assert np.abs(z).max() < 4.0
+    assert np.sum(np.square(z)) < 56.0

@@ -180,3 +180,15 @@ def test_improving_is_refused_where_it_would_overwrite_or_has_nothing_to_improve
     given.write_text(SCENARIO.replace("profile", "profil"))
     (tmp_path / "log.csv").write_text("t,ax,ay,az\n" + "".join(f"{k / 100},0,0,9.81\n" for k in range(400)))
     assert main(["diagnose", str(tmp_path / "log.csv"), "--gravity", "9.81", "--against", str(given)]) == 1
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_the_second_act_finds_what_was_sealed_and_mends_the_simulation(seed, tmp_path):
+    from trihedron.pipeline.disagreeing import disagree
+
+    done = disagree(tmp_path, seed)
+    assert done.found.verdict == "missing-physics"
+    first = done.found.effects[0]
+    assert done.sealed["effect"] in (first.id, *first.confounded_with)
+    assert done.improved.verdict == "consistent"
+    assert (tmp_path / "improved.toml").read_text().startswith("# The simulation of an ordinary sensor")

@@ -9,6 +9,7 @@ from scipy.optimize import brentq, minimize
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
+from noise_series import series
 from noise_trial.generator import agree, by_spectrum, in_time
 from trihedron import _core
 from trihedron.estimate.noise import allan_deviation, identify_noise, stream_allan_deviation
@@ -139,3 +140,19 @@ def test_a_large_level_costs_no_digits_but_those_it_rounds_away(level):
     parts = np.array_split((x + level)[:, np.newaxis], 7)
     assert stream_allan_deviation(parts, 100.0, clusters).deviation == pytest.approx(here, rel=1e-9)
     assert identify_noise(x + level, 100.0).axes[0].value("N") == pytest.approx(1e-4, rel=0.01)
+
+
+@pytest.mark.parametrize("truth", [{"N": 1e-2, "K": 6e-4}, {"N": 1e-3, "B": 2e-2}, {"N": 1e-3, "K": 2e-2}])
+@pytest.mark.parametrize("share", [0.05, 0.3])
+def test_scattered_loss_leaves_the_terms_where_they_are(truth, share):
+    rng = np.random.default_rng(65)
+    inside = 0
+    for _ in range(6):
+        x = series(rng, 60_000, 100.0, **truth)
+        x[rng.random(len(x)) < share] = np.nan
+        noise = identify_noise(x, 100.0)
+        assert noise.breaks_s == ()
+        terms = noise.axes[0].terms
+        inside += sum(terms[TermName(s)].lower <= v <= terms[TermName(s)].upper for s, v in truth.items())
+    # Twelve intervals of 95 %: nine or more with a probability of 0.998.
+    assert inside >= 9

@@ -145,6 +145,22 @@ def test_verification_notices_a_sensor_that_has_changed(scenario, result):
     assert "residual-above-noise" in codes
 
 
+def test_a_miss_far_beyond_what_was_expected_is_not_to_be_trusted_unless_a_limit_accepts_it(scenario, result):
+    changed = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(1.2, -0.3834, 0.1025)))
+    other, _ = simulate(changed, 13)
+    verified = trihedron.verify(result, other)
+    finding = next(f for f in verified.findings if f.code.value == "residual-above-noise")
+    assert finding.numbers["times_expected"] > 10.0
+    assert finding.severity.value == "serious"
+    # 0.9 m/s² more of one zero is missed by 50 mg rms; whoever can live with 200 mg is told, not stopped.
+    wide = trihedron.verify(result, other, limit_mg=200.0)
+    assert {f.severity.value for f in wide.findings if f.code.value == "residual-above-noise"} == {"warning"}
+    # A change of a few times the error bars is a warning.
+    slightly = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(0.303, -0.3834, 0.1025)))
+    near, _ = simulate(slightly, 13)
+    assert all(f.severity.value != "serious" for f in trihedron.verify(result, near).findings)
+
+
 def test_a_check_predicts_the_error_bars_that_the_calibration_has(recording, result):
     checked = trihedron.check(recording)
     assert checked.is_fit

@@ -58,7 +58,7 @@ pub fn degrees_of_freedom(n: usize, m: usize, noise: NoiseType, kind: Kind) -> R
         return Ok(summed);
     }
     let (slope, offset) = match noise {
-        NoiseType::Quantisation => return Ok(summed),
+        NoiseType::Quantisation => return Ok(reflected_white_phase(n, m, summed)),
         NoiseType::White => (1.5, 0.0),
         NoiseType::Flicker => (1.168, 0.222),
         NoiseType::Walk => (0.927, 0.358),
@@ -66,6 +66,18 @@ pub fn degrees_of_freedom(n: usize, m: usize, noise: NoiseType, kind: Kind) -> R
     // The table is for m >> 1; at the smallest clusters hardly anything is reflected.
     let table = slope * n as f64 / m as f64 - offset;
     Ok(if m < 8 { table.min(summed) } else { table }.max(1.0))
+}
+
+/// Total variance of white phase: both ends of the phase stand in every reflected term, twice.
+///
+/// A term that is reflected at one end is `2 e_0 − e_{m−k} − 2 e_k + e_{k+m}`: variance 10 instead of 6, of which the
+/// `4 e_0²` is the same number in all `m − 1` of them: 32 of the variance of each end's sum, per square of their count.
+fn reflected_white_phase(n: usize, m: usize, summed: f64) -> f64 {
+    let (terms, reflected) = ((n - 1) as f64, m.min(n - m).saturating_sub(1) as f64);
+    let plain = 6.0 * terms;
+    let mean = plain + 8.0 * reflected;
+    let variance = 2.0 * plain * plain / summed + 64.0 * reflected * reflected + 320.0 * reflected;
+    (2.0 * mean * mean / variance).max(1.0)
 }
 
 fn summed(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from itertools import count
 from pathlib import Path
 from typing import Annotated, Optional
@@ -19,9 +20,13 @@ def demo(
         Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
         typer.Argument(metavar="[FOLDER]", help=f"Where to write; {FOLDER} when not said, or the next free name."),
     ] = None,
+    seed: Annotated[
+        Optional[int],  # noqa: UP045
+        typer.Option("--seed", metavar="N", min=0, help="Unit and flaw of the second act; drawn if not said."),
+    ] = None,
     force: Force = False,
 ) -> None:
-    """A complete session, simulated: calibrate, verify, report, and compare with the truth."""
+    """Two acts, simulated: calibrate and compare with the truth; then a simulation that a log contradicts."""
     target = _free_folder() if folder is None and not force else folder or Path(FOLDER)
     if folder is not None and folder.exists() and not force:
         raise ValueError(f"{folder}: this exists and was left alone; choose another name or add --force.")
@@ -30,6 +35,10 @@ def demo(
 
     done = demonstrate(target, overwrite=force, say=say)
     typer.echo(to_text(done.document), nl=False)
+    from trihedron.pipeline.disagreeing import disagree
+
+    drawn = secrets.randbelow(1_000_000) if seed is None else seed
+    typer.echo(to_text(disagree(target, drawn, overwrite=force, say=say).document), nl=False)
     leave((*done.result.findings, *done.verification.findings))
 
 

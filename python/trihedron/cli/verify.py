@@ -33,7 +33,10 @@ def verify(
     full: Annotated[bool, typer.Option("--full", help="Print the whole report, with every pose and move.")] = False,
     force: Force = False,
 ) -> None:
-    """Test a calibration on another recording."""
+    """Test a calibration on another recording.
+
+    Exit status 2 when a limit is exceeded, or, without one, when the miss is more than ten times what was expected.
+    """
     check_outputs(json, force=force, report=report)
     from trihedron.files.calibration import read_calibration
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
@@ -19,6 +18,7 @@ from trihedron.diagnose.selection.evidence import with_evidence
 from trihedron.diagnose.selection.model import StepwiseModel, begin
 from trihedron.diagnose.selection.prune import judged_again
 from trihedron.diagnose.selection.score import Scored
+from trihedron.diagnose.selection.stages import held_out_stages
 from trihedron.diagnose.selection.stepwise import MAX_EFFECTS, candidates_of, scores, with_next
 from trihedron.diagnose.selection.verdict import accounted_for, verdict_of
 from trihedron.diagnose.session.observations import Observations, observe
@@ -66,13 +66,11 @@ def diagnose_recording(
     prior = prior_of(obs, calibration) if calibration_is_given else None
     if prior is None and is_open(calibration):
         start, prior = nominal_start(obs, calibration)
-    # Matrices of a few hundred columns: threads of the linear algebra would wait for each other longer than they work.
-    with threadpool_limits(limits=1, user_api="blas"):
-        run = _run(obs, start, prior, alpha, lambda done, text: tell(0.6 * done, text))
-        widened = _widened(obs, run.remaining)
-        if widened is not obs:
-            # Moves that nothing explains would bend everything beside them: once more, with their noise as it is.
-            run = _run(widened, start, prior, alpha, lambda done, text: tell(0.6 + 0.4 * done, text))
+    run = _run(obs, start, prior, alpha, lambda done, text: tell(0.6 * done, text))
+    widened = _widened(obs, run.remaining)
+    if widened is not obs:
+        # Moves that nothing explains would bend everything beside them: once more, with their noise as it is.
+        run = _run(widened, start, prior, alpha, lambda done, text: tell(0.6 + 0.4 * done, text))
     model, base = run.model, run.bare.fitted
     twin = model.fitted.twin
     result = Diagnosis(
@@ -101,6 +99,7 @@ def diagnose_recording(
         recording_sha256=recording.sha256,
         references=MappingProxyType(model.context.references),
         residuals=residuals_before_after(base, model.fitted),
+        stages=held_out_stages(run.bare, model),
     )
     tell(1.0, "done")
     return result

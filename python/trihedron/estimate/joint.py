@@ -51,6 +51,7 @@ def calibrate_joint(
     """
     options = options or MoveOptions()
     measured = measure_moves(recording, segments, accelerometer, options.rate_degree, options.is_attitude_removed)
+    options = options.suited_to(measured)
     basis, frame = free_directions(accelerometer.S)
     first = starts(recording, measured, accelerometer, options.nominal())
     part = AccelerometerPart(accelerometer, basis, is_given=False)

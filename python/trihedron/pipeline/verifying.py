@@ -29,7 +29,8 @@ def verify(
     """Norm of gravity at rest and gravity carried through moves, in a recording that the calibration has not seen.
 
     Without ``gravity_m_s2`` or a place, gravity is that of the calibration. ``limit_mg`` and ``limit_deg`` are what the
-    user can accept (rms): beyond them a serious finding says so.
+    user can accept (rms): beyond them a serious finding says so. Where no limit is said, a miss of more than ten times
+    what noise and the stated errors allow is serious; where one is said and kept, it is a warning.
 
     Raises
     ------
@@ -47,7 +48,15 @@ def verify(
     else:
         gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     judged = verify_calibration(known, recording, segments, gravity, source)
-    findings = (*recording.findings, *segments.findings, *judged.findings, *more, *_limits(judged, limit_mg, limit_deg))
+    accepted = {
+        FindingCode.RESIDUAL_ABOVE_NOISE: limit_mg is not None,
+        FindingCode.HELD_OUT_WORSE: limit_deg is not None,
+    }
+    missed = tuple(
+        replace(found, severity=Severity.WARNING) if accepted.get(found.code, False) else found
+        for found in judged.findings
+    )
+    findings = (*recording.findings, *segments.findings, *missed, *more, *_limits(judged, limit_mg, limit_deg))
     findings += _same_recording(known.recording_sha256, recording.sha256)
     return VerificationResult(replace(judged, findings=findings), known, segments, recording)
 

@@ -28,12 +28,12 @@ def table_of(data: object) -> Table:
         (a ``ValueError``) when it is none of these, or lengths disagree.
     """
     if isinstance(data, Mapping):
-        return _of_columns("dict", list(data.items()))
+        return columns_table("dict", list(data.items()))
     if _is_frame(data):
-        return _of_columns(type(data).__name__, _frame_columns(data))
+        return columns_table(type(data).__name__, _frame_columns(data))
     array = _as_array(data)
     if array.dtype.names:
-        return _of_columns("array", [(name, array[name]) for name in array.dtype.names])
+        return columns_table("array", [(name, array[name]) for name in array.dtype.names])
     if array.ndim != 2:
         raise ReadError(
             f"an array of readings has rows and columns, got shape {array.shape}; give (n, columns), or a dictionary "
@@ -92,7 +92,14 @@ def _series(series: Any) -> Any:
     return values
 
 
-def _of_columns(kind: str, items: list[tuple[Any, Any]]) -> Table:
+def columns_table(kind: str, items: list[tuple[Any, Any]]) -> Table:
+    """Named arrays (n,) or (n, k) as a table; single values are metadata.
+
+    Raises
+    ------
+    ReadError
+        When lengths disagree, or there is no column of numbers.
+    """
     names: list[str] = []
     columns: list[FloatArray] = []
     words: dict[int, str] = {}

@@ -8,12 +8,6 @@ from trihedron.read.errors import ReadError
 
 _CSV = "export it as CSV or Parquet"
 _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
-    (b"SQLite", "a database", _CSV),
-    (b"\x89HDF", "an HDF5 (or MATLAB 7.3) file", "export the log as CSV or Parquet"),
-    (b"MATLAB", "a MATLAB file", _CSV),
-    (b"#ROSBA", "a ROS bag", _CSV),
-    (b"\x89MCAP", "an MCAP file", _CSV),
-    (b"ULog", "a ULog file", _CSV),
     (b"%PDF", "a PDF document", "ask for the numbers as CSV"),
     (b"\x28\xb5\x2f\xfd", "zstd-compressed", "unpack it with `zstd -d` first"),
     (b"7z\xbc\xaf\x27\x1c", "a 7-Zip archive", "unpack it first"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from trihedron.read.archive import read_npy
@@ -34,6 +35,10 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
     ReadError
         When the file cannot be read or is no log, or offers several devices of which none was chosen.
     """
+    if path.is_dir() and (path / "metadata.yaml").is_file():
+        from trihedron.read.ros import read_bag
+
+        return tuple(replace(table, is_chosen=True) for table in read_bag(path, "", choice, progress))
     size = check_readable(path)
     try:
         with path.open("rb") as stream:
@@ -51,8 +56,39 @@ def read_tables(path: Path, choice: Choice, progress: Progress | None = None) ->
         from trihedron.read.parquet import read_parquet
 
         return by_sensor(read_parquet(path))
+    known = _ecosystem(path, magic, choice, progress)
+    if known is not None:
+        return tuple(replace(table, is_chosen=True) for table in known)
     refuse_foreign(path, magic)
     from trihedron.read.text import compression_of, read_text
 
     tables = read_text(path, compression_of(magic), size, progress)
     return by_sensor(tables[0]) if len(tables) == 1 else tables
+
+
+def _ecosystem(path: Path, magic: bytes, choice: Choice, progress: Progress | None) -> tuple[Table, ...] | None:
+    """Formats that libraries of their own ecosystem read, each fetched only when such a file is met."""
+    suffix = {b"#ROSBAG": ".bag", b"\x89MCAP": ".mcap", b"SQLite ": ".db3"}.get(
+        magic[: 5 if magic[:1] == b"\x89" else 7]
+    )
+    if suffix is not None:
+        from trihedron.read.ros import read_bag
+
+        return read_bag(path, suffix, choice, progress)
+    if magic.startswith(b"ULog"):
+        from trihedron.read.ulog import read_ulog
+
+        return read_ulog(path, choice)
+    if magic.startswith(b"\xa3\x95"):
+        from trihedron.read.ardupilot import read_dataflash
+
+        return read_dataflash(path, choice, progress)
+    if magic.startswith(b"\x89HDF") or magic.startswith(b"MATLAB 7.3"):
+        from trihedron.read.tree import read_hdf5
+
+        return (read_hdf5(path, choice),)
+    if magic.startswith(b"MATLAB"):
+        from trihedron.read.tree import read_matlab
+
+        return (read_matlab(path, choice),)
+    return None

@@ -60,6 +60,8 @@ class Table:
     sensor: Literal["accelerometer", "gyroscope"] | None = None
     clock: StatedClock = field(default_factory=StatedClock)
     rows_in_file: int = 0
+    is_chosen: bool = False
+    """The user's choice of topic and instance was spent on reading this table."""
 
     @property
     def n_in_file(self) -> int:

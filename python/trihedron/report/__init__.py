@@ -4,6 +4,7 @@ from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
 from trihedron.report.demonstration import demonstration_report
 from trihedron.report.diagnosis import diagnosis_report
+from trihedron.report.disagreement import disagreement_report
 from trihedron.report.document import Document
 from trihedron.report.kalman import kalman_report
 from trihedron.report.segments import segments_report
@@ -16,6 +17,7 @@ __all__ = [
     "check_report",
     "demonstration_report",
     "diagnosis_report",
+    "disagreement_report",
     "kalman_report",
     "segments_report",
     "to_text",

@@ -60,7 +60,7 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         words = tuple(("", word) for word in numbers) or (("", "None of the given numbers differs."),)
         sections.append(Section("Numbers that differ (recording minus model)", (Facts(words),)))
     sections += [
-        Section("What was left out", _effects(diagnosis)),
+        Section("What was left out", effects_blocks(diagnosis)),
         Section("What remains", (Paragraph(_remaining(diagnosis)),)),
         Section("Held out: before and after", _held_out(diagnosis)),
         Section("Candidates", (_candidates(diagnosis),)),
@@ -192,7 +192,7 @@ def where_in_words(test: DomainTest) -> str:
     return "; ".join(parts)
 
 
-def _effects(diagnosis: Diagnosis) -> tuple[Block, ...]:
+def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if not diagnosis.effects:
         return (Paragraph("No effect of the catalogue earns its place in the model."),)
     blocks: list[Block] = []

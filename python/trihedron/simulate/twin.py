@@ -122,6 +122,7 @@ def _motion(
         acceleration[0] = 0.0
         if not is_last:
             acceleration[-1] = 0.0
+            acceleration = _coming_to_rest(acceleration)
         steps.append(Replay(w, acceleration, stop_s - end[i], name=f"move {i + 1}"))
         q = path[-1]
         attitude = (float(q[0]), float(q[1]), float(q[2]), float(q[3]))
@@ -175,6 +176,18 @@ def _ending_in(rate: FloatArray, start: Quaternion, duration_s: float, up: Float
         c = shortest_turn(_unit(R[-1] @ up), np.array([0.0, 0.0, 1.0])) / duration_s
         rate = rate + R.transpose(0, 2, 1) @ c
     return rate
+
+
+def _coming_to_rest(acceleration: FloatArray) -> FloatArray:
+    """(m, 3) the acceleration less a smooth hump, so that what stood still before the move stands still after it.
+
+    What is left of a velocity is a flaw of the recording (a late sensor, a scale), not a motion: replayed, every
+    simulation would inherit it.
+    """
+    m = len(acceleration)
+    hump = np.sin(np.pi * np.arange(m) / (m - 1)) ** 2
+    out: FloatArray = acceleration - hump[:, None] * (acceleration.sum(axis=0) / hump.sum())
+    return out
 
 
 def _matrices(q: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -17,10 +18,19 @@ FRAME_TOLERANCE = 0.03
 the first order of the mechanisms) is no difference."""
 
 
-def left_open_by(effects: Iterable[AcceptedEffect]) -> frozenset[str]:
-    """Ids of numbers that cannot be judged beside these effects."""
+def left_open_by(effects: Iterable[AcceptedEffect]) -> dict[str, float]:
+    """Ids of numbers that these effects leave open, and by how much (SI): where they are counted from is a convention.
+
+    The size is that of the effect's own parameters where they are of the number's unit, else not known: infinite.
+    """
     named = {effect.id: effect.leaves_open for effect in catalogue()}
-    return frozenset(number for effect in effects for number in named.get(effect.id, ()))
+    out: dict[str, float] = {}
+    for effect in effects:
+        for number in named.get(effect.id, ()):
+            unit = {"accel-zero": "m/s^2", "gyro-zero": "rad/s"}.get(number, "")
+            size = max((abs(p.value) for p in effect.parameters if p.unit == unit), default=math.inf)
+            out[number] = out.get(number, 0.0) + size
+    return out
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -39,6 +40,7 @@ factor of 1.9 and ranges come in powers of two."""
 ADRIFT = 1e-9
 """Variance, relative to its group's largest, below which a covariance is not told from zero."""
 
+NOTHING_OPEN: Mapping[str, float] = MappingProxyType({})
 _AXES = ("x", "y", "z")
 
 
@@ -92,7 +94,7 @@ def compare_numbers(
     *,
     alpha: float,
     linear: FittedModel | None = None,
-    left_open: Collection[str] = (),
+    left_open: Mapping[str, float] = NOTHING_OPEN,
 ) -> ComparedNumbers:
     """Hold the numbers of ``model`` against those of ``recording``.
 
@@ -105,15 +107,16 @@ def compare_numbers(
     linear : FittedModel, optional
         The recording's fit without effects. A linear calibration absorbs part of an effect that it does not know: a
         group counts only where it differs from this fit too.
-    left_open : ids, optional
-        Groups that cannot be judged beside the effects accepted: shown, never significant.
+    left_open : mapping from id to size, optional
+        Groups whose level an accepted effect leaves open by so much: beneath it they are shown, never significant.
     """
     groups, ranges = _groups(model, recording)
     p = np.array([group.p_value for group in groups])
     if linear is not None:
         beside = {group.id: group.p_value for group in _groups(model, linear)[0]}
         p = np.array([max(value, beside.get(group.id, 0.0)) for value, group in zip(p, groups, strict=True)])
-    significant = _holm(p, alpha / 2.0) & np.array([group.id not in left_open for group in groups])
+    is_judged = [float(np.abs(group.difference).max()) > left_open.get(group.id, 0.0) for group in groups]
+    significant = _holm(p, alpha / 2.0) & np.array(is_judged)
     out: list[ParameterDifference] = []
     for group, p_value, is_significant in zip(groups, p, significant, strict=True):
         named = _as_gravity(group, alpha) if is_significant and group.id == "accel-scale" else group

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -44,6 +44,10 @@ class MoveOptions:
     is_attitude_removed: bool | None = None
     n_folds: int = 5
     nominal_scale: FloatArray | float | None = None
+
+    def suited_to(self, measured: MoveMeasurements) -> MoveOptions:
+        """With a constant rate offset where a coarse converter hides the zero from the holds."""
+        return replace(self, is_offset_free=True) if np.any(measured.is_undithered) else self
 
     def nominal(self) -> FloatArray | None:
         """Nominal scale as a matrix (3, 3)."""

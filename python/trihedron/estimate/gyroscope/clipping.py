@@ -18,6 +18,10 @@ DOUBT = 0.5
 """Standard error of the bridged area above the limit, as a part of that area."""
 
 
+NOISE_JUMP = 5.0
+"""Standard deviations of a reading that noise alone may jump at the two ends of a peak's top, in all peaks of a log."""
+
+
 @dataclass(frozen=True, eq=False)
 class Clipped:
     """``is_clipped`` (n, 3), ``readings`` (n, 3) with the peaks bridged, ``variance`` (n, 3) of each bridged
@@ -31,8 +35,9 @@ class Clipped:
 def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray) -> Clipped | None:
     """Replace runs at the limit by the cubic that continues the slopes on both sides; ``None`` when there are none.
 
-    The limit of an axis is its extreme value if neighbouring samples share it, far from where the gyro rests: a gyro
-    that does not clip reaches its extreme once. A cubic with slopes ``s₁, s₂`` at the ends of a run of length ``T``
+    The limit of an axis is its extreme value if neighbouring samples share it, far from where the gyro rests, and the
+    readings jump to it or from it further than a smooth peak inside one step of the converter would
+    (:func:`_is_cut`). A cubic with slopes ``s₁, s₂`` at the ends of a run of length ``T``
     has the area ``T² (s₁ − s₂)/12`` above the chord; half of it is taken for its standard error.
     """
     is_clipped = np.zeros(gyroscope.shape, dtype=bool)
@@ -44,7 +49,7 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray) -> Clipped | None
         rest, span = float(np.median(column[finite])), float(np.ptp(column[finite]))
         for limit in (float(np.max(column[finite])), float(np.min(column[finite]))):
             at = column == limit
-            if abs(limit - rest) > 0.3 * span and np.any(at[1:] & at[:-1]):
+            if abs(limit - rest) > 0.3 * span and _is_cut(column, at):
                 is_clipped[:, axis] |= at
     if not np.any(is_clipped):
         return None
@@ -53,6 +58,29 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray) -> Clipped | None
         for first, last in _runs(is_clipped[:, axis]):
             _bridge(time_s, readings[:, axis], variance[:, axis], first, last)
     return Clipped(is_clipped, readings, variance)
+
+
+def _is_cut(column: FloatArray, at: BoolArray) -> bool:
+    """Some run at the extreme is no smooth peak that happens to share a code.
+
+    A parabola of which n samples stay within a step q has a curvature of at most 8 q/(n − 1)², and one sample further
+    it has fallen by at most 4 q n/(n − 1)² more; rounding may add a step, and noise its own jumps.
+    """
+    finite = column[np.isfinite(column)]
+    gaps = np.diff(np.unique(finite))
+    if not len(gaps):
+        return False
+    quantum = float(np.median(gaps[gaps <= 1.5 * np.quantile(gaps, 0.25)]))
+    noise = 1.4826 * float(np.median(np.abs(np.diff(finite)))) / np.sqrt(2.0)
+    for first, last in _runs(at):
+        count = last - first + 1
+        if count < 2:
+            continue
+        smooth = quantum * (1.0 + 4.0 * count / (count - 1) ** 2) + NOISE_JUMP * noise
+        ends = [column[k] for k in (first - 1, last + 1) if 0 <= k < len(column) and np.isfinite(column[k])]
+        if ends and max(abs(value - column[first]) for value in ends) > smooth:
+            return True
+    return False
 
 
 def clipped_time(clipped: Clipped | None, edges: IntArray, step_s: float) -> FloatArray:

@@ -11,6 +11,12 @@ from scipy.stats import chi2 as chi2_distribution
 from trihedron._core import Moves
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, bridge_clipping, clipped_time
+from trihedron.estimate.gyroscope.rounding import (
+    common_zero,
+    density_without_rounding,
+    rounding_variance,
+    undithered_axes,
+)
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.recording import Recording
@@ -35,7 +41,8 @@ class MoveMeasurements:
     true zero reading changes from hold to hold; ``clipped_s`` (m,) is the time in each move that the gyro spent at
     its limit. ``attitude`` is the dependence of the zero reading on specific force where it was removed: ``rate``
     (samples, 3) are the raw gyro readings without it, and so are the zeros. ``zero_weights`` (n, 3) make the
-    session's zero reading ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,).
+    session's zero reading ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,). ``is_undithered`` (3,) are the axes
+    whose zero lies hidden inside a step of the converter.
     """
 
     moves: Moves
@@ -58,6 +65,7 @@ class MoveMeasurements:
     zero_excess: FloatArray
     attitude: AttitudeDependence | None
     rate: FloatArray
+    is_undithered: BoolArray
 
     @property
     def is_lost(self) -> BoolArray:
@@ -154,6 +162,10 @@ def measure_moves(
     zero = np.ascontiguousarray(segments.gyroscope_mean, dtype=np.float64)
     var_zero = _mean_variance(segments.gyroscope_sigma_mean, segments.gyroscope_sigma, gyroscope)
     force = reading @ accelerometer.S.T + accelerometer.b
+    sigma = segments.gyroscope_sigma
+    quantum = resolution_of(gyroscope)
+    white = np.full(3, np.inf) if sigma is None else _without_rounding(np.asarray(sigma), quantum)
+    undithered = undithered_axes(quantum, white)
     attitude = attitude_dependence(zero, var_zero, force) if is_attitude_removed is not False else None
     if attitude is not None and (attitude.is_present or is_attitude_removed):
         rate = gyroscope - (raw_force @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
@@ -161,8 +173,10 @@ def measure_moves(
     else:
         attitude, rate = None, gyroscope
     clipped = bridge_clipping(recording.time_s, gyroscope)
+    extra = rounding_variance(gyroscope, quantum, np.median(segments.gyroscope_mean, axis=0), undithered)
     if clipped is not None:
         rate = np.where(clipped.is_clipped, rate + clipped.readings - gyroscope, rate)
+        extra = clipped.variance if extra is None else clipped.variance + np.where(clipped.is_clipped, 0.0, extra)
     prepared = Moves(
         recording.time_s,
         rate,
@@ -170,7 +184,7 @@ def measure_moves(
         np.ascontiguousarray(anchors),
         links,
         rate_degree,
-        None if clipped is None else clipped.variance,
+        extra,
     )
 
     var_reading = _mean_variance(segments.accelerometer_sigma_mean, segments.accelerometer_sigma, raw_force)
@@ -178,6 +192,11 @@ def measure_moves(
     walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_zero[links[:, 1]] + var_zero[links[:, 0]])
     weights, mean, var_mean, excess, _ = pool_zeros(zero, var_zero)
     zero, var_zero = shrink(zero, var_zero, mean)
+    if np.any(undithered):
+        # Rounding hides the same part of every hold's zero: what it hides is fitted to the moves, as one offset.
+        hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
+        own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
+        zero, var_zero = common_zero(zero, np.where(undithered, own, var_zero), undithered)
     if attitude is not None:
         var_mean = np.maximum(var_mean, attitude.var_zero)
     steps = np.diff(recording.time_s)
@@ -196,7 +215,9 @@ def measure_moves(
         zero_mean=mean,
         var_zero_mean=var_mean,
         var_zero_walk=walk,
-        noise_density=rate_noise_density(recording, segments),
+        noise_density=density_without_rounding(
+            rate_noise_density(recording, segments), quantum, 1.0 / recording.rate_hz, undithered
+        ),
         sigma_time_s=jitter,
         nominal_step_s=nominal,
         clipped_s=clipped_time(clipped, edges, nominal),
@@ -204,6 +225,7 @@ def measure_moves(
         zero_excess=excess,
         attitude=attitude,
         rate=rate,
+        is_undithered=undithered,
     )
 
 
@@ -261,6 +283,12 @@ def _mean_variance(sigma_mean: FloatArray | None, sigma: FloatArray | None, read
         # Below half a step of noise the converter's error no longer averages out: it stays uniform within one step.
         variance = variance + np.where(np.asarray(sigma) < 0.5 * lsb, lsb**2 / 12.0, 0.0)
     return np.ascontiguousarray(variance)
+
+
+def _without_rounding(sigma: FloatArray, quantum: FloatArray) -> FloatArray:
+    """Noise (3,) of one reading without what rounding adds to it; readings of one code alone show none."""
+    out: FloatArray = np.sqrt(np.maximum(sigma**2 - quantum**2 / 12.0, 0.0))
+    return out
 
 
 def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArray:

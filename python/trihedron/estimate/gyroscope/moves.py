@@ -53,6 +53,7 @@ def calibrate_moves(
     """
     options = options or MoveOptions()
     measured = measure_moves(recording, segments, accelerometer, options.rate_degree, options.is_attitude_removed)
+    options = options.suited_to(measured)
     first = starts(recording, measured, accelerometer, options.nominal())
     part = given_accelerometer(accelerometer)
     aligned = align_screened(measured, part, gravity_m_s2, first, options)

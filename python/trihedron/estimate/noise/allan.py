@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.estimate.noise.degrees import KINDS, edf_along
+from trihedron.estimate.noise.degrees import KINDS, bias_along, edf_along
+from trihedron.estimate.noise.gaps import true_share
 from trihedron.records.noise import AllanCurve, AllanKind, FloatArray
 
 _LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
@@ -41,7 +42,8 @@ def allan_deviation(
     ----------
     x : (n,) or (n, channels)
         Equally spaced readings in any unit, float64, float32, int16 or int32 (not copied when C-contiguous). NaN marks
-        a missing reading; clusters are then means of the readings they have, weighted by their number.
+        a missing reading; clusters are then means of the readings they have, weighted by their number, and freed of
+        what such means scatter about those of all readings (docs/noise.md, section 1).
     rate_hz : float
         Samples per second.
     clusters : (k,) of int, optional
@@ -68,6 +70,8 @@ def allan_deviation(
         raise ValueError(f"an Allan deviation needs at least {_LONGEST[kind]} readings, got {n}")
     sizes = default_clusters(n, kind) if clusters is None else checked_clusters(clusters)
     variance, terms, weight = _core.allan_variance(readings, sizes, KINDS[kind])
+    for c in range(len(variance)):
+        variance[c] *= true_share(readings[:, c], np.array(sizes), variance[c], 3 if kind == "hadamard" else 2)
     return curve_with_intervals(
         kind, rate_hz, n, np.array(sizes), variance.T, terms.T, weight.T, confidence, tuple(names), tuple(units)
     )
@@ -85,6 +89,8 @@ def curve_of_columns(
     sizes = default_clusters(n) if clusters is None else checked_clusters(clusters)
     found = [_core.allan_variance(column[:, np.newaxis], sizes, KINDS["overlapping"]) for column in columns]
     variance, terms, weight = (np.concatenate([one[k] for one in found]).T for k in range(3))
+    shares = [true_share(column, np.array(sizes), variance[:, c]) for c, column in enumerate(columns)]
+    variance = variance * np.stack(shares, axis=1)
     return curve_with_intervals(
         "overlapping", rate_hz, n, np.array(sizes), variance, terms.astype(np.int64), weight, 0.95, names, units
     )
@@ -208,6 +214,7 @@ def curve_with_intervals(
     """The curve with its degrees of freedom and chi-square intervals, the noise type read off the local slope."""
     channels = variance.shape[1]
     edf = np.column_stack([edf_along(n, clusters, variance[:, c], weight[:, c], kind) for c in range(channels)])
+    bias = np.column_stack([bias_along(n, clusters, variance[:, c], kind) for c in range(channels)])
     tail = (1.0 - confidence) / 2.0
     high, low = (_core.chi_square_quantile(share, edf.ravel()).reshape(edf.shape) for share in (1.0 - tail, tail))
     return AllanCurve(
@@ -219,8 +226,8 @@ def curve_with_intervals(
         n_terms=np.asarray(terms, dtype=np.int64),
         weight=weight,
         edf=edf,
-        lower=np.sqrt(variance * edf / high),
-        upper=np.sqrt(variance * edf / low),
+        lower=np.sqrt(variance / bias * edf / high),
+        upper=np.sqrt(variance / bias * edf / low),
         confidence=confidence,
         names=names or tuple(f"channel {c + 1}" for c in range(channels)),
         units=units or ("",) * channels,

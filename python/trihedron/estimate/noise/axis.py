@@ -24,7 +24,8 @@ TOLERANCE = 0.02
 
 def identify_axis(bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurve, channel: int) -> NoiseAxis:
     """``blank`` with the terms that its spectrum shows, its lines, and what was noticed on the way."""
-    nyquist = blank.rate_hz / 2.0
+    # Thinned readings of slow noise show themselves as means only, and end where these do.
+    nyquist = min(blank.rate_hz / 2.0, max(float(band.frequency_hz[-1]) for band in bands) * (1.0 + 1e-9))
     findings: list[Finding] = []
     highest, at_nyquist = white_limit(bands, nyquist, None)
     selection = select(bands, highest, tolerance=TOLERANCE if highest < nyquist else 0.0)

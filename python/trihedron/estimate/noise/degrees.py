@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.estimate.noise.isotonic import never_falling
 from trihedron.records.noise import AllanKind, FloatArray
 
 KINDS = {
@@ -64,6 +65,24 @@ def edf_along(
     return out
 
 
+def bias_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray, kind: AllanKind) -> FloatArray:
+    """(k,) expectation of a variance over the Allan variance: 1 but for the total variance (docs/noise.md, section 2).
+
+    Flicker and walk after Greenhall, Howe and Percival (1999); quantisation: both ends of the phase stand in every
+    reflected term.
+    """
+    if kind != "total":
+        return np.ones(len(clusters))
+    m = clusters.astype(np.float64)
+    by_type = np.stack(
+        [1.0 + 4.0 / 3.0 * (m - 1.0) / (n - 1.0), np.ones_like(m), 1.0 - 0.481 * m / n, 1.0 - 0.750 * m / n]
+    )
+    place = np.clip(slopes_along(n, clusters, variance) + 2.0, 0.0, 3.0)
+    below = np.minimum(place.astype(np.int64), 2)
+    share, rows = place - below, np.arange(len(m))
+    return np.asarray(by_type[below, rows] ** (1.0 - share) * by_type[below + 1, rows] ** share)
+
+
 def slopes_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray) -> FloatArray:
     """(k,) slopes of log variance against log cluster size, never falling.
 
@@ -81,7 +100,7 @@ def slopes_along(n: int, clusters: npt.NDArray[np.int64], variance: FloatArray) 
     slope = np.diff(ys) / np.where(step > 0, step, 1.0)
     # Variance of a slope over one step: two neighbouring values of about n/m degrees of freedom, largely the same.
     weight = step**2 * n / 2.0 ** (0.5 * (xs[1:] + xs[:-1]))
-    rising = _never_falling(slope, np.maximum(weight, 1e-12))
+    rising = never_falling(slope, np.maximum(weight, 1e-12))
     middle = 0.5 * (xs[1:] + xs[:-1])
     return np.interp(x, middle, _held_at_the_end(rising, middle, n))
 
@@ -95,20 +114,3 @@ def _held_at_the_end(slope: FloatArray, middle: FloatArray, n: int) -> FloatArra
     if len(reliable) == 0:
         return slope
     return np.asarray(np.minimum(slope, slope[reliable[-1]]))
-
-
-def _never_falling(values: FloatArray, weights: FloatArray) -> FloatArray:
-    """Isotonic regression by pooling adjacent violators."""
-    level: list[float] = []
-    mass: list[float] = []
-    size: list[int] = []
-    for value, weight in zip(values.tolist(), weights.tolist(), strict=True):
-        level.append(value)
-        mass.append(weight)
-        size.append(1)
-        while len(level) > 1 and level[-2] > level[-1]:
-            last, last_mass, last_size = level.pop(), mass.pop(), size.pop()
-            level[-1] = (level[-1] * mass[-1] + last * last_mass) / (mass[-1] + last_mass)
-            mass[-1] += last_mass
-            size[-1] += last_size
-    return np.repeat(level, size)

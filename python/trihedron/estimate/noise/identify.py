@@ -14,6 +14,7 @@ import numpy.typing as npt
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import as_readings, check_question, curve_of_columns
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
+from trihedron.estimate.noise.gaps import bridged
 from trihedron.estimate.noise.screening import Event, readout, repeated_rows, shaken, steps_and_knocks
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.finding import Finding
@@ -129,7 +130,7 @@ def _screen(
     cuts: list[tuple[int, int]] = []
     findings: list[Finding] = []
     if automatic:
-        steps, knocks = steps_and_knocks(column)
+        steps, knocks = steps_and_knocks(bridged(column))
         calm = column.copy() if knocks else column
         for knock in knocks:
             calm[knock.start : knock.stop] = np.nan

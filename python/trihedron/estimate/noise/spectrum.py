@@ -15,6 +15,16 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.estimate.noise.gaps import (
+    MOST_BRIDGED,
+    MOST_SLOW,
+    SCATTERED_BLOCK,
+    Run,
+    block_means,
+    filled,
+    scattered_loss,
+    slow_over_fast,
+)
 from trihedron.estimate.noise.leakage import flicker_leakage
 from trihedron.records.noise import FloatArray
 
@@ -34,6 +44,8 @@ class Ordinates:
     ``frequency_hz``, ``power``, ``count`` (k,): place, mean over segments, number of segments; ``line`` (k,) the
     coefficient of a line of slope 1/s, ``cross`` (k,) the mean product with it; ``length`` readings or means of
     ``block`` readings in ``step_s`` steps per transform; ``order`` (k,) the index of the coefficient.
+    Where readings are missing here and there, ``kept`` is the share of the power that is left, and ``sampling`` what
+    the variance of a reading within the reach of a mean, or of the transform, adds to every ordinate (eq. 16).
     """
 
     frequency_hz: FloatArray
@@ -45,6 +57,8 @@ class Ordinates:
     length: int
     step_s: float
     block: int
+    kept: float = 1.0
+    sampling: float = 0.0
 
     @property
     def corner_floor(self) -> float:
@@ -53,18 +67,33 @@ class Ordinates:
 
     @cached_property
     def basis(self) -> FloatArray:
-        """(4, k) expected power for Q = N = B = K = 1 (docs/noise.md, eq. 9)."""
-        h = self.step_s
-        eigenvalue = 4.0 * np.sin(np.pi * self.frequency_hz * h) ** 2
-        corners = self.corner_floor * np.cos(np.pi * self.order / (2.0 * self.length)) ** 2
-        return np.stack(
-            [
-                eigenvalue / h + corners,
-                np.ones_like(eigenvalue),
-                h / np.sqrt(eigenvalue) * flicker_leakage(self.order),
-                h**2 * (1.0 / eigenvalue - (1.0 - 1.0 / self.block**2) / 6.0),
-            ]
-        )
+        """(4, k) expected power for Q = N = B = K = 1 (docs/noise.md, eq. 9, 16)."""
+        out = unit_densities(self.frequency_hz, self.order, self.length, self.step_s, self.block)
+        if self.sampling == 0.0:
+            return out
+        # Variances of a reading within a mean or a transform, from the same densities at the step of readings.
+        step_s = self.step_s / self.block
+        length = self.length if self.block == 1 else 64 * self.block
+        order = np.arange(1 if self.block == 1 else 64, length)
+        within = unit_densities(order / (2.0 * length * step_s), order, length, step_s, 1).sum(axis=1) / length
+        return np.asarray(self.kept * out + self.sampling * within[:, np.newaxis])
+
+
+def unit_densities(
+    frequency_hz: FloatArray, order: npt.NDArray[np.int64], length: int, step_s: float, block: int
+) -> FloatArray:
+    """(4, k) expected power of ordinates for Q = N = B = K = 1, no reading missing (docs/noise.md, eq. 9)."""
+    h = step_s
+    eigenvalue = 4.0 * np.sin(np.pi * frequency_hz * h) ** 2
+    corners = 4.0 / (length * h) * np.cos(np.pi * order / (2.0 * length)) ** 2
+    return np.stack(
+        [
+            eigenvalue / h + corners,
+            np.ones_like(eigenvalue),
+            h / np.sqrt(eigenvalue) * flicker_leakage(order),
+            h**2 * (1.0 / eigenvalue - (1.0 - 1.0 / block**2) / 6.0),
+        ]
+    )
 
 
 def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]]) -> list[Ordinates]:
@@ -77,11 +106,16 @@ def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
     """
     total = sum(stop - start for start, stop in stretches)
     block = -(-total // LONGEST_TRANSFORM) if total > LONGEST_TRANSFORM else 1
+    used = USED_SHARE
+    if scattered_loss(x) > MOST_BRIDGED:
+        block = max(block, SCATTERED_BLOCK)
+        # Slow noise of thinned readings drowns their fast noise: means alone, as far as they go.
+        used = 2 if slow_over_fast(x) > MOST_SLOW else USED_SHARE
     bands: list[Ordinates] = []
     for start, stop in stretches:
-        runs = _block_means(x[start:stop], block)
-        bands += [_whole(means, block / rate_hz, block, share) for means, share in runs if len(means) >= 32]
-    if block > 1:
+        runs = block_means(x[start:stop], block)
+        bands += [_whole(run, block / rate_hz, block, used) for run in runs if len(run.means) >= 32]
+    if block > 1 and used == USED_SHARE:
         bands += _segments(x, rate_hz, stretches, block)
     if not bands:
         raise ValueError(
@@ -99,52 +133,20 @@ def ordinates_of_means(
     ``stretches`` count means.
     """
     step_s = block / rate_hz
-    bands = [_whole(means[a:b], step_s, block, 0.0) for a, b in stretches if b - a >= 32]
+    bands = [_whole(Run(means[a:b], 0.0, 0.0), step_s, block) for a, b in stretches if b - a >= 32]
     if block > 1:
         bands += _segments(head, rate_hz, [(0, len(head))], block)
     return bands
 
 
-def _block_means(x: FloatArray, block: int) -> list[tuple[FloatArray, float]]:
-    """Runs of block means without a hole, each with the share of its blocks that are bridged.
-
-    A block that lacks half its readings is a hole. Holes that are short (1/64 of the run) and few (5 %) are bridged by
-    a straight line: they take away the waves that are as short, and nothing from the long ones.
-    """
-    n = len(x) // block
-    parts = x[: n * block].reshape(n, block)
-    if np.isfinite(np.sum(x)):
-        return [(parts.mean(axis=1) if block > 1 else np.asarray(x), 0.0)]
-    present = np.isfinite(parts)
-    count = present.sum(axis=1)
-    means = np.where(present, parts, 0.0).sum(axis=1) / np.maximum(count, 1)
-    hole = 2 * count < block
-    means[hole] = np.nan
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], hole, [True]]).astype(np.int8)))
-    joined: list[tuple[int, int]] = []
-    for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        if joined and a - joined[-1][1] <= max(3, n // 64) and hole[joined[0][0] : b].mean() < 0.05:
-            joined[-1] = (joined[-1][0], b)
-        else:
-            joined.append((a, b))
-    out = []
-    for a, b in joined:
-        run, gone = means[a:b], hole[a:b]
-        if gone.any():
-            places = np.flatnonzero(~gone)
-            level = np.convolve(np.pad(run[places], 4, mode="edge"), np.full(9, 1.0 / 9.0), mode="valid")
-            run[gone] = np.interp(np.flatnonzero(gone), places, level)
-        out.append((run, float(gone.mean())))
-    return out
-
-
-def _whole(means: FloatArray, step_s: float, block: int, bridged: float) -> Ordinates:
+def _whole(run: Run, step_s: float, block: int, used: int = USED_SHARE) -> Ordinates:
+    means = run.means
     n = len(means)
-    last = n - 1 if block == 1 else n // USED_SHARE
+    last = n - 1 if block == 1 else n // used
     order = np.arange(1, last + 1)
     coefficient = cosine_transform(means - means.mean())[1 : last + 1]
     # What is bridged holds no white noise.
-    coefficient /= np.sqrt(1.0 - bridged)
+    coefficient /= np.sqrt(1.0 - run.bridged)
     line = line_coefficients(n, order) * step_s
     return Ordinates(
         frequency_hz=order / (2.0 * n * step_s),
@@ -156,30 +158,25 @@ def _whole(means: FloatArray, step_s: float, block: int, bridged: float) -> Ordi
         length=n,
         step_s=step_s,
         block=block,
+        sampling=run.sampling * block,
     )
 
 
 def _segments(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]], block: int) -> list[Ordinates]:
     # The bands meet where the block means' lowest eighth ends; 16 ordinates of a segment lie below that.
     length = max(SEGMENT, 1 << (128 * block - 1).bit_length())
+    total = max((stop - start for start, stop in stretches), default=0)
+    while length > total and length > 256 * USED_SHARE:
+        length //= 2
     starts = np.array([s for a, b in stretches for s in range(a, b - length + 1, length)])
     if len(starts) == 0:
         return []
     if len(starts) > MOST_SEGMENTS:
         starts = starts[np.linspace(0, len(starts) - 1, MOST_SEGMENTS).astype(int)]
-    parts = np.stack([x[s : s + length] for s in starts])
-    missing = ~np.isfinite(parts)
-    if missing.any():
-        good = missing.mean(axis=1) < 0.02
-        parts, missing = parts[good], missing[good]
-        if len(parts) == 0:
-            return []
-        # Below 2 % of readings: a repeated neighbour changes the power by less than its own uncertainty.
-        for row, gone in zip(parts, missing, strict=True):
-            if gone.any():
-                row[gone] = np.interp(np.flatnonzero(gone), np.flatnonzero(~gone), row[~gone])
+    parts, present = filled(np.stack([x[s : s + length] for s in starts]))
+    if len(parts) == 0:
+        return []
     step_s = 1.0 / rate_hz
-    parts -= parts.mean(axis=1, keepdims=True)
     coefficient = cosine_transform(parts)
     lowest = length // (USED_SHARE * block) + 1
     order = np.arange(lowest, length)
@@ -196,6 +193,8 @@ def _segments(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
             length=length,
             step_s=step_s,
             block=1,
+            kept=float(np.mean(present**2)),
+            sampling=float(np.mean(present * (1.0 - present))),
         )
     ]
 

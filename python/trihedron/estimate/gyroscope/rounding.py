@@ -1,0 +1,88 @@
+"""What a coarse converter hides: the rate inside one step, at rest and in moves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+UNDITHERED = 0.5
+"""Noise below this part of a step does not dither it: the mean of a rounded reading is off by up to half a step,
+however long it is taken."""
+SOFT_START = 1.0 / (math.sqrt(2.0) - 1.0)
+LEAST_WHITE = 1e-2
+"""Part of the rounding's variance that an undithered axis is given as white noise: it shows none of its own."""
+
+
+def undithered_axes(quantum: FloatArray, sigma: FloatArray) -> BoolArray:
+    """Axes (3,) whose noise ``sigma`` (3,) [raw] is too small to be seen through the converter's ``quantum`` (3,)."""
+    out: BoolArray = (quantum > 0.0) & (sigma < UNDITHERED * quantum)
+    return out
+
+
+def rounding_variance(
+    readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray
+) -> FloatArray | None:
+    """Variance (n, 3) by rounding of readings summed as if independent; ``None`` where no axis needs it.
+
+    While the rate passes through a step from one side to the other, the errors of the ``n`` readings inside run through
+    all values of the step and cancel but for one of them: ``q²/12`` for the run, ``q²/12n`` a reading. Where the rate
+    turns back inside the step, the readings share one error: their sum has the variance ``n² q²/12``, that is
+    ``n q²/12`` a reading. At the ``rest`` reading (3,) the error is that of the zero, which is not charged here but for
+    the start and the end of a move that still lie inside the step.
+    """
+    if not np.any(axes):
+        return None
+    out = np.zeros(readings.shape)
+    for axis in np.flatnonzero(axes):
+        codes = np.where(np.isfinite(readings[:, axis]), readings[:, axis], np.inf)
+        out[:, axis] = _of_runs(codes, float(quantum[axis]), float(rest[axis]))
+    return out
+
+
+def _of_runs(codes: FloatArray, quantum: float, rest: float) -> FloatArray:
+    begins = np.concatenate([[0], np.flatnonzero(codes[1:] != codes[:-1]) + 1])
+    count = np.diff(np.concatenate([begins, [len(codes)]]))
+    level = codes[begins]
+    with np.errstate(invalid="ignore"):
+        step = np.sign(np.diff(level))
+        # Between the two nearest codes a zero may toggle.
+        is_rest = np.abs(level - rest) < 0.75 * quantum
+    is_passed = np.zeros(len(level), dtype=bool)
+    is_passed[1:-1] = step[1:] * step[:-1] > 0.0
+    out = np.repeat(np.where(is_passed, 1.0 / count, count).astype(np.float64), count)
+    for k in np.flatnonzero(is_rest & ~is_passed):
+        # A rate that grows as t² crosses the first step in at most 1/(√2 − 1) of the time it takes for the next.
+        left = int(min(count[k], SOFT_START * count[k - 1])) if k > 0 else 0
+        right = int(min(count[k], SOFT_START * count[k + 1])) if k + 1 < len(count) else 0
+        if left + right < count[k]:
+            first, last = int(begins[k]), int(begins[k] + count[k])
+            out[first:last] = 0.0
+            out[first : first + left] = left
+            out[last - right : last] = right
+    return out * quantum**2 / 12.0
+
+
+def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: float, axes: BoolArray) -> FloatArray:
+    """Rate noise (3,) [raw·√s], on undithered axes without the rounding that :func:`rounding_variance` adds."""
+    rounding = quantum**2 / 12.0 * step_s
+    rest = np.maximum(density**2 - rounding, LEAST_WHITE * rounding)
+    out: FloatArray = np.where(axes, np.sqrt(rest), density)
+    return out
+
+
+def common_zero(zero: FloatArray, var_zero: FloatArray, axes: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Zeros (n, 3) and variances of undithered axes: one zero for all holds, as uncertain between them as it scatters.
+
+    A mean that rounding has moved says nothing of its own hold; what is common to all holds is left to the moves.
+    """
+    zero, var_zero = zero.copy(), var_zero.copy()
+    for axis in np.flatnonzero(axes):
+        scatter = float(np.var(zero[:, axis]))
+        zero[:, axis] = float(np.mean(zero[:, axis]))
+        var_zero[:, axis] = var_zero[:, axis] + scatter
+    return np.ascontiguousarray(zero), np.ascontiguousarray(var_zero)

@@ -1,0 +1,181 @@
+"""Readings that are missing: long gaps cut a log, scattered losses thin it out, and what each does to a spectrum.
+
+Means of the readings that are there scatter about the mean of all of them by (1/c - 1/m) s², with c of m readings
+there and s² the variance of readings within the reach of the mean: what the theory of sampling calls the finite
+population. A transform of a thinned log has the power f² S + f (1 - f) h s² (docs/noise.md, eq. 16).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.estimate.noise.isotonic import never_falling
+from trihedron.records.noise import FloatArray
+
+MOST_BRIDGED = 0.02
+"""Share of missing readings up to which their place is bridged by a line: 2 % of white noise, given back."""
+SCATTERED_BLOCK = 16
+"""Readings per mean where losses are scattered: half of them lost, fewer than four are left in 1 % of the means."""
+LONGEST_SCATTERED = 64
+"""Missing readings in a row beyond which it is a gap: half of all lost at random, a row of 64 has a chance of 1e-15."""
+MOST_SLOW = 3.0
+"""Variance of a log over that from reading to reading beyond which its thinned readings say little of fast noise."""
+MOST_LOOKS = 8192
+"""Clusters from which the sampling is read: 1 % of a correction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Means (k,) of blocks without a hole, the share that is bridged, and the mean of 1/c - 1/m of their readings."""
+
+    means: FloatArray
+    bridged: float
+    sampling: float
+
+
+def scattered_loss(x: FloatArray) -> float:
+    """Share of readings missing outside long gaps."""
+    if np.isfinite(np.sum(x)):
+        return 0.0
+    missing = ~np.isfinite(x)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
+    rows = edges[1::2] - edges[::2]
+    in_gaps = int(rows[rows > LONGEST_SCATTERED].sum())
+    return float((missing.sum() - in_gaps) / max(len(x) - in_gaps, 1))
+
+
+def slow_over_fast(x: FloatArray) -> float:
+    """Variance of readings over half the mean squared difference of neighbours: 1 for white noise."""
+    change = np.diff(x)
+    fast = 0.5 * float(np.nanmean(np.square(change))) if np.any(np.isfinite(change)) else 0.0
+    return float(np.nanvar(x)) / fast if fast > 0.0 else 1.0
+
+
+def bridged(x: FloatArray) -> FloatArray:
+    """Readings with straight lines over scattered losses, which an event detector would take for jumps to the mean.
+
+    Long gaps stay: a line across them would be an event itself.
+    """
+    gone = ~np.isfinite(x)
+    if not gone.any() or gone.all():
+        return x
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], gone, [False]]).astype(np.int8)))
+    start, stop = edges[::2], edges[1::2]
+    short = stop - start <= LONGEST_SCATTERED
+    place = np.zeros(len(x) + 1, dtype=np.int64)
+    place[start[short]] += 1
+    place[stop[short]] -= 1
+    fill = np.flatnonzero(np.cumsum(place[:-1]))
+    out = x.copy()
+    out[fill] = np.interp(fill, np.flatnonzero(~gone), x[~gone])
+    return out
+
+
+def block_means(x: FloatArray, block: int) -> list[Run]:
+    """Runs of block means without a hole.
+
+    A block that lacks half of what its like have is a hole. Holes that are short (1/64 of the run) and few (5 %) are
+    bridged by a straight line: they take away the waves that are as short, and nothing from the long ones.
+    """
+    n = len(x) // block
+    parts = x[: n * block].reshape(n, block)
+    if np.isfinite(np.sum(x)):
+        return [Run(parts.mean(axis=1) if block > 1 else np.asarray(x), 0.0, 0.0)]
+    present = np.isfinite(parts)
+    count = present.sum(axis=1)
+    means = np.where(present, parts, 0.0).sum(axis=1) / np.maximum(count, 1)
+    usual = float(np.median(count[count > 0])) if np.any(count > 0) else float(block)
+    hole = 2 * count < usual
+    means[hole] = np.nan
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], hole, [True]]).astype(np.int8)))
+    joined: list[tuple[int, int]] = []
+    for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if joined and a - joined[-1][1] <= max(3, n // 64) and hole[joined[0][0] : b].mean() < 0.05:
+            joined[-1] = (joined[-1][0], b)
+        else:
+            joined.append((a, b))
+    out = []
+    for a, b in joined:
+        run, gone = means[a:b], hole[a:b]
+        sampling = float(np.mean(1.0 / count[a:b][~gone])) - 1.0 / block
+        if gone.any():
+            places = np.flatnonzero(~gone)
+            level = np.convolve(np.pad(run[places], 4, mode="edge"), np.full(9, 1.0 / 9.0), mode="valid")
+            run[gone] = np.interp(np.flatnonzero(gone), places, level)
+        out.append(Run(run, float(gone.mean()), max(sampling, 0.0)))
+    return out
+
+
+def filled(parts: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Segments (k, n) about their means without a missing reading, and the share of each that was there (k,).
+
+    Few missing readings are bridged and their share of white noise given back (1 is returned); scattered ones are left
+    at the mean; segments with a long gap are left out.
+    """
+    missing = ~np.isfinite(parts)
+    if not missing.any():
+        return parts - parts.mean(axis=1, keepdims=True), np.ones(len(parts))
+    out, shares = [], []
+    for row, gone in zip(parts, missing, strict=True):
+        share = float(gone.mean())
+        if share < MOST_BRIDGED:
+            whole = np.interp(np.arange(len(row)), np.flatnonzero(~gone), row[~gone])
+            out.append((whole - whole.mean()) / np.sqrt(1.0 - share))
+            shares.append(1.0)
+        elif share < 0.9 and _longest(gone) <= LONGEST_SCATTERED:
+            out.append(np.where(gone, 0.0, row - row[~gone].mean()))
+            shares.append(1.0 - share)
+    if not out:
+        return np.empty((0, parts.shape[1])), np.empty(0)
+    return np.stack(out), np.array(shares)
+
+
+def _longest(missing: npt.NDArray[np.bool_]) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+def true_share(x: FloatArray, clusters: npt.NDArray[np.int64], variance: FloatArray, order: int = 2) -> FloatArray:
+    """(k,) share of an Allan variance (k,) of means of the readings present that means of all readings would have.
+
+    ``order`` 2 is the Allan, 3 the Hadamard variance. Between 1 (slow noise, which a mean of few readings has as well)
+    and the share of white noise; never falling in between along the clusters, as slow noise gains on white.
+    """
+    present = np.isfinite(x)
+    if present.all():
+        return np.ones(len(clusters))
+    level = np.where(present, x, 0.0).sum() / max(int(present.sum()), 1)
+    y = np.where(present, x - level, 0.0)
+    count, total, square = (np.concatenate([[0.0], np.cumsum(v)]) for v in (present, y, y**2))
+    least, slow = np.ones(len(clusters)), np.full(len(clusters), np.nan)
+    factors = (1.0, 1.0) if order == 2 else (1.0, 4.0, 1.0)
+    for i, m in enumerate(clusters.tolist()):
+        last = len(x) - order * m
+        if m == 1 or last < 0 or not np.isfinite(variance[i]):
+            continue
+        starts = np.unique(np.linspace(0, last, min(last + 1, MOST_LOOKS)).astype(np.int64))
+        c, s, q = (
+            np.stack([v[starts + (k + 1) * m] - v[starts + k * m] for k in range(order)])
+            for v in (count, total, square)
+        )
+        whole = np.all(c > 0, axis=0)
+        degrees = float(np.maximum(c - 1, 0)[:, whole].sum())
+        if not degrees > 0:
+            continue
+        within = float((q - s**2 / np.maximum(c, 1.0))[:, whole].sum()) / degrees
+        inverse = np.tensordot(factors, 1.0 / c[:, whole], axes=1)
+        # The weights of the variance itself: each term's by what white noise gives it.
+        mean_inverse = len(inverse) / float(np.sum(1.0 / inverse))
+        full = sum(factors) / m
+        least[i] = full / mean_inverse
+        excess = within * (mean_inverse - full) / sum(factors)
+        if least[i] < 1.0 - 1e-9:
+            slow[i] = np.clip((1.0 - excess / variance[i] - least[i]) / (1.0 - least[i]), 0.0, 1.0)
+    known = np.isfinite(slow)
+    if not known.any():
+        return np.ones(len(clusters))
+    slow[known] = never_falling(slow[known], len(x) / clusters[known].astype(np.float64))
+    return np.asarray(np.where(known, least + (1.0 - least) * np.where(known, slow, 0.0), 1.0))

@@ -1,0 +1,100 @@
+"""ArduPilot DataFlash logs (.bin), read by pymavlink: IMU messages, or the raw ACC and GYR."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from trihedron.read.devices import Choice
+from trihedron.read.errors import ReadError
+from trihedron.read.table import Progress, StatedClock, Table, file_sha256
+from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
+from trihedron.records import Finding
+
+MAGIC = b"\xa3\x95"
+_TYPES = ["IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
+_STAMPS = (("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS", "ms"))
+_FIELDS = {
+    "IMU": ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ", "T", "Temp"),
+    "ACC": ("AccX", "AccY", "AccZ"),
+    "GYR": ("GyrX", "GyrY", "GyrZ"),
+}
+_UNITS = {"Acc": "m/s^2", "Gyr": "rad/s"}
+
+
+def read_dataflash(path: Path, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
+    """IMU messages of one instance, or with topic ``ACC`` its raw accelerometer and gyro, each on its clock.
+
+    Raises
+    ------
+    ReadError
+        When pymavlink is not installed, the log is damaged, or holds several IMUs of which none was chosen.
+    """
+    try:
+        from pymavlink import DFReader
+    except ImportError:
+        raise missing_extra(path, "an ArduPilot .bin log", "pymavlink", "ardupilot") from None
+    rows: dict[tuple[str, str], list[list[float]]] = {}
+    names: dict[tuple[str, str], list[str]] = {}
+    try:
+        log = DFReader.DFReader_binary(str(path))
+        while (message := log.recv_match(type=_TYPES)) is not None:
+            _keep(message, rows, names)
+            if progress is not None and sum(map(len, rows.values())) % 20000 == 0:
+                progress(min(log.percent / 100.0, 1.0), f"reading {path.name}")
+    # pymavlink answers damage with whatever its unpacking met.
+    except Exception as error:
+        raise ReadError(f"{path}: pymavlink cannot read this log ({first_line(error)}); copy it again.") from None
+    imu = [Stream("IMU", len(r), i) for (t, i), r in sorted(rows.items()) if t == "IMU"]
+    raw = [Stream("ACC", len(r), i) for (t, i), r in sorted(rows.items()) if t == "ACC" and ("GYR", i) in rows]
+    streams = imu + raw
+    offered = streams if choice.topic is not None or not imu else imu
+    taken = pick(path, offered, choice, "this log")
+    note = choice_note("This log", taken, streams)
+    sha256 = file_sha256(path)
+    if taken.topic == "IMU":
+        return (_table(path, ("IMU", taken.instance), rows, names, sha256, note, None),)
+    return (
+        _table(path, ("ACC", taken.instance), rows, names, sha256, note, "accelerometer"),
+        _table(path, ("GYR", taken.instance), rows, names, sha256, (), "gyroscope"),
+    )
+
+
+def _keep(
+    message: Any, rows: dict[tuple[str, str], list[list[float]]], names: dict[tuple[str, str], list[str]]
+) -> None:
+    """IMU2 of older logs is instance 1, as field I says in newer ones."""
+    word, number = re.fullmatch(r"([A-Z]+)(\d?)", message.get_type()).groups()  # type: ignore[union-attr]
+    fields = message.to_dict()
+    instance = str(fields.get("I", int(number or 1) - 1))
+    key = (word, instance)
+    if key not in names:
+        stamp, unit = next(((s, u) for s, u in _STAMPS if s in fields), ("", ""))
+        if not stamp:
+            raise ValueError(f"{message.get_type()} has no time stamp")
+        names[key] = [f"{stamp} [{unit}]", *(name for name in _FIELDS[word] if name in fields)]
+        rows[key] = []
+    plain = [names[key][0].split(" ")[0], *names[key][1:]]
+    rows[key].append([float(fields[name]) for name in plain])
+
+
+def _table(
+    path: Path,
+    key: tuple[str, str],
+    rows: dict[tuple[str, str], list[list[float]]],
+    names: dict[tuple[str, str], list[str]],
+    sha256: str,
+    findings: tuple[Finding, ...],
+    sensor: Any,
+) -> Table:
+    values = np.array(rows[key])
+    labels = []
+    for name in names[key]:
+        unit = _UNITS.get(name[:3])
+        labels.append(f"{name} [{unit}]" if unit else {"T": "temperature", "Temp": "temperature"}.get(name, name))
+    clock = StatedClock(time=0, unit="ms" if "[ms]" in labels[0] else "us")
+    columns = tuple(np.ascontiguousarray(values[:, k]) for k in range(values.shape[1]))
+    return Table(path, tuple(labels), columns, sha256, findings=findings, sensor=sensor, clock=clock)

@@ -1,0 +1,122 @@
+"""ROS 1 bags, ROS 2 bags (folder, .db3, .mcap): messages of type sensor_msgs/Imu, read by rosbags."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from trihedron.read.devices import Choice
+from trihedron.read.errors import ReadError
+from trihedron.read.table import FloatArray, Progress, Table, file_sha256
+from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
+
+_IMU = "sensor_msgs/msg/Imu"
+_NAMES = ("stamp.secs", "stamp.nsecs", *(f"linear_acceleration.{x} [m/s^2]" for x in "xyz"))
+_ALL_NAMES = (*_NAMES, *(f"angular_velocity.{x} [rad/s]" for x in "xyz"), "received")
+
+
+def read_bag(path: Path, suffix: str, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
+    """The messages of one topic, or of an accelerometer's and a gyro's topic, on the clock of their headers.
+
+    Raises
+    ------
+    ReadError
+        When rosbags is not installed, the bag is damaged, or does not tell which topic to read.
+    """
+    try:
+        from rosbags.highlevel import AnyReader
+    except ImportError:
+        raise missing_extra(path, "a ROS bag or MCAP file", "rosbags", "ros") from None
+    # rosbags goes by the ending of the name, and a file may have another one.
+    with tempfile.TemporaryDirectory() as folder:
+        named = path
+        if suffix and path.suffix != suffix:
+            named = Path(folder) / f"bag{suffix}"
+            named.symlink_to(path.absolute())
+        try:
+            with AnyReader([named], default_typestore=_typestore()) as reader:
+                return _tables(path, reader, choice, progress)
+        except ReadError:
+            raise
+        # rosbags answers damage with errors of every layer below it: struct, zlib, sqlite, assertions.
+        except Exception as error:
+            raise ReadError(
+                f"{path}: rosbags cannot read this bag ({first_line(error)}); reindex or copy it again."
+            ) from None
+
+
+def _typestore() -> Any:
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(Stores.LATEST)
+
+
+def _tables(path: Path, reader: Any, choice: Choice, progress: Progress | None) -> tuple[Table, ...]:
+    counts: dict[str, int] = {}
+    others: list[str] = []
+    for connection in reader.connections:
+        if connection.msgtype == _IMU:
+            counts[connection.topic] = counts.get(connection.topic, 0) + connection.msgcount
+        else:
+            others.append(f"{connection.topic} [{connection.msgtype}]")
+    streams = [Stream(topic, count) for topic, count in sorted(counts.items())]
+    if not streams:
+        raise ReadError(
+            f"{path}: no topic of type sensor_msgs/Imu in this bag; it holds {', '.join(others[:12]) or '0 messages'}."
+        )
+    sha256 = file_sha256(path) if path.is_file() else ""
+    pair = _pair(streams) if choice.topic is None else None
+    if pair is not None:
+        acc, gyr = (_table(path, reader, s, streams, sha256, progress) for s in pair)
+        return _only(acc, "accelerometer", (5, 6, 7)), _only(gyr, "gyroscope", (2, 3, 4))
+    return (_table(path, reader, pick(path, streams, choice, "this bag"), streams, sha256, progress),)
+
+
+def _pair(streams: list[Stream]) -> tuple[Stream, Stream] | None:
+    """Two topics of a camera that logs each sensor by itself, as RealSense does: /camera/accel and /camera/gyro."""
+    acc = [s for s in streams if "acc" in s.topic.lower() and "gyr" not in s.topic.lower() and s.count]
+    gyr = [s for s in streams if "gyr" in s.topic.lower() and "acc" not in s.topic.lower() and s.count]
+    return (acc[0], gyr[0]) if len(acc) == len(gyr) == 1 and len([s for s in streams if s.count]) == 2 else None
+
+
+def _only(table: Table, sensor: Any, drop: tuple[int, ...]) -> Table:
+    from dataclasses import replace
+
+    keep = [i for i in range(len(table.columns)) if i not in drop]
+    names = table.names or ()
+    return replace(
+        table, sensor=sensor, names=tuple(names[i] for i in keep), columns=tuple(table.columns[i] for i in keep)
+    )
+
+
+def _table(
+    path: Path, reader: Any, stream: Stream, streams: list[Stream], sha256: str, progress: Progress | None
+) -> Table:
+    wanted = [c for c in reader.connections if c.topic == stream.topic and c.msgtype == _IMU]
+    rows: FloatArray = np.empty((stream.count, len(_ALL_NAMES)))
+    n = 0
+    start = None
+    for connection, received, raw in reader.messages(connections=wanted):
+        message = reader.deserialize(raw, connection.msgtype)
+        stamp, a, w = message.header.stamp, message.linear_acceleration, message.angular_velocity
+        start = received if start is None else start
+        values = (stamp.sec, stamp.nanosec, a.x, a.y, a.z, w.x, w.y, w.z, (received - start) * 1e-9)
+        if n == len(rows):
+            rows = np.concatenate([rows, np.empty_like(rows)])
+        rows[n] = values
+        n += 1
+        if progress is not None and n % 20000 == 0:
+            progress(n / stream.count, f"reading {stream.topic}: {n} messages")
+    if n < stream.count:
+        raise ReadError(f"{path}: the index of this bag promises {stream.count} messages on {stream.topic}, {n} came.")
+    if n == 0:
+        raise ReadError(f"{path}: 0 messages on {stream.topic}; the sensor was not recorded.")
+    rows = rows[:n]
+    names, columns = list(_ALL_NAMES), [np.ascontiguousarray(rows[:, k]) for k in range(len(_ALL_NAMES))]
+    if not np.any(rows[:, 0] != 0) and not np.any(rows[:, 1] != 0):
+        # No clock in the headers: the one of whoever recorded is all there is.
+        names, columns = ["time [s]", *names[2:8]], [columns[8], *columns[2:8]]
+    return Table(path, tuple(names), tuple(columns), sha256, findings=choice_note("This bag", stream, streams))

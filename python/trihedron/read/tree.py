@@ -1,0 +1,131 @@
+"""HDF5 and MATLAB files: groups of arrays, of which the one with an accelerometer or a gyro is the log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.columns import find_columns
+from trihedron.read.devices import Choice
+from trihedron.read.errors import ReadError
+from trihedron.read.memory import columns_table
+from trihedron.read.table import Table, file_sha256
+from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
+
+Groups = dict[str, dict[str, npt.NDArray[Any]]]
+MIN_ROWS = 8
+
+
+def read_hdf5(path: Path, choice: Choice) -> Table:
+    """The log of an HDF5 or MATLAB 7.3 file.
+
+    Raises
+    ------
+    ReadError
+        When h5py is not installed, the file is damaged, or does not tell which group to read.
+    """
+    try:
+        import h5py
+    except ImportError:
+        raise missing_extra(path, "an HDF5 (or MATLAB 7.3) file", "h5py", "hdf5") from None
+    groups: Groups = {}
+
+    def visit(name: str, node: Any) -> None:
+        if isinstance(node, h5py.Dataset) and (node.dtype.kind in "iufb" or node.dtype.names) and node.size:
+            if name.startswith("#"):
+                return  # MATLAB's own bookkeeping
+            parent, _, leaf = name.rpartition("/")
+            groups.setdefault(parent, {})[leaf] = node[()]
+
+    try:
+        with h5py.File(path, "r") as file:
+            file.visititems(visit)
+    # h5py answers damage with errors of several kinds.
+    except Exception as error:
+        raise ReadError(f"{path}: h5py cannot read this file ({first_line(error)}); copy it again.") from None
+    return _of_groups(path, groups, choice, "this HDF5 file")
+
+
+def read_matlab(path: Path, choice: Choice) -> Table:
+    """The log of a MATLAB file before version 7.3, read by SciPy.
+
+    Raises
+    ------
+    ReadError
+        When the file is damaged, holds objects of MATLAB only, or does not tell which structure to read.
+    """
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(str(path), simplify_cells=True)
+    # SciPy answers damage with errors of several kinds.
+    except Exception as error:
+        raise ReadError(f"{path}: SciPy cannot read this MATLAB file ({first_line(error)}); save it again.") from None
+    groups: Groups = {}
+    _walk("", {k: v for k, v in content.items() if not k.startswith("__")}, groups)
+    if not groups:
+        raise ReadError(
+            f"{path}: no arrays of numbers in this MATLAB file; tables and timetables are objects that only MATLAB "
+            "reads: save their columns as arrays, or write them with writetable or writetimetable as CSV."
+        )
+    return _of_groups(path, groups, choice, "this MATLAB file")
+
+
+def _walk(name: str, node: Mapping[str, Any], groups: Groups) -> None:
+    for key, value in node.items():
+        if isinstance(value, Mapping):
+            _walk(f"{name}/{key}".strip("/"), value, groups)
+        elif isinstance(value, np.ndarray) and value.dtype.kind in "iufb" and value.size:
+            groups.setdefault(name, {})[key] = value
+        elif isinstance(value, int | float):
+            groups.setdefault(name, {})[key] = np.array(value)
+
+
+def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
+    tables: dict[str, Table] = {}
+    for name, arrays in groups.items():
+        table = _table(path, arrays)
+        if table is None:
+            continue
+        try:
+            find_columns(table, None, None)
+        except ReadError:
+            continue
+        tables[name or "/"] = table
+    if not tables:
+        held = ", ".join(f"{g}/{n}".strip("/") for g, arrays in groups.items() for n in arrays)
+        raise ReadError(f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it holds {held[:300]}.")
+    streams = [Stream(name, table.n_rows) for name, table in tables.items()]
+    taken = pick(path, streams, choice, what)
+    chosen = tables[taken.topic]
+    return replace(
+        chosen, path=path, sha256=file_sha256(path), findings=(*chosen.findings, *choice_note(what, taken, streams))
+    )
+
+
+def _table(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> Table | None:
+    """Arrays of the group's usual length as columns, those of MATLAB's 1 x n and 3 x n turned round."""
+    shaped: dict[str, npt.NDArray[Any]] = {}
+    for name, array in arrays.items():
+        if array.dtype.names:
+            shaped |= {field: array[field] for field in array.dtype.names if array[field].ndim == 1}
+            continue
+        plain = np.squeeze(array)
+        if plain.ndim == 2 and plain.shape[0] <= 12 < plain.shape[1]:
+            plain = plain.T
+        shaped[name] = plain
+    lengths = [a.shape[0] for a in shaped.values() if a.ndim in (1, 2) and a.shape[0] >= MIN_ROWS]
+    if not lengths:
+        return None
+    n = max(set(lengths), key=lengths.count)
+    kept = [(name, a) for name, a in shaped.items() if a.ndim in (1, 2) and a.shape[0] == n]
+    single = [(name, a) for name, a in shaped.items() if a.ndim == 0]
+    try:
+        return columns_table(str(path), [*kept, *single])
+    except ReadError:
+        return None

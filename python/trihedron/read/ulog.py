@@ -1,0 +1,95 @@
+"""PX4 ULog, read by pyulog: raw sensor_accel and sensor_gyro of one instance, or sensor_combined."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from trihedron.read.devices import Choice
+from trihedron.read.errors import ReadError
+from trihedron.read.table import StatedClock, Table, file_sha256
+from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
+from trihedron.records import Finding, FindingCode, Severity
+
+_RAW = "sensor_accel"
+_COMBINED = "sensor_combined"
+_TOPICS = [_RAW, "sensor_gyro", _COMBINED]
+_UNITS = {"sensor_accel": "m/s^2", "sensor_gyro": "rad/s"}
+_SKIP = {"timestamp", "timestamp_sample"}
+
+
+def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
+    """The accelerometer's and the gyro's table of one instance, or the one table of ``sensor_combined``.
+
+    Raw topics are taken where they were logged at full rate (at least half as many rows as ``sensor_combined`` has).
+
+    Raises
+    ------
+    ReadError
+        When pyulog is not installed, the log is damaged, or holds several IMUs of which none was chosen.
+    """
+    try:
+        from pyulog import ULog
+    except ImportError:
+        raise missing_extra(path, "a PX4 ULog", "pyulog", "px4") from None
+    try:
+        log = ULog(str(path), _TOPICS)
+    # pyulog answers damage with whatever its unpacking met.
+    except Exception as error:
+        raise ReadError(f"{path}: pyulog cannot read this log ({first_line(error)}); copy it again.") from None
+    data = {(d.name, d.multi_id): d.data for d in log.data_list}
+    counts = {key: len(columns["timestamp"]) for key, columns in data.items()}
+    combined = counts.get((_COMBINED, 0), 0)
+    raw = [
+        Stream(_RAW, n, str(i))
+        for (name, i), n in sorted(counts.items())
+        if name == _RAW and counts.get(("sensor_gyro", i), 0)
+    ]
+    streams = raw + ([Stream(_COMBINED, combined)] if (_COMBINED, 0) in counts else [])
+    offered = streams
+    if choice.topic is None and choice.instance is None:
+        full = [s for s in raw if s.count >= 0.5 * combined]
+        offered = full or [s for s in streams if s.topic == _COMBINED] or raw
+    taken = pick(path, offered, choice, "this log")
+    findings = (*choice_note("This log", taken, streams), *_dropouts(log))
+    sha256 = file_sha256(path)
+    if taken.topic == _COMBINED:
+        return (_table(path, data[(_COMBINED, 0)], "", sha256, findings),)
+    i = int(taken.instance)
+    return (
+        _table(path, data[(_RAW, i)], "sensor_accel", sha256, findings),
+        _table(path, data[("sensor_gyro", i)], "sensor_gyro", sha256, ()),
+    )
+
+
+def _table(path: Path, data: dict[str, Any], topic: str, sha256: str, findings: tuple[Finding, ...]) -> Table:
+    # The sample's own stamp, where the log has it; `timestamp` is when the message was published.
+    stamp = "timestamp_sample" if "timestamp_sample" in data else "timestamp"
+    names, columns = ["timestamp [us]"], [np.asarray(data[stamp], dtype=np.float64)]
+    for name, values in data.items():
+        if name not in _SKIP and np.asarray(values).dtype.kind in "iufb":
+            word = {"sensor_accel": "acc", "sensor_gyro": "gyr"}.get(topic, "")
+            names.append(f"{word}_{name} [{_UNITS[topic]}]" if topic and name in ("x", "y", "z") else name)
+            columns.append(np.asarray(values, dtype=np.float64))
+    sensors: dict[str, Any] = {"sensor_accel": "accelerometer", "sensor_gyro": "gyroscope"}
+    clock = StatedClock(time=0, unit="us")
+    return Table(path, tuple(names), tuple(columns), sha256, findings=findings, sensor=sensors.get(topic), clock=clock)
+
+
+def _dropouts(log: Any) -> tuple[Finding, ...]:
+    if not log.dropouts:
+        return ()
+    lost_s = sum(drop.duration for drop in log.dropouts) / 1e3
+    return (
+        Finding(
+            FindingCode.SAMPLES_LOST,
+            Severity.WARNING,
+            f"The logger itself reports {len(log.dropouts)} dropouts, {lost_s:.3g} s altogether.",
+            "A memory card that was too slow.",
+            "Turns that fall into a gap are integrated wrongly; repeat them.",
+            MappingProxyType({"count": float(len(log.dropouts)), "lost_s": lost_s}),
+        ),
+    )
