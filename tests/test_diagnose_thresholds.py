@@ -1,4 +1,4 @@
-"""Numbers in comparisons of the diagnosis carry a name and a reason; the bare ones that are left may only become fewer."""
+"""Numbers in comparisons of the diagnosis carry a name and a reason; the bare ones left may only become fewer."""
 
 import ast
 from pathlib import Path
@@ -47,19 +47,17 @@ STILL_BARE = {
 
 
 def bare_literals(path: Path) -> list[str]:
-    found = []
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Compare):
-            for part in (node.left, *node.comparators):
-                for leaf in ast.walk(part):
-                    if (
-                        isinstance(leaf, ast.Constant)
-                        and isinstance(leaf.value, int | float)
-                        and not isinstance(leaf.value, bool)
-                        and leaf.value not in SELF_EXPLANATORY
-                    ):
-                        found.append(f"{path.name}:{leaf.lineno}: {ast.unparse(node)}")
-    return found
+    compared = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Compare)]
+    return [
+        f"{path.name}:{leaf.lineno}: {ast.unparse(node)}"
+        for node in compared
+        for part in (node.left, *node.comparators)
+        for leaf in ast.walk(part)
+        if isinstance(leaf, ast.Constant)
+        and isinstance(leaf.value, int | float)
+        and not isinstance(leaf.value, bool)
+        and leaf.value not in SELF_EXPLANATORY
+    ]
 
 
 def test_no_comparison_gets_a_new_bare_threshold():
