@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.calibrating import METHODS, calibrate
     from trihedron.pipeline.checking import check
     from trihedron.pipeline.choices import settle_gravity
+    from trihedron.pipeline.converting import convert
     from trihedron.pipeline.diagnosing import diagnose, extend
     from trihedron.pipeline.filtering import KalmanResult, kalman
     from trihedron.pipeline.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
@@ -29,6 +30,7 @@ __all__ = [
     "apply",
     "calibrate",
     "check",
+    "convert",
     "diagnose",
     "driven",
     "extend",
@@ -53,6 +55,7 @@ _HOME = {
     "METHODS": "trihedron.pipeline.calibrating",
     "calibrate": "trihedron.pipeline.calibrating",
     "check": "trihedron.pipeline.checking",
+    "convert": "trihedron.pipeline.converting",
     "settle_gravity": "trihedron.pipeline.choices",
     "diagnose": "trihedron.pipeline.diagnosing",
     "extend": "trihedron.pipeline.diagnosing",
