@@ -398,6 +398,68 @@ pub fn minimise(
     )
 }
 
+/// The linear problem at one point, whatever form its normal equations have.
+pub trait Local {
+    /// F of GN1 here.
+    fn cost(&self) -> f64;
+    /// Residuals behind it.
+    fn n_residuals(&self) -> usize;
+    /// Whether residuals and derivatives are all numbers.
+    fn is_finite(&self) -> bool;
+    /// Left side of GN4.
+    fn gradient_cosine(&self) -> f64;
+    /// GN2; λ counts in units of the largest eigenvalue of the scaled normal equations.
+    ///
+    /// # Errors
+    /// When the damped equations cannot be solved.
+    fn step(&self, lambda: f64) -> Result<DVector<f64>>;
+    /// By how much the step lowers the linear problem's cost.
+    fn predicted(&self, step: &DVector<f64>) -> f64;
+    /// What the step tolerance limits: for dense problems the left side of GN3 over `|D x|`.
+    fn length(&self, step: &DVector<f64>) -> f64;
+}
+
+/// A problem whose points need not be vectors and whose normal equations may have structure.
+pub trait Descent {
+    /// Where the problem is evaluated.
+    type Point;
+    /// Its linearisation.
+    type Local: Local;
+
+    /// The linear problem at a point; `previous` is the one before, for scales that must not shrink.
+    ///
+    /// # Errors
+    /// When the model cannot be evaluated there at all.
+    fn linearise(&self, point: &Self::Point, previous: Option<&Self::Local>)
+    -> Result<Self::Local>;
+
+    /// F of GN1; infinite where the model does not hold, which the solver treats as a wall.
+    ///
+    /// # Errors
+    /// When the model cannot be evaluated there at all.
+    fn cost(&self, point: &Self::Point) -> Result<f64>;
+
+    /// The point a step away.
+    fn moved(&self, point: &Self::Point, step: &DVector<f64>) -> Self::Point;
+}
+
+/// Where a descent ended.
+#[derive(Debug)]
+pub struct Ended<P, L> {
+    /// The point.
+    pub point: P,
+    /// Its linear problem.
+    pub local: L,
+    /// Why it stopped.
+    pub stop: Stop,
+    /// Linearisations made.
+    pub iterations: usize,
+    /// Left side of GN4.
+    pub gradient: f64,
+    /// Length of the undamped step, as [`Local::length`] counts it.
+    pub step: f64,
+}
+
 /// Minimises a [`Problem`].
 ///
 /// # Errors
@@ -410,83 +472,98 @@ pub fn minimise_problem(
     if start.is_empty() {
         return Err(Error::bad_input("a fit needs at least one parameter"));
     }
-    let mut x = start;
-    let mut scale: DVector<f64> = DVector::zeros(x.len());
+    let dense = Dense {
+        problem,
+        rank_tolerance: options.rank_tolerance,
+    };
+    let ended = descend(&dense, start, options)?;
+    let linear = ended.local.linear;
+    Ok(Solution {
+        parameters: ended.point,
+        stop: ended.stop,
+        iterations: ended.iterations,
+        cost: linear.cost,
+        chi2: linear.chi2,
+        gradient: ended.gradient,
+        step: ended.step,
+        certainty: certainty(
+            &linear.r_factor,
+            options.loss.covariance_factor(options.block),
+            options.rank_tolerance,
+        ),
+        n_residuals: linear.n_residuals,
+        r_factor: linear.r_factor,
+    })
+}
+
+/// The descent itself: Gauss-Newton steps, damped where a full one does not lower the cost.
+///
+/// # Errors
+/// When the start gives a cost that is not finite, or the model cannot be evaluated.
+pub fn descend<D: Descent>(
+    problem: &D,
+    start: D::Point,
+    options: &Options,
+) -> Result<Ended<D::Point, D::Local>> {
+    let mut point = start;
+    let mut previous: Option<D::Local> = None;
     let mut damping = 0.0_f64;
     let mut iterations = 0;
     loop {
-        let linear = problem.linearise(&x)?;
+        let local = problem.linearise(&point, previous.as_ref())?;
         iterations += 1;
-        if !linear.cost.is_finite() || linear.r_factor.iter().any(|value| !value.is_finite()) {
+        if !local.cost().is_finite() || !local.is_finite() {
             return Err(Error::bad_input(
                 "the residuals or their derivatives are not finite at the start of the fit; check the input for NaN",
             ));
         }
-        // Marquardt's scaling, never shrinking: a column that fades must not let its parameter run away.
-        scale = scale.zip_map(&column_norms(&linear.r_factor), f64::max);
-        let scaled = Scaled::new(&linear.r_factor, &scale.map(positive_or_one), &linear.rhs);
-        let gradient = cosine(&linear);
-        let undamped = scaled.step(0.0, options.rank_tolerance);
-        let size = scaled.d.component_mul(&x).norm();
-        let step = if size > 0.0 {
-            scaled.d.component_mul(&undamped).norm() / size
-        } else {
-            f64::INFINITY
-        };
-        let finish = |stop: Stop| Solution {
-            parameters: x.clone(),
-            stop,
-            iterations,
-            cost: linear.cost,
-            chi2: linear.chi2,
-            gradient,
-            step,
-            certainty: certainty(
-                &linear.r_factor,
-                options.loss.covariance_factor(options.block),
-                options.rank_tolerance,
-            ),
-            r_factor: linear.r_factor.clone(),
-            n_residuals: linear.n_residuals,
-        };
+        let gradient = local.gradient_cosine();
+        let step = local.length(&local.step(0.0)?);
         // Whitened residuals are of order one; a root mean square of 1e-13 is rounding whatever the unit.
-        if linear.cost <= 1e-26 * linear.n_residuals as f64 {
-            return Ok(finish(Stop::ZeroResidual));
+        let mut stop = if local.cost() <= 1e-26 * local.n_residuals() as f64 {
+            Some(Stop::ZeroResidual)
+        } else if step <= options.step_tolerance {
+            Some(Stop::SmallStep)
+        } else if gradient <= options.gradient_tolerance {
+            Some(Stop::SmallGradient)
+        } else if iterations > options.max_iterations {
+            Some(Stop::TooManyIterations)
+        } else {
+            None
+        };
+        if stop.is_none() {
+            match lower(problem, &point, &local, &mut damping)? {
+                Some(next) => point = next,
+                None => stop = Some(Stop::NoDescent),
+            }
         }
-        if step <= options.step_tolerance {
-            return Ok(finish(Stop::SmallStep));
+        if let Some(stop) = stop {
+            return Ok(Ended {
+                point,
+                local,
+                stop,
+                iterations,
+                gradient,
+                step,
+            });
         }
-        if gradient <= options.gradient_tolerance {
-            return Ok(finish(Stop::SmallGradient));
-        }
-        if iterations > options.max_iterations {
-            return Ok(finish(Stop::TooManyIterations));
-        }
-        match descend(problem, &x, &linear, &scaled, &mut damping, options)? {
-            Some(next) => x = next,
-            None => return Ok(finish(Stop::NoDescent)),
-        }
+        previous = Some(local);
     }
 }
 
 /// A step that lowers the cost, undamped when possible; `None` when even a tiny one does not.
-fn descend(
-    problem: &impl Problem,
-    x: &DVector<f64>,
-    linear: &Linear,
-    scaled: &Scaled,
+fn lower<D: Descent>(
+    problem: &D,
+    point: &D::Point,
+    local: &D::Local,
     damping: &mut f64,
-    options: &Options,
-) -> Result<Option<DVector<f64>>> {
-    let unit = scaled.s[0] * scaled.s[0];
+) -> Result<Option<D::Point>> {
     for _ in 0..60 {
-        let delta = scaled.step(*damping * unit, options.rank_tolerance);
-        let moved = x + &delta;
+        let delta = local.step(*damping)?;
+        let moved = problem.moved(point, &delta);
         let cost = problem.cost(&moved)?;
-        let predicted = 0.5
-            * (linear.rhs.norm_squared()
-                - (&linear.r_factor * &delta + &linear.rhs).norm_squared());
-        let gain = (linear.cost - cost) / predicted;
+        let predicted = local.predicted(&delta);
+        let gain = (local.cost() - cost) / predicted;
         if cost.is_finite() && predicted > 0.0 && gain > 1e-4 {
             if gain > 0.75 {
                 *damping = if *damping > 1e-6 { *damping * 0.1 } else { 0.0 };
@@ -497,14 +574,98 @@ fn descend(
         }
         // Flat to rounding: the change is below what the sum of squares can resolve, so take the Newton step as it is.
         if *damping == 0.0
-            && predicted <= 1e-13 * linear.cost
-            && (cost - linear.cost).abs() <= 1e-12 * linear.cost
+            && predicted <= 1e-13 * local.cost()
+            && (cost - local.cost()).abs() <= 1e-12 * local.cost()
         {
             return Ok(Some(moved));
         }
         *damping = (*damping * 8.0).max(1e-4);
     }
     Ok(None)
+}
+
+/// A [`Problem`] over a plain vector, its Jacobian compressed to an R factor.
+struct Dense<'a, P> {
+    problem: &'a P,
+    rank_tolerance: f64,
+}
+
+struct DenseLocal {
+    linear: Linear,
+    scale: DVector<f64>,
+    scaled: Scaled,
+    size: f64,
+    rank_tolerance: f64,
+}
+
+impl<P: Problem> Descent for Dense<'_, P> {
+    type Point = DVector<f64>;
+    type Local = DenseLocal;
+
+    fn linearise(&self, x: &DVector<f64>, previous: Option<&DenseLocal>) -> Result<DenseLocal> {
+        let linear = self.problem.linearise(x)?;
+        if linear.r_factor.iter().any(|value| !value.is_finite()) {
+            return Err(Error::bad_input(
+                "the residuals or their derivatives are not finite at the start of the fit; check the input for NaN",
+            ));
+        }
+        // Marquardt's scaling, never shrinking: a column that fades must not let its parameter run away.
+        let before = previous.map_or_else(|| DVector::zeros(x.len()), |local| local.scale.clone());
+        let scale = before.zip_map(&column_norms(&linear.r_factor), f64::max);
+        let scaled = Scaled::new(&linear.r_factor, &scale.map(positive_or_one), &linear.rhs);
+        let size = scaled.d.component_mul(x).norm();
+        Ok(DenseLocal {
+            linear,
+            scale,
+            scaled,
+            size,
+            rank_tolerance: self.rank_tolerance,
+        })
+    }
+
+    fn cost(&self, x: &DVector<f64>) -> Result<f64> {
+        self.problem.cost(x)
+    }
+
+    fn moved(&self, x: &DVector<f64>, step: &DVector<f64>) -> DVector<f64> {
+        x + step
+    }
+}
+
+impl Local for DenseLocal {
+    fn cost(&self) -> f64 {
+        self.linear.cost
+    }
+
+    fn n_residuals(&self) -> usize {
+        self.linear.n_residuals
+    }
+
+    fn is_finite(&self) -> bool {
+        self.linear.rhs.iter().all(|value| value.is_finite())
+    }
+
+    fn gradient_cosine(&self) -> f64 {
+        cosine(&self.linear)
+    }
+
+    fn step(&self, lambda: f64) -> Result<DVector<f64>> {
+        let unit = self.scaled.s[0] * self.scaled.s[0];
+        Ok(self.scaled.step(lambda * unit, self.rank_tolerance))
+    }
+
+    fn predicted(&self, step: &DVector<f64>) -> f64 {
+        let linear = &self.linear;
+        0.5 * (linear.rhs.norm_squared() - (&linear.r_factor * step + &linear.rhs).norm_squared())
+    }
+
+    fn length(&self, step: &DVector<f64>) -> f64 {
+        if self.size > 0.0 {
+            self.scaled.d.component_mul(step).norm() / self.size
+        } else {
+            f64::INFINITY
+        }
+    }
 }
 
 /// The compressed Jacobian in scaled parameters, decomposed once per linearisation.

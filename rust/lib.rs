@@ -15,6 +15,7 @@ pub mod norm_invariant;
 pub mod poisson;
 pub mod rotation;
 pub mod screening;
+pub mod session_model;
 pub mod simulate;
 pub mod spectral_likelihood;
 pub mod stillness;

@@ -126,25 +126,81 @@ fn cubic_moments(a: f64, b: f64, c: f64, h: f64) -> (f64, f64) {
     )
 }
 
-/// Moments of the cubic through four samples over the step between the samples `left` and `left + 1`.
-fn moments_of_cubic(
-    t: &[f64; 4],
-    w: &[Vector3<f64>; 4],
-    left: usize,
-    h: f64,
-) -> (Vector3<f64>, Vector3<f64>) {
-    let middle = 0.5 * (t[left] + t[left + 1]);
-    let tau = t.map(|x| x - middle);
-    let mut moment0 = Vector3::zeros();
-    let mut moment1 = Vector3::zeros();
-    for j in 0..4 {
-        let [a, b, c] = [tau[(j + 1) % 4], tau[(j + 2) % 4], tau[(j + 3) % 4]];
-        let (i0, i1) = cubic_moments(a, b, c, h);
-        let scale = 1.0 / ((tau[j] - a) * (tau[j] - b) * (tau[j] - c));
-        moment0 += w[j] * (i0 * scale);
-        moment1 += w[j] * (i1 * scale);
+/// One integration step as sums over samples: `∫ w dτ = Σ zeroth_j w_j`, `(1/h) ∫ τ w dτ = Σ first_j w_j`, τ from the
+/// middle of the step.
+#[derive(Debug, Clone, Copy)]
+pub struct StepWeights {
+    /// The samples that the rate polynomial runs through; unused ones carry no weight.
+    pub sample: [usize; 4],
+    /// Weights of the zeroth moment, s.
+    pub zeroth: [f64; 4],
+    /// Weights of the first moment, s.
+    pub first: [f64; 4],
+    /// Sample at which the step begins.
+    pub from: usize,
+    /// Sample at which it ends.
+    pub to: usize,
+    /// Its duration, s.
+    pub h: f64,
+}
+
+impl StepWeights {
+    fn constant(from: usize, to: usize, h: f64) -> Self {
+        Self {
+            sample: [from; 4],
+            zeroth: [h, 0.0, 0.0, 0.0],
+            first: [0.0; 4],
+            from,
+            to,
+            h,
+        }
     }
-    (moment0, moment1)
+
+    fn line(from: usize, to: usize, h: f64) -> Self {
+        Self {
+            sample: [from, to, from, to],
+            zeroth: [0.5 * h, 0.5 * h, 0.0, 0.0],
+            first: [-h / 12.0, h / 12.0, 0.0, 0.0],
+            from,
+            to,
+            h,
+        }
+    }
+
+    /// The cubic through four samples at `t`, over the step between the samples `left` and `left + 1` of them.
+    fn cubic(sample: [usize; 4], t: &[f64; 4], left: usize, h: f64) -> Self {
+        let middle = 0.5 * (t[left] + t[left + 1]);
+        let tau = t.map(|x| x - middle);
+        let (mut zeroth, mut first) = ([0.0; 4], [0.0; 4]);
+        for j in 0..4 {
+            let [a, b, c] = [tau[(j + 1) % 4], tau[(j + 2) % 4], tau[(j + 3) % 4]];
+            let (i0, i1) = cubic_moments(a, b, c, h);
+            let scale = 1.0 / ((tau[j] - a) * (tau[j] - b) * (tau[j] - c));
+            zeroth[j] = i0 * scale;
+            first[j] = i1 * scale;
+        }
+        Self {
+            sample,
+            zeroth,
+            first,
+            from: sample[left],
+            to: sample[left + 1],
+            h,
+        }
+    }
+
+    /// Both moments of a signal.
+    pub fn moments(&self, signal: impl Fn(usize) -> Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        let (mut zeroth, mut first) = (Vector3::zeros(), Vector3::zeros());
+        for j in 0..4 {
+            if self.zeroth[j] != 0.0 || self.first[j] != 0.0 {
+                let value = signal(self.sample[j]);
+                zeroth += value * self.zeroth[j];
+                first += value * self.first[j];
+            }
+        }
+        (zeroth, first)
+    }
 }
 
 /// Neighbouring steps may differ by this factor (jitter, one lost sample) before a cubic through them is worse than a
@@ -202,42 +258,51 @@ pub fn prepare(
         }
         used.push(k);
     }
-    let n = used.len();
-    let mut steps = Vec::with_capacity(n.saturating_sub(1));
-    for i in 0..n.saturating_sub(1) {
-        let (p, q) = (used[i], used[i + 1]);
-        let h = time_s[q] - time_s[p];
-        let (moment0, moment1) = match model {
-            RateModel::Constant => (raw[p] * h, Vector3::zeros()),
-            RateModel::Coning if n >= 4 => {
-                let first = i.saturating_sub(1).min(n - 4);
-                let index = [0, 1, 2, 3].map(|j| used[first + j]);
-                let t = index.map(|k| time_s[k]);
-                let gaps = [t[1] - t[0], t[2] - t[1], t[3] - t[2]];
-                let widest = gaps[0].max(gaps[1]).max(gaps[2]);
-                let narrowest = gaps[0].min(gaps[1]).min(gaps[2]);
-                if widest > UNEVEN_STEPS * narrowest {
-                    moments_of_line(&raw[p], &raw[q], h)
-                } else {
-                    moments_of_cubic(&t, &index.map(|k| raw[k]), i - first, h)
-                }
+    let steps = step_weights(time_s, &used, model)
+        .into_iter()
+        .map(|step| {
+            let (moment0, moment1) = step.moments(|k| raw[k]);
+            let (p, q) = (step.from, step.to);
+            Step {
+                moment0,
+                moment1,
+                change: raw[q] - raw[p],
+                h: step.h,
+                fraction: (0.5 * (time_s[p] + time_s[q]) - range.anchor_before_s) / span_s,
+                var_extra: var_extra.map_or_else(Vector3::zeros, |var| var[p]),
             }
-            RateModel::Linear | RateModel::Coning => moments_of_line(&raw[p], &raw[q], h),
-        };
-        steps.push(Step {
-            moment0,
-            moment1,
-            change: raw[q] - raw[p],
-            h,
-            fraction: (0.5 * (time_s[p] + time_s[q]) - range.anchor_before_s) / span_s,
-            var_extra: var_extra.map_or_else(Vector3::zeros, |var| var[p]),
-        });
-    }
+        })
+        .collect();
     Ok(PreparedMove { steps, span_s })
 }
 
-fn moments_of_line(from: &Vector3<f64>, to: &Vector3<f64>, h: f64) -> (Vector3<f64>, Vector3<f64>) {
-    ((from + to) * (0.5 * h), (to - from) * (h / 12.0))
+/// Integration steps between the samples `used` (ascending, of strictly rising time).
+#[must_use]
+pub fn step_weights(time_s: &[f64], used: &[usize], model: RateModel) -> Vec<StepWeights> {
+    let n = used.len();
+    (0..n.saturating_sub(1))
+        .map(|i| {
+            let (p, q) = (used[i], used[i + 1]);
+            let h = time_s[q] - time_s[p];
+            match model {
+                RateModel::Constant => StepWeights::constant(p, q, h),
+                RateModel::Coning if n >= 4 => {
+                    let first = i.saturating_sub(1).min(n - 4);
+                    let index = [0, 1, 2, 3].map(|j| used[first + j]);
+                    let t = index.map(|k| time_s[k]);
+                    let gaps = [t[1] - t[0], t[2] - t[1], t[3] - t[2]];
+                    let widest = gaps[0].max(gaps[1]).max(gaps[2]);
+                    let narrowest = gaps[0].min(gaps[1]).min(gaps[2]);
+                    if widest > UNEVEN_STEPS * narrowest {
+                        StepWeights::line(p, q, h)
+                    } else {
+                        StepWeights::cubic(index, &t, i - first, h)
+                    }
+                }
+                RateModel::Linear | RateModel::Coning => StepWeights::line(p, q, h),
+            }
+        })
+        .collect()
 }
 
 impl PreparedMove {

@@ -12,6 +12,8 @@ mod norm_invariant;
 mod poisson;
 #[path = "kernels/rotation.rs"]
 mod rotation;
+#[path = "kernels/session_model.rs"]
+mod session_model;
 #[path = "kernels/stillness.rs"]
 mod stillness;
 

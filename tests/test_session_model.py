@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from trihedron.diagnose.session.observations import observe
-from trihedron.diagnose.session.solve import tune_noise
+from trihedron.diagnose.session.solve import folds_of, leverage, predict_held_out, reduce, tune_noise
 from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.diagnose.session.twin import NO_DISTORTION
 from trihedron.estimate.accelerometer import calibrate_norm
@@ -70,14 +70,14 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
     fitted, _ = fitted_to(recording, 9.803)
     # imu_tk found 1.000 on the log's own unit; shrunk by its zeros' scatter it was 0.816, moves 4.70 deg.
     assert fitted.twin.gyro_S[0, 0] == pytest.approx(1.0, abs=0.01)
-    missed = [np.linalg.norm(move["residual"][:2]) for move in fitted.line._moves]
+    missed = np.linalg.norm(fitted.line.move_errors[0][:, :2], axis=1)
     assert np.degrees(np.sqrt(np.mean(np.square(missed))) / 9.803) < 0.35
 
 
 def test_samples_that_share_a_stamp_are_spread_to_the_next():
     stamps = np.array([0.0, 0.01, 0.02, 0.02, 0.02, 0.05, 0.06, 0.06])
     spread = spread_stamps(stamps, 0.01)
-    np.testing.assert_allclose(spread, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.065], atol=1e-12)
+    np.testing.assert_allclose(spread, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.07], atol=1e-12)
 
 
 def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
@@ -92,3 +92,42 @@ def test_two_samples_with_one_stamp_change_nothing_that_can_be_seen():
     sigma = np.sqrt(np.diag(plain.covariance()))[9:18]
     # One stamp of a move of some hundred samples late by half a step: a fraction of the noise.
     assert np.abs((fitted.twin.gyro_S - plain.twin.gyro_S).ravel() / sigma).max() < 1.0
+
+
+def test_chain_and_dense_algebra_give_the_same_covariance_leverage_projection_and_prediction():
+    recording, truth = session_of(3, 12)
+    fitted, _ = fitted_to(recording, truth.gravity_m_s2)
+    J, r = fitted.line.core.jacobian(), fitted.system.residual
+    size = np.linalg.norm(J, axis=0)
+    scaled = J / size
+    eye = np.eye(len(size))
+    inverse = np.linalg.inv(scaled.T @ scaled + 1e-12 * eye)
+    covariance = inverse / np.outer(size, size)
+    # Two factorisations of one matrix of condition 1e6: ten digits are left, the ridge takes the rest.
+    np.testing.assert_allclose(fitted.covariance(), covariance[:18, :18], rtol=1e-6, atol=0)
+    np.testing.assert_allclose(leverage(fitted), np.einsum("ri,ij,rj->r", scaled, inverse, scaled), atol=1e-8)
+    columns = np.random.default_rng(1).standard_normal((len(r), 3))
+    np.testing.assert_allclose(
+        reduce(fitted).project(columns), columns - scaled @ (inverse @ (scaled.T @ columns)), atol=1e-8
+    )
+    folds = folds_of(fitted)
+    found = predict_held_out(fitted, folds)
+    for k, held in enumerate(folds):
+        train = scaled[~held]
+        cov = np.linalg.inv(train.T @ train + 1e-6 * eye)
+        spread = scaled[held] @ cov @ scaled[held].T + np.eye(held.sum())
+        innovation = r[held] - scaled[held] @ (cov @ (train.T @ r[~held]))
+        value, vector = np.linalg.eigh(spread)
+        known = value < 1e4
+        chi2 = float(((vector.T @ innovation)[known] ** 2 / value[known]).sum())
+        assert found.fold_chi2[k].sum() == pytest.approx(chi2, rel=1e-6)
+        assert found.fold_log_det[k] == pytest.approx(np.log(value[known]).sum(), abs=1e-6)
+
+
+def test_the_fit_says_why_it_stopped_and_how_far_the_optimum_can_be():
+    recording, truth = session_of(5, 12)
+    core = fitted_to(recording, truth.gravity_m_s2)[0].line.core
+    assert core.is_converged
+    step, _ = core.convergence
+    assert step < 1e-3  # standard errors, all rows together
+    assert core.iterations < 30

@@ -446,6 +446,113 @@ def simulate_convert(
 # trajectory
 def attitude_in_moves(time_s: FloatArray, rate: FloatArray, moves: list[tuple[int, int]]) -> FloatArray: ...
 
+# the joint model of a session
+@final
+class SessionModel:
+    def __new__(
+        cls,
+        *,
+        gravity_m_s2: float,
+        hold_time_s: FloatArray,
+        hold_force: FloatArray,
+        hold_force_sigma: FloatArray,
+        force_density: FloatArray,
+        hold_rate: FloatArray | None,
+        hold_rate_sigma: FloatArray | None,
+        rate_density: FloatArray | None,
+        time_s: FloatArray,
+        force: FloatArray,
+        rate: FloatArray | None,
+        ranges: npt.NDArray[np.int64],
+        before: npt.NDArray[np.int64],
+        unresolved: FloatArray,
+        jitter_s: float,
+        nominal_step_s: float,
+        inflation: tuple[float, float],
+        prior: tuple[FloatArray, FloatArray] | None,
+        is_prior_weak: bool,
+        scatter: FloatArray | None,
+    ) -> SessionModel: ...
+    def fit(
+        self,
+        *,
+        force_scale: FloatArray,
+        force_bias: FloatArray,
+        rate_scale: FloatArray,
+        up: FloatArray,
+        rate_zero: FloatArray,
+        force_zero: FloatArray,
+        effect: FloatArray,
+        corners_s: tuple[float, float],
+        scatter: tuple[float, float],
+        force_effect: FloatArray | None,
+        rate_effect: FloatArray | None,
+        is_tuned: bool,
+    ) -> SessionFit: ...
+    def move_residuals(
+        self,
+        *,
+        force_scale: FloatArray,
+        force_bias: FloatArray,
+        rate_scale: FloatArray,
+        up: FloatArray,
+        rate_zero: FloatArray,
+        force_zero: FloatArray,
+    ) -> FloatArray: ...
+
+@final
+class SessionFit:
+    @property
+    def force_scale(self) -> FloatArray: ...
+    @property
+    def force_bias(self) -> FloatArray: ...
+    @property
+    def rate_scale(self) -> FloatArray: ...
+    @property
+    def up(self) -> FloatArray: ...
+    @property
+    def rate_zero(self) -> FloatArray: ...
+    @property
+    def force_zero(self) -> FloatArray: ...
+    @property
+    def effect(self) -> FloatArray: ...
+    @property
+    def corners_s(self) -> tuple[float, float]: ...
+    @property
+    def scatter(self) -> tuple[float, float]: ...
+    @property
+    def is_walk_at_edge(self) -> tuple[bool, bool]: ...
+    @property
+    def chi2(self) -> float: ...
+    @property
+    def log_marginal(self) -> float: ...
+    @property
+    def log_profile(self) -> float: ...
+    @property
+    def is_converged(self) -> bool: ...
+    @property
+    def stopped_because(self) -> str: ...
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def convergence(self) -> tuple[float, float]: ...
+    @property
+    def residual(self) -> FloatArray: ...
+    @property
+    def labels(self) -> npt.NDArray[np.int64]: ...
+    def path(self) -> tuple[FloatArray, FloatArray, FloatArray]: ...
+    def moves(self) -> tuple[FloatArray, FloatArray]: ...
+    def whitening(self) -> FloatArray: ...
+    def columns(self, force: FloatArray | None, rate: FloatArray | None) -> FloatArray: ...
+    def project(self, columns: FloatArray) -> FloatArray: ...
+    def leverage(self) -> FloatArray: ...
+    def held_out(
+        self, folds: npt.NDArray[np.bool_]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
+    def border_covariance(self) -> FloatArray: ...
+    def linear_covariance(self, force_origin: FloatArray, rate_origin: FloatArray) -> tuple[FloatArray, FloatArray]: ...
+    def jacobian(self) -> FloatArray: ...
+
 # zero_process
 def zero_process_grams(
     columns: FloatArray,

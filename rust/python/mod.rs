@@ -20,6 +20,7 @@ mod kalman_norm;
 mod poisson;
 mod rotation;
 mod screening;
+mod session_model;
 mod simulate;
 mod spectral_likelihood;
 mod stillness;
@@ -46,6 +47,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     kalman_norm::register(module)?;
     rotation::register(module)?;
     screening::register(module)?;
+    session_model::register(module)?;
     simulate::register(module)?;
     spectral_likelihood::register(module)?;
     stillness::register(module)?;

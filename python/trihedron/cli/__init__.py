@@ -22,7 +22,9 @@ from trihedron.cli.convert import convert
 from trihedron.cli.demo import demo
 from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
+from trihedron.cli.guide import guide
 from trihedron.cli.kalman import kalman
+from trihedron.cli.plan import plan
 from trihedron.cli.ports import ports
 from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
@@ -31,8 +33,10 @@ from trihedron.cli.verify import verify
 # In the order in which they are used.
 COMMANDS = (
     demo,
+    plan,
     ports,
     capture,
+    guide,
     check,
     segment,
     calibrate,

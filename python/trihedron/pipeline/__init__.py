@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.choices import settle_gravity
     from trihedron.pipeline.converting import convert
     from trihedron.pipeline.diagnosing import diagnose, extend
+    from trihedron.pipeline.exporting import export
     from trihedron.pipeline.filtering import KalmanResult, kalman
     from trihedron.pipeline.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
     from trihedron.pipeline.improving import driven, improve
@@ -33,6 +34,7 @@ __all__ = [
     "convert",
     "diagnose",
     "driven",
+    "export",
     "extend",
     "improve",
     "kalman",
@@ -59,6 +61,7 @@ _HOME = {
     "settle_gravity": "trihedron.pipeline.choices",
     "diagnose": "trihedron.pipeline.diagnosing",
     "extend": "trihedron.pipeline.diagnosing",
+    "export": "trihedron.pipeline.exporting",
     "KalmanResult": "trihedron.pipeline.filtering",
     "kalman": "trihedron.pipeline.filtering",
     "noise": "trihedron.pipeline.identifying",

@@ -12,8 +12,8 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_mo
 from trihedron.diagnose.effects.insertion import bridge, insert_samples
 from trihedron.diagnose.effects.sample_steps import MAX_LOST, Loss, find_losses
 from trihedron.diagnose.session.observations import Observations, observe
-from trihedron.diagnose.session.solve import fit
-from trihedron.diagnose.session.twin import NO_DISTORTION, Linearisation, Twin
+from trihedron.diagnose.session.solve import fit, move_misfit
+from trihedron.diagnose.session.twin import NO_DISTORTION, Twin
 from trihedron.records.diagnosis import EffectParameter, Where
 
 CLEAR_COUNT = 3.0
@@ -87,8 +87,7 @@ def _misfit(obs: Observations, twin: Twin, m: int, losses: dict[int, int]) -> fl
         move_ranges=((0, len(time)),),
         move_holds=obs.move_holds[m : m + 1],
     )
-    residual = Linearisation(one, twin, NO_DISTORTION).move_residual(0)
-    return float(residual @ residual)
+    return float(move_misfit(one, twin)[0])
 
 
 class DroppedSamples(DirectEffect):

@@ -8,7 +8,6 @@ import numpy as np
 
 from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.session.twin import _LOWER, N_ACCEL, N_GYRO, N_HOLD
 from trihedron.records.diagnosis import DomainResiduals, LinearModel
 
 _ROWS: tuple[tuple[str, str, str, str, tuple[str, ...]], ...] = (
@@ -65,12 +64,8 @@ def _shown(fitted: Fit) -> dict[str, _Shown]:
         spread = np.sqrt((obs.hold_rate_sigma**2 @ (twin.gyro_S**2).T).mean(axis=1))
         out["static-gyro"] = _Shown(obs.hold_time_s, rate - rate.mean(axis=0), spread)
     if obs.n_moves:
-        noise = []
-        for move in line._moves:
-            root = np.linalg.inv(move["white"])
-            noise.append(np.diag(root @ root.T))
-        variance = np.array(noise)
-        residual = np.array([move["residual"] for move in line._moves])
+        residual, noise = line.move_errors
+        variance = np.einsum("mii->mi", noise)
         middle = np.array([0.5 * (obs.time_s[a] + obs.time_s[b - 1]) for a, b in obs.move_ranges])
         angle = np.degrees(np.hypot(residual[:, 0], residual[:, 1]) / twin.gravity)
         expected = np.degrees(np.sqrt(variance[:, :2].sum(axis=1)) / twin.gravity)
@@ -82,22 +77,7 @@ def _shown(fitted: Fit) -> dict[str, _Shown]:
 def with_covariance(model: LinearModel, fitted: Fit) -> LinearModel:
     """The linear model with the full covariance of its numbers, in the order of a calibration file.
 
-    ``cov = T C Tᵀ``: T takes the fit's unknowns on centred readings to S row by row and b on raw ones.
+    On raw readings: S row by row, then b, of the gyro with one zero for the session (eq. 11.16).
     """
-    obs = fitted.line.obs
-    C = fitted.covariance()
-    h = obs.n_holds
-    T = np.zeros((24, len(C)))
-    for k, (i, j) in enumerate(_LOWER):
-        T[3 * i + j, k] = 1.0
-        T[9 + i, k] -= obs.force_origin[j]
-    T[9:12, 6:9] = np.eye(3)
-    if model.gyroscope is None:
-        return replace(model, covariance=T[:12] @ C @ T[:12].T)
-    T[12:21, N_ACCEL : N_ACCEL + N_GYRO] = np.eye(9)
-    T[21:24, N_ACCEL : N_ACCEL + N_GYRO] = -np.kron(np.eye(3), obs.rate_origin[None])
-    for hold in range(h):
-        first = N_ACCEL + N_GYRO + N_HOLD * hold + 2
-        T[21:24, first : first + 3] = -np.eye(3) / h
-    covariance = T @ C @ T.T
-    return replace(model, covariance=0.5 * (covariance + covariance.T))
+    covariance = fitted.linear[0]
+    return replace(model, covariance=covariance[:12, :12] if model.gyroscope is None else covariance)

@@ -84,16 +84,16 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
     h = line.obs.n_holds
     direct = system.walk == 0
     rows = np.flatnonzero((system.domain == STATIC_ACCEL) & direct)
-    error = np.linalg.solve(line._accel_white, r[rows].reshape(h, 3, 1))[:, :, 0]
+    error = np.linalg.solve(line.accel_white, r[rows].reshape(h, 3, 1))[:, :, 0]
     out[STATIC_ACCEL] = float(np.sqrt(np.mean(np.einsum("ni,ni->n", error, line.twin.up) ** 2)))
-    if line._gyro_white is not None:
+    if line.gyro_white is not None:
         rows = np.flatnonzero((system.domain == STATIC_GYRO) & direct)
-        error = np.linalg.solve(line._gyro_white, r[rows].reshape(h, 3, 1))[:, :, 0]
+        error = np.linalg.solve(line.gyro_white, r[rows].reshape(h, 3, 1))[:, :, 0]
         out[STATIC_GYRO] = float(np.sqrt(np.mean(error**2)))
     angle, speed = [], []
     for m in range(line.obs.n_moves):
         rows = np.flatnonzero(np.isin(system.domain, (MOVES, DYNAMICS)) & (system.segment == m) & direct)
-        error = np.linalg.solve(line._moves[m]["white"], r[rows])
+        error = np.linalg.solve(line.move_white[m], r[rows])
         angle.append(float((error[:2] ** 2).sum()) / line.twin.gravity**2)
         speed.append(float((error[2:] ** 2).mean()))
     if angle:

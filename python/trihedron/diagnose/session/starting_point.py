@@ -166,39 +166,24 @@ def prior_of(obs: Observations, calibration: Calibration) -> Prior:
 
 
 def linear_model(fitted: Fit) -> LinearModel:
-    """S, b of both sensors from a fitted twin, with standard errors, on raw readings."""
+    """S, b of both sensors from a fitted session, with standard errors, on raw readings; one zero for the session."""
     twin, obs = fitted.twin, fitted.line.obs
-    cov = fitted.covariance()
-    origin = obs.force_origin
-    S = twin.accel_S
-    to_b = np.zeros((3, 9))
-    for k, (i, j) in enumerate(_LOWER):
-        to_b[i, k] = -origin[j]
-    to_b[:, 6:9] = np.eye(3)
-    sigma_S = np.zeros((3, 3))
-    for k, (i, j) in enumerate(_LOWER):
-        sigma_S[i, j] = np.sqrt(max(cov[k, k], 0.0))
-    cov_b = to_b @ cov[:9, :9] @ to_b.T
+    covariance, gyro_b = fitted.linear
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     accel: dict[str, Any] = {
-        "S": S.tolist(),
-        "b": (twin.accel_b - S @ origin).tolist(),
-        "sigma_S": sigma_S.tolist(),
-        "sigma_b": np.sqrt(np.maximum(np.diag(cov_b), 0.0)).tolist(),
+        "S": twin.accel_S.tolist(),
+        "b": (twin.accel_b - twin.accel_S @ obs.force_origin).tolist(),
+        "sigma_S": sigma[:9].reshape(3, 3).tolist(),
+        "sigma_b": sigma[9:12].tolist(),
         "raw_unit": obs.recording.accelerometer_unit.value,
     }
     if obs.raw_rate is None:
         return LinearModel(MappingProxyType(accel), None)
-    mean_bias = twin.gyro_bias.mean(axis=0)
-    n = obs.n_holds
-    pick = np.zeros((3, cov.shape[0]))
-    for h in range(n):
-        pick[:, 18 + 8 * h + 2 : 18 + 8 * h + 5] = -np.eye(3) / n
-    pick[:, 9:18] = -np.kron(np.eye(3), obs.rate_origin[None])
     gyro: dict[str, Any] = {
         "S": twin.gyro_S.tolist(),
-        "b": (-twin.gyro_S @ obs.rate_origin - mean_bias).tolist(),
-        "sigma_S": np.sqrt(np.maximum(np.diag(cov)[9:18], 0.0)).reshape(3, 3).tolist(),
-        "sigma_b": np.sqrt(np.maximum(np.diag(pick @ cov @ pick.T), 0.0)).tolist(),
+        "b": gyro_b.tolist(),
+        "sigma_S": sigma[12:21].reshape(3, 3).tolist(),
+        "sigma_b": sigma[21:24].tolist(),
         "raw_unit": obs.recording.gyroscope_unit.value,
     }
     return LinearModel(MappingProxyType(accel), MappingProxyType(gyro))

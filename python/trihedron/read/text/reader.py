@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
 from types import MappingProxyType
 
@@ -52,8 +54,13 @@ class TextReader:
 
     def read(self) -> Table:
         """The whole file as a table."""
+        # Closed whatever is raised in between: a refusal must not leave the file open until the next collection.
+        with closing(blocks(self.path, self.compression, self.cursor, self.content)) as parts:
+            return self._read(parts)
+
+    def _read(self, parts: Iterable[bytes]) -> Table:
         layout: Layout | None = None
-        for raw in blocks(self.path, self.compression, self.cursor, self.content):
+        for raw in parts:
             data = as_utf8(self.path, raw, self.cursor.lines + 1)
             if b"\n" not in data and b"\r" in data:
                 data = data.replace(b"\r", b"\n")

@@ -1,0 +1,420 @@
+//! The fit of a session, and the strengths of the processes behind its zeros (docs/model-session.md, 11.9-11.12).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::chain::{Chain, Factor, Layout};
+use super::rows::{Group, N_PROCESSES, Passed, Weights};
+use super::{Distortion, Session, State, Strengths};
+use crate::error::Result;
+use crate::gauss_newton::{Descent, Local, Options, Stop, descend};
+
+/// Added to the diagonal of the scaled normal equations: directions that nothing sees stay finite.
+pub const RIDGE: f64 = 1e-12;
+/// The undamped step moves all whitened rows together by less than this many standard errors: converged.
+const STEP_TOLERANCE: f64 = 1e-3;
+/// Renewals of the moves' weights; they follow the state in second order and settle in two.
+const RENEWALS: usize = 6;
+
+/// Corner times tried, s. A bias that walks faster than the first is drift.
+pub const CORNER_GRID_S: [f64; 7] = [20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 2560.0];
+/// Scatter that counts as none, in units of the session's reference.
+pub const NO_SCATTER: f64 = 1e-3;
+/// Scatters tried beyond none: a factor of 1.5 apart, up to a thousand times the reference.
+const N_SCATTER: i32 = 26;
+const SCATTER_FROM: f64 = 0.05;
+const SCATTER_RATIO: f64 = 1.5;
+/// Twice the gain in log-likelihood that makes a scatter count: 5.41 is passed in 1 % of sessions without any (half of
+/// χ² with one degree of freedom, the variance being at its boundary).
+const SCATTER_GATE: f64 = 5.41;
+
+/// A fitted session.
+#[derive(Debug)]
+pub struct Fit {
+    /// Where it ended.
+    pub state: State,
+    /// Strengths of the processes there.
+    pub strengths: Strengths,
+    /// Effects in it.
+    pub distortion: Distortion,
+    /// Whitening of the moves.
+    pub weights: Weights,
+    /// Moves carried there.
+    pub passed: Vec<Passed>,
+    /// All rows there.
+    pub groups: Vec<Group>,
+    /// Their normal equations.
+    pub chain: Chain,
+    /// The same factored.
+    pub factor: Factor,
+    /// Why the last descent stopped.
+    pub stop: Stop,
+    /// Linearisations made in all.
+    pub iterations: usize,
+    /// Length of the undamped step there, in standard errors of all rows together.
+    pub step: f64,
+    /// Left side of the orthogonality test.
+    pub gradient: f64,
+}
+
+impl Fit {
+    /// `Σ r²`.
+    #[must_use]
+    pub fn chi2(&self) -> f64 {
+        chi2_of(&self.groups)
+    }
+
+    /// Sizes of the unknowns.
+    #[must_use]
+    pub fn layout(&self) -> Layout {
+        self.chain.layout
+    }
+
+    fn log_weight(&self) -> f64 {
+        self.groups.iter().map(|group| group.log_weight).sum()
+    }
+
+    /// Log-likelihood with all unknowns integrated out, up to a constant.
+    #[must_use]
+    pub fn log_marginal(&self) -> f64 {
+        -0.5 * self.chi2() - 0.5 * self.factor.log_det() + self.log_weight()
+    }
+
+    /// Log-likelihood with the poses integrated out and what they share at its optimum, up to a constant.
+    #[must_use]
+    pub fn log_profile(&self) -> f64 {
+        -0.5 * self.chi2() - 0.5 * self.factor.log_det_poses() + self.log_weight()
+    }
+
+    /// Whether the walk of either zero (accelerometer, gyro) is as strong as the grid allows: it then stands in for
+    /// something else, a drift or a scatter.
+    #[must_use]
+    pub fn is_walk_at_edge(&self) -> [bool; 2] {
+        self.strengths
+            .corner_s
+            .map(|corner| corner <= CORNER_GRID_S[0])
+    }
+}
+
+fn chi2_of(groups: &[Group]) -> f64 {
+    groups.iter().map(|g| g.rows.residual.norm_squared()).sum()
+}
+
+/// `Jᵀr` `(n, 1)`.
+#[must_use]
+pub fn gradient(layout: Layout, groups: &[Group]) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(layout.n(), 1);
+    for group in groups {
+        let r = DMatrix::from_column_slice(group.rows.len(), 1, group.rows.residual.as_slice());
+        group.rows.add_transposed(layout, &r, &mut out);
+    }
+    out
+}
+
+/// A session with its weights held: what one descent works on.
+struct Held<'a> {
+    session: &'a Session,
+    distortion: &'a Distortion,
+    strengths: Strengths,
+    weights: &'a Weights,
+}
+
+/// The linear problem of a state.
+struct Here {
+    groups: Vec<Group>,
+    passed: Vec<Passed>,
+    chain: Chain,
+    gradient: DMatrix<f64>,
+    cost: f64,
+    n: usize,
+}
+
+impl Descent for Held<'_> {
+    type Point = State;
+    type Local = Here;
+
+    fn linearise(&self, state: &State, _previous: Option<&Here>) -> Result<Here> {
+        let passed = self.session.pass(state, self.distortion, self.weights);
+        let groups = self.session.groups(
+            state,
+            &self.strengths,
+            self.distortion,
+            self.weights,
+            &passed,
+        )?;
+        let layout = self.session.layout(self.distortion.k);
+        let chain = Chain::of(layout, groups.iter().map(|group| &group.rows));
+        Ok(Here {
+            gradient: gradient(layout, &groups),
+            cost: 0.5 * chi2_of(&groups),
+            n: groups.iter().map(|group| group.rows.len()).sum(),
+            groups,
+            passed,
+            chain,
+        })
+    }
+
+    fn cost(&self, state: &State) -> Result<f64> {
+        let chi2 = self
+            .session
+            .chi2(state, &self.strengths, self.distortion, self.weights);
+        // A triad that collapsed on the way is a wall, not an end.
+        Ok(chi2.map_or(f64::INFINITY, |value| {
+            if value.is_finite() {
+                0.5 * value
+            } else {
+                f64::INFINITY
+            }
+        }))
+    }
+
+    fn moved(&self, state: &State, step: &DVector<f64>) -> State {
+        state.moved(step, self.session.layout(self.distortion.k))
+    }
+}
+
+impl Here {
+    fn image(&self, step: &DVector<f64>) -> impl Iterator<Item = (&Group, DMatrix<f64>)> {
+        let x = DMatrix::from_column_slice(step.len(), 1, step.as_slice());
+        self.groups
+            .iter()
+            .map(move |group| (group, group.rows.times(self.chain.layout, &x)))
+    }
+}
+
+impl Local for Here {
+    fn cost(&self) -> f64 {
+        self.cost
+    }
+
+    fn n_residuals(&self) -> usize {
+        self.n
+    }
+
+    fn is_finite(&self) -> bool {
+        self.gradient.iter().all(|value| value.is_finite())
+    }
+
+    fn gradient_cosine(&self) -> f64 {
+        let size = (2.0 * self.cost).sqrt().max(f64::MIN_POSITIVE);
+        self.chain
+            .diagonal()
+            .iter()
+            .zip(self.gradient.iter())
+            .filter(|(d, _)| **d > 0.0)
+            .map(|(d, g)| g.abs() / d.sqrt() / size)
+            .fold(0.0, f64::max)
+    }
+
+    fn step(&self, lambda: f64) -> Result<DVector<f64>> {
+        let x = self
+            .chain
+            .factor(RIDGE + lambda, None)?
+            .solve(&self.gradient);
+        Ok(-x.column(0).into_owned())
+    }
+
+    fn predicted(&self, step: &DVector<f64>) -> f64 {
+        let after: f64 = self
+            .image(step)
+            .map(|(group, image)| (image.column(0) + &group.rows.residual).norm_squared())
+            .sum();
+        self.cost - 0.5 * after
+    }
+
+    fn length(&self, step: &DVector<f64>) -> f64 {
+        self.image(step)
+            .map(|(_, image)| image.norm_squared())
+            .sum::<f64>()
+            .sqrt()
+    }
+}
+
+/// Fits a session at given strengths: descents with the moves' weights held, renewed until they no longer move it.
+///
+/// # Errors
+/// When the start cannot be evaluated or nothing determines a row's weight.
+pub fn fit(
+    session: &Session,
+    start: State,
+    strengths: Strengths,
+    distortion: &Distortion,
+) -> Result<Fit> {
+    let options = Options {
+        step_tolerance: STEP_TOLERANCE,
+        gradient_tolerance: 1e-14,
+        max_iterations: 50,
+        ..Options::default()
+    };
+    let mut state = start;
+    let mut iterations = 0;
+    for renewal in 0.. {
+        let (weights, _) = session.weigh(&state, distortion)?;
+        let held = Held {
+            session,
+            distortion,
+            strengths,
+            weights: &weights,
+        };
+        let ended = descend(&held, state, &options)?;
+        iterations += ended.iterations;
+        state = ended.point;
+        let is_settled = ended.iterations == 1 || session.moves.is_empty();
+        if is_settled || renewal >= RENEWALS {
+            let factor = ended.local.chain.factor(RIDGE, None)?;
+            return Ok(Fit {
+                state,
+                strengths,
+                distortion: distortion.clone(),
+                weights,
+                passed: ended.local.passed,
+                groups: ended.local.groups,
+                chain: ended.local.chain,
+                factor,
+                stop: ended.stop,
+                iterations,
+                step: ended.step,
+                gradient: ended.gradient,
+            });
+        }
+    }
+    unreachable!("the loop returns at its last renewal")
+}
+
+/// Fits a session with the strengths of its processes chosen by marginal likelihood (11.12).
+///
+/// Only rows of the processes depend on a strength, each in proportion: the evidence of every strength follows from the
+/// rows already made, in time linear in the poses.
+///
+/// # Errors
+/// As [`fit`].
+pub fn tune(
+    session: &Session,
+    start: State,
+    strengths: Strengths,
+    distortion: &Distortion,
+) -> Result<Fit> {
+    let first = fit(session, start, strengths, distortion)?;
+    let best = Evidence::of(&first).search(session);
+    if best == first.strengths {
+        return Ok(first);
+    }
+    fit(session, first.state, best, distortion)
+}
+
+/// Normal equations by process, ready to be weighed anew.
+struct Evidence {
+    at: Strengths,
+    fixed: Chain,
+    fixed_side: DMatrix<f64>,
+    fixed_sum: f64,
+    process: Vec<(Chain, DMatrix<f64>, f64, usize)>,
+}
+
+impl Evidence {
+    fn of(fit: &Fit) -> Self {
+        let layout = fit.layout();
+        let part = |process: Option<usize>| {
+            let groups: Vec<Group> = fit
+                .groups
+                .iter()
+                .filter(|group| group.kind.process() == process)
+                .cloned()
+                .collect();
+            let chain = Chain::of(layout, groups.iter().map(|group| &group.rows));
+            let n = groups.iter().map(|group| group.rows.len()).sum();
+            (chain, gradient(layout, &groups), chi2_of(&groups), n)
+        };
+        let (fixed, fixed_side, fixed_sum, _) = part(None);
+        Self {
+            at: fit.strengths,
+            fixed,
+            fixed_side,
+            fixed_sum,
+            process: (0..N_PROCESSES).map(|p| part(Some(p))).collect(),
+        }
+    }
+
+    /// Log-evidence at other strengths, from the linear problem here.
+    fn at(&self, strengths: &Strengths) -> f64 {
+        let factors = [
+            strengths.corner_s[0] / self.at.corner_s[0],
+            strengths.corner_s[1] / self.at.corner_s[1],
+            self.at.scatter[0] / strengths.scatter[0],
+            self.at.scatter[1] / strengths.scatter[1],
+        ];
+        let mut chain = self.fixed.clone();
+        let mut side = self.fixed_side.clone();
+        let mut sum = self.fixed_sum;
+        let mut weight = 0.0;
+        for ((part, part_side, part_sum, n), factor) in self.process.iter().zip(factors) {
+            let squared = factor * factor;
+            chain.add_scaled(part, squared);
+            side += part_side * squared;
+            sum += part_sum * squared;
+            weight += *n as f64 * factor.ln();
+        }
+        let Ok(factor) = chain.factor(RIDGE, None) else {
+            return f64::NEG_INFINITY;
+        };
+        let chi2 = sum - side.dot(&factor.solve(&side));
+        -0.5 * chi2 - 0.5 * factor.log_det() + weight
+    }
+
+    /// One process after the other until none moves.
+    fn search(&self, session: &Session) -> Strengths {
+        let has_rate = session.rate.is_some();
+        let mut best = self.at;
+        if session.scatter.is_some() {
+            best.scatter = [NO_SCATTER; 2];
+        }
+        self.search_corners(&mut best, has_rate);
+        if session.scatter.is_none() {
+            return best;
+        }
+        let none = self.at(&best);
+        for sensor in 0..if has_rate { 2 } else { 1 } {
+            let mut tried = best;
+            for _ in 0..2 {
+                self.search_scatter(&mut tried, sensor);
+                self.search_corners(&mut tried, has_rate);
+            }
+            let base = if best.scatter == [NO_SCATTER; 2] {
+                none
+            } else {
+                self.at(&best)
+            };
+            if 2.0 * (self.at(&tried) - base) > SCATTER_GATE {
+                best = tried;
+            }
+        }
+        best
+    }
+
+    fn search_corners(&self, best: &mut Strengths, has_rate: bool) {
+        // One sensor after the other, and the first again: their walks hardly meet in a row.
+        for sensor in [0, 1, 0] {
+            if sensor == 1 && !has_rate {
+                continue;
+            }
+            let values = CORNER_GRID_S.map(|corner| {
+                let mut tried = *best;
+                tried.corner_s[sensor] = corner;
+                (self.at(&tried), corner)
+            });
+            if let Some((_, corner)) = values.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                best.corner_s[sensor] = corner;
+            }
+        }
+    }
+
+    fn search_scatter(&self, best: &mut Strengths, sensor: usize) {
+        let values = (0..N_SCATTER).map(|k| {
+            let mut tried = *best;
+            tried.scatter[sensor] = SCATTER_FROM * SCATTER_RATIO.powi(k);
+            (self.at(&tried), tried.scatter[sensor])
+        });
+        if let Some((_, scatter)) = values.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            best.scatter[sensor] = scatter;
+        }
+    }
+}
