@@ -46,14 +46,20 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     names: dict[tuple[str, str], list[str]] = {}
     # What pymavlink meets on the way it prints on stderr; that it skipped damaged bytes is a finding.
     said = io.StringIO()
+    # Made before it is filled, so that its file can be closed when it gives up while it is filled.
+    log: Any = DFReader.DFReader_binary.__new__(DFReader.DFReader_binary)
     try:
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), _quiet():
-            log = DFReader.DFReader_binary(str(path))
+            log.__init__(str(path))
             while (message := log.recv_match(type=_TYPES)) is not None:
                 _keep(message, rows, names)
     # pymavlink answers damage with whatever its unpacking met.
     except Exception as error:
         raise ReadError(f"{path}: pymavlink cannot read this log ({first_line(error)}); copy it again.") from None
+    finally:
+        for name in ("data_map", "filehandle"):
+            if hasattr(log, name):
+                getattr(log, name).close()
     imu = [Stream("IMU", len(r), i) for (t, i), r in sorted(rows.items()) if t == "IMU"]
     raw = [Stream("ACC", len(r), i) for (t, i), r in sorted(rows.items()) if t == "ACC" and ("GYR", i) in rows]
     streams = imu + raw

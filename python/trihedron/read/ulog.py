@@ -41,8 +41,9 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     _check_definitions(path)
     try:
         # pyulog prints what it meets; stdout belongs to results.
-        with contextlib.redirect_stdout(io.StringIO()):
-            log = ULog(str(path), _TOPICS)
+        # The stream is ours, because pyulog leaves its own open when it gives up.
+        with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as stream:
+            log = ULog(stream, _TOPICS)
     # pyulog answers damage with whatever its unpacking met.
     except Exception as error:
         raise ReadError(f"{path}: pyulog cannot read this log ({first_line(error)}); copy it again.") from None
