@@ -8,9 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 
-from trihedron.files.export import TARGETS, export_calibration, upper_frame
-from trihedron.records import Calibration, SensorCalibration
+from trihedron.cli import main
+from trihedron.files.calibration import write_calibration
+from trihedron.files.export import (
+    TARGETS,
+    ExportOptions,
+    NoiseFigure,
+    SensorNoise,
+    export_calibration,
+    export_files,
+    upper_frame,
+)
+from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
 from trihedron.sensor_model import in_frame
 
 READINGS = np.random.default_rng(5).normal(size=(40, 3)) * 8.0
@@ -63,90 +74,246 @@ def test_python_snippet_runs_and_agrees(handed):
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler on this machine")
-def test_c_snippet_compiles_without_warnings_and_agrees(tmp_path):
+@pytest.mark.parametrize(
+    ("suffix", "real", "tolerance"), [("", "double", ROUNDING), ("_f", "float", {"rtol": 0, "atol": 1e-5})]
+)
+def test_c_header_compiles_without_warnings_and_agrees(tmp_path, suffix, real, tolerance):
     known = calibration("counts")
-    main = """
+    main_c = f"""
     #include <stdio.h>
-    int main(void) {
-        double r[3], f[3], w[3];
-        while (scanf("%lf %lf %lf", r, r + 1, r + 2) == 3) {
-            trihedron_correct(&trihedron_accelerometer, r, f);
-            trihedron_correct(&trihedron_gyroscope, r, w);
+    #include "calibration.h"
+    #include "calibration.h"
+    int main(void) {{
+        double in[3]; {real} r[3], f[3], w[3]; int i;
+        while (scanf("%lf %lf %lf", in, in + 1, in + 2) == 3) {{
+            for (i = 0; i < 3; ++i) r[i] = ({real})in[i];
+            trihedron_correct{suffix}(&trihedron_accelerometer{suffix}, r, f);
+            trihedron_correct{suffix}(&trihedron_gyroscope{suffix}, r, w);
             printf("%.17g %.17g %.17g %.17g %.17g %.17g\\n", f[0], f[1], f[2], w[0], w[1], w[2]);
-        }
+        }}
         return 0;
-    }
+    }}
     """
+    (tmp_path / "calibration.h").write_text(export_calibration(known, "c"))
     source = tmp_path / "main.c"
-    source.write_text(export_calibration(known, "c") + main)
-    build = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", str(source), "-o", str(tmp_path / "main")]
-    subprocess.run(build, check=True, capture_output=True)
+    source.write_text(main_c)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+    subprocess.run(["cc", *flags, str(source), "-o", str(tmp_path / "main")], check=True, capture_output=True)
     rows = "\n".join(" ".join(repr(float(v)) for v in row) for row in READINGS)
     done = subprocess.run([tmp_path / "main"], input=rows, capture_output=True, text=True, check=True)
     out = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
-    np.testing.assert_allclose(out[:, :3], corrected(known.accelerometer), **ROUNDING)
-    np.testing.assert_allclose(out[:, 3:], corrected(known.gyroscope), **ROUNDING)
+    # Single precision: 6e-8 of numbers below 30, a few of them summed.
+    np.testing.assert_allclose(out[:, :3], corrected(known.accelerometer), **tolerance)
+    np.testing.assert_allclose(out[:, 3:], corrected(known.gyroscope), **tolerance)
 
 
-@pytest.mark.parametrize("handed", [1.0, -1.0])
-def test_kalibr_distorts_truth_into_the_readings(handed):
-    """a_m = M a + b; w_m = M C_gyro_i w + A a + b, M lower triangular, C a rotation."""
-    known = calibration("counts", handed)
-    text = export_calibration(known, "kalibr")
-    rows = [numbers(line) for line in text.splitlines() if line.strip().startswith("- [")]
-    biases = [numbers(line.split("#")[0]) for line in text.splitlines() if line.strip().startswith("b:")]
-    M_a, M_w, A, C = (np.array(rows[3 * k : 3 * k + 3]) for k in range(4))
-    assert np.allclose(M_a, np.tril(M_a))
-    assert np.allclose(M_w, np.tril(M_w))
-    np.testing.assert_allclose(C @ C.T, np.eye(3), atol=1e-12)
-    assert np.linalg.det(C) > 0
-    assert not A.any()
+@pytest.mark.skipif(shutil.which("rustc") is None, reason="no Rust compiler on this machine")
+def test_rust_module_compiles_without_warnings_and_agrees(tmp_path):
+    known = calibration("counts")
+    (tmp_path / "calibration.rs").write_text(export_calibration(known, "rust"))
+    (tmp_path / "bare.rs").write_text("#![no_std]\n#![deny(warnings)]\npub mod calibration;\n")
+    (tmp_path / "main.rs").write_text(
+        """#![deny(warnings)]
+        mod calibration;
+        fn main() {
+            for line in std::io::stdin().lines() {
+                let v: Vec<f64> = line.unwrap().split_whitespace().map(|w| w.parse().unwrap()).collect();
+                let raw = [v[0], v[1], v[2]];
+                println!("{:?} {:?}", calibration::ACCELEROMETER.correct(raw), calibration::GYROSCOPE.correct(raw));
+            }
+        }"""
+    )
+    build = ["rustc", "--edition", "2021", "--out-dir", str(tmp_path)]
+    subprocess.run([*build, "--crate-type", "lib", str(tmp_path / "bare.rs")], check=True, capture_output=True)
+    subprocess.run([*build, str(tmp_path / "main.rs")], check=True, capture_output=True)
+    rows = "\n".join(" ".join(repr(float(v)) for v in row) for row in READINGS[:5])
+    done = subprocess.run([tmp_path / "main"], input=rows, capture_output=True, text=True, check=True)
+    out = np.array([numbers(line) for line in done.stdout.splitlines()])
+    np.testing.assert_allclose(out[:, :3], corrected(known.accelerometer)[:5], **ROUNDING)
+    np.testing.assert_allclose(out[:, 3:], corrected(known.gyroscope)[:5], **ROUNDING)
+
+
+NOISE = ExportOptions(
+    SensorNoise(NoiseFigure(2e-3), NoiseFigure(4e-5, is_limit=True)),
+    SensorNoise(NoiseFigure(1e-4), NoiseFigure(2e-6)),
+    rate_hz=200.0,
+    topic="/imu",
+)
+SIX = (
+    "accelerometer_noise_density", "accelerometer_random_walk", "gyroscope_noise_density", "gyroscope_random_walk",
+    "update_rate", "rostopic",
+)  # fmt: skip
+
+
+def with_g_sensitivity(known):
+    G = 1e-3 * np.array([[1.0, -2.0, 0.5], [0.3, 0.7, -1.1], [2.0, 0.0, -0.4]])
+    parameters = [{"name": f"G_{i}{j}", "value": G[a, b]} for a, i in enumerate("xyz") for b, j in enumerate("xyz")]
+    effects = [{"id": "gyro-g-sensitivity", "parameters": parameters}]
+    return replace(known, extensions={"effects": effects}), G
+
+
+@pytest.mark.parametrize("mirrored", ["none", "both", "gyro", "swapped"])
+def test_kalibr_distorts_truth_into_the_readings(mirrored):
+    """a_m = M a + b; w_m = M C_gyro_i w + A C_gyro_i a + b, M lower triangular, C a proper rotation always."""
+    known = calibration("si", -1.0 if mirrored == "both" else 1.0)
+    if mirrored in ("gyro", "swapped"):
+        turn = np.diag([1.0, -1.0, 1.0]) if mirrored == "gyro" else np.eye(3)[[1, 0, 2]]
+        known = replace(known, gyroscope=replace(known.gyroscope, S=known.gyroscope.S @ turn))
+    known, G = with_g_sensitivity(known)
+    document = yaml.safe_load(export_calibration(known, "kalibr", NOISE))
+    assert set(SIX) <= set(document)
+    M_a, b_a = np.array(document["accelerometers"]["M"]), np.array(document["accelerometers"]["b"])
+    gyro = {key: np.array(value) for key, value in document["gyroscopes"].items()}
+    np.testing.assert_array_equal(M_a, np.tril(M_a))
+    np.testing.assert_array_equal(gyro["M"], np.tril(gyro["M"]))
+    np.testing.assert_allclose(gyro["C_gyro_i"] @ gyro["C_gyro_i"].T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(gyro["C_gyro_i"]) > 0.999
     force, rate = corrected(known.accelerometer), corrected(known.gyroscope)
-    np.testing.assert_allclose(force @ M_a.T + biases[0], READINGS, **ROUNDING)
-    np.testing.assert_allclose(rate @ (M_w @ C).T + biases[1], READINGS, **ROUNDING)
+    np.testing.assert_allclose(force @ M_a.T + b_a, READINGS, **ROUNDING)
+    C = gyro["C_gyro_i"]
+    measured = rate @ (gyro["M"] @ C).T + force @ (gyro["A"] @ C).T + gyro["b"]
+    # The gyro that follows specific force reads S⁻¹ (ω + G f - b).
+    np.testing.assert_allclose(measured, READINGS + force @ (np.linalg.inv(known.gyroscope.S) @ G).T, **ROUNDING)
+
+
+def test_openvins_corrects_the_readings():
+    """a = R_ACCtoIMU Da (a_m - b), ω = R_GYROtoIMU Dw (w_m - b - Tg a), with Da = Ta⁻¹, Dw = Tw⁻¹."""
+    known, G = with_g_sensitivity(calibration("si"))
+    text = export_calibration(known, "openvins", NOISE)
+    # OpenCV takes a comment behind a value for a sequence.
+    assert not [line for line in text.splitlines() if "#" in line and not line.strip().startswith("#")]
+    imu = yaml.safe_load(text.replace("%YAML:1.0", ""))["imu0"]
+    assert set(SIX) <= set(imu)
+    Tw, R, Ta, Tg = (np.array(imu[key]) for key in ("Tw", "R_IMUtoGYRO", "Ta", "Tg"))
+    b_a, b_w = (
+        np.array(numbers(re.search(rf"#   {name} \[(.*)\]", text)[1])) for name in ("accelerometer", "gyroscope")
+    )
+    force = corrected(known.accelerometer)
+    np.testing.assert_allclose((READINGS - b_a) @ np.linalg.inv(Ta).T, force, **ROUNDING)
+    readings = READINGS + force @ (np.linalg.inv(known.gyroscope.S) @ G).T
+    rate = (readings - b_w - force @ Tg.T) @ (R.T @ np.linalg.inv(Tw)).T
+    np.testing.assert_allclose(rate, corrected(known.gyroscope), **ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("target", "keys"), [("kalibr", SIX[:4]), ("vins-fusion", ("acc_n", "acc_w", "gyr_n", "gyr_w"))]
+)
+def test_noise_goes_into_the_file_and_an_absent_walk_as_a_limit_that_is_labelled(target, keys):
+    text = export_calibration(calibration("si"), target, NOISE)
+    document = yaml.safe_load(text.replace("%YAML:1.0", ""))
+    assert [document[key] for key in keys] == ([2e-3, 4e-5, 1e-4, 2e-6])
+    before = text.splitlines()[next(i for i, line in enumerate(text.splitlines()) if line.startswith(keys[1])) - 1]
+    assert "upper limit" in before
+    assert text.count("upper limit") == 1
+
+
+def test_ros_covariances_are_those_of_one_message():
+    document = yaml.safe_load(export_calibration(calibration("si"), "ros", NOISE))
+    np.testing.assert_allclose(np.reshape(document["linear_acceleration_covariance"], (3, 3)), np.eye(3) * 4e-6 * 200)
+    np.testing.assert_allclose(np.reshape(document["angular_velocity_covariance"], (3, 3)), np.eye(3) * 1e-8 * 200)
+    assert document["orientation_covariance"][0] == -1.0
+    with pytest.raises(ValueError, match="--noise"):
+        export_calibration(calibration("si"), "ros")
+
+
+def diagonal_only(known):
+    """The same calibration without misalignment: what an autopilot can hold."""
+    sensors = [replace(s, S=np.diag(np.diag(s.S))) for s in (known.accelerometer, known.gyroscope)]
+    return replace(known, accelerometer=sensors[0], gyroscope=sensors[1])
+
+
+def test_px4_subtracts_the_offset_then_scales():
+    known = diagonal_only(calibration("si"))
+    rows = [line.split("\t") for line in export_calibration(known, "px4").splitlines() if not line.startswith("#")]
+    values = {row[2]: float(row[3]) for row in rows}
+    offset = np.array([values[f"CAL_ACC0_{a}OFF"] for a in "XYZ"])
+    scale = np.array([values[f"CAL_ACC0_{a}SCALE"] for a in "XYZ"])
+    # Nine digits are written.
+    np.testing.assert_allclose((READINGS - offset) * scale, corrected(known.accelerometer), atol=1e-7)
+    offset = np.array([values[f"CAL_GYRO0_{a}OFF"] for a in "XYZ"])
+    np.testing.assert_allclose((READINGS - offset) * np.diag(known.gyroscope.S), corrected(known.gyroscope), atol=1e-7)
+
+
+def test_ardupilot_subtracts_the_offset_then_scales_and_counts_temperature_from_35_degrees():
+    known = diagonal_only(calibration("si"))
+    named = {"bias_per_kelvin_x": 2e-3, "bias_per_kelvin_z": -1e-3, "bias_per_kelvin2_x": 3e-5}
+    effect = {"id": "accel-thermal-bias", "parameters": [{"name": k, "value": v} for k, v in named.items()]}
+    known = replace(known, extensions={"effects": [effect], "references": {"temperature_degc": 22.0}})
+    lines = [
+        line.split(",") for line in export_calibration(known, "ardupilot").splitlines() if not line.startswith("#")
+    ]
+    values = {line[0]: float(line[1]) for line in lines if len(line) == 2}
+    offset = np.array([values[f"INS_ACCOFFS_{a}"] for a in "XYZ"])
+    scale = np.array([values[f"INS_ACCSCAL_{a}"] for a in "XYZ"])
+    np.testing.assert_allclose((READINGS - offset) * scale, corrected(known.accelerometer), atol=1e-7)
+    warm, cold = 50.0, 10.0
+    true = 2e-3 * (warm - cold) + 3e-5 * ((warm - 22.0) ** 2 - (cold - 22.0) ** 2)
+    c1, c2 = 1e-6 * values["INS_TCAL1_ACC1_X"], 1e-6 * values["INS_TCAL1_ACC2_X"]
+    made = c1 * (warm - cold) + c2 * ((warm - 35.0) ** 2 - (cold - 35.0) ** 2)
+    assert made == pytest.approx(true, rel=1e-6)
+
+
+@pytest.mark.parametrize("target", ["px4", "ardupilot"])
+def test_what_an_autopilot_cannot_hold_is_written_into_the_file_with_its_size(target):
+    known = calibration("si")
+    text = export_calibration(known, target)
+    # 0.006 of the accelerometer at 9.81 m/s² is 59 mm/s².
+    assert re.search(r"% of the accelerometer's is lost, 5\d(\.\d)? mm/s\^2 at 1 g", text)
+    assert "gyro scale" in text
 
 
 @pytest.mark.parametrize("handed", [1.0, -1.0])
-def test_imu_tk_subtracts_the_zero_then_scales_then_aligns(handed):
-    """x = T K (raw - B) in its own frame, which is ours turned by the rotation that the file states."""
+def test_imu_tk_reads_its_numbers_from_the_first_character_on(handed):
+    """x = T K (raw - B), in our frame turned by the rotation that the file states; one file a sensor."""
     known = calibration("counts", handed)
-    text = export_calibration(known, "imu_tk")
     rotation, _ = upper_frame(known)
     assert np.linalg.det(rotation) > 0
-    body = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    values = [[float(v) for v in line.split()] for line in body]
-    for k, sensor in enumerate((known.accelerometer, known.gyroscope)):
-        part = values[9 * k : 9 * k + 9]
-        T, K, B = np.array(part[:3]), np.array(part[3:6]), np.array(part[6:9]).ravel()
+    files = export_files(known, "imu_tk")
+    assert set(files) == {"_acc.calib", "_gyro.calib"}
+    for ending, sensor in (("_acc.calib", known.accelerometer), ("_gyro.calib", known.gyroscope)):
+        # As its reader does: 3 x 3, 3 x 3 and 3 x 1 numbers, white space between, nothing else before the last.
+        words = files[ending].split()[:21]
+        values = np.array([float(word) for word in words])
+        T, K, B = values[:9].reshape(3, 3), values[9:18].reshape(3, 3), values[18:]
         np.testing.assert_array_equal(np.diag(T), 1.0)
-        if k == 0:
+        if ending == "_acc.calib":
             np.testing.assert_array_equal(T, np.triu(T))
         np.testing.assert_allclose((READINGS - B) @ (T @ K).T, corrected(sensor) @ rotation.T, **ROUNDING)
 
 
-def test_basalt_subtracts_the_zero_after_the_matrix():
+def test_basalt_subtracts_the_zero_after_the_matrix_and_has_noise_and_rate():
     """(I + M) raw - b with M by columns, its lower triangle for the accelerometer."""
     known = calibration()
-    document = json.loads(export_calibration(known, "basalt"))
+    document = json.loads(export_calibration(known, "basalt", NOISE))["value0"]
     a, w = np.array(document["calib_accel_bias"]), np.array(document["calib_gyro_bias"])
     M = np.array([[a[3], 0, 0], [a[4], a[6], 0], [a[5], a[7], a[8]]])
     np.testing.assert_allclose(READINGS @ (np.eye(3) + M).T - a[:3], corrected(known.accelerometer), **ROUNDING)
     M = w[3:].reshape(3, 3).T
     np.testing.assert_allclose(READINGS @ (np.eye(3) + M).T - w[:3], corrected(known.gyroscope), **ROUNDING)
+    assert (document["imu_update_rate"], document["accel_noise_std"], document["gyro_bias_std"]) == (
+        200.0, [2e-3] * 3, [2e-6] * 3,
+    )  # fmt: skip
 
 
-def test_basalt_refuses_readings_that_are_not_si():
-    with pytest.raises(ValueError, match="Basalt expects raw readings in m/s"):
-        export_calibration(calibration("counts"), "basalt")
+@pytest.mark.parametrize("target", ["basalt", "kalibr", "openvins", "px4", "ardupilot"])
+def test_counts_are_refused_or_converted_by_the_size_of_a_count(target):
+    known = calibration("counts")
+    with pytest.raises(ValueError, match="--accel-lsb"):
+        export_calibration(known, target)
+    options = ExportOptions(accel_lsb="0.001 m/s^2", gyro_lsb="0.001 rad/s")
+    # Counts of 1e-3 SI and S of 1e-3 SI per count are the calibration of SI readings.
+    left, right = (numbers(export_calibration(k, target, o)) for k, o in ((known, options), (calibration(), None)))
+    np.testing.assert_allclose(left, right, rtol=1e-6, atol=1e-12)
 
 
-def test_xio_scales_the_difference_then_aligns():
+def test_xio_scales_the_difference_then_aligns_to_g_and_degrees():
     known = calibration("counts")
     parts = assignments(export_calibration(known, "xio"))
-    for name, sensor in (("accelerometer", known.accelerometer), ("gyroscope", known.gyroscope)):
+    wanted = (("accelerometer", known.accelerometer, 1 / 9.80665), ("gyroscope", known.gyroscope, 180 / np.pi))
+    for name, sensor, unit in wanted:
         M = parts[f"{name}Misalignment"].reshape(3, 3)
         s, b = parts[f"{name}Sensitivity"], parts[f"{name}Offset"]
-        np.testing.assert_allclose((s * (READINGS - b)) @ M.T, corrected(sensor), **ROUNDING)
+        np.testing.assert_allclose((s * (READINGS - b)) @ M.T, unit * corrected(sensor), **ROUNDING)
 
 
 def test_pyins_distorts_truth_into_the_readings():
@@ -161,18 +328,61 @@ def test_pyins_distorts_truth_into_the_readings():
 def test_every_export_says_when_the_calibration_is_not_to_be_trusted_or_has_no_gyro(target):
     known = calibration()
     alone = replace(known, gyroscope=None, covariance=np.zeros((12, 12)))
-    assert export_calibration(alone, target)
+    assert export_calibration(alone, target, NOISE)
+    serious = Finding(FindingCode.NOT_CONVERGED, Severity.SERIOUS, "it did not settle.")
+    assert "NOT TO BE TRUSTED" in export_calibration(replace(known, findings=(serious,)), target, NOISE)
 
 
 def test_a_symmetric_frame_is_turned_before_a_triangular_convention_is_written():
-    known = in_frame(calibration("counts"), "symmetric")
-    text = export_calibration(known, "kalibr")
-    rows = [numbers(line) for line in text.splitlines() if line.strip().startswith("- [")]
+    known = in_frame(calibration("si"), "symmetric")
+    M = np.array(yaml.safe_load(export_calibration(known, "kalibr"))["accelerometers"]["M"])
     lower = in_frame(known, "lower")
-    M = np.array(rows[:3])
     np.testing.assert_allclose(M, np.linalg.inv(lower.accelerometer.S), **ROUNDING)
 
 
 def test_an_unknown_target_is_answered_with_the_list():
     with pytest.raises(ValueError, match="kalibr"):
         export_calibration(calibration(), "floppy")
+
+
+@pytest.mark.parametrize("target", sorted(TARGETS))
+def test_a_singular_matrix_is_no_calibration(target):
+    known = calibration()
+    S = known.accelerometer.S.copy()
+    S[:, 2] = 1.001 * S[:, 1]
+    with pytest.raises(ValueError, match="singular"):
+        export_calibration(replace(known, accelerometer=replace(known.accelerometer, S=S)), target, NOISE)
+
+
+def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path, capsys):
+    file = tmp_path / "c.json"
+    write_calibration(calibration("counts"), file)
+    assert main(["export", str(file), "--to", "imu_tk", "-o", str(tmp_path / "unit.calib")]) == 0
+    assert {p.name for p in tmp_path.glob("*.calib")} == {"unit_acc.calib", "unit_gyro.calib"}
+    assert main(["export", str(file), "--to", "imu_tk", "-o", str(tmp_path / "unit.calib")]) == 1
+    assert "unit_acc.calib" in capsys.readouterr().err
+    assert main(["export", str(file), "--to", "px4", "--accel-lsb", "0.1 mg", "--gyro-lsb", "0.01 deg/s"]) == 0
+    assert "is lost" in capsys.readouterr().err
+
+
+def test_noise_of_a_rest_log_goes_from_allan_into_the_export(tmp_path, capsys):
+    rng = np.random.default_rng(3)
+    t = np.arange(60_000) / 100.0
+    readings = np.hstack(
+        [1e-2 * rng.standard_normal((len(t), 3)) + [0, 0, 9.81], 1e-3 * rng.standard_normal((len(t), 3))]
+    )
+    table = np.column_stack([t, readings])
+    head = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
+    np.savetxt(tmp_path / "rest.csv", table, delimiter=",", header=head, comments="", fmt="%.9g")
+    assert main(["allan", str(tmp_path / "rest.csv"), "--json", str(tmp_path / "allan.json")]) == 0
+    file = tmp_path / "c.json"
+    write_calibration(calibration("si"), file)
+    capsys.readouterr()
+    assert main(["export", str(file), "--to", "kalibr", "--noise", str(tmp_path / "allan.json")]) == 0
+    document = yaml.safe_load(capsys.readouterr().out)
+    # White noise of 1e-2 at 100 Hz is 1e-3 per √Hz; 60 000 samples know it to 0.3 %.
+    assert document["accelerometer_noise_density"] == pytest.approx(1e-3, rel=0.02)
+    assert document["gyroscope_noise_density"] == pytest.approx(1e-4, rel=0.02)
+    assert document["update_rate"] == pytest.approx(100.0, rel=1e-3)
+    assert main(["export", str(file), "--to", "kalibr", "--noise", str(file)]) == 1
+    assert "trihedron allan --json" in capsys.readouterr().err

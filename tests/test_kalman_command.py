@@ -9,7 +9,7 @@ import trihedron
 from trihedron.cli import main
 from trihedron.read import ReadError, read_axis_noise
 from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise
-from trihedron.simulate import Accelerometer, Clock, NoiseTerms, Scenario, dividing_head, long_rest, simulate
+from trihedron.simulate import Accelerometer, Adc, Clock, NoiseTerms, Scenario, dividing_head, long_rest, simulate
 
 S_TRUE = ((0.98, 0.01, -0.02), (0.005, 1.03, 0.008), (-0.01, 0.012, 0.99))
 B_TRUE = (0.2, -0.3, 0.1)
@@ -86,6 +86,38 @@ def test_the_noise_may_be_a_log_of_rest(session, tmp_path, capsys):
         # 30 000 samples tell N to 0.4 %; the walk, seen over 20 minutes, to about 15 %.
         assert axis["noise"]["white"] == pytest.approx(0.01, rel=0.03)
         assert axis["noise"]["walk"] == pytest.approx(0.001, rel=0.6)
+
+
+def rest_log(path, **accelerometer):
+    scenario = Scenario(
+        motion=long_rest(600.0), accelerometer=Accelerometer(**accelerometer), clock=Clock(rate_hz=25.0)
+    )
+    rest = simulate(scenario, seed=3)[0]
+    rows = np.column_stack([rest.time_s, rest.accelerometer])
+    np.savetxt(path, rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.9g")
+    return path
+
+
+@pytest.mark.parametrize("noise", [0.01 / 28, 0.0025, 0.1])
+def test_a_log_of_rest_with_the_noise_of_another_converter_is_refused(session, tmp_path, capsys, noise):
+    rest = rest_log(tmp_path / "rest.csv", noise=NoiseTerms(N=(noise,) * 3))
+    assert run(session, "--reference", session / "angles.csv", "--noise", rest) == 1
+    said = capsys.readouterr().err
+    assert "another converter" in said
+    assert "accelerometer x" in said
+
+
+def test_a_log_of_rest_in_finer_steps_than_the_session_is_refused(session, tmp_path, capsys):
+    accelerometer = Accelerometer(S=S_TRUE, b=B_TRUE, noise=NoiseTerms(N=(1e-4,) * 3), adc=Adc(lsb=0.05))
+    scenario = Scenario(motion=dividing_head(), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
+    recording = simulate(scenario, seed=4)[0]
+    log = tmp_path / "coarse.csv"
+    rows = np.column_stack([recording.time_s, recording.accelerometer])
+    np.savetxt(log, rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.7g")
+    rest = rest_log(tmp_path / "rest.csv", noise=NoiseTerms(N=(1e-4,) * 3))
+    words = ["kalman", log, "--reference", session / "angles.csv", "--gravity", "9.80665", "--noise", rest]
+    assert main([*map(str, words)]) == 1
+    assert "steps of 0.05" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

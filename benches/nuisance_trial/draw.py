@@ -172,6 +172,12 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
     accel = force @ A.T + zero_a + rng.normal(size=(n, 3)) * accel_sigma
     gyro = rate @ W.T + zero_g + rng.normal(size=(n, 3)) * gyro_sigma
     if weak_1_over_f:
+        accel_sigma, gyro_sigma = (
+            rng.uniform(0.8e-3, 2e-3) * rate_hz**0.5,
+            rng.uniform(0.004, 0.01) * DEG * rate_hz**0.5,
+        )
+        accel = force @ A.T + zero_a + rng.normal(size=(n, 3)) * accel_sigma
+        gyro = rate @ W.T + zero_g + rng.normal(size=(n, 3)) * gyro_sigma
         accel += _flicker(rng, n, 0.0003 * G)
         gyro += _flicker(rng, n, 20.0 * DEG / 3600.0)
     lsb_a, lsb_g = (accel_sigma * rng.uniform(0.5, 1.6), gyro_sigma * rng.uniform(0.5, 1.6)) if here["coarse"] else (

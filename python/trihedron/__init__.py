@@ -44,7 +44,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from trihedron.estimate.noise import allan_deviation, identify_noise
     from trihedron.files.calibration import read_calibration, write_calibration
-    from trihedron.pipeline import apply, calibrate, check, diagnose, kalman, noise, read, segment, verify
+    from trihedron.pipeline import apply, calibrate, check, diagnose, export, kalman, noise, read, segment, verify
     from trihedron.records import Calibration, Finding, Recording, Segments
     from trihedron.records.diagnosis import Diagnosis
 
@@ -59,6 +59,7 @@ __all__ = [
     "calibrate",
     "check",
     "diagnose",
+    "export",
     "identify_noise",
     "kalman",
     "noise",
@@ -69,7 +70,7 @@ __all__ = [
     "write_calibration",
 ]
 
-_VERBS = ("apply", "calibrate", "check", "diagnose", "kalman", "noise", "read", "segment", "verify")
+_VERBS = ("apply", "calibrate", "check", "diagnose", "export", "kalman", "noise", "read", "segment", "verify")
 _ROOMS = ("capture",)
 """Rooms of which people use more than one name: ``trihedron.capture.Recorder``."""
 _HOME = dict.fromkeys(_VERBS, "trihedron.pipeline")

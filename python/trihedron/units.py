@@ -101,6 +101,11 @@ def mg_from_m_s2(acceleration_m_s2: float) -> float:
     return 1000.0 * acceleration_m_s2 / STANDARD_GRAVITY_M_S2
 
 
+def m_s2_from_micro_g(acceleration_micro_g: float) -> float:
+    """Acceleration in millionths of standard gravity → m/s²."""
+    return 1e-6 * acceleration_micro_g * STANDARD_GRAVITY_M_S2
+
+
 def mm_s2_from_m_s2(acceleration_m_s2: float) -> float:
     """Acceleration, m/s² → mm/s²."""
     return 1000.0 * acceleration_m_s2

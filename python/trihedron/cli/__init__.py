@@ -22,6 +22,7 @@ from trihedron.cli.demo import demo
 from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
 from trihedron.cli.kalman import kalman
+from trihedron.cli.plan import plan
 from trihedron.cli.ports import ports
 from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
@@ -30,6 +31,7 @@ from trihedron.cli.verify import verify
 # In the order in which they are used.
 COMMANDS = (
     demo,
+    plan,
     ports,
     capture,
     check,

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.checking import check
     from trihedron.pipeline.choices import settle_gravity
     from trihedron.pipeline.diagnosing import diagnose, extend
+    from trihedron.pipeline.exporting import export
     from trihedron.pipeline.filtering import KalmanResult, kalman
     from trihedron.pipeline.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
     from trihedron.pipeline.improving import driven, improve
@@ -31,6 +32,7 @@ __all__ = [
     "check",
     "diagnose",
     "driven",
+    "export",
     "extend",
     "improve",
     "kalman",
@@ -56,6 +58,7 @@ _HOME = {
     "settle_gravity": "trihedron.pipeline.choices",
     "diagnose": "trihedron.pipeline.diagnosing",
     "extend": "trihedron.pipeline.diagnosing",
+    "export": "trihedron.pipeline.exporting",
     "KalmanResult": "trihedron.pipeline.filtering",
     "kalman": "trihedron.pipeline.filtering",
     "noise": "trihedron.pipeline.identifying",

@@ -10,9 +10,12 @@ from trihedron.estimate.kalman import (
     NormFrame,
     calibrate_session,
     calibrate_session_without_references,
+    check_same_converter,
     noise_from_identified,
 )
-from trihedron.estimate.noise import identify_noise
+from trihedron.estimate.noise import identify_noise, noise_of_holds
+from trihedron.estimate.noise.holds import SHORTEST as SHORTEST_HOLD
+from trihedron.estimate.noise.resolution import converter_step
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import Progress, segment
 from trihedron.read import read_axis_noise, read_pose_table, read_recording
@@ -98,8 +101,10 @@ def kalman(
     table = reference
     if isinstance(table, str | os.PathLike):
         table = read_pose_table(table, gravity_m_s2=gravity, sigma_angle_deg=sigma_angle_deg)
-    given, noted = _settle_noise(noise, recording)
+    given, noted, identified = _settle_noise(noise, recording)
     segments = segment(recording, progress=progress) if segments is None else segments
+    if identified and isinstance(given, Sequence):
+        _check_converter(given, recording, segments)
     outcome: KalmanCalibration | NormKalmanCalibration
     if table is None:
         outcome = calibrate_session_without_references(
@@ -124,17 +129,32 @@ def kalman(
 
 def _settle_noise(
     noise: NoiseSource | None, recording: Recording
-) -> tuple[AxisNoise | Sequence[AxisNoise] | None, tuple[Finding, ...]]:
-    """Noise in raw units, and what was noticed while it was identified."""
+) -> tuple[AxisNoise | Sequence[AxisNoise] | None, tuple[Finding, ...], bool]:
+    """Noise in raw units, what was noticed while it was identified, and whether it was identified from a log."""
     if isinstance(noise, str | os.PathLike):
         if os.fspath(noise).lower().endswith(".json"):
-            return read_axis_noise(noise), ()
+            return read_axis_noise(noise), (), False
         noise = _identify(read_recording(noise))
     if isinstance(noise, Noise):
         noticed = [*noise.findings, *(finding for axis in noise.axes for finding in axis.findings)]
         weighty = tuple(finding for finding in noticed if finding.severity is not Severity.NOTE)
-        return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty
-    return noise, ()
+        return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty, True
+    return noise, (), False
+
+
+def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments: Segments) -> None:
+    """Refuse the noise of a log of rest that another converter wrote."""
+    readings = recording.accelerometer
+    if readings is None or not segments.holds:
+        return
+    windows = [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= SHORTEST_HOLD]
+    if not windows:
+        return
+    inside = noise_of_holds(readings, recording.rate_hz, windows)
+    # Codes between the poses count too: inside a hold a coarse converter shows one.
+    steps = [converter_step(readings[:, axis]) for axis in range(3)]
+    octaves = [axis.octaves for axis in inside]
+    check_same_converter(given, steps, octaves, recording.rate_hz, recording.source)
 
 
 def _identify(rest: Recording) -> Noise:

@@ -18,11 +18,14 @@ from trihedron.read.errors import ReadError
 from trihedron.read.memory import table_of
 from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
-from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of
+from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import FloatArray, Progress, Table
 from trihedron.records import Finding, FindingCode, Recording, Severity
 from trihedron.units import AccelerationUnit, RateUnit
+
+STAMPS = "stamps as logged [s]"
+"""Name under which stamps that gave way to an even clock are kept."""
 
 
 # Absurd readings (1e300) overflow squares; they then fail every test of plausibility, which is what they should.
@@ -148,11 +151,12 @@ def audited(
     progress: Progress | None,
 ) -> Recording:
     """Units settled, clock and readings audited, rows accounted for: a record."""
+    sensors = settled(sensors)
     findings = list(sensors.findings)
     _accounted(sensors, findings)
     time_s, table = sensors.time_s, sensors.table
     n = len(time_s)
-    rate = mean_rate_hz(time_s)
+    rate = _rate_hz(sensors)
     present = {
         name: triad
         for name, triad in (("accelerometer", sensors.accelerometer), ("gyroscope", sensors.gyroscope))
@@ -181,7 +185,7 @@ def audited(
         gyr_unit = RateUnit(judged.unit)
         findings += judged.findings
     if sensors.has_clock:
-        findings += audit_timing(time_s, rate, sensors.place)
+        findings += audit_timing(time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.stamps_s)
     counter = sensors.columns.counter
     if counter is not None:
         findings += audit_counter(_kept(sensors, counter, n), table.label(counter), sensors.place)
@@ -209,10 +213,19 @@ def audited(
         source=source,
         sha256=sha256,
         findings=tuple(findings),
+        sampling=sensors.sampling,
         auxiliary=MappingProxyType(_auxiliary(sensors, n)),
         rows_in_file=sensors.rows_in_file,
         rows_read=sensors.rows_read,
     )
+
+
+def _rate_hz(sensors: Sensors) -> float:
+    """Samples per second: of the clock behind the stamps where losses can be told on it, else of the rows."""
+    sampling = sensors.sampling
+    if sampling.period_s > 0.0 and (sampling.counts_losses or sampling.is_even):
+        return 1.0 / sampling.period_s
+    return mean_rate_hz(sensors.time_s)
 
 
 def _kept(sensors: Sensors, column: int, n: int) -> FloatArray:
@@ -234,4 +247,8 @@ def _auxiliary(sensors: Sensors, n: int) -> dict[str, FloatArray]:
         kept = np.array(_kept(sensors, i, n))
         kept.setflags(write=False)
         out[key] = kept
+    if sensors.stamps_s is not None:
+        stamps = np.array(sensors.stamps_s)
+        stamps.setflags(write=False)
+        out[STAMPS] = stamps
     return out

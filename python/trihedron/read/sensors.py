@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz
+from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz, settle_clock
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
@@ -18,7 +18,8 @@ from trihedron.read.names import parse_name
 from trihedron.read.rest import is_integer
 from trihedron.read.sensing import WHOLE, order_of_triads
 from trihedron.read.table import FloatArray, Progress, Table
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode, Sampling, Severity
+from trihedron.records.sampling import UNJUDGED
 
 ASSUMED_RATE_HZ = 100.0
 WITNESS_ROWS = 200_000
@@ -40,7 +41,10 @@ class Options:
 
 @dataclass(frozen=True, eq=False)
 class Sensors:
-    """Both triads on one time base, and where each sample stood in the file."""
+    """Both triads on one time base, and where each sample stood in the file.
+
+    ``sampling``, ``lost_behind`` (n - 1,) once the clock is settled, and ``stamps_s`` (n,), the stamps it replaced.
+    """
 
     time_s: FloatArray
     start_s: float
@@ -52,6 +56,9 @@ class Sensors:
     offset: int
     has_clock: bool
     gyroscope_unit: str = ""
+    sampling: Sampling = UNJUDGED
+    lost_behind: npt.NDArray[np.int64] | None = None
+    stamps_s: FloatArray | None = None
     findings: tuple[Finding, ...] = field(default=())
     rows_in_file: int = 0
     rows_read: int = 0
@@ -129,9 +136,9 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         0,
         chosen.time is not None,
         chosen.gyroscope_unit,
-        tuple(findings),
-        table.n_in_file,
-        len(clock.time_s),
+        findings=tuple(findings),
+        rows_in_file=table.n_in_file,
+        rows_read=len(clock.time_s),
     )
 
 
@@ -238,6 +245,29 @@ def _witness(table: Table, chosen: Columns) -> Witness:
     else:
         readings = np.stack([table.columns[c][:WITNESS_ROWS] for c in triad], axis=1)
     return Witness(readings, None if temperature is None else table.columns[temperature])
+
+
+def settled(sensors: Sensors) -> Sensors:
+    """The same on the clock that its stamps, its counter and the motion speak for; as it is where that was done."""
+    if not sensors.has_clock or sensors.sampling is not UNJUDGED:
+        return sensors
+    triads = [x for x in (sensors.accelerometer, sensors.gyroscope) if x is not None]
+    n, counter = len(sensors.time_s), sensors.columns.counter
+    numbers = None
+    if counter is not None:
+        numbers = sensors.table.columns[counter]
+        numbers = numbers if sensors.rows is None else numbers[sensors.rows]
+        numbers = numbers[sensors.offset : sensors.offset + n] if len(numbers) else None
+    found = settle_clock(sensors.time_s, sensors.start_s, triads, numbers)
+    return replace(
+        sensors,
+        time_s=found.time_s,
+        start_s=found.start_s,
+        sampling=found.sampling,
+        lost_behind=found.lost_behind,
+        stamps_s=sensors.time_s if found.sampling.is_even else None,
+        findings=(*sensors.findings, *found.findings),
+    )
 
 
 def _stated_rate(table: Table) -> float | None:
@@ -360,6 +390,11 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
             f"{accelerometer.table.path}: {len(accelerometer.time_s)} rows here and {len(gyroscope.time_s)} in "
             f"{gyroscope.table.path.name}, and no time column to match them by; log both with time stamps."
         )
+    same_stamps = accelerometer.start_s == gyroscope.start_s and np.array_equal(accelerometer.time_s, gyroscope.time_s)
+    if not same_stamps:
+        accelerometer, gyroscope = settled(accelerometer), settled(gyroscope)
+    assert accelerometer.accelerometer is not None
+    assert gyroscope.gyroscope is not None
     merged = merge(
         accelerometer.accelerometer,
         accelerometer.time_s,
@@ -372,6 +407,7 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
     base = accelerometer if merged.base == "accelerometer" else gyroscope
     seen = {(f.code, f.seen) for f in accelerometer.findings}
     extra = [f for f in gyroscope.findings if (f.code, f.seen) not in seen]
+    kept = slice(merged.first, merged.first + len(merged.time_s))
     return Sensors(
         merged.time_s,
         merged.start_s,
@@ -391,6 +427,9 @@ def merge_sensors(accelerometer: Sensors, gyroscope: Sensors) -> Sensors:
         merged.first,
         base.has_clock,
         _unit_before(gyroscope.gyroscope_unit, gyroscope.gyroscope),
+        base.sampling,
+        None if base.lost_behind is None else base.lost_behind[kept][: len(merged.time_s) - 1],
+        None if base.stamps_s is None else base.stamps_s[kept],
         (*accelerometer.findings, *extra, *merged.findings),
         accelerometer.rows_in_file + gyroscope.rows_in_file,
         accelerometer.rows_read + gyroscope.rows_read - merged.rows_left_out,

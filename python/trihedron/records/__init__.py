@@ -36,6 +36,7 @@ from trihedron.records.noise import (
     TermName,
 )
 from trihedron.records.recording import Recording
+from trihedron.records.sampling import Sampling, StampKind
 from trihedron.records.segments import Hold, Move, Segments
 from trihedron.records.truth import TrueSegment, Truth
 from trihedron.records.verification import Verification
@@ -67,11 +68,13 @@ __all__ = [
     "Observability",
     "PoseTable",
     "Recording",
+    "Sampling",
     "Segments",
     "SensorCalibration",
     "Severity",
     "SlowPair",
     "SpectralLine",
+    "StampKind",
     "TermName",
     "TrueSegment",
     "Truth",

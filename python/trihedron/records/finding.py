@@ -49,6 +49,9 @@ class FindingCode(str, Enum):
     RATE_STATED = "rate-stated"
     RATE_CONTRADICTED = "rate-contradicted"
     TIME_WRAPPED = "time-wrapped"
+    EVEN_CLOCK = "even-clock"
+    STAMPS_KEPT = "stamps-kept"
+    CLOCK_UNDECIDED = "clock-undecided"
     SAMPLES_LOST = "samples-lost"
     GRAVITY_MISSING = "gravity-missing"
     # segment

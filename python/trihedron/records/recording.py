@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.records.finding import Finding
+from trihedron.records.sampling import UNJUDGED, Sampling
 from trihedron.units import AccelerationUnit, RateUnit
 
 FloatArray = npt.NDArray[np.float64]
@@ -62,7 +63,8 @@ class Recording:
     Parameters
     ----------
     time_s : (n,)
-        Seconds since the first sample, non-decreasing. As the clock said: gaps and jitter are kept.
+        Seconds since the first sample, non-decreasing: the stamps, or the even clock behind them where ``sampling``
+        says so. Gaps are kept.
     accelerometer, gyroscope : (n, 3) or None
         Raw readings in ``accelerometer_unit`` / ``gyroscope_unit``. At least one sensor is present. Rows that the log
         lost hold NaN in the sensor that lost them; stages skip them.
@@ -74,6 +76,8 @@ class Recording:
         Where it came from, for people; and the hash of the bytes that were read (of the arrays when made in memory).
     findings : tuple of Finding
         The audit of the log.
+    sampling : Sampling
+        What the stamps are worth, as judged when the log was read.
     auxiliary : mapping of name to (n,) array
         Every other numeric column, untouched.
     rows_in_file, rows_read : int
@@ -98,6 +102,7 @@ class Recording:
     source: str = "memory"
     sha256: str = ""
     findings: tuple[Finding, ...] = ()
+    sampling: Sampling = UNJUDGED
     auxiliary: MappingProxyType[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
     rows_in_file: int = 0
     rows_read: int = 0

@@ -51,7 +51,7 @@ def noise_report(
         sections=(
             Section("Result", tuple(tables)),
             Section("Findings", (findings_block(findings),)),
-            Section("Intervals", tuple(_intervals_table(axes, unit) for unit, axes in groups)),
+            *_intervals(groups),
             Section("Customary units", tuple(b for unit, axes in groups for b in _customary(axes, unit))),
             *([Section("How long to record", (_lengths_table(noise, lengths, accuracy),))] if lengths else []),
             Section("Kalibr", (Facts(tuple(kalibr_rows(noise).items())),)),
@@ -131,6 +131,13 @@ def _terms_table(axes: list[NoiseAxis], unit: str) -> Table:
         tuple(rows),
         "Noise terms ± standard error; < is the upper end of the 95 % interval",
     )
+
+
+def _intervals(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Section]:
+    """Intervals of all terms; a curve alone has none that hold whatever is named."""
+    if any(axis.slow_pair is None for _, axes in groups for axis in axes):
+        return []
+    return [Section("Intervals", tuple(_intervals_table(axes, unit) for unit, axes in groups))]
 
 
 def _intervals_table(axes: list[NoiseAxis], unit: str) -> Table:

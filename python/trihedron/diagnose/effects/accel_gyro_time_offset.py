@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only
+from trihedron.diagnose.effects.late_readings import by_delay, is_confirmed, times_for
+from trihedron.diagnose.session.observations import FloatArray
 
 
 class AccelGyroTimeOffset(Effect):
-    """Accelerometer readings belong to an earlier instant: f(t) reads f(t − δ)."""
+    """Accelerometer readings belong to an earlier instant: f(t) reads f(t − δ); where δ < 0 the gyro is late."""
 
     id = "accel-gyro-time-offset"
     mechanism = "accelerometer and gyro samples with the same time stamp belong to different instants"
@@ -19,4 +21,17 @@ class AccelGyroTimeOffset(Effect):
         return "the log has no moves with a gyro" if not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:
-        return [Variant(force_only(-context.force_rate[:, :, None]), ("accelerometer_delay",), ("s",))]
+        return [
+            _offset(context, sign * t, f"{1e3 * sign * t:+.0f} ms") for t in times_for(context) for sign in (1.0, -1.0)
+        ]
+
+    def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
+        return _offset(context, variant.scale * float(value[0]), variant.label)
+
+    def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:
+        return is_confirmed(value, covariance)
+
+
+def _offset(context: Context, delay_s: float, label: str) -> Variant:
+    columns = force_only(by_delay(context, context.force, delay_s)[:, :, None])
+    return Variant(columns, ("accelerometer_delay",), ("s",), label=label, scale=delay_s)

@@ -26,6 +26,7 @@ class Variant:
     """One shape of an effect: the distortion per unit of each parameter, and the shape numbers it was made with.
 
     ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; each costs as a parameter does.
+    ``scale`` is what one of a linear parameter stands for in the unit that is reported.
     """
 
     distortion: Distortion
@@ -34,6 +35,7 @@ class Variant:
     shape: dict[str, tuple[float, str]] = field(default_factory=dict)
     label: str = ""
     shape_sigma: float = 0.0
+    scale: float = 1.0
 
 
 class Effect(ABC):
@@ -74,6 +76,10 @@ class Effect(ABC):
         """The same variant at another value of its one shape number; ``None`` where the shape is not continuous."""
         return None
 
+    def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:  # noqa: ARG002
+        """A scaled variant made again for the size it was found to have; ``None`` where columns do not depend on it."""
+        return None
+
     def made_again(self, context: Context, variant: Variant) -> Variant | None:
         """The same variant on other observations (samples put back or taken out); ``None`` where it does not exist."""
         same = [v for v in self.variants(context) if v.label == variant.label and v.names == variant.names]
@@ -91,11 +97,15 @@ class Effect(ABC):
         """Whether the fitted parameters are ones that the mechanism can have."""
         return True
 
+    def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+        """The same where it depends on the shape."""
+        return self.is_plausible(value, covariance)
+
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
         """Physical parameters from the linear ones; shape numbers follow without a standard error of their own."""
-        sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        sigma = abs(variant.scale) * np.sqrt(np.maximum(np.diag(covariance), 0.0))
         linear = tuple(
-            EffectParameter(name, float(v), float(s), unit)
+            EffectParameter(name, variant.scale * float(v), float(s), unit)
             for name, v, s, unit in zip(variant.names, value, sigma, variant.units, strict=True)
         )
         shape = tuple(EffectParameter(name, v, variant.shape_sigma, unit) for name, (v, unit) in variant.shape.items())

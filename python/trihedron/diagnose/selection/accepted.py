@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -30,8 +31,15 @@ def accepted_effects(model: StepwiseModel) -> tuple[AcceptedEffect, ...]:
             assert found.variant is not None
             parameters = found.effect.parameters(found.variant, values, cov)
             statement = found.effect.statement(parameters)
-        out.append((share, _accepted(found, values, parameters, statement)))
-    return tuple(one for _, one in sorted(out, key=lambda pair: -pair[0]))
+        is_footnote = _stated(found) is not None and share < HEADLINE
+        record = replace(_accepted(found, values, parameters, statement), share=share)
+        out.append(((is_footnote, -share), record))
+    return tuple(one for _, one in sorted(out, key=lambda pair: pair[0]))
+
+
+HEADLINE = 0.5
+"""What carries less than half of the samples' own variance (a faint line) or poses (one bump) follows behind whatever
+explains poses and moves."""
 
 
 def shares(model: StepwiseModel) -> tuple[float, ...]:

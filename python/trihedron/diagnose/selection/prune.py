@@ -68,7 +68,7 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
         and against.predicts
         and against.falls
         and against.has_size
-        and one.effect.is_plausible(against.value, against.covariance)
+        and one.effect.is_plausible_variant(one.variant, against.value, against.covariance)
         and explains(against)
     )
     return now, stands

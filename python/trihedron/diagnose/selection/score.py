@@ -79,6 +79,10 @@ def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored],
             gain = max(gain, 0.0)
             n_shape = len(variant.shape)
             merit = gain - np.log(n_rows) * (result.rank + n_shape) - 2.0 * np.log(len(variants))
+            # A shape whose own estimate is impossible (a lag that answers before it is asked) is nobody's rival.
+            spread = result.covariance * float(scale.max())
+            if not effect.is_plausible_variant(variant, result.estimate, spread):
+                merit = -np.inf
             merits.append(float(merit))
             p = min(1.0, float(chdtrc(result.rank, gain)) * len(variants))
             scored = Scored(effect, variant, gain, result.rank, p, merit)

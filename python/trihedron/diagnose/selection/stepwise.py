@@ -91,7 +91,7 @@ def is_sound(one: Refit) -> bool:
         and a.predicts
         and a.falls
         and a.has_size
-        and one.scored.effect.is_plausible(a.value, a.covariance)
+        and one.scored.effect.is_plausible_variant(a.variant, a.value, a.covariance)
     )
 
 

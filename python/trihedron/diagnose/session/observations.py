@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.diagnose.residuals.aliasing import unresolved_variance
+from trihedron.diagnose.residuals.coloured_noise import coloured_variance
 from trihedron.records import Recording, Segments
 
 FloatArray = npt.NDArray[np.float64]
@@ -29,7 +30,7 @@ class Observations:
     ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about
     their stamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
     ``unresolved`` maps a move's two holds to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
-    by motion faster than the samples.
+    by motion faster than the samples and by noise slower than a move.
     ``is_scatter_free`` lets zeros scatter from hold to hold beside their walk, as far as the evidence goes.
     The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
     """
@@ -113,9 +114,18 @@ def observe(recording: Recording, segments: Segments) -> Observations:
             holds.append((move.hold_before, move.hold_after))
     spans = [(hold.start, hold.stop) for hold in segments.holds]
     variances = np.zeros((len(ranges), 2, 3))
+    lasts = np.array([(hold.stop - hold.start) * step_s for hold in segments.holds])
+    moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
+    slow = (
+        (segments.accelerometer_sigma_mean, segments.accelerometer_sigma * np.sqrt(step_s)),
+        (hold_rate_sigma, rate_density),
+    )
     for k, readings in enumerate((recording.accelerometer, recording.gyroscope)):
         if readings is not None:
             variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s)
+        sigma, density = slow[k]
+        if sigma is not None and density is not None and ranges:
+            variances[:, k] += coloured_variance(sigma, density, lasts, moves_last)
     return Observations(
         recording=recording,
         segments=segments,

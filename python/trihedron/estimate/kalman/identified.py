@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Protocol
 
+from trihedron.records.hold_noise import OctaveNoise
 from trihedron.records.kalman import AxisNoise
 from trihedron.units import AccelerationUnit, acceleration_to_si
+
+MOST_ABOVE = 2.0
+"""Noise of the session over that of the log of rest beyond which its error bars would be more than twice too small."""
+MOST_BELOW = 3.0
+"""The other way round: a sensor may be quieter in a session than in an office, not so in every octave."""
+COARSER = math.sqrt(2.0)
+"""Steps that differ by more are of another converter or range."""
 
 
 class IdentifiedProcess(Protocol):
@@ -97,3 +106,58 @@ def _one(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> AxisNoise:
         sample_sigma=axis.sample_sigma,
     )
     return noise.scaled(factor)
+
+
+def check_same_converter(
+    given: Sequence[AxisNoise],
+    steps: Sequence[float],
+    octaves: Sequence[Sequence[OctaveNoise]],
+    rate_hz: float,
+    source: str,
+) -> None:
+    """Refuse the noise of another converter than the session's, of which ``steps`` and ``octaves`` by axis are given.
+
+    Steps are compared where the session's is not lost in the noise; densities octave by octave, beyond a factor in
+    every one of them: a filter or a hand's tremor changes some.
+
+    Raises
+    ------
+    ValueError
+        Naming the axis, both figures and the remedy.
+    """
+    remedy = "record the rest with the range, rate and output of the session"
+    for axis, noise, step, seen in zip("xyz", given, steps, octaves, strict=True):
+        fast = noise.sample_sigma
+        if step > COARSER * noise.resolution and step > fast > 0.0:
+            raise ValueError(
+                f"the log of rest is of another converter than {source}: accelerometer {axis} has steps of {step:.3g} "
+                f"there, and the noise of the rest, {fast:.3g} a sample in steps of {noise.resolution:.3g}, would have "
+                f"shown them; {remedy}"
+            )
+        ratios = [
+            (octave.density.lower / expected, octave.density.upper / expected, octave.density.value / expected)
+            for octave in seen
+            for expected in [_density(noise, math.sqrt(octave.low_hz * octave.high_hz), rate_hz)]
+            if expected > 0.0
+        ]
+        if not ratios:
+            continue
+        lowest, highest = min(r[0] for r in ratios), max(r[1] for r in ratios)
+        if lowest > MOST_ABOVE**2 or highest < 1.0 / MOST_BELOW**2:
+            middle = math.sqrt(sorted(r[2] for r in ratios)[len(ratios) // 2])
+            words = f"{middle:.2g} times that" if middle > 1.0 else f"1/{1.0 / middle:.2g} of that"
+            raise ValueError(
+                f"the noise of accelerometer {axis} inside the still poses of {source} is {words} of the log of rest, "
+                f"at every frequency: another converter, range or unit; {remedy}"
+            )
+
+
+def _density(noise: AxisNoise, frequency_hz: float, rate_hz: float) -> float:
+    """Two-sided density of identified noise (docs/noise.md, section 3)."""
+    omega = 2.0 * math.pi * frequency_hz
+    return (
+        (omega * noise.quantisation) ** 2 / rate_hz
+        + noise.white**2
+        + noise.flicker**2 / omega
+        + (noise.walk / omega) ** 2
+    )

@@ -3,6 +3,8 @@
 from trihedron.estimate.noise.allan import allan_deviation, default_clusters, stream_allan_deviation
 from trihedron.estimate.noise.degrees import degrees_of_freedom
 from trihedron.estimate.noise.from_curve import identify_curve
+from trihedron.estimate.noise.hold_statistics import ratio_of
+from trihedron.estimate.noise.holds import noise_of_holds
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s, relative_sigma
 from trihedron.estimate.noise.streamed import stream_noise
@@ -13,6 +15,8 @@ __all__ = [
     "degrees_of_freedom",
     "identify_curve",
     "identify_noise",
+    "noise_of_holds",
+    "ratio_of",
     "recording_length_s",
     "relative_sigma",
     "stream_allan_deviation",

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.table import FloatArray
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode, Sampling, Severity, StampKind
+from trihedron.records.sampling import UNJUDGED
 
 Place = Callable[[int], str]
 
@@ -20,8 +21,19 @@ JITTER_STEPS = 0.03
 SERIOUS_LOSS = 0.05
 
 
-def audit_timing(time_s: FloatArray, rate_hz: float, place: Place) -> list[Finding]:
-    """Findings on time stamps that were in the log. ``place(i)`` names sample i for people."""
+def audit_timing(
+    time_s: FloatArray,
+    rate_hz: float,
+    place: Place,
+    sampling: Sampling = UNJUDGED,
+    lost_behind: npt.NDArray[np.int64] | None = None,
+    stamps_s: FloatArray | None = None,
+) -> list[Finding]:
+    """Findings on time stamps that were in the log. ``place(i)`` names sample i for people.
+
+    ``lost_behind`` (n - 1,) are the samples lost behind each, where the clock tells them; else long steps count.
+    ``stamps_s`` (n,) are the stamps as logged where an even clock took their place.
+    """
     if len(time_s) < 3:
         return []
     step = np.diff(time_s)
@@ -29,11 +41,20 @@ def audit_timing(time_s: FloatArray, rate_hz: float, place: Place) -> list[Findi
     if not len(positive):
         return []
     usual = float(np.median(positive))
-    findings = _duplicates(step, place)
-    batched = bool(findings) and np.count_nonzero(step == 0) > 0.2 * len(step)
-    gaps = np.flatnonzero(step > (5.0 if batched else GAP_STEPS) * usual)
-    if len(gaps):
-        findings.append(_gap(step, gaps, usual, place))
+    findings = _duplicates(step if stamps_s is None else np.diff(stamps_s), place, is_mended=stamps_s is not None)
+    if lost_behind is not None:
+        findings += _lost(step, lost_behind, place)
+    elif sampling.kind in (StampKind.LATE, StampKind.SCATTERED):
+        pass  # a late stamp looks like a loss: how many are lost is not told
+    else:
+        batched = bool(findings) and np.count_nonzero(step == 0) > 0.2 * len(step)
+        gaps = np.flatnonzero(step > (5.0 if batched else GAP_STEPS) * usual)
+        lost = np.zeros(len(step), dtype=np.int64)
+        lost[gaps] = np.maximum(np.rint(step[gaps] / usual) - 1, 0)
+        findings += _gap(step, gaps, lost, place) if len(gaps) else []
+    if stamps_s is not None:
+        step = np.diff(stamps_s)
+        usual = float(np.median(step[step > 0]))
     inside = step[(step <= GAP_STEPS * usual) & (step > 0)]
     jitter = float(inside.std())
     mean = float(inside.mean())
@@ -41,11 +62,15 @@ def audit_timing(time_s: FloatArray, rate_hz: float, place: Place) -> list[Findi
         findings.append(
             Finding(
                 FindingCode.TIME_JITTER,
-                Severity.NOTE if jitter < 0.2 * mean else Severity.WARNING,
+                Severity.NOTE if jitter < 0.2 * mean or stamps_s is not None else Severity.WARNING,
                 f"Steps between stamps vary by {1e3 * jitter:.3g} ms rms (median {1e3 * usual:.5g} ms = "
                 f"{1 / usual:.5g} Hz, mean {1e3 * mean:.5g} ms = {1 / mean:.5g} Hz, {1e3 * float(inside.min()):.3g} to "
-                f"{1e3 * float(inside.max()):.3g} ms); the rate used is {rate_hz:.5g} Hz.",
-                "Stamps taken when the data arrived, or rounded.",
+                f"{1e3 * float(inside.max()):.3g} ms)"
+                + (", and no even clock lies behind them" if sampling.kind is StampKind.IRREGULAR else "")
+                + f"; the rate used is {rate_hz:.5g} Hz.",
+                "Stamps taken when the data arrived, or rounded."
+                if sampling.kind is not StampKind.IRREGULAR
+                else "A program that samples in its own time: its stamps were kept.",
                 "Stamp in the sensor's own interrupt if turns matter.",
                 MappingProxyType(
                     {
@@ -61,7 +86,12 @@ def audit_timing(time_s: FloatArray, rate_hz: float, place: Place) -> list[Findi
     return findings
 
 
-def _duplicates(step: FloatArray, place: Place) -> list[Finding]:
+def _lost(step: FloatArray, lost: npt.NDArray[np.int64], place: Place) -> list[Finding]:
+    gaps = np.flatnonzero(lost > 0)
+    return _gap(step, gaps, lost, place) if len(gaps) else []
+
+
+def _duplicates(step: FloatArray, place: Place, *, is_mended: bool) -> list[Finding]:
     same = np.flatnonzero(step == 0)
     if not len(same):
         return []
@@ -69,39 +99,41 @@ def _duplicates(step: FloatArray, place: Place) -> list[Finding]:
     return [
         Finding(
             FindingCode.TIME_DUPLICATE,
-            Severity.WARNING,
+            Severity.NOTE if is_mended else Severity.WARNING,
             f"{len(same)} samples ({100 * fraction:.3g} %) carry the same time as the one before "
             f"(first: {place(int(same[0]) + 1)}).",
             "Several samples stamped in one go, a stamp of too few digits, or rows written twice.",
-            "With samples stamped in batches, read with --columns time=none and --rate.",
+            "" if is_mended else "With samples stamped in batches, read with --columns time=none and --rate.",
             MappingProxyType({"count": float(len(same)), "fraction": fraction, "sample": float(same[0] + 1)}),
         )
     ]
 
 
-def _gap(step: FloatArray, gaps: npt.NDArray[np.intp], usual: float, place: Place) -> Finding:
+def _gap(step: FloatArray, gaps: npt.NDArray[np.intp], lost: npt.NDArray[np.int64], place: Place) -> list[Finding]:
     longest = int(gaps[np.argmax(step[gaps])])
-    lost = int(np.sum(np.maximum(np.rint(step[gaps] / usual) - 1, 0)))
-    fraction = lost / (len(step) + 1 + lost)
+    total = int(lost.sum())
+    fraction = total / (len(step) + 1 + total)
     worst = sorted((int(g) for g in gaps[np.argsort(step[gaps])[::-1][:3]]), key=int)
     listed = "; ".join(f"{step[g]:.4g} s before {place(g + 1)}" for g in worst)
-    return Finding(
-        FindingCode.TIME_GAP,
-        Severity.SERIOUS if fraction > SERIOUS_LOSS else Severity.WARNING,
-        f"{len(gaps)} gaps longer than {GAP_STEPS:g} steps, about {lost} samples lost ({100 * fraction:.2g} %); the "
-        f"longest lasts {step[longest]:.4g} s. Where: {listed}{' ...' if len(gaps) > 3 else ''}.",
-        "Lost packets, a full buffer, or a stamp that came late.",
-        "Turns that fall into a gap are integrated wrongly; repeat them.",
-        MappingProxyType(
-            {
-                "count": float(len(gaps)),
-                "longest_s": float(step[longest]),
-                "sample": float(longest + 1),
-                "lost_samples": float(lost),
-                "fraction": fraction,
-            }
-        ),
-    )
+    return [
+        Finding(
+            FindingCode.TIME_GAP,
+            Severity.SERIOUS if fraction > SERIOUS_LOSS else Severity.WARNING,
+            f"{len(gaps)} gaps, about {total} samples lost ({100 * fraction:.2g} %); the "
+            f"longest lasts {step[longest]:.4g} s. Where: {listed}{' ...' if len(gaps) > 3 else ''}.",
+            "Lost packets or a full buffer.",
+            "Turns that fall into a gap are integrated wrongly; repeat them.",
+            MappingProxyType(
+                {
+                    "count": float(len(gaps)),
+                    "longest_s": float(step[longest]),
+                    "sample": float(longest + 1),
+                    "lost_samples": float(total),
+                    "fraction": fraction,
+                }
+            ),
+        )
+    ]
 
 
 def audit_counter(counter: FloatArray, label: str, place: Place) -> list[Finding]:

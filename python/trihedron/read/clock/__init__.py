@@ -2,6 +2,7 @@
 
 from trihedron.read.clock.base import Clock, build_clock
 from trihedron.read.clock.rate import mean_rate_hz
+from trihedron.read.clock.settle import Settled, settle_clock
 from trihedron.read.clock.unit import SECONDS, Witness, parse_time_unit
 
-__all__ = ["SECONDS", "Clock", "Witness", "build_clock", "mean_rate_hz", "parse_time_unit"]
+__all__ = ["SECONDS", "Clock", "Settled", "Witness", "build_clock", "mean_rate_hz", "parse_time_unit", "settle_clock"]

@@ -1,0 +1,1 @@
+"""Stamps of imagined loggers, drawn without a look at what reads them."""

@@ -1,0 +1,54 @@
+"""Readings that come late: what a delay and a low-pass add, to all orders that a recording can tell (eq. 9.14).
+
+A reading y that trails the truth x by a pure delay δ has x(t) = y(t + δ); behind a low-pass of first order
+x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y''. All three begin with τ y': what tells them apart is
+the next term. Columns are made for a time of a grid and scale with its parameter, which must come out near one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.session.observations import FloatArray
+
+TIMES_S = (0.004, 0.008, 0.016, 0.032, 0.064)
+"""Times tried, each twice the one before: a parameter between 1/√2 and √2 of its own covers all between."""
+NEAR_ONE = (0.6, 1.6)
+"""A time that its own column does not confirm: the next of the grid fits better, or the mechanism does not."""
+
+
+def times_for(context: Context) -> tuple[float, ...]:
+    """The times of the grid that the sampling resolves: half a sample at least."""
+    step_s = 1.0 / context.obs.recording.rate_hz
+    return tuple(t for t in TIMES_S if t >= 0.25 * step_s) or (TIMES_S[-1],)
+
+
+def shifted(context: Context, values: FloatArray, ahead_s: float) -> FloatArray:
+    """(points, 3) values read ``ahead_s`` later inside moves, their ends held; unchanged in holds."""
+    out = values.copy()
+    for where in context.moves:
+        t = context.time_s[where]
+        # A straight line between samples would be a low-pass of its own.
+        out[where] = CubicSpline(t, values[where], bc_type="clamped")(np.clip(t + ahead_s, t[0], t[-1]))
+    return out
+
+
+def by_delay(context: Context, values: FloatArray, delay_s: float) -> FloatArray:
+    """What a delay adds to readings: y(t) - y(t + δ)."""
+    return values - shifted(context, values, delay_s)
+
+
+def by_low_pass(context: Context, values: FloatArray, time_s: float) -> FloatArray:
+    """What a second-order low-pass of this delay adds to readings: -(τ y' + τ²/2 y'')."""
+    step = max(0.5 * time_s, 1.0 / context.obs.recording.rate_hz)
+    twice = shifted(context, values, step) - 2.0 * values + shifted(context, values, -step)
+    out: FloatArray = -(time_s * context.derivative(values) + 0.5 * (time_s / step) ** 2 * twice)
+    return out
+
+
+def is_confirmed(value: FloatArray, covariance: FloatArray) -> bool:
+    """Whether a scaled parameter is near one, within three standard errors."""
+    sigma = 3.0 * float(np.sqrt(max(float(covariance[0, 0]), 0.0)))
+    return bool(NEAR_ONE[0] - sigma < value[0] < NEAR_ONE[1] + sigma and value[0] > 0.0)

@@ -1,0 +1,35 @@
+"""Slow noise of the sensors inside moves, as the poses show it (eq. 8.2b)."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def coloured_variance(
+    hold_sigma: FloatArray, density: FloatArray, hold_duration_s: FloatArray, move_duration_s: FloatArray
+) -> FloatArray:
+    """Variance that slow noise adds to every move's integral, beyond that of white noise.
+
+    The integral of white noise over T has the variance N²T. Flicker and walk add what the poses' means show of them: a
+    mean over τ with c² times the white variance stands for c²N² as long as T is of the order of τ. Without it a healthy
+    consumer part (0.3 mg, 20 °/h) disagreed in 15 of 20 sessions (benches/blind_nuisances.py --flicker).
+
+    Parameters
+    ----------
+    hold_sigma : (holds, 3)
+        Standard errors of pose means that do not assume whiteness, raw units.
+    density : (3,)
+        White noise, raw units per √Hz.
+    hold_duration_s, move_duration_s : (holds,), (moves,)
+
+    Returns
+    -------
+    (moves, 3) array, (raw unit · s)²
+    """
+    white = density / np.sqrt(hold_duration_s)[:, None]
+    colour = np.maximum(np.median((hold_sigma / white) ** 2, axis=0), 1.0)
+    out: FloatArray = np.outer(move_duration_s, (colour - 1.0) * density**2)
+    return out

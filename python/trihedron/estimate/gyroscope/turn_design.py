@@ -1,0 +1,129 @@
+"""How well known turns and moves would determine the gyro, before any is made (the manual's problems 3, 4 and 8)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TurnDesign:
+    """Standard errors by one route: ``scale`` (3,) of a row of ``S_w`` towards each axis, per unit of noise in the raw
+    reading's own unit per rad, and ``zero`` of ``b_w``. With the noise in rad/s/√Hz both are relative and rad/s."""
+
+    scale: FloatArray
+    zero: float
+
+
+def design_least_squares(
+    axes: Sequence[int],
+    angles_rad: Sequence[float],
+    durations_s: Sequence[float],
+    zero_s: float,
+    noise_density: float,
+    sigma_turn_rad: float = 0.0,
+) -> TurnDesign:
+    """All rows ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` at once: the manual's problem 4.
+
+    With ``v_i = N² Δt_i + σ_turn²``, ``Q_j = Σ φ²/v``, ``P_j = Σ φ Δt/v`` over the turns about axis j, and
+    ``T = Σ Δt²/v + Δt_0/N²``: ``var b = 1/(T - Σ_j P_j²/Q_j)`` and ``var S_j = 1/Q_j + (P_j/Q_j)² var b``.
+
+    Raises
+    ------
+    ValueError
+        When the turns do not determine an axis, or nothing tells the zero.
+    """
+    q, p, t = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
+    information = t + zero_s / noise_density**2 - float(np.sum(p**2 / q))
+    if not information > 1e-12 * (t + zero_s / noise_density**2):
+        raise ValueError("nothing tells the zero: turn there and back, or hold still for some seconds")
+    var_zero = 1.0 / information
+    return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_zero), math.sqrt(var_zero))
+
+
+def design_zero_first(
+    axes: Sequence[int],
+    angles_rad: Sequence[float],
+    durations_s: Sequence[float],
+    zero_s: float,
+    noise_density: float,
+    sigma_turn_rad: float = 0.0,
+) -> TurnDesign:
+    """``b_w = φ'_0/Δt_0`` from the zero turn, then ``S_w`` from the turns freed of it: the manual's problem 3.
+
+    ``var b = N²/Δt_0``, ``var S_j = 1/Q_j + (P_j/Q_j)² N²/Δt_0``; for one turn ``N² Δt (1 + Δt/Δt_0)/φ²``.
+
+    Raises
+    ------
+    ValueError
+        When the turns do not determine an axis, or there is no zero turn.
+    """
+    q, p, _ = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
+    if not zero_s > 0.0:
+        raise ValueError("this route needs a zero turn: hold still for some seconds")
+    var_zero = noise_density**2 / zero_s
+    return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_zero), math.sqrt(var_zero))
+
+
+def _sums(
+    axes: Sequence[int],
+    angles_rad: Sequence[float],
+    durations_s: Sequence[float],
+    noise_density: float,
+    sigma_turn_rad: float,
+) -> tuple[FloatArray, FloatArray, float]:
+    if not noise_density > 0.0 or sigma_turn_rad < 0.0 or min(durations_s, default=0.0) <= 0.0:
+        raise ValueError("noise and durations must be positive")
+    which, angle, time = np.asarray(axes), np.asarray(angles_rad), np.asarray(durations_s)
+    weight = 1.0 / (noise_density**2 * time + sigma_turn_rad**2)
+    q = np.array([float(np.sum((weight * angle**2)[which == axis])) for axis in range(3)])
+    p = np.array([float(np.sum((weight * angle * time)[which == axis])) for axis in range(3)])
+    if np.any(q <= 0.0):
+        missing = " and ".join(str(axis + 1) for axis in np.flatnonzero(q <= 0.0))
+        raise ValueError(f"no turn about axis {missing}: each axis needs one of its own")
+    return q, p, float(np.sum(weight * time**2))
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedMove:
+    """A turn by ``angle_rad`` about the unit ``axis`` (3,) of the body, which starts with ``up`` (3,) upwards."""
+
+    up: FloatArray
+    axis: FloatArray
+    angle_rad: float
+
+
+def design_moves(moves: Sequence[PlannedMove], sigma_rad: float) -> tuple[int, float]:
+    """Rank of the nine elements of ``S_ω`` in what the moves show, and the largest relative standard error of one.
+
+    A rate error ``δS n θ'`` turns the body by ``ε = A(θ) δS n``, ``A = ∫₀^θ exp(-[n]× s) ds =
+    θ n nᵀ + sin θ (1 - n nᵀ) - (1 - cos θ) [n]×``; gravity after the move shows it as ``u × ε``, two numbers of error
+    ``sigma_rad`` each (5.7). Three turns about level axes therefore show six; all nine take a stop inside each turn.
+    """
+    rows = []
+    for move in moves:
+        n, angle = move.axis / np.linalg.norm(move.axis), move.angle_rad
+        cross = _cross(n)
+        along = np.outer(n, n)
+        gain = angle * along + math.sin(angle) * (np.eye(3) - along) - (1.0 - math.cos(angle)) * cross
+        # What is fixed in the room turns the other way in the body.
+        turned = along + math.cos(angle) * (np.eye(3) - along) - math.sin(angle) * cross
+        up = turned @ (move.up / np.linalg.norm(move.up))
+        rows.append(np.kron(_cross(up) @ gain, n[None, :]))
+    matrix = np.concatenate(rows) / sigma_rad
+    singular, directions = np.linalg.svd(matrix)[1:]
+    rank = int(np.sum(singular > 1e-9 * singular[0]))
+    if rank < 9:
+        return rank, math.inf
+    covariance = (directions[:9].T / singular[:9] ** 2) @ directions[:9]
+    return rank, math.sqrt(float(np.max(np.diag(covariance))))
+
+
+def _cross(v: FloatArray) -> FloatArray:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

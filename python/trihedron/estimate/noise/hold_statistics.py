@@ -1,0 +1,106 @@
+"""Figures of many holds in one, and the ratio of two such figures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records.hold_noise import Measured, Ratio
+from trihedron.records.noise import FloatArray
+
+MOST_LEFT_OUT = 0.25
+"""Share of holds that may be left out for noise far above the rest's: a disturbed hold, not another sensor."""
+FAR = 5.0
+"""Robust standard deviations beyond which a hold is disturbed: one clean hold in a million."""
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """Mean logarithm over holds, its standard error with the degrees of freedom of that, and the holds' own scatter."""
+
+    mean: float
+    sigma: float
+    dof: float
+    scatter: float
+
+
+def robust_holds(variance: FloatArray, dof: FloatArray) -> npt.NDArray[np.bool_]:
+    """(k,) holds whose noise is not far above the rest's; at most a quarter is left out, the worst first."""
+    keep = np.asarray(variance > 0.0)
+    if np.count_nonzero(keep) < 4:
+        return keep if keep.any() else np.ones(len(variance), dtype=bool)
+    logs = np.log(np.maximum(variance, 1e-300))
+    centre = float(np.median(logs[keep]))
+    spread = 1.4826 * float(np.median(np.abs(logs[keep] - centre)))
+    score = (logs - centre) / np.sqrt(np.maximum(spread**2, 2.0 / dof))
+    worst = np.argsort(-score)[: int(MOST_LEFT_OUT * len(variance))]
+    keep[worst[score[worst] > FAR]] = False
+    return keep
+
+
+def pooled_logarithm(values: FloatArray, dof: FloatArray) -> Pooled:
+    """Mean logarithm of chi-squared ``values`` (k,) over ``dof`` (k,), holds differing by a scatter of their own.
+
+    The scatter is that of DerSimonian and Laird (1986). Where it shows, the standard error is known from the k holds
+    alone, and a t distribution belongs to it.
+    """
+    from scipy.special import digamma, polygamma
+
+    good = (values > 0.0) & (dof > 0.0)
+    if not good.any():
+        return Pooled(-math.inf, math.inf, 1.0, 0.0)
+    half = 0.5 * dof[good]
+    logs = np.log(values[good]) - (digamma(half) - np.log(half))
+    own = np.asarray(polygamma(1, half))
+    k = len(logs)
+    weight = 1.0 / own
+    mean = float(weight @ logs / weight.sum())
+    excess = float(weight @ (logs - mean) ** 2) - (k - 1)
+    between = max(0.0, excess / float(weight.sum() - (weight**2).sum() / weight.sum())) if k > 1 else 0.0
+    weight = 1.0 / (own + between)
+    mean = float(weight @ logs / weight.sum())
+    sigma = 1.0 / math.sqrt(float(weight.sum()))
+    # Of the error what the scatter makes is known from k - 1 numbers.
+    share = between / (between + 1.0 / float(np.mean(1.0 / own)))
+    degrees = (k - 1) / share**2 if share > 0.0 else math.inf
+    if not np.isfinite(sigma):
+        degrees = 1.0
+    return Pooled(mean, sigma, float(degrees), math.sqrt(between))
+
+
+def as_measured(value: float, sigma_log: float, dof: float) -> Measured:
+    """A positive value with the 95 % interval of its logarithm."""
+    reach = _quantile(dof) * sigma_log
+    return Measured(value, value * math.exp(-reach), value * math.exp(reach), sigma_log, dof)
+
+
+def ratio_of(one: Measured, other: Measured) -> Ratio:
+    """One figure over the other; errors of unlike certainty after Welch and Satterthwaite.
+
+    Raises
+    ------
+    ValueError
+        When a figure is not positive.
+    """
+    from scipy.stats import t
+
+    if not (one.value > 0.0 and other.value > 0.0):
+        raise ValueError("only positive figures have a ratio")
+    squares = (one.sigma_log**2, other.sigma_log**2)
+    sigma = math.sqrt(sum(squares))
+    parts = sum(s**2 / d for s, d in zip(squares, (one.dof, other.dof), strict=True) if math.isfinite(d))
+    dof = sigma**4 / parts if parts > 0.0 else math.inf
+    log_ratio = math.log(one.value / other.value)
+    reach = _quantile(dof) * sigma
+    p_value = 2.0 * float(t.sf(abs(log_ratio) / sigma, min(dof, 1e9))) if sigma > 0.0 else float(log_ratio == 0.0)
+    value = math.exp(log_ratio)
+    return Ratio(value, value * math.exp(-reach), value * math.exp(reach), p_value)
+
+
+def _quantile(dof: float) -> float:
+    from scipy.stats import t
+
+    return float(t.ppf(0.975, min(dof, 1e9)))

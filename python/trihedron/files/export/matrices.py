@@ -1,0 +1,38 @@
+"""Matrix factors in the conventions of other programs."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.files.export.contract import named_sensors
+from trihedron.records import Calibration, SensorCalibration
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def lower_orthogonal(A: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """``A = L Q`` with L lower triangular and Q a proper rotation, det Q = +1.
+
+    The diagonal of L is positive where A keeps the hand of its axes; a mirrored triad shows as one negative diagonal
+    entry of L, the one of A's most negative axis, never as a reflection in Q.
+    """
+    q, r = np.linalg.qr(A.T)
+    signs = np.where(np.diag(r) < 0.0, -1.0, 1.0)
+    L, Q = (r * signs[:, None]).T, (q * signs).T
+    if np.linalg.det(Q) < 0.0:
+        flip = np.ones(3)
+        flip[int(np.argmin(np.diag(Q)))] = -1.0
+        L, Q = L * flip, flip[:, None] * Q
+    return L, Q
+
+
+def upper_frame(calibration: Calibration) -> tuple[FloatArray, list[tuple[SensorCalibration, FloatArray, FloatArray]]]:
+    """Both sensors turned by R so that the accelerometer's S is upper triangular: R and (sensor, R S, R b)."""
+    q, r = np.linalg.qr(calibration.accelerometer.S)
+    # The signs of the diagonal stay with S: a left-handed triad is not mended by a reflection of Mz.
+    rotation = (q * (np.sign(np.diag(r)) * np.sign(np.diag(calibration.accelerometer.S)))).T
+    turned = [(sensor, rotation @ sensor.S, rotation @ sensor.b) for _, sensor in named_sensors(calibration)]
+    # Rounding below the diagonal is removed: the target does not expect it.
+    turned[0] = (turned[0][0], np.triu(turned[0][1]), turned[0][2])
+    return rotation, turned

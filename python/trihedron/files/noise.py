@@ -1,0 +1,64 @@
+"""Noise figures read back from the JSON that ``trihedron allan`` writes."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+from trihedron.files.export.contract import NoiseFigure, SensorNoise
+
+_SENSORS = {"m/s^2": "accelerometer", "rad/s": "gyroscope"}
+
+
+class NoiseFileError(ValueError):
+    """Noise that cannot be read. One sentence: which file, what is wrong, what to do."""
+
+
+def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], float]:
+    """White density and random walk of each sensor (root mean square of its axes), and the rate [Hz] of the rest log.
+
+    An absent term comes as the limit that the log gives it.
+
+    Raises
+    ------
+    NoiseFileError
+        When the file is missing or is not what ``trihedron allan --json`` writes, or its readings are not in SI.
+    """
+    path = Path(path)
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise NoiseFileError(f"{path}: there is no such file; check the name and the folder.") from None
+    except (OSError, ValueError, RecursionError):
+        raise NoiseFileError(f"{path}: this is not JSON; name a file written by `trihedron allan --json`.") from None
+    try:
+        axes = document["axes"]
+        out = {
+            sensor: SensorNoise(_figure(axes, unit, "N"), _figure(axes, unit, "K"))
+            for unit, sensor in _SENSORS.items()
+            if any(axis["unit"] == unit for axis in axes)
+        }
+        rate = float(document["rate_hz"])
+    except (KeyError, TypeError, ValueError):
+        raise NoiseFileError(
+            f"{path}: this JSON holds no noise terms; name a file written by `trihedron allan --json`."
+        ) from None
+    if not out:
+        raise NoiseFileError(
+            f"{path}: its noise is in raw units; run `trihedron allan` with the units or on SI readings."
+        )
+    return out, rate
+
+
+def _figure(axes: list[dict[str, Any]], unit: str, term: str) -> NoiseFigure:
+    terms = [axis["terms"][term] for axis in axes if axis["unit"] == unit]
+    if all(t["present"] for t in terms):
+        return NoiseFigure(_rms([float(t["value"]) for t in terms]))
+    return NoiseFigure(_rms([max(float(t["limit"]), float(t["value"])) for t in terms]), is_limit=True)
+
+
+def _rms(values: list[float]) -> float:
+    return math.sqrt(sum(v * v for v in values) / len(values))

@@ -1,0 +1,163 @@
+"""Plan: how certain an experiment would be, before it is made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from trihedron.estimate.accelerometer.poses import CANDIDATES, PoseDesign, pose_in_words
+from trihedron.estimate.gyroscope.turn_design import (
+    PlannedMove,
+    design_least_squares,
+    design_moves,
+    design_zero_first,
+)
+from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth, TurnPlan
+from trihedron.units import STANDARD_GRAVITY_M_S2, radians_from_degrees
+
+POSE_SETS = ("6 faces", "9 poses", "12 edges", "18 poses: faces and edges", "26 poses: faces, edges and corners")
+
+
+def plan(
+    *,
+    turns_deg: Sequence[float],
+    turn_s: float,
+    hold_s: float,
+    gyroscope_density: float,
+    accelerometer_density: float,
+    sigma_turn_rad: float = 0.0,
+    gravity_m_s2: float = STANDARD_GRAVITY_M_S2,
+) -> ExperimentPlan:
+    """Error bars to expect from known turns about each axis, from sets of poses, and from moves between poses.
+
+    Parameters
+    ----------
+    turns_deg : sequence of float
+        The turns about every one of the three axes, each taking ``turn_s``.
+    hold_s : float
+        How long every pose, and the one zero turn, is held.
+    gyroscope_density, accelerometer_density : float
+        White noise [rad/s/√Hz, m/s²/√Hz].
+    sigma_turn_rad : float
+        Standard error of a turn's angle (the wall).
+
+    Raises
+    ------
+    ValueError
+        When a figure is not positive or the turns determine nothing.
+    """
+    for name, value in (("turn time", turn_s), ("hold", hold_s), ("accelerometer noise", accelerometer_density)):
+        if not value > 0.0:
+            raise ValueError(f"the {name} must be a positive number, got {value:g}")
+    angles = [radians_from_degrees(angle) for angle in turns_deg if angle != 0.0] * 3
+    axes = [axis for axis in range(3) for angle in turns_deg if angle != 0.0]
+    arguments = (axes, angles, [turn_s] * len(angles), hold_s, gyroscope_density, sigma_turn_rad)
+    both, first = design_least_squares(*arguments), design_zero_first(*arguments)
+    sigma = accelerometer_density / math.sqrt(hold_s) / gravity_m_s2
+    angle_noise = math.hypot(math.sqrt(2.0) * sigma, gyroscope_density * math.sqrt(turn_s))
+    return ExperimentPlan(
+        gyroscope_density=gyroscope_density,
+        accelerometer_density=accelerometer_density,
+        gravity_m_s2=gravity_m_s2,
+        hold_s=hold_s,
+        sigma_turn_rad=sigma_turn_rad,
+        turns=TurnPlan(
+            n_turns=len(axes) // 3,
+            angles_deg=tuple(float(angle) for angle in turns_deg if angle != 0.0),
+            duration_s=turn_s,
+            zero_s=hold_s,
+            scale=float(both.scale.max()),
+            zero=both.zero,
+            scale_zero_first=float(first.scale.max()),
+            zero_zero_first=first.zero,
+        ),
+        poses=tuple(_poses(name, sigma, gravity_m_s2) for name in POSE_SETS),
+        moves=_moves(angle_noise),
+    )
+
+
+def _poses(name: str, sigma: float, gravity_m_s2: float) -> PosePlan:
+    kinds = np.count_nonzero(np.abs(CANDIDATES) > 1e-9, axis=1)
+    if name.startswith("6"):
+        up = CANDIDATES[kinds == 1]
+    elif name.startswith("9"):
+        up = _best(9, sigma)
+    elif name.startswith("12"):
+        up = CANDIDATES[kinds == 2]
+    else:
+        up = CANDIDATES[kinds <= (2 if name.startswith("18") else 3)]
+    sigmas = np.full(len(up), sigma)
+    design = PoseDesign.of(up, sigmas)
+    errors = np.sqrt(np.diag(design.covariance))
+    worst = float(errors.max())
+    worth = []
+    for k in range(len(up)):
+        rest = PoseDesign.of(np.delete(up, k, axis=0), np.delete(sigmas, k))
+        loss = float(np.sqrt(np.diag(rest.covariance)).max()) / worst if rest.rank == 9 else math.inf
+        worth.append(PoseWorth(pose_in_words(up[k]), loss))
+    worth.sort(key=lambda pose: -pose.loss)
+    if design.rank < 9:
+        return PosePlan(name, len(up), design.rank, math.inf, math.inf, math.inf, ())
+    return PosePlan(
+        name=name,
+        n_poses=len(up),
+        rank=design.rank,
+        scale=float(errors[[0, 2, 5]].max()),
+        angle=float(errors[[1, 3, 4]].max()),
+        zero=float(errors[6:].max()) * gravity_m_s2,
+        worth=tuple(worth),
+    )
+
+
+def _best(n: int, sigma: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """n of the 26 poses: taken one after another, then exchanged as long as the worst standard error falls."""
+
+    def score(rows: list[int]) -> float:
+        design = PoseDesign.of(CANDIDATES[rows], np.full(len(rows), sigma))
+        # What is not seen yet is as uncertain as the thing itself; among equals the smaller sum.
+        covariance = np.linalg.inv(design.information + np.eye(9))
+        return float(covariance.diagonal().max() + 1e-3 * np.trace(covariance))
+
+    rows: list[int] = []
+    for _ in range(n):
+        rows.append(min(range(len(CANDIDATES)), key=lambda k: score([*rows, k])))
+    best = score(rows)
+    improved = True
+    while improved:
+        improved = False
+        for k in range(n):
+            for other in range(len(CANDIDATES)):
+                trial = [*rows[:k], other, *rows[k + 1 :]]
+                value = score(trial)
+                if value < best * (1.0 - 1e-9):
+                    rows, best, improved = trial, value, True
+    return CANDIDATES[rows]
+
+
+def _moves(angle_noise: float) -> tuple[MovePlan, ...]:
+    e = np.eye(3)
+    quarter, eighth = 0.5 * math.pi, 0.25 * math.pi
+    third = [e[2], e[0], e[1]]
+    single = [PlannedMove(third[k], e[k], quarter) for k in range(3)]
+    halves = [
+        part
+        for k in range(3)
+        for part in (
+            PlannedMove(third[k], e[k], eighth),
+            PlannedMove(math.cos(eighth) * third[k] + math.sin(eighth) * np.cross(third[k], e[k]), e[k], eighth),
+        )
+    ]
+    back = [
+        *single,
+        *(PlannedMove(np.cross(third[k], e[k]), e[k], -quarter) for k in range(3)),
+    ]
+    both = [*back, *(PlannedMove(np.cross(e[k], third[k]), e[k], quarter) for k in range(3))]
+    sets = (
+        ("three quarter turns about level axes", single),
+        ("the same, each with a stop half way", halves),
+        ("the same quarter turns, there and back", back),
+        ("there, back, and from another side", both),
+    )
+    return tuple(MovePlan(name, len(moves), *design_moves(moves, angle_noise)) for name, moves in sets)

@@ -1,0 +1,220 @@
+"""The even clock behind a log's stamps, if there is one, and the samples lost on it (docs/reading.md, section 4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import median_filter
+
+from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, earliest, track
+from trihedron.read.clock.period import find_period
+from trihedron.read.table import FloatArray
+from trihedron.records.sampling import StampKind
+
+IntArray = npt.NDArray[np.int64]
+
+FEWEST_ROWS = 100
+"""Fewer stamps tell no kind of clock."""
+UNSEEN = 0.02
+"""Part of a period by which stamps may stray from an even clock before anybody asks how it grows."""
+EXACT = 0.005
+"""Stamps this part of a period about an even clock (rms) are even."""
+GROWTH = 4.0
+"""Growth of the variance of a lag's elapsed time over sixteen times the lag, above which no even clock lies behind the
+stamps: 16 for steps drawn anew, 1 for an even clock."""
+TAKEN_BACK = 0.02
+"""Share of blocks whose earliest stamp may move back by a whole period: an even clock's never do."""
+CLOSE_PIECES = 60
+"""Pieces of a log over which a wandering rate is followed: a thermal drift takes minutes."""
+
+
+@dataclass(frozen=True, eq=False)
+class EvenClock:
+    """``tick`` (n,) number of each sample, lost ones counted; ``even_s`` (n,) when the even clock took it, relative to
+    the stamps; ``kind``; ``counts_losses``: whether ``tick`` says what was lost; ``pauses`` (m,) rows behind which the
+    logger paused; ``wanders``: the rate changes over the log."""
+
+    kind: StampKind
+    period_s: float
+    sigma_period_s: float
+    tick: IntArray
+    even_s: FloatArray
+    stamp_error_s: float
+    counts_losses: bool
+    pauses: IntArray
+    grid_s: float = 0.0
+    wanders: bool = False
+
+    @property
+    def lost_behind(self) -> IntArray:
+        """(n - 1,) samples lost behind each row; those of pauses too, as far as the clock tells."""
+        return np.asarray(np.diff(self.tick) - 1, dtype=np.int64)
+
+
+def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> EvenClock | None:
+    """The even clock behind stamps (n,) in order, or ``None`` for fewer than 100 rows.
+
+    ``counter`` (n,) numbers the samples, lost ones too, from 0 (already continued where it wraps): then it tells the
+    losses and the stamps only the rate.
+    """
+    n = len(time_s)
+    if n < FEWEST_ROWS or not time_s[-1] > time_s[0]:
+        return None
+    found = find_period(time_s)
+    period, sees = found.period_s, found.is_seen
+    if counter is not None:
+        tick, pauses, width, moved_back = (
+            counter,
+            np.zeros(0, np.int64),
+            block_rows(time_s, period, found.coherence),
+            0.0,
+        )
+        sees = True
+        period = _long_run(time_s, counter)
+    else:
+        width = block_rows(time_s, period, found.coherence)
+        period, tick, pauses, moved_back = track(time_s, period, width, sees, found.coherence > 0.9)
+    even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False)
+    error = time_s - even
+    for _ in range(3 if counter is None and sees else 0):
+        # Followed loosely: a loss counted too early makes a dip that the clock must not follow.
+        moved = behind_late_rows(tick, error / period)
+        if moved is tick:
+            break
+        tick = moved
+        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False)
+        error = time_s - even
+    if wanders:
+        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, CLOSE_PIECES)
+        error = time_s - even
+    on_grid = 0.0 < found.grid_s < 1.3 * period and _range(error) < 1.3 * found.grid_s
+    growth = 0.0 if on_grid else _growth(error, pauses, UNSEEN * period)
+    if moved_back > TAKEN_BACK or growth > GROWTH or (not sees and growth > 0.5 * GROWTH):
+        return EvenClock(StampKind.IRREGULAR, period, sigma, np.arange(n), time_s, 0.0, False, pauses)
+    kind = _kind(error, period, found.grid_s)
+    if kind is not StampKind.LATE:
+        # Two-sided errors have their middle, not their edge, on the clock.
+        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, True, CLOSE_PIECES)
+        error = time_s - even
+    rms = float(np.sqrt(np.mean((error - error.mean()) ** 2)))
+    return EvenClock(kind, mean_period, sigma, tick, even, rms, sees, pauses, found.grid_s, wanders)
+
+
+def _long_run(time_s: FloatArray, tick: IntArray) -> float:
+    """Period from stamps and their numbers: a line through the earliest stamps of some hundred blocks, thrice."""
+    period = float((time_s[-1] - time_s[0]) / max(tick[-1] - tick[0], 1))
+    width = max(len(time_s) // 300, 8)
+    for _ in range(3):
+        late = time_s - period * tick
+        at = earliest(late, width)
+        slope = np.polyfit(tick[at] - tick[at[0]], late[at], 1)[0] if len(at) > 2 else 0.0
+        period += float(slope)
+    return period
+
+
+def _lay(
+    time_s: FloatArray,
+    tick: IntArray,
+    period: float,
+    pauses: IntArray,
+    width: int,
+    through_middle: bool,
+    pieces: int = 12,
+) -> tuple[FloatArray, float, float, bool]:
+    """The even clock (n,) under the earliest stamps, or through the middle of all; its mean period over the
+    longest stretch and the standard error of that;
+    whether its rate wanders, followed in so many ``pieces``."""
+    late = time_s - period * tick
+    even = np.empty_like(late)
+    edges = np.concatenate([[0], pauses + 1, [len(late)]])
+    sigma, longest, wanders, slope = np.inf, 0, False, 0.0
+    for a, b in pairwise(edges):
+        piece = late[a:b]
+        if b - a < 4 * width:
+            even[a:b] = piece.min() + period * tick[a:b]
+            continue
+        if through_middle:
+            cut = (b - a) // width * width
+            x = tick[a : a + cut].reshape(-1, width).mean(axis=1)
+            y = each = np.median(piece[:cut].reshape(-1, width), axis=1)
+        else:
+            at = earliest(piece, width)
+            x, each = tick[a:b][at].astype(np.float64), piece[at]
+            y = ahead(each, STALL_STEPS // width + 1)
+        x0, scale = x.mean(), max(float(np.ptp(x)), 1.0)
+        u = (x - x0) / scale
+        line = _robust_line(u, y)
+        left = y - np.polyval(line, u)
+        noise = 1.4826 * float(np.median(np.abs(np.diff(each)))) / np.sqrt(2.0) + 1e-3 * period
+        size = min(max(len(y) // 12, 5), 401) | 1
+        smooth = median_filter(left, size, mode="nearest")
+        # Wander: the smoothed rest is far more than the blocks' own scatter leaves in it.
+        curved = float(np.std(smooth)) > max(8.0 * noise / np.sqrt(size), UNSEEN * period)
+        even[a:b] = np.polyval(line, (tick[a:b] - x0) / scale)
+        if curved and len(y) >= 24:
+            wanders = True
+            even[a:b] += np.interp(
+                tick[a:b], x, median_filter(left, min(max(len(y) // pieces, 5), 101) | 1, mode="nearest")
+            )
+        even[a:b] += period * tick[a:b]
+        if b - a > longest:
+            longest, slope = b - a, float(line[0]) / scale
+            spread = float(np.std(left - smooth if curved else left))
+            # Neighbouring blocks share what delays them: four count as one.
+            sigma = spread / scale / max(float(np.std(u)), 1e-9) / np.sqrt(max(len(y) / 4.0, 1.0))
+    digits = float(np.spacing(np.abs(time_s).max())) / max(int(tick[-1] - tick[0]), 1)
+    return even, period + slope, float(np.hypot(sigma, digits)), wanders
+
+
+def _robust_line(u: FloatArray, y: FloatArray) -> FloatArray:
+    """Straight line through points of which some are far too late."""
+    keep = np.ones(len(y), dtype=bool)
+    line = np.polyfit(u, y, 1)
+    for _ in range(3):
+        left = y - np.polyval(line, u)
+        limit = 4.0 * 1.4826 * float(np.median(np.abs(left - np.median(left)))) + 1e-12
+        keep = np.abs(left - np.median(left)) <= limit
+        if keep.sum() < 3:
+            break
+        line = np.polyfit(u[keep], y[keep], 1)
+    return np.asarray(line)
+
+
+def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:
+    """Variance of the change of the stamps' error over 16 m rows over that over m, m as long as the log allows."""
+    edges = np.concatenate([[0], pauses + 1, [len(error)]])
+    longest = int(np.argmax(np.diff(edges)))
+    piece = error[edges[longest] : edges[longest + 1]][: 1 << 20]
+    far = min(len(piece) // 8, 1024)
+    near = max(far // 16, 1)
+
+    def typical(lag: int) -> float:
+        change = np.abs(piece[lag:] - piece[:-lag])
+        return float(np.mean(np.minimum(change, 8.0 * np.median(change) + 1e-300) ** 2))
+
+    return typical(far) / max(typical(near), unseen**2)
+
+
+def _range(error: FloatArray) -> float:
+    """Width that holds all but 2 % of the errors: those next to a loss may stand on its wrong side."""
+    low, high = np.percentile(error[:: max(len(error) // 100_000, 1)], [1.0, 99.0])
+    return float(high - low)
+
+
+def _kind(error: FloatArray, period: float, grid: float) -> StampKind:
+    """Kind of stamps from their errors (n,) about the even clock."""
+    probe = error[:: max(len(error) // 100_000, 1)]
+    low, middle, high = np.percentile(probe, [0.2, 50.0, 99.8])
+    rms = float(np.std(probe))
+    if rms < EXACT * period:
+        return StampKind.EXACT
+    if 0.0 < grid < 1.3 * period and _range(error) < 1.3 * grid:
+        return StampKind.ROUNDED
+    # One-sided: the early edge is sharp, the late one runs out; or samples come in packets.
+    together = float(np.mean(np.diff(error) < -0.7 * period))
+    if high - middle > 2.0 * (middle - low) or together > 0.02 or high - low > 1.0 * period:
+        return StampKind.LATE
+    return StampKind.SCATTERED

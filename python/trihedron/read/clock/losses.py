@@ -1,0 +1,180 @@
+"""Samples lost on a clock of known period, by which the earliest stamps move and stay moved (docs/reading.md, 4)."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import median_filter
+
+from trihedron.read.clock.period import PAUSE_STEPS
+from trihedron.read.table import FloatArray
+
+IntArray = npt.NDArray[np.int64]
+
+LOST = 0.6
+"""Part of a period by which the earliest stamps must move, and stay moved, for a sample to be lost."""
+MISS = 1e-2
+"""Chance that no stamp of a whole log's blocks is nearly undelayed."""
+STALL_STEPS = 120
+"""A link that stands still for longer than this has paused."""
+
+
+def block_rows(time_s: FloatArray, period: float, coherence: float) -> int:
+    """Rows among which one is all but certainly stamped without delay, 2 (θ/T) ln(n/α), and more than a packet."""
+    n = len(time_s)
+    mean_delay = np.sqrt(float(np.clip(coherence, 0.05, 1.0)) ** -2 - 1.0) / (
+        2.0 * np.pi
+    )  # of an exponential law, in periods
+    width = 2.0 * mean_delay * np.log(n / MISS)
+    probe = time_s[: 1 << 20]
+    close = np.diff(probe) < 0.3 * period
+    if close.any():
+        runs = np.diff(np.flatnonzero(np.concatenate([[True], ~close, [True]])))
+        width = max(width, 2.0 * float(np.percentile(runs[runs > 1], 99.0)) if np.any(runs > 1) else 0.0)
+    return int(np.clip(np.ceil(width), 4, max(n // 12, 8)))
+
+
+def earliest(late: FloatArray, width: int) -> IntArray:
+    """Row of the earliest stamp of every block of ``width`` rows (the last one may be longer)."""
+    blocks = max(len(late) // width, 1)
+    body = late[: blocks * width].reshape(blocks, -1) if blocks * width <= len(late) else late[None, :]
+    at = body.argmin(axis=1) + np.arange(blocks) * body.shape[1]
+    rest = late[blocks * width :]
+    if len(rest) and rest.min() < late[at[-1]]:
+        at[-1] = blocks * width + int(rest.argmin())
+    if len(late) - at[-1] > width:
+        at = np.append(at, len(late) - width // 2 + int(late[-(width // 2) :].argmin()))
+    return np.asarray(at, dtype=np.int64)
+
+
+def ahead(values: FloatArray, reach: int) -> FloatArray:
+    """Minimum over each value and the ``reach`` that follow it."""
+    out = values.copy()
+    done = 0
+    while done < reach:
+        step = min(done + 1, reach - done)
+        out[:-step] = np.minimum(out[:-step], out[step:])
+        done += step
+    return out
+
+
+def track(
+    time_s: FloatArray, period: float, width: int, sees: bool, is_sharp: bool
+) -> tuple[float, IntArray, IntArray, float]:
+    """Period, tick of every row, pauses, and the share of blocks that moved back by a period.
+
+    The earliest stamp of every block, a stall of the link looked past, moves by whole periods where samples are lost
+    and by a little where the period is not quite right; a period that was not seen comes from first and last stamp.
+    """
+    n = len(time_s)
+    pauses = np.flatnonzero(np.diff(time_s) > PAUSE_STEPS * period)
+    edges = np.concatenate([[0], pauses + 1, [n]])
+    row = np.arange(n, dtype=np.int64)
+    reach = STALL_STEPS // width + 1
+    for _ in range(0 if sees else 3):
+        late = time_s - period * row
+        slopes, weights = [], []
+        for a, b in pairwise(edges):
+            if b - a >= 4 * width:
+                at = earliest(late[a:b], width) + a
+                slopes.append(float((late[at[-1]] - late[at[0]]) / (at[-1] - at[0])))
+                weights.append(b - a)
+        if slopes:
+            period += float(np.average(slopes, weights=weights))
+    late = time_s - period * row
+    lost = np.zeros(n, dtype=np.int64)
+    back = blocks = 0
+    for a, b in pairwise(edges):
+        if not sees or b - a < 2 * width:
+            continue
+        moved_back, n_blocks = _count_losses(late[a:b] / period, width, reach, is_sharp, lost[a:b])
+        back, blocks = back + moved_back, blocks + n_blocks
+    for k in pauses:
+        # How many a pause cost is told no better than its own length.
+        lost[k + 1] += max(round(float(time_s[k + 1] - time_s[k]) / period) - 1, 0)
+    return period, row + np.cumsum(lost), pauses.astype(np.int64), back / max(blocks, 1)
+
+
+def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost: IntArray) -> tuple[int, int]:
+    """Write the samples lost in front of each row of one stretch into ``lost``; ``late`` in periods.
+
+    Behind the last block a loss is counted only where every stamp is nearly right (``is_sharp``).
+
+    Returns the number of blocks that moved back by a period, and of all blocks.
+    """
+    at = earliest(late, width)
+    first = ahead(late[at], reach)
+    # The level the clock itself drifts on: the part of the moves that is not whole periods.
+    moves = np.diff(first)
+    count = np.floor(moves + (1.0 - LOST)).astype(np.int64)
+    back = int(np.count_nonzero(moves < -LOST))
+    _settle(first, count)
+    for j in np.flatnonzero(count > 0):
+        a, b = int(at[j]), int(at[j + 1])
+        if b <= a:
+            continue
+        inside = late[a + 1 : b + 1] - first[j]
+        level = np.minimum.accumulate(inside[::-1])[::-1]
+        level[-1] = count[j]
+        whole = np.clip(np.floor(level + (1.0 - LOST)).astype(np.int64), 0, count[j])
+        whole[-1] = count[j]
+        whole = np.maximum.accumulate(whole)
+        lost[a + 1 : b + 1] += np.diff(whole, prepend=0)
+    tail = late[at[-1] :] - first[-1]
+    if is_sharp and len(tail) > 1:
+        whole = np.floor(np.minimum.accumulate(tail[::-1])[::-1] + (1.0 - LOST)).astype(np.int64)
+        lost[at[-1] + 1 :] += np.diff(np.maximum(whole, 0))
+    return back, len(at)
+
+
+def _settle(first: FloatArray, count: IntArray) -> None:
+    """Correct ``count`` (m - 1,) where the level of the earliest stamps (m,), losses taken off, stays a period away.
+
+    A block without an early stamp hides the move to the next level in two halves; a chance early one invents a move.
+    """
+    m = 5
+    for _ in range(3):
+        level = first - np.concatenate([[0], np.cumsum(count)])
+        if len(level) < 2 * m + 1:
+            return
+        middle = median_filter(level, m, mode="nearest")
+        change = np.zeros(len(count))
+        change[m // 2 : len(count) - m // 2] = middle[m:] - middle[:-m]
+        far = np.abs(change) > LOST
+        if not far.any():
+            return
+        starts = np.flatnonzero(np.diff(np.concatenate([[False], far, [False]]).astype(np.int8)) == 1)
+        stops = np.flatnonzero(np.diff(np.concatenate([[False], far, [False]]).astype(np.int8)) == -1)
+        moved = False
+        for a, b in zip(starts, stops, strict=True):
+            by = int(np.rint(change[a:b][np.argmax(np.abs(change[a:b]))]))
+            at = a + int(np.argmax(np.diff(level)[a:b] if by > 0 else count[a:b]))
+            by = max(by, -int(count[at]))
+            count[at] += by
+            moved |= by != 0
+        if not moved:
+            return
+
+
+def behind_late_rows(tick: IntArray, error: FloatArray) -> IntArray:
+    """Ticks with every loss put behind the rows that it would have stamped before they were taken.
+
+    A row late by most of a period in front of a loss looks like one behind it; counted so its ``error`` (n,), in
+    periods about the earliest stamps, is negative.
+    """
+    lost = np.diff(tick, prepend=tick[0] - 1) - 1
+    at = np.flatnonzero(lost > 0)
+    if not len(at):
+        return tick
+    early = -0.1
+    shift = np.zeros(len(tick), dtype=np.int64)
+    moved = False
+    for i in at:
+        k, count = int(i), int(lost[i])
+        while k < len(tick) and k < i + STALL_STEPS and error[k] < early and lost[k] == (count if k == i else 0):
+            shift[k] += count
+            k += 1
+        moved = moved or k > int(i)
+    return tick - shift if moved else tick

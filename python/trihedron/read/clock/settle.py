@@ -1,0 +1,146 @@
+"""Which clock a recording gets: its stamps, or the even clock behind them (docs/reading.md, section 4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.clock.even import EvenClock, find_even_clock
+from trihedron.read.clock.followed import followed
+from trihedron.read.table import FloatArray
+from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records.sampling import Sampling, StampKind
+
+IntArray = npt.NDArray[np.int64]
+
+WORTH = 0.03
+"""Stamps this part of a step (rms) about an even clock are as good as even (those rounded to a tenth of a step are):
+a turn integrated over them errs by less than a thirtieth of what one sample adds."""
+SHARED = 0.005
+"""Share of samples with the stamp of the one before, above which stamps cannot be when samples were taken."""
+STANDARD_ERRORS, SYSTEMATIC = 4.0, 0.15
+"""A share of 0 or 1 is refused beyond four standard errors and what a filter, or a bent course, makes of it."""
+VAGUE = 0.2
+"""Standard error of the share above which motion tells nothing."""
+ONE_STEP = 0.9
+"""Part of the steps a sample counter makes that are its usual one; counters of inner ticks alternate."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """``time_s`` (n,) from the first sample on and ``start_s``; the record; ``lost_behind`` (n - 1,) or ``None`` where
+    nothing tells; findings."""
+
+    time_s: FloatArray
+    start_s: float
+    sampling: Sampling
+    lost_behind: IntArray | None
+    findings: tuple[Finding, ...]
+
+
+def settle_clock(
+    time_s: FloatArray, start_s: float, triads: list[FloatArray], counter: FloatArray | None = None
+) -> Settled:
+    """The clock of samples with stamps (n,) and readings (n, 3) in every one of ``triads``.
+
+    Stamps that two samples share, and those that are an even clock's but for rounding, give way to it; others if motion
+    says that the samples were taken evenly. A ``counter`` (n,) that counts samples tells which were lost.
+    """
+    clock = find_even_clock(time_s)
+    numbers = None if counter is None else sample_numbers(counter)
+    if clock is not None and numbers is not None and clock.kind not in (StampKind.EXACT, StampKind.ROUNDED):
+        counted = find_even_clock(time_s, numbers)
+        if counted is not None and counted.kind is not StampKind.IRREGULAR:
+            clock = counted
+    if clock is None:
+        return Settled(time_s, start_s, Sampling(), None, ())
+    if clock.kind is StampKind.IRREGULAR:
+        return Settled(time_s, start_s, Sampling(StampKind.IRREGULAR, clock.period_s), None, ())
+    lost = clock.lost_behind
+    share, sigma = 0.0, float("inf")
+    shared = float(np.mean(np.diff(time_s) == 0.0))
+    is_even = False
+    if clock.stamp_error_s > WORTH * clock.period_s:
+        share, sigma = followed(time_s, clock.even_s, clock.tick, triads)
+        follows = share - STANDARD_ERRORS * sigma > SYSTEMATIC
+        ignores = share + STANDARD_ERRORS * sigma < 1.0 - SYSTEMATIC
+        by_itself = shared > SHARED or clock.kind is StampKind.ROUNDED
+        is_even = not follows and (ignores or by_itself)
+    sampling = Sampling(
+        clock.kind, clock.period_s, clock.sigma_period_s, clock.stamp_error_s, is_even, clock.counts_losses,
+        int(lost.sum()) if clock.counts_losses else 0, int(np.count_nonzero(lost)) if clock.counts_losses else 0,
+        share, sigma,
+    )  # fmt: skip
+    findings = _findings(sampling, clock, shared)
+    told = lost if clock.counts_losses else None
+    if not is_even:
+        return Settled(time_s, start_s, sampling, told, findings)
+    even = clock.even_s - clock.even_s[0]
+    return Settled(np.maximum.accumulate(even), start_s + float(clock.even_s[0]), sampling, told, findings)
+
+
+def sample_numbers(counter: FloatArray) -> IntArray | None:
+    """(n,) numbers of samples from 0 on from a counter that counts them (continued where it wraps), or ``None``."""
+    if len(counter) < 3 or not np.all(np.isfinite(counter)) or not np.all(counter == np.rint(counter)):
+        return None
+    step = np.diff(counter)
+    if counter.min() >= 0:
+        for modulus in (2.0**8, 2.0**16, 2.0**32):
+            if counter.max() < modulus:
+                step = np.where(step < 0, step + modulus, step)
+                break
+    if np.any(step <= 0):
+        return None
+    values, counts = np.unique(step, return_counts=True)
+    usual = float(values[np.argmax(counts)])
+    if counts.max() < ONE_STEP * len(step) or not np.all(step / usual == np.rint(step / usual)):
+        return None
+    return np.concatenate([[0], np.cumsum(np.rint(step / usual))]).astype(np.int64)
+
+
+def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Finding, ...]:
+    if sampling.stamp_error_s <= WORTH * sampling.period_s:
+        return ()
+    period, error = sampling.period_s, sampling.stamp_error_s
+    numbers = MappingProxyType(
+        {
+            "period_s": period,
+            "sigma_period_s": sampling.sigma_period_s,
+            "stamp_error_s": error,
+            "shared_fraction": shared,
+            "followed": sampling.followed,
+            "sigma_followed": sampling.sigma_followed,
+        }
+    )
+    how = {
+        StampKind.ROUNDED: f"rounded to {1e3 * clock.grid_s:.3g} ms",
+        StampKind.LATE: f"late by {1e3 * error:.2g} ms rms, as they are when samples are stamped on arrival",
+    }.get(sampling.kind, f"scattered by {1e3 * error:.2g} ms rms")
+    by_motion = (
+        f"the readings follow {sampling.followed:.2f} ± {sampling.sigma_followed:.2g} of it"
+        if sampling.sigma_followed < VAGUE
+        else "no motion tells when the samples were taken"
+    )
+    rate = f"T = {1e3 * period:.6g} ± {1e3 * sampling.sigma_period_s:.1g} ms ({1 / period:.6g} Hz)"
+    if sampling.is_even:
+        seen = f"The stamps are those of an even clock, {rate}, {how} ({by_motion}); the even clock was taken."
+        return (Finding(FindingCode.EVEN_CLOCK, Severity.NOTE, seen, "", "", numbers),)
+    if sampling.followed - STANDARD_ERRORS * sampling.sigma_followed > SYSTEMATIC:
+        if sampling.followed + STANDARD_ERRORS * sampling.sigma_followed > 1.0 - SYSTEMATIC:
+            seen = (
+                f"The stamps leave an even clock ({rate}) by {1e3 * error:.2g} ms rms and {by_motion}: they were kept."
+            )
+            return (Finding(FindingCode.STAMPS_KEPT, Severity.NOTE, seen, "", "", numbers),)
+        seen = (
+            f"The stamps are {how} about an even clock ({rate}) and {by_motion}: both are partly right, the stamps "
+            "were kept."
+        )
+        cause = "Samples taken unevenly and stamped inexactly."
+    else:
+        seen = f"The stamps are {how} about an even clock ({rate}) and {by_motion}: the stamps were kept."
+        cause = "A sensor that is sampled evenly and stamped on arrival, or one that is sampled unevenly."
+    action = "Log the sensor's own sample counter or data-ready times if turns matter."
+    return (Finding(FindingCode.CLOCK_UNDECIDED, Severity.WARNING, seen, cause, action, numbers),)

@@ -1,0 +1,74 @@
+"""Nouns of noise inside the still poses of a session: each figure with the interval that two logs are compared by."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A positive figure: ``value`` with its 95 % interval.
+
+    ``sigma_log`` is the standard error of its logarithm, known from ``dof`` degrees of freedom (infinite where it
+    follows from the number of readings alone).
+    """
+
+    value: float
+    lower: float
+    upper: float
+    sigma_log: float
+    dof: float = math.inf
+
+
+@dataclass(frozen=True)
+class OctaveNoise:
+    """Two-sided density [u²/Hz] between ``low_hz`` and ``high_hz``, as the mean over the holds."""
+
+    low_hz: float
+    high_hz: float
+    density: Measured
+
+
+@dataclass(frozen=True)
+class HoldLine:
+    """A line of ``amplitude`` [u] at ``frequency_hz`` that the holds have in common, over ``limit`` times its level."""
+
+    frequency_hz: float
+    amplitude: Measured
+    excess: float
+
+
+@dataclass(frozen=True)
+class HoldNoise:
+    """Noise of one axis inside the holds of a session; u is the unit of the raw readings.
+
+    ``white`` is the density N [u/√Hz] from reading to reading, freed of the rounding of the converter, ``None`` where
+    the converter hides it; ``step`` [u] the resolution, zero where the readings are finer than their noise shows.
+    ``corner_hz`` is the corner of a low-pass filter where one shows, ``corner_above_hz`` what it lies above where none
+    does. ``scatter`` is by how much the noise differs from hold to hold beyond chance (standard deviation of the
+    logarithm of its power).
+    """
+
+    name: str
+    unit: str
+    rate_hz: float
+    n_holds: int
+    n_readings: int
+    white: Measured | None
+    step: float
+    octaves: tuple[OctaveNoise, ...]
+    lines: tuple[HoldLine, ...]
+    corner_hz: Measured | None
+    corner_above_hz: float
+    scatter: float
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """One figure over another with its 95 % interval, and the chance of such a difference where there is none."""
+
+    value: float
+    lower: float
+    upper: float
+    p_value: float

@@ -1,0 +1,68 @@
+"""An experiment before it is made: how certain its answer would be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class TurnPlan:
+    """Standard errors from known turns: relative ``scale`` of each turned axis, ``zero`` [rad/s]; all rows at once
+    (least squares), and the zero from the zero turn first. ``n_turns`` about every axis."""
+
+    n_turns: int
+    angles_deg: tuple[float, ...]
+    duration_s: float
+    zero_s: float
+    scale: float
+    zero: float
+    scale_zero_first: float
+    zero_zero_first: float
+
+
+@dataclass(frozen=True)
+class PoseWorth:
+    """One pose of a set, in words, and by which factor the worst standard error of the nine grows without it
+    (infinite: not determined)."""
+
+    pose: str
+    loss: float
+
+
+@dataclass(frozen=True)
+class PosePlan:
+    """Standard errors of a set of poses by method 2: relative ``scale``, ``angle`` between axes [rad], ``zero`` [m/s²],
+    the largest of three each; ``rank`` of nine; ``worth`` the poses by what they are worth, most first."""
+
+    name: str
+    n_poses: int
+    rank: int
+    scale: float
+    angle: float
+    zero: float
+    worth: tuple[PoseWorth, ...]
+
+
+@dataclass(frozen=True)
+class MovePlan:
+    """Gyro by moves (method 2): how many of the nine numbers of scale a set of moves determines, and the largest
+    relative standard error among them (infinite: not determined)."""
+
+    name: str
+    n_moves: int
+    rank: int
+    scale: float
+
+
+@dataclass(frozen=True)
+class ExperimentPlan:
+    """What known turns, poses and moves would tell; noise densities in rad/s/√Hz and m/s²/√Hz."""
+
+    gyroscope_density: float
+    accelerometer_density: float
+    gravity_m_s2: float
+    hold_s: float
+    sigma_turn_rad: float
+    turns: TurnPlan
+    poses: tuple[PosePlan, ...]
+    moves: tuple[MovePlan, ...]

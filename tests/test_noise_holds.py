@@ -1,0 +1,102 @@
+"""Noise inside holds: simulated sessions of known figures, and one held against another."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
+
+from noise_holds import RATE, session
+from trihedron.estimate.noise import noise_of_holds, ratio_of
+from trihedron.records.hold_noise import Measured
+
+
+def of(rng, **options):
+    readings, windows = session(rng, **options)
+    return noise_of_holds(readings, RATE, windows)[0]
+
+
+@pytest.mark.parametrize("options", [{}, {"step": 0.1}, {"step": 0.2}, {"scatter": 0.2}, {"knocks": 2}], ids=str)
+def test_the_white_density_and_the_ratio_of_two_are_inside_their_intervals(options):
+    rng = np.random.default_rng(71)
+    inside = covered = false = 0
+    for _ in range(20):
+        one, other = of(rng, N=1.25e-2, **options), of(rng, **options)
+        inside += other.white.lower <= 1e-2 <= other.white.upper
+        ratio = ratio_of(one.white, other.white)
+        covered += ratio.lower <= 1.25 <= ratio.upper
+        false += ratio_of(other.white, of(rng, **options).white).p_value < 0.01
+    # Of 20 at 95 %: 16 or more with probability 0.997; two false alarms at 1 % once in sixty.
+    assert inside >= 16
+    assert covered >= 16
+    assert false <= 2
+
+
+def test_octaves_hold_the_density_and_tell_where_two_spectra_differ():
+    rng = np.random.default_rng(72)
+    plain, bent = of(rng, holds=40), of(rng, holds=40, corner=10.0)
+    assert sum(o.density.lower <= 1e-4 <= o.density.upper for o in plain.octaves) >= len(plain.octaves) - 1
+    by_octave = {o.low_hz: o.density for o in bent.octaves}
+    p_values = [ratio_of(o.density, by_octave[o.low_hz]).p_value for o in plain.octaves]
+    assert p_values[-1] < 1e-10
+    assert p_values[0] > 1e-3
+
+
+def test_a_filter_shows_its_corner_and_white_noise_none():
+    rng = np.random.default_rng(73)
+    inside = 0
+    for _ in range(10):
+        axis = of(rng, corner=15.0)
+        inside += axis.corner_hz is not None and axis.corner_hz.lower <= 15.0 <= axis.corner_hz.upper
+        plain = of(rng)
+        assert plain.corner_hz is None
+        # Nothing below Nyquist, to what twenty holds tell.
+        assert plain.corner_above_hz > 35.0
+    assert inside >= 8
+
+
+def test_a_line_common_to_the_holds_is_found_with_its_amplitude():
+    rng = np.random.default_rng(74)
+    (line,) = of(rng, holds=40, line=0.03).lines
+    assert line.frequency_hz == pytest.approx(17.0, abs=0.4)
+    assert line.amplitude.value == pytest.approx(0.03, rel=0.3)
+    assert of(rng, holds=40).lines == ()
+
+
+@pytest.mark.parametrize("step", [0.05, 0.1, 1 / 16, 3.0])
+def test_the_step_of_the_converter_is_read_off_the_values_also_where_digits_are_cut(step):
+    rng = np.random.default_rng(75)
+    readings, windows = session(rng, step=step, N=step / 10)
+    axis = noise_of_holds(np.round(readings, 4), RATE, windows)[0]
+    assert axis.step == pytest.approx(step, rel=2e-3)
+    assert of(rng).step == 0.0
+
+
+def test_noise_that_the_converter_hides_is_not_stated():
+    assert of(np.random.default_rng(76), step=1.0).white is None
+
+
+def test_missing_readings_cut_holds_and_channels_keep_their_names():
+    rng = np.random.default_rng(77)
+    readings, windows = session(rng, holds=10)
+    readings[windows[3][0] + 100] = np.nan
+    two = noise_of_holds(np.column_stack([readings, 2 * readings]), RATE, windows, names=("x", "y"), units=("g", "g"))
+    assert [axis.name for axis in two] == ["x", "y"]
+    assert two[0].n_holds == 11
+    assert two[1].white.value == pytest.approx(2 * two[0].white.value, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("question", "words"),
+    [
+        (lambda: noise_of_holds(np.zeros(100), 0.0, [(0, 50)]), "rate_hz"),
+        (lambda: noise_of_holds(np.zeros(100), 1.0, [(50, 200)]), "earlier to a later"),
+        (lambda: noise_of_holds(np.zeros(100), 1.0, [(0, 10)]), "hold still for longer"),
+        (lambda: ratio_of(Measured(0.0, 0.0, 0.0, 1.0), Measured(1.0, 1.0, 1.0, 1.0)), "positive"),
+    ],
+)
+def test_a_question_without_an_answer_is_refused_in_words(question, words):
+    with pytest.raises(ValueError, match=words):
+        question()

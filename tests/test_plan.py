@@ -1,0 +1,133 @@
+"""The error bars of an experiment before it is made: the manual's problems 3, 4 and 8."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from trihedron.cli import main
+from trihedron.estimate.gyroscope import Turn, calibrate_turns
+from trihedron.estimate.gyroscope.turn_design import (
+    PlannedMove,
+    design_least_squares,
+    design_moves,
+    design_zero_first,
+)
+from trihedron.records import Recording
+
+N = math.radians(0.005)
+
+
+def turns_of(seed=0):
+    """Uneven turns about three axes: angles and durations that no symmetry helps."""
+    rng = np.random.default_rng(seed)
+    axes = np.repeat([0, 1, 2], 3)
+    return axes, rng.uniform(0.8, 7.0, 9) * rng.choice([-1, 1], 9), rng.uniform(0.7, 9.0, 9)
+
+
+def by_brute_force(axes, angles, times, zero_s, route, rng, trials=4000):
+    """Standard deviations of S_w's diagonal and of b_w (first row) over simulated turns, by plain least squares."""
+    S, b = np.diag([1.02, 0.97, 1.0]), np.array([0.02, -0.01, 0.03])
+    out = []
+    for _ in range(trials):
+        phi = np.zeros((len(axes), 3))
+        phi[np.arange(len(axes)), axes] = angles
+        raw = phi @ S.T + np.outer(times, b) + rng.normal(size=(len(axes), 3)) * N * np.sqrt(times)[:, None]
+        zero = b * zero_s + rng.normal(size=3) * N * math.sqrt(zero_s)
+        weight = 1.0 / np.sqrt(times)
+        if route == "first":
+            at_rest = zero / zero_s
+            solution = np.linalg.lstsq(
+                phi * weight[:, None], (raw - np.outer(times, at_rest)) * weight[:, None], rcond=None
+            )
+            out.append([*np.diag(solution[0]), at_rest[0]])
+        else:
+            design = np.vstack([np.column_stack([phi, times]) * weight[:, None], [0, 0, 0, math.sqrt(zero_s)]])
+            side = np.vstack([raw * weight[:, None], zero / math.sqrt(zero_s)])
+            solution = np.linalg.lstsq(design, side, rcond=None)[0]
+            out.append([*np.diag(solution[:3]), solution[3, 0]])
+    return np.std(out, axis=0)
+
+
+@pytest.mark.parametrize(("route", "formula"), [("first", design_zero_first), ("both", design_least_squares)])
+def test_the_formulas_of_both_routes_are_the_scatter_of_simulated_turns(route, formula):
+    axes, angles, times = turns_of()
+    design = formula(axes, angles, times, 3.0, N)
+    seen = by_brute_force(axes, angles, times, 3.0, route, np.random.default_rng(1))
+    # 4000 trials: a standard deviation is known to 1.1 %.
+    np.testing.assert_allclose([*design.scale, design.zero], seen, rtol=0.05)
+
+
+def test_one_turn_and_one_zero_turn_give_the_manuals_variance():
+    design = design_zero_first([0, 1, 2], [math.pi / 2] * 3, [2.0] * 3, 5.0, N)
+    by_hand = N * math.sqrt(2.0 * (1.0 + 2.0 / 5.0)) / (math.pi / 2)
+    np.testing.assert_allclose(design.scale, by_hand, rtol=1e-12)
+    # There and back the zero cancels, and both routes are one.
+    pair = ([0, 0, 1, 1, 2, 2], [math.pi / 2, -math.pi / 2] * 3, [2.0] * 6, 5.0, N)
+    np.testing.assert_allclose(design_zero_first(*pair).scale, N * math.sqrt(2.0 / 2.0) / (math.pi / 2), rtol=1e-12)
+    np.testing.assert_allclose(design_least_squares(*pair).scale, design_zero_first(*pair).scale, rtol=1e-12)
+    assert design_least_squares(*pair).zero < design_zero_first(*pair).zero
+
+
+def test_the_plan_is_what_the_calibration_says_of_itself():
+    rng, rate = np.random.default_rng(3), 200.0
+    pieces, turns, zeros, clock = [], [], [], 0
+    for axis in range(3):
+        for angle in (math.pi / 2, -math.pi / 2):
+            n, still = int(2.0 * rate), int(20.0 * rate)
+            zeros.append((clock, clock + still))
+            turns.append(Turn(clock + still, clock + still + n, axis, angle))
+            block = np.zeros((still + n, 3))
+            t = (np.arange(n) + 0.5) / n
+            block[still:, axis] = angle / 2.0 * 30 * t**2 * (1 - t) ** 2
+            pieces.append(block)
+            clock += still + n
+    gyro = np.vstack(pieces) + rng.normal(size=(clock, 3)) * N * math.sqrt(rate)
+    recording = Recording(np.arange(clock) / rate, None, gyro, rate)
+    found, _ = calibrate_turns(recording, turns, zeros)
+    design = design_least_squares([0, 0, 1, 1, 2, 2], [math.pi / 2, -math.pi / 2] * 3, [2.0] * 6, 120.0, N)
+    # The calibration measures N itself, from 240 blocks of half a second: to 3 %.
+    np.testing.assert_allclose(np.diag(found.sigma_S), design.scale, rtol=0.12)
+    np.testing.assert_allclose(found.sigma_b, design.zero, rtol=0.12)
+
+
+def level_turns(stops):
+    """Three quarter turns about level body axes, each cut into ``stops + 1`` equal moves."""
+    moves = []
+    for k in range(3):
+        axis, up = np.eye(3)[k], np.eye(3)[(k + 2) % 3]
+        for part in range(stops + 1):
+            begun = 0.5 * math.pi * part / (stops + 1)
+            now = math.cos(begun) * up + math.sin(begun) * np.cross(up, axis)
+            moves.append(PlannedMove(now, axis, 0.5 * math.pi / (stops + 1)))
+    return moves
+
+
+def test_three_turns_about_level_axes_show_six_numbers_and_nine_with_a_stop_in_each():
+    assert design_moves(level_turns(0), 1e-3)[0] == 6
+    rank, sigma = design_moves(level_turns(1), 1e-3)
+    assert rank == 9
+    assert 1e-4 < sigma < 1e-2
+
+
+def test_turns_that_determine_nothing_are_refused_in_words():
+    with pytest.raises(ValueError, match="no turn about axis 3"):
+        design_least_squares([0, 1], [1.0, 1.0], [1.0, 1.0], 1.0, N)
+    with pytest.raises(ValueError, match="nothing tells the zero"):
+        design_least_squares([0, 1, 2], [1.0] * 3, [1.0] * 3, 0.0, N)
+
+
+def test_the_command_says_what_turns_poses_and_moves_are_worth(capsys):
+    assert main(["plan", "--turns", "1440,-1440", "--turn-time", "12", "--json"]) == 0
+    planned = json.loads(capsys.readouterr().out)
+    assert planned["turns"]["n_turns"] == 2
+    assert [pose["rank"] for pose in planned["poses"]][:2] == [6, 9]
+    assert planned["poses"][0]["scale"] is None
+    # Eight half turns: sixteen times the angle of a quarter turn, at √6 times the noise of 2 s.
+    assert main(["plan", "--json"]) == 0
+    quarter = json.loads(capsys.readouterr().out)
+    assert planned["turns"]["scale"] == pytest.approx(quarter["turns"]["scale"] * math.sqrt(6.0) / 16.0, rel=1e-9)
+    assert main(["plan"]) == 0
+    assert "three quarter turns about level axes" in capsys.readouterr().out
+    assert main(["plan", "--turn-time", "-1"]) == 1
