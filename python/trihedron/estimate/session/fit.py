@@ -21,7 +21,7 @@ START_CORNER_S = 160.0
 NO_SCATTER = 1e-3
 DEAF = 1e3
 """Widening at which a row no longer says anything beside the others."""
-MOST_WIDENINGS = 3
+MOST_WIDENINGS = 8
 MOVES, DYNAMICS = 2, 3
 """Labels of rows: gravity after a move, velocity over it."""
 
@@ -60,22 +60,19 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     Moves that miss by more than their samples' noise explains count with the noise that they show, and a velocity that
     does is left out: what the linear model lacks there must not be spread over the accelerometer.
     """
-    # Moves are judged, and the strengths of the zeros chosen, by a session that hardly listens to moves: one that they
-    # had bent would explain their misfit as scatter of the accelerometer's zero, and then believe the poses even less.
-    inflation = (DEAF, DEAF)
-    core = fitted(replace(observed, inflation=inflation), S_a, b_a + S_a @ observed.force_origin, S_w, None)
-    is_heard = True
+    # Strengths of the zeros are chosen by a session that hardly listens to moves: one that moves had bent would explain
+    # their misfit as scatter of the accelerometer's zero, and then believe the poses even less.
+    core = fitted(replace(observed, inflation=(DEAF, DEAF)), S_a, b_a + S_a @ observed.force_origin, S_w, None)
+    inflation = (1.0, 1.0)
     for _ in range(MOST_WIDENINGS):
-        wider = _inflation(core, inflation)
-        if wider == inflation or (is_heard is False and wider[0] == inflation[0]):
-            break
-        is_heard = is_heard and wider[1] < DEAF
-        wider = (wider[0], 1.0 if is_heard else DEAF)
-        inflation = wider
         core = fitted(
             replace(observed, inflation=inflation), core.force_scale, core.force_bias, core.rate_scale, core,
             is_tuned=False,
         )  # fmt: skip
+        wider = _inflation(core, inflation)
+        if wider == inflation:
+            break
+        inflation = wider
     chi2, dof = _misfit(core, MOVES)
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
@@ -140,12 +137,11 @@ def _inflation(core: _core.SessionFit, now: tuple[float, float]) -> tuple[float,
     What makes the velocity miss (arms between the accelerometers, a delay) follows the motion and is no noise: widened
     to its size it still pulled a real accelerometer by five of its standard errors.
     """
-    out = []
-    for domain, factor in zip((MOVES, DYNAMICS), now, strict=True):
-        chi2, dof = _misfit(core, domain)
-        base = 1.0 if factor == DEAF else factor
-        ratio = (factor / base) ** 2 * chi2 / max(dof, 1.0)
-        is_wider = dof >= 1.0 and fdtrc(dof, NOISE_DOF, ratio) < FALSE_ALARM
-        wider = DEAF if domain == DYNAMICS else base * float(np.sqrt(ratio))
-        out.append(wider if is_wider else base)
-    return out[0], out[1]
+    moves, dynamics = now
+    chi2, dof = _misfit(core, MOVES)
+    if dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
+        moves *= float(np.sqrt(chi2 / dof))
+    chi2, dof = _misfit(core, DYNAMICS)
+    if dynamics < DEAF and dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
+        dynamics = DEAF
+    return moves, dynamics
