@@ -138,10 +138,10 @@ def _inflation(core: _core.SessionFit, now: tuple[float, float]) -> tuple[float,
     to its size it still pulled a real accelerometer by five of its standard errors.
     """
     moves, dynamics = now
+    chi2, dof = _misfit(core, DYNAMICS)
+    if dynamics < DEAF and dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
+        return moves, DEAF  # and gravity after the moves is judged once it no longer bends the fit
     chi2, dof = _misfit(core, MOVES)
     if dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
         moves *= float(np.sqrt(chi2 / dof))
-    chi2, dof = _misfit(core, DYNAMICS)
-    if dynamics < DEAF and dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
-        dynamics = DEAF
     return moves, dynamics
