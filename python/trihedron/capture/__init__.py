@@ -15,6 +15,7 @@ from __future__ import annotations
 from trihedron.capture.clock import ClockFit, ClockLine, Timeline
 from trihedron.capture.detection import Found, find_protocol
 from trihedron.capture.errors import CaptureError, DiskError, SourceEndedError, SourceLostError
+from trihedron.capture.guide import Guide
 from trihedron.capture.log import GrowingLog
 from trihedron.capture.ports import Port, list_ports
 from trihedron.capture.protocols import (
@@ -42,6 +43,7 @@ __all__ = [
     "Found",
     "Frame",
     "GrowingLog",
+    "Guide",
     "LineColumns",
     "NameColumns",
     "Port",

@@ -150,6 +150,11 @@ class Recorder:
         """Take no more bytes; what came is still written."""
         self._stop.set()
 
+    def write_now(self) -> None:
+        """Put everything that has come into the log, so that it can be read while it grows."""
+        if self._log is not None:
+            self._log.flush(force=True)
+
     def clock_text(self) -> str:
         """How the host's clock and the device's go together."""
         return clock_sentence(self.clock, self._timeline)

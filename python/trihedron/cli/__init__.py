@@ -21,6 +21,7 @@ from trihedron.cli.check import check
 from trihedron.cli.demo import demo
 from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
+from trihedron.cli.guide import guide
 from trihedron.cli.kalman import kalman
 from trihedron.cli.plan import plan
 from trihedron.cli.ports import ports
@@ -34,6 +35,7 @@ COMMANDS = (
     plan,
     ports,
     capture,
+    guide,
     check,
     segment,
     calibrate,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
+from trihedron.cli.guide import DEFAULT_ACCURACY
 from trihedron.cli.options import Force
 
 if TYPE_CHECKING:
@@ -52,6 +53,21 @@ def capture(
     wait: Annotated[
         float, typer.Option("--wait", metavar="S", min=0.0, help="How long to wait for a board that was unplugged.")
     ] = 60.0,
+    guide: Annotated[bool, typer.Option("--guide", help="Lead through a calibration on a live screen.")] = False,
+    browser: Annotated[bool, typer.Option("--browser", help="The guide as a page in the browser.")] = False,
+    no_open: Annotated[bool, typer.Option("--no-open", help="With --browser: print the link, open nothing.")] = False,
+    accuracy: Annotated[
+        str, typer.Option("--accuracy", metavar="TEXT", help='Of the guide: "accel 0.05 %, gyro 0.1 %".')
+    ] = DEFAULT_ACCURACY,
+    gravity: Annotated[
+        Optional[float],  # noqa: UP045
+        typer.Option("--gravity", metavar="M/S2", help="|g| where the board is, for the guide's calibration."),
+    ] = None,
+    calibration: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--calibration", metavar="FILE", help="Of the guide: calibration to write at the end."),
+    ] = None,
+    bell: Annotated[bool, typer.Option("--bell", help="Of the guide: ring when a pose is taken.")] = False,
     list_them: Annotated[bool, typer.Option("--list", help="List the protocols and stop.")] = False,
     force: Force = False,
 ) -> None:
@@ -67,7 +83,7 @@ def capture(
     from trihedron.files.output import check_free
     from trihedron.pipeline.capturing import open_device
 
-    check_free([output], overwrite=force)
+    check_free([output, calibration], overwrite=force)
     source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
     _say(f"{source.name}: {found.protocol}. Recording to {output}; Ctrl-C stops.")
     recorder = Recorder(
@@ -79,7 +95,25 @@ def capture(
         wait_for_return_s=wait,
         first_bytes=found.first_bytes,
     )
-    record(recorder, output, seconds)
+    if not (guide or browser):
+        record(recorder, output, seconds)
+        return
+    from trihedron.cli.guide import finish, run_guided
+    from trihedron.pipeline import read
+
+    stop_on_signals(recorder)
+    made = run_guided(
+        recorder,
+        output,
+        accuracy,
+        gravity,
+        browser=browser,
+        bell=bell,
+        open_browser=not no_open,
+        seconds=seconds,
+    )
+    conclude(recorder, output, recorder.count.tally.saved, is_ended_well=made.is_done)
+    finish(read(output), made.cut_s, gravity, calibration, force=force)
 
 
 def record(recorder: Recorder, output: Path, seconds: float | None) -> None:
@@ -101,13 +135,13 @@ def record(recorder: Recorder, output: Path, seconds: float | None) -> None:
     conclude(recorder, output, progress.n)
 
 
-def conclude(recorder: Recorder, output: Path, n: int) -> None:
+def conclude(recorder: Recorder, output: Path, n: int, *, is_ended_well: bool = False) -> None:
     """What was saved, from which clock, and whether that is to be trusted."""
     count = recorder.count
     typer.echo(f"{output}: {n} frames; {count.sentence().replace(' / ', ', ')}")
     if recorder.clock is not None:
         typer.echo(f"clocks: {recorder.clock_text().replace(' / ', ', ')}")
-    if recorder.ended_because:
+    if recorder.ended_because and not is_ended_well:
         _say(f"trihedron: {recorder.ended_because}; what came before is saved in {output}.")
         raise typer.Exit(2)
     if count.lost > LOSSES_NOT_TRUSTED * (n + count.lost):

@@ -77,6 +77,21 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
     return name
 
 
+def sensor_columns(columns: tuple[str, ...]) -> list[int]:
+    """Places of the accelerometer's columns, then the gyro's, among the columns of a stream.
+
+    Raises
+    ------
+    ValueError
+        When none is an accelerometer.
+    """
+    empty = tuple(np.zeros(1) for _ in columns)
+    found = find_columns(Table(Path("the stream"), columns, empty), None, None)
+    if found.accelerometer is None:
+        raise ValueError("the board sends no accelerometer that is recognised; name its columns with --columns.")
+    return [*found.accelerometer, *(found.gyroscope or ())]
+
+
 def _labels(columns: Columns, names: tuple[str, ...] | None, n: int, *, is_mapped: bool) -> tuple[str, ...]:
     labels = [f"column_{i + 1}" for i in range(n)] if names is None else [name.replace(",", " ") for name in names]
     if names is not None and not is_mapped:

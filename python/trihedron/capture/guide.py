@@ -1,0 +1,230 @@
+"""A guided calibration as a state machine without a screen: readings in, what to show out.
+
+It knows no estimator: ``examine`` tells where the session stands (poses, error bars, the most useful next pose) and is
+called once per hold. Whoever composes it gives the real one (``trihedron.pipeline.guiding``) or a stand-in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from trihedron.capture.stillness import FloatArray, Stillness
+from trihedron.records.guiding import Accuracy, Examination, GuideView, Phase
+
+Examine = Callable[[], Examination]
+
+FIRST_HOLD_S = 6.0
+"""The first hold also measures the noise."""
+
+SAME_POSE_DEG = 15.0
+REACHED_DEG = 20.0
+N_CHECKS = 3
+MOST_POSES = 60
+RETRY_HOLD_S = 2.0
+MOVED_DEG = 8.0
+
+
+class Guide:
+    """Leads through a session: hold, move to the most useful pose, until the accuracy is reached, then poses to check.
+
+    Parameters
+    ----------
+    accuracy : Accuracy
+        When to stop.
+    examine : callable
+        Where the session stands now, from everything recorded so far.
+    n_checks : int
+        Poses held back from the calibration, to verify it.
+    most_poses : int
+        Where to stop asking when the accuracy is not reached.
+    """
+
+    def __init__(
+        self, accuracy: Accuracy, examine: Examine, *, n_checks: int = N_CHECKS, most_poses: int = MOST_POSES
+    ) -> None:
+        self.accuracy = accuracy
+        self.phase = Phase.BEGIN
+        self.examination: Examination | None = None
+        self.cut_s: float | None = None
+        """Where the poses held back begin, once there are any."""
+        self._examine = examine
+        self._n_checks, self._most = n_checks, most_poses
+        self._stillness = Stillness()
+        self._time_s = 0.0
+        self._is_taken = False
+        self._asked_s = FIRST_HOLD_S
+        self._taken_up: FloatArray | None = None
+        self._checks: list[FloatArray] = []
+        self._target: FloatArray | None = None
+        self._events = 0
+        self._remark = ""
+        self._looked_s = 0.0
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there is nothing more to ask for."""
+        return self.phase is Phase.DONE
+
+    def advance(self, time_s: FloatArray, readings: FloatArray) -> GuideView:
+        """Take readings (n, 3) or (n, 6), the accelerometer first, at ``time_s`` (n,), and say what to show."""
+        if len(time_s) and not self.is_done:
+            self._stillness.add(time_s, readings)
+            self._time_s = float(time_s[-1])
+            self._step()
+        return self.view()
+
+    def view(self) -> GuideView:
+        """What to show now."""
+        instruction, detail = self._words()
+        warnings = self.examination.warnings if self.examination else ()
+        if self._stillness.is_shaky and self._stillness.still_for_s > 1.0:
+            warnings = ("The board trembles: put it on something firm, hands off, away from fans.", *warnings)
+        if self._remark:
+            warnings = (self._remark, *warnings)
+        return GuideView(
+            phase=self.phase,
+            instruction=instruction,
+            detail=detail,
+            is_still=self._stillness.still_for_s > 0.0,
+            held_s=self._stillness.still_for_s,
+            hold_s=self._asked_s,
+            n_poses=0 if self.examination is None else len(self.examination.poses_up),
+            n_checks=len(self._checks),
+            up_now=self._up(),
+            examination=self.examination,
+            target_up=self._target,
+            warnings=warnings,
+            time_s=self._time_s,
+            accuracy=self.accuracy,
+            n_events=self._events,
+        )
+
+    def _step(self) -> None:
+        still_s = self._stillness.still_for_s
+        if still_s <= 0.0:
+            if self._is_taken and not self._has_moved():
+                return
+            self._is_taken = False
+            if self.phase is Phase.HOLD:
+                self.phase = Phase.MOVE
+            return
+        if self._is_taken:
+            if not self._has_moved():
+                return
+            self._is_taken = False
+        if self.phase is Phase.MOVE:
+            self.phase = Phase.HOLD
+        if still_s >= self._asked_s:
+            self._take()
+
+    def _has_moved(self) -> bool:
+        up = self._up()
+        if up is None or self._taken_up is None:
+            return True
+        return float(np.degrees(np.arccos(np.clip(up @ self._taken_up, -1.0, 1.0)))) > MOVED_DEG
+
+    def _take(self) -> None:
+        """The board has been held long enough: does the pose count, and what comes next?"""
+        if self.phase is Phase.CHECK:
+            self._take_check()
+            return
+        before = 0 if self.examination is None else len(self.examination.poses_up)
+        examination = self._examine()
+        self.examination = examination
+        self._asked_s = examination.hold_s
+        if len(examination.poses_up) <= before and before:
+            self._remark = "This pose does not count yet: hold on, hands off."
+            self._asked_s = self._stillness.still_for_s + RETRY_HOLD_S
+            if self._stillness.still_for_s > 3.0 * examination.hold_s:
+                self._remark = "This pose was counted before: turn the board on."
+                self._accepted()
+            return
+        self._remark = ""
+        if before and self._is_repeat(examination):
+            self._remark = "The board lies almost as in an earlier pose: follow the arrow to learn more."
+        self._accepted()
+        if examination.is_good_enough:
+            self.cut_s = self._time_s
+            self.phase = Phase.CHECK if self._n_checks else Phase.DONE
+            self._target = self._far_from_all()
+        elif len(examination.poses_up) >= self._most:
+            self._remark = f"{self._most} poses and the accuracy is not reached: the warnings say what limits it."
+            self.cut_s = self._time_s
+            self.phase = Phase.CHECK if self._n_checks else Phase.DONE
+            self._target = self._far_from_all()
+        else:
+            self._target = examination.next_up
+            self.phase = Phase.MOVE
+
+    def _accepted(self) -> None:
+        self._is_taken = True
+        self._events += 1
+        self._taken_up = self._up()
+
+    def _is_repeat(self, examination: Examination) -> bool:
+        *earlier, last = examination.poses_up
+        return bool(earlier) and bool(np.max(np.array(earlier) @ last) > np.cos(np.radians(SAME_POSE_DEG)))
+
+    def _take_check(self) -> None:
+        up = self._up()
+        if up is not None:
+            self._checks.append(up)
+        self._accepted()
+        self._asked_s = self.examination.hold_s if self.examination else FIRST_HOLD_S
+        if len(self._checks) >= self._n_checks:
+            self.phase, self._target = Phase.DONE, None
+        else:
+            self._target = self._far_from_all()
+
+    def _far_from_all(self) -> FloatArray:
+        """The direction farthest from every pose: where a calibration has most to prove."""
+        grid = np.array([direction for direction in product((-1.0, 0.0, 1.0), repeat=3) if any(direction)])
+        unit: FloatArray = grid / np.linalg.norm(grid, axis=1)[:, None]
+        known = [] if self.examination is None else list(self.examination.poses_up)
+        seen = np.array([*known, *self._checks])
+        if len(seen) == 0:
+            seen = np.array([[0.0, 0.0, 1.0]])
+        far: FloatArray = unit[int(np.argmin((unit @ seen.T).max(axis=1)))]
+        return far
+
+    def _up(self) -> FloatArray | None:
+        mean = self._stillness.mean
+        if mean is None:
+            return None
+        known = self.examination
+        if known is None:
+            return None
+        up: FloatArray = known.matrix @ (mean[:3] - known.centre)
+        length = float(np.linalg.norm(up))
+        return up / length if length > 0.0 else None
+
+    def _words(self) -> tuple[str, str]:
+        left = max(self._asked_s - self._stillness.still_for_s, 0.0)
+        if self.phase is Phase.DONE:
+            return "Done.", "The calibration and its check follow."
+        if self.phase is Phase.BEGIN:
+            if self._stillness.still_for_s > 0.0:
+                return f"Hold still: {left:.0f} s", "The first rest measures the noise of the board."
+            return "Put the board down and take your hands off.", "Anything firm will do; it need not be level."
+        if self._is_taken or self._stillness.still_for_s <= 0.0:
+            return self._where_to()
+        return f"Hold still: {left:.0f} s", "Hands off; a word and a beep say when it is enough."
+
+    def _where_to(self) -> tuple[str, str]:
+        known = self.examination
+        if self.phase is Phase.CHECK:
+            n = self._n_checks - len(self._checks)
+            more = f"{n} more poses" if n > 1 else "One more pose"
+            return f"Accuracy reached. {more} to check it.", "Any pose far from the others."
+        if known is None:
+            return "Turn the board to another side.", ""
+        return f"Turn: {known.next_words}.", known.why
+
+
+def with_remark(view: GuideView, remark: str) -> GuideView:
+    """The same view with one more warning in front."""
+    return replace(view, warnings=(remark, *view.warnings))

@@ -1,0 +1,233 @@
+"""``trihedron guide`` and ``trihedron capture --guide``: the guide's loop, with a screen, a page or neither."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Optional
+
+import typer
+
+from trihedron.cli.options import Force, LogSource, with_options
+
+if TYPE_CHECKING:
+    from trihedron.capture import Block, Recorder
+    from trihedron.records import Recording
+    from trihedron.records.guiding import FloatArray, GuideView
+
+STEP_S = 0.25
+"""Of a replayed log: as the blocks of a live one."""
+
+DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
+Show = Callable[["GuideView"], None]
+
+
+@with_options(source=LogSource)
+def guide(
+    source: LogSource,
+    accuracy: Annotated[
+        str, typer.Option("--accuracy", metavar="TEXT", help='When to stop: "accel 0.05 %, gyro 0.1 %".')
+    ] = DEFAULT_ACCURACY,
+    gravity: Annotated[
+        Optional[float],  # noqa: UP045 -- typer evaluates it at run time
+        typer.Option("--gravity", metavar="M/S2", help="|g| where it was recorded."),
+    ] = None,
+    every: Annotated[
+        bool, typer.Option("--every", help="Print the screen after every pose, not only the last.")
+    ] = False,
+    output: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--output", "-o", metavar="FILE", help="Calibration to write."),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Replay a log through the guide: what it would have said pose by pose, then calibrate and verify."""
+    from trihedron.cli.output import check_outputs
+    from trihedron.cli.screen import as_text
+    from trihedron.pipeline.guiding import examine, part_of
+    from trihedron.records.guiding import Accuracy
+    from trihedron.units import STANDARD_GRAVITY_M_S2
+
+    wanted = Accuracy.parse(accuracy)
+    check_outputs(output, force=force)
+    recording = source.read()
+    now = {"s": 0.0}
+    made = _guide(
+        wanted,
+        lambda: examine(
+            part_of(recording, -math.inf, now["s"] + 1e-9), wanted, gravity_m_s2=gravity or STANDARD_GRAVITY_M_S2
+        ),
+    )
+    readings = readings_of(recording)
+    n_events = 0
+    for first, last in steps(recording.time_s):
+        now["s"] = float(recording.time_s[last - 1])
+        view = made.advance(recording.time_s[first:last], readings[first:last])
+        if view.n_events > n_events:
+            n_events = view.n_events
+            typer.echo(_line(view))
+            if every:
+                typer.echo(as_text(view))
+        if made.is_done:
+            break
+    typer.echo(as_text(made.view()))
+    finish(part_of(recording, -math.inf, now["s"] + 1e-9), made.cut_s, gravity, output, force=force)
+
+
+def _guide(wanted: Any, examine: Callable[[], Any]) -> Any:
+    from trihedron.capture.guide import Guide
+
+    return Guide(wanted, examine)
+
+
+def steps(time_s: FloatArray) -> Iterable[tuple[int, int]]:
+    """Ranges of samples of about ``STEP_S``."""
+    import numpy as np
+
+    edges = np.searchsorted(time_s, np.arange(time_s[0], time_s[-1] + STEP_S, STEP_S))
+    edges = np.unique([*edges, len(time_s)])
+    return zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
+
+
+def readings_of(recording: Recording) -> FloatArray:
+    """(n, 3) or (n, 6), the accelerometer first."""
+    import numpy as np
+
+    parts = [part for part in (recording.accelerometer, recording.gyroscope) if part is not None]
+    if recording.accelerometer is None:
+        raise ValueError(f"{recording.source}: a guide needs the accelerometer; this log has a gyro alone.")
+    return np.hstack(parts)
+
+
+def _line(view: GuideView) -> str:
+    known = view.examination
+    if known is None:
+        return ""
+    far = f"{known.shortfall:.2f}" if math.isfinite(known.shortfall) else "unknown"
+    left = "reached" if known.is_good_enough else far
+    return f"{view.time_s:7.1f} s  pose {view.n_poses:2d}  shortfall {left:8s} {view.instruction}"
+
+
+def finish(
+    recording: Recording, cut_s: float | None, gravity: float | None, output: Path | None, *, force: bool
+) -> None:
+    """Calibrate, verify on the poses held back, report; status 2 where the answer is not to be trusted."""
+    from trihedron.cli.output import leave
+    from trihedron.files.calibration import write_calibration
+    from trihedron.pipeline.guiding import conclude
+    from trihedron.report import calibration_report, to_text, verification_report
+
+    result, check = conclude(recording, cut_s, gravity_m_s2=gravity)
+    typer.echo(to_text(calibration_report(result.calibration, result.segments, result.recording), sections=3), nl=False)
+    findings = list(result.calibration.findings)
+    if check is not None:
+        typer.echo("")
+        document = verification_report(check.verification, check.segments, check.recording)
+        typer.echo(to_text(document, sections=2), nl=False)
+    if output is not None:
+        write_calibration(result.calibration, output, overwrite=force)
+        typer.echo(f"calibration: {output}", err=True)
+    leave(findings)
+
+
+def run_guided(
+    recorder: Recorder,
+    log: Path,
+    accuracy: str,
+    gravity: float | None,
+    *,
+    browser: bool,
+    bell: bool,
+    open_browser: bool,
+    seconds: float | None,
+) -> Any:
+    """Capture with the guide beside it; returns the guide, which knows where the check begins."""
+    from trihedron.pipeline import read
+    from trihedron.pipeline.guiding import examine
+    from trihedron.records.guiding import Accuracy
+    from trihedron.units import STANDARD_GRAVITY_M_S2
+
+    wanted = Accuracy.parse(accuracy)
+
+    def look() -> Any:
+        recorder.write_now()
+        return examine(read(log), wanted, gravity_m_s2=gravity or STANDARD_GRAVITY_M_S2)
+
+    made = _guide(wanted, look)
+    columns: list[int] = []
+    started = time.monotonic()
+    with _Shown(recorder, started, browser=browser, bell=bell, open_browser=open_browser) as show:
+        for block in recorder:
+            if not columns:
+                columns = sensor_columns(block)
+            show(made.advance(block.time_s, block.values[:, columns]))
+            if made.is_done or (seconds is not None and time.monotonic() - started > seconds):
+                recorder.stop()
+    return made
+
+
+def sensor_columns(block: Block) -> list[int]:
+    """Which columns of a stream are the accelerometer and the gyro, as the log's reader sees them."""
+    from trihedron.pipeline.capturing import sensor_columns as of
+
+    return of(block.columns)
+
+
+class _Shown:
+    """A screen on a terminal, a line per change elsewhere, the page besides where it is wanted."""
+
+    def __init__(self, recorder: Recorder, started: float, *, browser: bool, bell: bool, open_browser: bool) -> None:
+        self._recorder, self._started = recorder, started
+        self._browser, self._bell, self._open = browser, bell, open_browser
+        self._live: Any = None
+        self._page: Any = None
+        self._events, self._drawn_s, self._said = 0, 0.0, ""
+
+    def __enter__(self) -> Show:
+        if self._browser:
+            from trihedron.cli.page import Page
+
+            self._page = Page()
+            typer.echo(f"The guide is at {self._page.address} (this computer only).", err=True)
+            if self._open:
+                import webbrowser
+
+                webbrowser.open(self._page.address)
+        elif sys.stderr.isatty():
+            from rich.console import Console
+            from rich.live import Live
+
+            self._live = Live(console=Console(stderr=True), auto_refresh=False, screen=True)
+            self._live.start()
+        return self._show
+
+    def __exit__(self, *_: object) -> None:
+        if self._live is not None:
+            self._live.stop()
+        if self._page is not None:
+            self._page.close()
+
+    def _show(self, view: GuideView) -> None:
+        rings = view.n_events > self._events
+        self._events = view.n_events
+        if rings and self._bell:
+            sys.stderr.write("\a")
+        now = time.monotonic()
+        if now - self._drawn_s < 0.1 and not rings:
+            return
+        self._drawn_s = now
+        lost = self._recorder.count.lost
+        if self._page is not None:
+            self._page.show(view, lost)
+        if self._live is not None:
+            from trihedron.cli.screen import screen
+
+            size = self._live.console.size
+            shown = screen(view, min(size.width, 120), size.height, lost=lost, seconds=now - self._started)
+            self._live.update(shown, refresh=True)
+        elif rings or (view.instruction.split(":")[0] != self._said and self._page is None):
+            self._said = view.instruction.split(":")[0]
+            typer.echo(f"{view.time_s:7.1f} s  {view.instruction}", err=True)

@@ -1,0 +1,146 @@
+"""The guide on a terminal: one screen of 80 × 24, more where there is room; plain marks, readable in light and dark."""
+
+from __future__ import annotations
+
+import math
+
+from rich.console import Group
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from trihedron.records.guiding import Examination, FloatArray, GuideView, Phase, Uncertain
+
+# Names of the sixteen ANSI colours: the terminal's own theme decides what is readable on its background.
+GOOD, BAD, DIM, STRONG = "green", "red", "dim", "bold"
+
+POSE, HERE, TARGET = "o", "@", "X"
+
+
+def hemispheres(view: GuideView, width: int = 17, height: int = 9) -> list[str]:
+    """Where up pointed in the body: two discs seen from axis 3, its upper half left and its lower half right."""
+    discs = [[[" "] * width for _ in range(height)] for _ in range(2)]
+    for disc in discs:
+        for i in range(height):
+            for j in range(width):
+                x, y = (2 * j - width + 1) / (width - 1), (2 * i - height + 1) / (height - 1)
+                if abs(math.hypot(x, y) - 1.0) < 1.2 / height:
+                    disc[i][j] = "."
+        disc[height // 2][width // 2] = "+"
+
+    def put(up: FloatArray, mark: str) -> None:
+        which = 0 if up[2] >= 0.0 else 1
+        # Equal areas: as many poses on paper as on the sphere.
+        radius = math.sqrt(max(1.0 - abs(float(up[2])), 0.0))
+        length = math.hypot(float(up[0]), float(up[1])) or 1.0
+        j = round((float(up[0]) / length * radius + 1.0) / 2.0 * (width - 1))
+        i = round((1.0 - float(up[1]) / length * radius) / 2.0 * (height - 1))
+        discs[which][min(max(i, 0), height - 1)][min(max(j, 0), width - 1)] = mark
+
+    if view.examination is not None:
+        for up in view.examination.poses_up:
+            put(up, POSE)
+    if view.target_up is not None:
+        put(view.target_up, TARGET)
+    if view.up_now is not None:
+        put(view.up_now, HERE)
+    rows = ["".join(left) + "  " + "".join(right) for left, right in zip(*discs, strict=True)]
+    return [f"{'axis 3 up':^{width}}  {'axis 3 down':^{width}}", *rows]
+
+
+def bar(share: float, width: int) -> str:
+    """A bar that is full at 1."""
+    n = round(min(max(share, 0.0), 1.0) * width)
+    return "#" * n + "-" * (width - n)
+
+
+def percent(value: float | None) -> str:
+    """A fraction in per cent with two digits, or a dash."""
+    return "--" if value is None else f"{100.0 * value:.2g}"
+
+
+def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0, seconds: float | None = None) -> Group:
+    """The whole screen as something that rich prints."""
+    inner = width - 4
+    state = Text("STILL " if view.is_still else "MOVING", style=f"{STRONG} {GOOD if view.is_still else DIM}")
+    head = Text.assemble(state, "  ", Text(view.instruction, style=STRONG))
+    full = bar(view.held_s / max(view.hold_s, 0.1), inner - 24)
+    hold = f"hold  [{full}] {min(view.held_s, 99.9):4.1f} of {view.hold_s:.0f} s"
+    lines: list[Text] = [head, Text(view.detail, style=DIM), Text(hold)]
+    angle = view.degrees_to_target
+    if angle is not None and view.phase in (Phase.MOVE, Phase.CHECK):
+        lines[1].append(f"  ({angle:.0f} degrees to go)")
+    body = Table.grid(padding=(0, 2))
+    body.add_column(no_wrap=True)
+    body.add_column(no_wrap=True)
+    tall = height >= 36
+    sphere = hemispheres(view, 25 if tall and width >= 110 else 17, 13 if tall and width >= 110 else 9)
+    legend = f"{POSE} taken  {HERE} now  {TARGET} next"
+    body.add_row(Text("\n".join([*sphere, legend])), _parameters(view.examination, tall=tall))
+    known = view.examination
+    facts = [f"{view.n_poses} poses"]
+    if known is not None:
+        facts.append(f"{known.rate_hz:.4g} Hz")
+        facts += [known.noise] if known.noise else []
+        facts.append(_to_go(known))
+    facts.append(f"{lost} lost")
+    if seconds is not None:
+        facts.append(f"{seconds:.0f} s")
+    room = max(height - 21, 1)
+    warned = [Text(f"! {text}"[: inner - 1], style=BAD, no_wrap=True) for text in view.warnings[:room]]
+    foot = Text(" | ".join(facts)[:inner], style=DIM, no_wrap=True)
+    title = f"trihedron guide: {view.accuracy.sentence()}"
+    return Group(Panel(Group(*lines, Text(""), body, Text(""), *warned, foot), title=title, width=width))
+
+
+def _to_go(known: Examination) -> str:
+    if known.is_good_enough:
+        return "accuracy reached"
+    if known.poses_needed is None:
+        return "accuracy far off"
+    return f"at least {known.poses_needed} more"
+
+
+def _parameters(known: Examination | None, *, tall: bool) -> Text:
+    """Error bars now, after the next pose and as wanted: all of them where there is room, else the worst of each."""
+    if known is None:
+        return Text("error bars come with the first poses", style=DIM)
+    room = 30 if tall else 14
+    out = Text(f"{'error bar, %':{room}s}{'now':>6}{'next':>7}{'goal':>6}\n", style=DIM)
+    rows = list(known.uncertain) if tall else _groups(known.uncertain)
+    for one in rows:
+        name = f"{'acc' if one.sensor == 'accelerometer' else 'gyro'} {one.name}"[: room - 1]
+        good = one.now is not None and one.now <= one.wanted
+        numbers = f"{percent(one.now):>6}{percent(one.after_next):>7}{percent(one.wanted):>6}"
+        out.append(f"{name:{room}s}{numbers} {'ok' if good else ''}\n", style=GOOD if good else "")
+    return out
+
+
+def _groups(all_of_them: tuple[Uncertain, ...]) -> list[Uncertain]:
+    """The worst of every kind, seven lines at most."""
+    groups: dict[tuple[str, str], list[Uncertain]] = {}
+    for one in all_of_them:
+        kind = "scale" if one.name.startswith("scale") else "zero" if one.name.startswith("zero") else "axes"
+        groups.setdefault((one.sensor, kind), []).append(one)
+    out = []
+    for (sensor, kind), members in groups.items():
+        worst = max(members, key=lambda one: math.inf if one.now is None else one.now)
+        after = [one.after_next for one in members if one.after_next is not None]
+        words = {"scale": "scales", "zero": "zeros", "axes": "angles"}[kind]
+        out.append(Uncertain(sensor, words, worst.now, max(after) if after else None, worst.wanted))
+    return out
+
+
+def as_text(view: GuideView, width: int = 80, height: int = 24) -> str:
+    """The screen as plain text: for tests and documentation."""
+    from rich.console import Console
+
+    console = Console(width=width, height=height, color_system=None, force_terminal=False, legacy_windows=False)
+    with console.capture() as captured:
+        console.print(screen(view, width, height))
+    return captured.get()
+
+
+def bell(rings: int) -> str:
+    """The terminal's bell, for eyes on the board."""
+    return "\a" * rings

@@ -1,0 +1,134 @@
+"""Which pose next: covariances run ahead of the data, for every pose that a hand can find."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.estimate.accelerometer.poses import CANDIDATES, design_rows
+from trihedron.records import Recording, Segments
+
+FloatArray = npt.NDArray[np.float64]
+
+NEAR = 0.9
+"""Cosine above which a pose is no move from the one before."""
+
+CORNER_PENALTY = 1.15
+"""A board stands on a face, leans on an edge, and is hard to hold on a corner: the corner must be worth it."""
+
+LONGEST_LOOK = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """Model covariances in relative units: accelerometer (9, 9) in the order of ``NAMES``, gyro (9, 9) row by row."""
+
+    up: FloatArray
+    accelerometer: FloatArray
+    gyroscope: FloatArray | None
+    pose_sigma: float
+    move_sigma: float
+
+
+def path_of(
+    recording: Recording, segments: Segments, S: FloatArray | None, before: int, after: int, start: int, stop: int
+) -> FloatArray | None:
+    """(k, 3) small rotation vectors of a move as the gyro saw it, in the body, or None without a scale."""
+    assert recording.gyroscope is not None
+    if S is None or stop - start < 4 or segments.gyroscope_mean is None:
+        return None
+    zero = 0.5 * (segments.gyroscope_mean[before] + segments.gyroscope_mean[after])
+    rate = (recording.gyroscope[start:stop] - zero) @ S.T
+    steps = np.diff(recording.time_s[start : stop + 1], append=recording.time_s[stop - 1])[: len(rate), None]
+    pieces = np.array_split(np.nan_to_num(rate * steps), min(len(rate), 60))
+    return np.array([piece.sum(axis=0) for piece in pieces])
+
+
+def shortest_path(start: FloatArray, stop: FloatArray, n: int = 30) -> FloatArray:
+    """(n, 3) rotation vectors of the body that take up from ``start`` to ``stop``, both (3,) in the body."""
+    # Up turns in the body against the body's own turn.
+    axis = np.cross(stop, start)
+    size = float(np.linalg.norm(axis))
+    if size < 1e-9:
+        helper = np.eye(3)[int(np.argmin(np.abs(start)))]
+        axis = np.cross(start, helper)
+        size = float(np.linalg.norm(axis))
+    angle = float(np.arccos(np.clip(start @ stop, -1.0, 1.0)))
+    return np.tile(axis / size * angle / n, (n, 1))
+
+
+def move_rows(path: FloatArray, up_after: FloatArray) -> FloatArray:
+    """(2, 9) derivative of where up is found after a move with respect to the gyro's relative errors, row by row.
+
+    An error E of the gyro (relative, δω = E ω) turns the attitude by Σ R E ω dt, R from the instant to the end.
+    """
+    rotation = np.eye(3)
+    total = np.zeros((3, 9))
+    for step in path[::-1]:
+        total += np.einsum("ai,k->aik", rotation, step).reshape(3, 9)
+        rotation = rotation @ _rotation(step).T
+    across = np.linalg.svd(up_after[None, :])[2][1:]
+    rows: FloatArray = across @ total
+    return rows
+
+
+def _rotation(vector: FloatArray) -> FloatArray:
+    angle = float(np.linalg.norm(vector))
+    if angle < 1e-12:
+        return np.eye(3)
+    x, y, z = vector / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turned: FloatArray = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return turned
+
+
+def sigma_of(known: Known) -> FloatArray:
+    gyroscope = np.full(9, np.nan) if known.gyroscope is None else np.sqrt(np.diag(known.gyroscope))
+    return np.concatenate([np.sqrt(np.diag(known.accelerometer)), gyroscope])
+
+
+def _with_pose(known: Known, direction: FloatArray) -> Known:
+    row = design_rows(direction[None, :])[0]
+    accelerometer = _updated(known.accelerometer, row[None, :], known.pose_sigma)
+    gyroscope = known.gyroscope
+    if gyroscope is not None and len(known.up):
+        rows = move_rows(shortest_path(known.up[-1], direction), direction)
+        gyroscope = _updated(gyroscope, rows, known.move_sigma)
+    up = np.vstack([known.up, direction[None, :]])
+    return Known(up, accelerometer, gyroscope, known.pose_sigma, known.move_sigma)
+
+
+def _updated(covariance: FloatArray, rows: FloatArray, sigma: float) -> FloatArray:
+    seen = covariance @ rows.T
+    gain = np.linalg.solve(rows @ seen + sigma**2 * np.eye(len(rows)), seen.T)
+    out: FloatArray = covariance - seen @ gain
+    return out
+
+
+def best_next(known: Known, wanted: FloatArray, factor: FloatArray) -> tuple[FloatArray, Known]:
+    """The pose of 26 that leaves the smallest shortfall, reached by the shortest turn from where the board lies."""
+    best: tuple[float, FloatArray, Known] | None = None
+    for direction in CANDIDATES:
+        if len(known.up) and float(known.up[-1] @ direction) > NEAR:
+            continue
+        future = _with_pose(known, direction)
+        relative = sigma_of(future) * factor / wanted
+        # The worst decides; the rest together break ties, so that no pose is asked for nothing.
+        cost = float(np.nanmax(relative)) + 0.3 * float(np.sqrt(np.nanmean(relative**2)))
+        cost *= CORNER_PENALTY if np.all(np.abs(direction) > 0.3) else 1.0
+        if best is None or cost < best[0]:
+            best = (cost, direction, future)
+    assert best is not None
+    return best[1], best[2]
+
+
+def poses_needed(known: Known, wanted: FloatArray, factor: FloatArray, shortfall: float) -> int | None:
+    if shortfall <= 1.0:
+        return 0
+    for count in range(1, LONGEST_LOOK + 1):
+        _, known = best_next(known, wanted, factor)
+        if float(np.nanmax(sigma_of(known) * factor / wanted)) <= 1.0:
+            return count
+    return None
