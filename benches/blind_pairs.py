@@ -246,6 +246,10 @@ def trial(pair: Pair) -> dict[str, Any]:
         expected = "parameters-differ"
     if side:
         expected = "missing-physics"
+    if pair.nuisances:
+        is_only_nuisance = bool(effects) and all(w == "recording" and e in NAMED_NUISANCES for w, e, _ in effects)
+        expected = "missing-physics" if is_only_nuisance and not side else expected
+        effects = [e for e in effects if not (e[0] == "recording" and e[1] in NAMED_NUISANCES)]
     first = (
         bool(effects)
         and effects[0][0] == side
