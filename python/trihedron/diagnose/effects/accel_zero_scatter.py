@@ -19,6 +19,7 @@ from trihedron.units import mm_s2_from_m_s2
 class AccelZeroScatter(DirectEffect):
     """Zeros drawn anew in every pose, one size for three axes: the length of gravity does not tell axes apart."""
 
+    is_spread = True
     id = "accel-zero-scatter"
     mechanism = "the accelerometer's zero is another in every pose"
     experiment = "hold one pose, turn away and come back to it ten times: what differs is scatter, what repeats is not"

@@ -56,6 +56,8 @@ class Effect(ABC):
     accounts_for: ClassVar[tuple[Domain, ...]] = ()
     """Domains of samples whose disagreement is this effect itself, seen from another side."""
 
+    is_spread: ClassVar[bool] = False
+    """Whether it only says how far something scatters, not why: mechanisms are named before it."""
     is_of_session: ClassVar[bool] = False
     """Whether it belongs to one experiment (a pushed pose, a tilted table) and to no instrument."""
     leaves_open: ClassVar[tuple[str, ...]] = ()

@@ -19,6 +19,7 @@ from trihedron.units import degrees_from_radians
 class GyroZeroScatter(DirectEffect):
     """The zero of every axis is drawn anew in every pose, beyond noise and drift."""
 
+    is_spread = True
     id = "gyro-zero-scatter"
     mechanism = "the gyro's zero is another in every pose"
     experiment = "hold one pose, turn away and come back to it ten times: what differs is scatter, what repeats is not"

@@ -31,7 +31,7 @@ def accepted_effects(model: StepwiseModel) -> tuple[AcceptedEffect, ...]:
             assert found.variant is not None
             parameters = found.effect.parameters(found.variant, values, cov)
             statement = found.effect.statement(parameters)
-        is_footnote = _stated(found) is not None and share < HEADLINE
+        is_footnote = found.effect.is_spread or (_stated(found) is not None and share < HEADLINE)
         record = replace(_accepted(found, values, parameters, statement), share=share)
         out.append(((is_footnote, -share), record))
     return tuple(one for _, one in sorted(out, key=lambda pair: pair[0]))
