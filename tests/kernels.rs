@@ -14,6 +14,8 @@ mod poisson;
 mod rotation;
 #[path = "kernels/session_model.rs"]
 mod session_model;
+#[path = "kernels/spectral_likelihood.rs"]
+mod spectral_likelihood;
 #[path = "kernels/stillness.rs"]
 mod stillness;
 

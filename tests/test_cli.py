@@ -117,7 +117,9 @@ def test_verify_says_when_it_is_given_the_recording_the_calibration_was_made_fro
 def test_export_writes_to_stdout_or_a_file(session, tmp_path, capsys):
     assert main(["export", str(session / "c.json"), "--to", "c"]) == 0
     assert "trihedron_correct" in capsys.readouterr().out
-    assert main(["export", str(session / "c.json"), "--to", "kalibr", "-o", str(tmp_path / "imu.yaml")]) == 0
+    size = ["--accel-lsb", "0.061 mg", "--gyro-lsb", "0.0305 deg/s"]
+    words = ["export", str(session / "c.json"), "--to", "kalibr", "-o", str(tmp_path / "imu.yaml")]
+    assert main([*words, *size]) == 0
     assert "C_gyro_i" in (tmp_path / "imu.yaml").read_text()
 
 

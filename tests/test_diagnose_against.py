@@ -192,3 +192,38 @@ def test_the_second_act_finds_what_was_sealed_and_mends_the_simulation(seed, tmp
     assert done.sealed["effect"] in (first.id, *first.confounded_with)
     assert done.improved.verdict == "consistent"
     assert (tmp_path / "improved.toml").read_text().startswith("# The simulation of an ordinary sensor")
+
+
+def noisy(profile, accel, gyro, seed, **changes):
+    """A simulated log with one mistake in its noise."""
+    return log(profile, accel, replace(gyro, noise=replace(gyro.noise, **changes)), 8, seed)
+
+
+def test_a_density_scaled_by_the_rate_twice_is_named_with_its_ratio(unit):
+    profile, accel, gyro = unit
+    N = tuple(10.0 * v for v in np.ones(3) * np.array(gyro.noise.N))
+    simulated = noisy(profile, accel, gyro, 11, N=N)  # 100 Hz: ten times
+    found = trihedron.diagnose(log(profile, accel, gyro, 9, 12), against=simulated, gravity_m_s2=9.80665)
+    assert found.verdict == "parameters-differ"
+    assert not found.effects
+    white = [n for n in found.noise_compared if n.term == "N" and n.sensor == "gyroscope"]
+    assert all(n.significant for n in white)
+    # Ratios of two estimates of 1.5 % each.
+    assert all(abs(n.ratio - 10.0) < 0.6 for n in white)
+    assert "√100 times the recording's: the density was multiplied by the root of the rate" in " ".join(
+        str(found).split()
+    )
+
+
+def test_a_coarser_converter_and_another_rate_are_said_and_nothing_else(unit):
+    profile, accel, gyro = unit
+    coarse = replace(accel, adc=replace(accel.adc, lsb=64.0 * accel.adc.lsb))
+    scenario = Scenario(
+        hand_session(22, hold_s=4.0, layout=10), "pair", coarse, gyro, replace(profile.clock, rate_hz=50.0)
+    )
+    simulated = simulate(scenario, 13)[0]
+    found = trihedron.diagnose(log(profile, accel, gyro, 11, 14), against=simulated, gravity_m_s2=9.80665)
+    assert found.verdict == "parameters-differ"
+    said = {(n.sensor, n.term) for n in found.noise_compared if n.significant}
+    assert said == {("accelerometer", "resolution"), ("both", "rate")}
+    assert not any(p.significant for p in found.parameters)

@@ -96,6 +96,8 @@ def speed(law, u):
         bump = np.exp(-0.5 * ((u - 0.5) * 8.0) ** 2)
         return bump / bump.mean()
     ramp = np.clip(np.minimum(u, 1.0 - u) / 0.08, 0.0, 1.0)
+    # Nothing that has a mass starts with a kink, which no sampling could integrate.
+    ramp = ramp**2 * (3.0 - 2.0 * ramp)
     return ramp / ramp.mean()
 
 

@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.laws.find import laws_of_rest
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
 from trihedron.diagnose.residuals.goodness_of_fit import test_rows
 from trihedron.diagnose.residuals.timing import test_timing
@@ -71,10 +72,11 @@ def diagnose_recording(
     if widened is not obs:
         # Moves that nothing explains would bend everything beside them: once more, with their noise as it is.
         run = _run(widened, start, prior, alpha, lambda done, text: tell(0.6 + 0.4 * done, text))
+    laws = laws_of_rest(run.model.context, run.remaining)
     model, base = run.model, run.bare.fitted
     twin = model.fitted.twin
     result = Diagnosis(
-        verdict=verdict_of(model, run.domains),
+        verdict=verdict_of(model, run.domains, has_laws=bool(laws)),
         domains=run.domains,
         effects=accepted_effects(model),
         remaining=run.remaining,
@@ -99,6 +101,7 @@ def diagnose_recording(
         recording_sha256=recording.sha256,
         references=MappingProxyType(model.context.references),
         residuals=residuals_before_after(base, model.fitted),
+        laws=laws,
         stages=held_out_stages(run.bare, model),
     )
     tell(1.0, "done")
@@ -132,9 +135,25 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
         # What was needless stood where another may belong.
         scored, _ = scores(judged, exclude=judged.refused)
         judged = judged_again(_grown(judged, scored, alpha, lambda _part: None))
+    judged, candidates = _with_late(judged, candidates, alpha)
     tell(0.9, "checking what remains")
     remaining = _all_domains(judged.context, alpha, judged.refused)
     return _Run(bare, judged, domains, accounted_for(judged, remaining), candidates)
+
+
+def _with_late(
+    model: StepwiseModel, candidates: dict[str, Candidate], alpha: float
+) -> tuple[StepwiseModel, dict[str, Candidate]]:
+    """What shows only in the rest of everything else (zeros that scatter); then the competition once more beside it."""
+    late, more = with_evidence(model, alpha, is_late=True)
+    for key, one in more.items():
+        known = candidates.get(key)
+        if known is None or known.p_value is None or (one.p_value is not None and one.p_value < known.p_value):
+            candidates = candidates | {key: one}
+    if len(late.accepted) == len(model.accepted):
+        return model, candidates
+    scored, _ = scores(late, exclude=late.refused)
+    return judged_again(_grown(late, scored, alpha, lambda _part: None)), candidates
 
 
 def _grown(model: StepwiseModel, scored: list[Scored], alpha: float, tell: Callable[[float], None]) -> StepwiseModel:

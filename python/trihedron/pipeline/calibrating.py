@@ -22,6 +22,7 @@ from trihedron.estimate.gyroscope import (
     stated_turns,
 )
 from trihedron.estimate.gyroscope.findings import scale_findings
+from trihedron.estimate.gyroscope.missing_samples import missing_samples
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.pipeline.choices import settle_gravity
@@ -110,7 +111,8 @@ def calibrate(
         )
     calibration = in_frame(calibration, wanted)
     scale = [] if calibration.gyroscope is None else scale_findings(calibration.gyroscope.S, recording.gyroscope_unit)
-    findings = (*said, *recording.findings, *segments.findings, *calibration.findings, *scale)
+    missing = [] if calibration.gyroscope is None else missing_samples(recording, segments)
+    findings = (*said, *recording.findings, *segments.findings, *calibration.findings, *scale, *missing)
     return CalibrationResult(replace(calibration, findings=findings), segments, recording)
 
 

@@ -14,12 +14,13 @@ from trihedron.diagnose.against import (
     model_of_calibration,
     model_of_diagnosis,
 )
-from trihedron.diagnose.against.numbers import SPREAD_DOF
+from trihedron.diagnose.against.numbers import SPREAD_DOF, RangeRatio
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import (
     Diagnosis,
     DomainTest,
+    NoiseDifference,
     ParameterDifference,
     Stage,
     StageDomain,
@@ -32,6 +33,7 @@ def compared(
     found: Diagnosis,
     given: Calibration,
     simulated: Diagnosis | None,
+    noise: tuple[NoiseDifference, ...],
     recording: Recording,
     segments: Segments,
     alpha: float,
@@ -39,6 +41,7 @@ def compared(
     """The free diagnosis of a recording as the answer to: where does the given model differ?
 
     ``simulated`` is the free diagnosis of the user's simulated log, where that is the model; else ``given`` is.
+    ``noise`` is what was compared of noise and sampling beside it.
     """
     model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated)
     given_effects = () if simulated is None else simulated.effects
@@ -52,7 +55,8 @@ def compared(
         left_open=left_open_by((*effects.missing, *effects.surplus)),
     )
     parameters = (*numbers.parameters, *effects.parameters)
-    differ = any(p.significant for p in parameters)
+    noise = (*noise, *(_range(one) for one in numbers.ranges))
+    differ = any(p.significant for p in parameters) or any(n.significant for n in noise)
     verdict: Verdict = found.verdict
     if found.verdict not in ("unexplained", "not-testable"):
         verdict = "parameters-differ" if differ else "consistent"
@@ -67,6 +71,7 @@ def compared(
         domains=(*(found.domains if effects.missing else found.remaining), _numbers_test(parameters)),
         effects=(*effects.missing, *effects.surplus),
         parameters=parameters,
+        noise_compared=noise,
         stages=(_as_given(given, recording, segments), *found.stages),
     )
 
@@ -86,6 +91,13 @@ def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
         bool(significant),
         Where(channels),
     )
+
+
+def _range(one: RangeRatio) -> NoiseDifference:
+    ratio = 2.0**-one.exponent
+    name = "gyro" if one.sensor == "gyroscope" else one.sensor
+    remark = f"The {name} of the model counts {ratio:g} times as many per unit: another range of the part."
+    return NoiseDifference(one.sensor, "", "range", None, None, ratio, None, "1", None, True, remark)
 
 
 def _as_given(given: Calibration, recording: Recording, segments: Segments) -> Stage:

@@ -12,16 +12,18 @@ from typing import Any
 import numpy as np
 
 from trihedron.diagnose import diagnose_recording
+from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
+from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
 from trihedron.pipeline.improving import driven
 from trihedron.pipeline.reading import Progress, read, segment
 from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
-from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
 
@@ -111,9 +113,12 @@ def diagnose(
     updated, own_effects = None, found.effects
     if known is not None and free:
         given = replace(known, gravity_m_s2=gravity)
-        found = compared(
-            found, given, None if simulated is None else simulated.diagnosis, recording_used, segments_used, alpha
-        )
+        noise: tuple[NoiseDifference, ...] = ()
+        if simulated is not None:
+            ours = sampled(recording_used, segments_used, model_of_diagnosis(found))
+            noise = compare_noise(simulated.sampled, ours, alpha=alpha)
+        free_simulation = None if simulated is None else simulated.diagnosis
+        found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
         updated, used = used, given
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(
@@ -136,6 +141,7 @@ class _Free:
     calibration: Calibration
     segments: Segments
     diagnosis: Diagnosis
+    sampled: Sampled
 
 
 def _start(
@@ -175,7 +181,8 @@ def _simulation(recording: Recording, gravity: float, alpha: float, tell: Progre
     except ValueError as error:
         raise ValueError(f"the simulated recording cannot be calibrated: {error}") from None
     diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=tell)
-    return _Free(result.calibration, result.segments, diagnosis)
+    noise = sampled(recording, result.segments, model_of_diagnosis(diagnosis))
+    return _Free(result.calibration, result.segments, diagnosis, noise)
 
 
 def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis, DomainResiduals, DomainTest, HeldOut
+from trihedron.report.diagnosis_laws import laws_blocks
 from trihedron.report.diagnosis_numbers import (
     differing_in_short,
     differing_noise,
@@ -61,7 +62,7 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         sections.append(Section("Numbers that differ (recording minus model)", (Facts(words),)))
     sections += [
         Section("What was left out", effects_blocks(diagnosis)),
-        Section("What remains", (Paragraph(_remaining(diagnosis)),)),
+        Section("What remains", (Paragraph(_remaining(diagnosis)), *laws_blocks(diagnosis))),
         Section("Held out: before and after", _held_out(diagnosis)),
         Section("Candidates", (_candidates(diagnosis),)),
         Section("Calibration and noise", _models(diagnosis)),

@@ -93,6 +93,10 @@ class Effect(ABC):
             same = [v for v in same if v.shape == variant.shape]
         return same[0] if same else None
 
+    def withstands(self, context: Context) -> bool:  # noqa: ARG002
+        """Whether it stands out of everything that zeros do by themselves: scatter, walk and drift together."""
+        return True
+
     def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
         """Whether the fitted parameters are ones that the mechanism can have."""
         return True

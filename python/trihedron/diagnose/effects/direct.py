@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import ClassVar
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,7 @@ class Evidence:
     observations claim (noise, excluded moves), or None; ``strength`` is the gain in 2 log-likelihood, for ranking.
     ``touched`` are the moves whose readings ``reweigh`` changes, ``None`` for all: there the change must help.
     ``share`` is the part of its domain's misfit that it explains, where that is not a matter of poses and moves.
+    ``series`` is a curve that belongs to the answer, as plain JSON types.
     ``restate`` gives the parameters once more from the twin that was fitted with the evidence taken into account.
     """
 
@@ -43,11 +44,14 @@ class Evidence:
     restate: Callable[[Context], tuple[EffectParameter, ...]] | None = None
     share: float | None = None
     touched: tuple[int, ...] | None = None
+    series: Mapping[str, Any] = field(default_factory=dict)
 
 
 class DirectEffect(Effect):
     """An effect with a test of its own."""
 
+    is_late: ClassVar[bool] = False
+    """Whether it is looked for after the competition, in what the effects of other mechanisms leave (scatter)."""
     is_proof: ClassVar[bool] = False
     """Whether the samples alone prove it (a range that ends): else mending it must predict held-out moves better."""
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES, Effect, Variant, rate_only
+from trihedron.diagnose.laws.find import ROOM_VECTOR, gyro_zero_laws
+from trihedron.diagnose.zeros.of_session import STANDS_OUT, gyro_evidence
 
 
 class GyroGSensitivity(Effect):
@@ -20,6 +22,13 @@ class GyroGSensitivity(Effect):
 
     def unavailable(self, context: Context) -> str | None:
         return "the log has no gyro" if context.obs.raw_rate is None else None
+
+    def withstands(self, context: Context) -> bool:
+        if any(ROOM_VECTOR in law.depends_on for law in gyro_zero_laws(context).laws):
+            return False  # its vertical part alone would be taken for this
+        found = gyro_evidence(context)
+        gravity = None if found is None else found.evidence.groups.get("gravity")
+        return gravity is None or gravity.p_value < STANDS_OUT
 
     def variants(self, context: Context) -> list[Variant]:
         eye = np.eye(9).reshape(9, 3, 3)

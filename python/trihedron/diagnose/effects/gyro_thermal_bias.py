@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, rate_only
+from trihedron.diagnose.zeros.of_session import STANDS_OUT, gyro_evidence
 
 
 class GyroThermalBias(Effect):
@@ -25,6 +26,11 @@ class GyroThermalBias(Effect):
         if np.ptp(context.temperature) < 0.2:
             return "the temperature changes by less than 0.2 °C"
         return None
+
+    def withstands(self, context: Context) -> bool:
+        found = gyro_evidence(context)
+        thermal = None if found is None else found.evidence.groups.get("thermal")
+        return thermal is None or thermal.p_value < STANDS_OUT
 
     def variants(self, context: Context) -> list[Variant]:
         assert context.temperature is not None

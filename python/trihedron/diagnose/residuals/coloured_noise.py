@@ -6,10 +6,19 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+QUIET, QUIET_OF_NORMAL = 0.3, 0.3853
+"""Quantile over the poses of the change from first half to second, and that of |x| for a normal x: slow noise is in all
+poses alike, a zero that jumps only in those where it did."""
+MAY_EXCEED = 2.5
+"""How far the colour of all poses may exceed that of the quiet ones: their quantile is good to a factor of two."""
 
 
 def coloured_variance(
-    hold_sigma: FloatArray, density: FloatArray, hold_duration_s: FloatArray, move_duration_s: FloatArray
+    hold_sigma: FloatArray,
+    halves: FloatArray,
+    density: FloatArray,
+    hold_duration_s: FloatArray,
+    move_duration_s: FloatArray,
 ) -> FloatArray:
     """Variance that slow noise adds to every move's integral, beyond that of white noise.
 
@@ -21,6 +30,8 @@ def coloured_variance(
     ----------
     hold_sigma : (holds, 3)
         Standard errors of pose means that do not assume whiteness, raw units.
+    halves : (holds, 3)
+        Mean of every pose's second half minus that of its first, raw units.
     density : (3,)
         White noise, raw units per √Hz.
     hold_duration_s, move_duration_s : (holds,), (moves,)
@@ -30,6 +41,8 @@ def coloured_variance(
     (moves, 3) array, (raw unit · s)²
     """
     white = density / np.sqrt(hold_duration_s)[:, None]
-    colour = np.maximum(np.median((hold_sigma / white) ** 2, axis=0), 1.0)
+    quiet = (np.quantile(np.abs(halves / white), QUIET, axis=0) / (2.0 * QUIET_OF_NORMAL)) ** 2
+    pooled = np.median((hold_sigma / white) ** 2, axis=0)
+    colour = np.maximum(np.minimum(pooled, MAY_EXCEED * quiet), 1.0)
     out: FloatArray = np.outer(move_duration_s, (colour - 1.0) * density**2)
     return out

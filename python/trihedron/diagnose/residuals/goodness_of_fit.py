@@ -16,6 +16,12 @@ ROW_DOMAINS: dict[int, Domain] = {
     MOVES: "moves",
     DYNAMICS: "dynamics",
 }
+N_DOMAINS_TESTED = 6.0
+"""Four of poses and moves, two of samples: the rate of false alarms is shared by them."""
+LEAST_DOF = 0.5
+"""Degrees of freedom below which the fit has used a domain up."""
+HEAVY, CARRIES = 9.0, 0.2
+"""A segment beyond three sigma, and a channel with a fifth of the misfit, are named as its place."""
 NOISE_DOF = 100.0
 """The predicted noise is itself measured in the recording: to about 7 %, as 100 degrees of freedom give."""
 
@@ -38,13 +44,13 @@ def test_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
     for label, name in ROW_DOMAINS.items():
         rows = fitted.system.domain == label
         dof = float((1.0 - used[rows]).sum())
-        if dof < 0.5:
+        if dof < LEAST_DOF:
             continue
         # A widened domain is judged by the noise it was predicted to have.
         widened = {MOVES: fitted.line.obs.moves_inflation, DYNAMICS: fitted.line.obs.dynamics_inflation}.get(label, 1.0)
         chi2 = float((fitted.system.residual[rows] ** 2).sum()) * widened**2
         p = float(fdtrc(dof, NOISE_DOF, chi2 / dof))
-        disagrees = p < alpha / 6.0
+        disagrees = p < alpha / N_DOMAINS_TESTED
         where = locate(fitted, label) if disagrees else Where()
         tests.append(
             DomainTest(name, chi2 / dof, dof, p, disagrees, where, physical.get(label, 0.0), rms_unit.get(label, ""))
@@ -59,10 +65,10 @@ def locate(fitted: Fit, label: int, n_most: int = 5) -> Where:
     squared = system.residual[rows] ** 2
     segments = system.segment[rows]
     per_segment = {int(s): float(squared[segments == s].sum()) for s in np.unique(segments)}
-    heavy = [s for s, v in sorted(per_segment.items(), key=lambda item: -item[1]) if v > 9.0][:n_most]
+    heavy = [s for s, v in sorted(per_segment.items(), key=lambda item: -item[1]) if v > HEAVY][:n_most]
     per_channel = np.array([squared[system.channel[rows] == c].sum() for c in range(3)])
     names = _CHANNELS[label]
-    channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] > 0.2 * per_channel.sum())
+    channels = tuple(names[c] for c in np.argsort(-per_channel) if per_channel[c] > CARRIES * per_channel.sum())
     is_hold = label in (STATIC_ACCEL, STATIC_GYRO)
     t = obs.time_s
     spans = []

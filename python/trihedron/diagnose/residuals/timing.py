@@ -11,6 +11,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.sample_steps import step_errors
 from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
+from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.records.diagnosis import DomainTest, Where
 
 
@@ -32,4 +33,4 @@ def test_timing(context: Context, alpha: float, refused: Collection[str]) -> Dom
         where = Where(where.channels, where.segments + evidence.where.segments, where.times_s + evidence.where.times_s)
     chi2_per_dof = 1.0 + max(z, 0.0) ** 2 / n + sum(e.strength for e in found if e.reweigh is not None) / n
     rms = float(np.sqrt(max(value, 0.0) / 5.0))
-    return DomainTest("timing", chi2_per_dof, float(n), p, p < alpha / 6.0, where, rms, "s")
+    return DomainTest("timing", chi2_per_dof, float(n), p, p < alpha / N_DOMAINS_TESTED, where, rms, "s")

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.ndimage import median_filter
 from scipy.special import chdtrc, gammaincc
 
+from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.session.observations import FloatArray, Observations
 from trihedron.records.diagnosis import DomainTest, Where
 
@@ -217,7 +218,7 @@ def test_within_static(obs: Observations, alpha: float) -> DomainTest:
     p = min(1.0, 2.0 * min(p_scatter, p_line))
     dof = float(scatter.dof.sum() * scatter.ratio.shape[1])
     chi2_per_dof = float(np.average(scatter.ratio, axis=0, weights=scatter.dof).mean())
-    disagrees = p < alpha / 6.0
+    disagrees = p < alpha / N_DOMAINS_TESTED
     where = Where()
     if disagrees:
         holds = np.flatnonzero(loud.min(axis=1) * n_looks < alpha)[:8]

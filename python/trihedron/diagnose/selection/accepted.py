@@ -82,6 +82,7 @@ def _accepted(
                 "shape": shape,
                 "values": [float(v) for v in values],
                 "applies_to_other_recordings": found.effect.applies_elsewhere,
+                **({} if found.evidence is None or not found.evidence.series else {"curve": found.evidence.series}),
             }
         ),
     )

@@ -267,20 +267,27 @@ def profile(fitted: Fit) -> float:
     return fitted.log_profile
 
 
-def excess(fitted: Fit) -> float:
-    """Chi-square beyond its degrees of freedom, over the domains that have more than they should.
+def domain_chi2(fitted: Fit) -> dict[int, tuple[float, float]]:
+    """Chi-square and degrees of freedom of every row domain, in the noise that was predicted.
 
-    In the noise that was predicted: where it was widened for what nothing explained, the widening is taken out.
+    Where noise was widened for what nothing explained, the widening is taken out.
     """
     used = leverage(fitted)
     obs = fitted.line.obs
-    total = 0.0
+    out = {}
     for d in ROW_DOMAINS:
         rows = fitted.system.domain == d
         widened = {MOVES: obs.moves_inflation, DYNAMICS: obs.dynamics_inflation}.get(d, 1.0)
-        chi2 = float((fitted.system.residual[rows] ** 2).sum()) * widened**2
-        total += max(chi2 - float((1.0 - used[rows]).sum()), 0.0)
-    return total
+        out[d] = (
+            float((fitted.system.residual[rows] ** 2).sum()) * float(widened) ** 2,
+            float((1.0 - used[rows]).sum()),
+        )
+    return out
+
+
+def excess(fitted: Fit) -> float:
+    """Chi-square beyond its degrees of freedom, over the domains that have more than they should."""
+    return sum(max(chi2 - dof, 0.0) for chi2, dof in domain_chi2(fitted).values())
 
 
 def held_out_records(before_fit: Fit, before: Prediction, after_fit: Fit, after: Prediction) -> tuple[HeldOut, ...]:

@@ -16,20 +16,28 @@ from trihedron.diagnose.session.twin import stacked
 from trihedron.records.diagnosis import Candidate
 
 
-def with_evidence(model: StepwiseModel, alpha: float) -> tuple[StepwiseModel, dict[str, Candidate]]:
-    """The model with every effect whose own test finds it, and what every such test said."""
-    found, candidates = _looked_for(model.context, alpha)
+def with_evidence(
+    model: StepwiseModel, alpha: float, *, is_late: bool = False
+) -> tuple[StepwiseModel, dict[str, Candidate]]:
+    """The model with every effect whose own test finds it, and what every such test said.
+
+    ``is_late`` asks for those that are looked for in what the competition has left.
+    """
+    taken = {one.effect.id for one in model.accepted if not one.effect.repeatable}
+    found, candidates = _looked_for(model.context, alpha, taken, is_late=is_late)
     for effect, evidence in found:
         model = _with_one(model, effect, evidence)
     return model, candidates
 
 
-def _looked_for(context: Context, alpha: float) -> tuple[list[tuple[DirectEffect, Evidence]], dict[str, Candidate]]:
+def _looked_for(
+    context: Context, alpha: float, taken: set[str], *, is_late: bool
+) -> tuple[list[tuple[DirectEffect, Evidence]], dict[str, Candidate]]:
     n_effects = len(catalogue())
     candidates: dict[str, Candidate] = {}
     found: list[tuple[DirectEffect, Evidence]] = []
     for effect in catalogue():
-        if not isinstance(effect, DirectEffect):
+        if not isinstance(effect, DirectEffect) or effect.is_late != is_late or effect.id in taken:
             continue
         reason = effect.unavailable(context)
         if reason is not None:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS
 from trihedron.diagnose.selection.compare import (
     Comparison,
     cost_of,
+    domain_chi2,
     excess,
     held_out_records,
     mends,
@@ -18,11 +16,12 @@ from trihedron.diagnose.selection.compare import (
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel, with_only
 from trihedron.diagnose.selection.stepwise import MIN_DELTA_BIC
 
-LEAST_SHARE = 0.25
-"""Of the held-out misfit in some domain of its sensor an effect must remove this share, all else being in the model:
-what removes less is the least bad guess at a mechanism that is not in the catalogue."""
-AGREES = 2.0
-"""Held-out chi-square per row at which a domain holds so little misfit that no share of it is asked for."""
+LEAST_SHARE = 0.5
+"""Of the misfit in the worst domain of its sensor an effect must remove this share, all else being in the model: what
+removes less is the least bad guess at a mechanism that is not in the catalogue. Those of benches/blind.py --foreign 15
+--seed 5 reached 0.46, flaws of data-sheet size among small faults (benches/blind_nuisances.py) 0.54 and more."""
+AGREES = 1.5
+"""Chi-square per degree of freedom at which a domain holds so little misfit that no share of it is asked for."""
 
 
 def judged_again(model: StepwiseModel) -> StepwiseModel:
@@ -62,7 +61,8 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
         cost_of(model.fitted, one.rank, len(one.variant.shape)), first,
     )  # fmt: skip
     bic = against.bic_gain
-    now = replace(one, delta_bic=bic, gain=max(against.gain_at(against.stays), 0.0), held_out=held)
+    gain = max(excess(without.fitted) - excess(model.fitted), 0.0)
+    now = replace(one, delta_bic=bic, gain=gain, held_out=held)
     stands = (
         bic > MIN_DELTA_BIC
         and against.predicts
@@ -75,12 +75,11 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
 
 
 def explains(against: Comparison) -> bool:
-    """Whether the effect removes its share of the held-out misfit of a domain of its own sensor."""
-    before, after = against.base_prediction.per_row, against.prediction.per_row
-    for d in own_domains(against.variant.distortion):
-        if d not in ROW_DOMAINS or before[d] <= 1.0:
-            continue
-        share = (before[d] - after[d]) / (before[d] - 1.0)
-        if share > LEAST_SHARE or (share > 0.0 and after[d] < AGREES):
-            return True
-    return bool(np.all(before < AGREES))
+    """Whether the effect removes its share of the misfit in the domain of its own sensor that has most of it."""
+    before, after = domain_chi2(against.base), domain_chi2(against.fitted)
+    own = own_domains(against.variant.distortion)
+    worst = max(own, key=lambda d: before[d][0] - before[d][1])
+    (chi2, dof), (left, left_dof) = before[worst], after[worst]
+    if chi2 <= AGREES * dof or left <= AGREES * left_dof:
+        return True
+    return bool(1.0 - (left - left_dof) / (chi2 - dof) > LEAST_SHARE)

@@ -48,13 +48,14 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     """The model with the effect that explains most of what is left; ``None`` where none is demanded."""
     n_effects = len(catalogue())
     leaders = [s for s in scored[:N_REFITS] if s.p_value * n_effects < alpha / 2.0]
+    context = model.context
     refits: list[Refit] = []
     sound: list[Refit] = []
     for s in leaders:
         if any(r.scored.merit > FAR_AHEAD * s.merit for r in sound):
             break
         refits.append(refit(model, s))
-        if is_sound(refits[-1]):
+        if is_sound(refits[-1]) and s.effect.withstands(context):
             sound.append(refits[-1])
     if not sound:
         return None

@@ -24,11 +24,11 @@ def accounted_for(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> tu
     )
 
 
-def verdict_of(model: StepwiseModel, domains: tuple[DomainTest, ...]) -> Verdict:
+def verdict_of(model: StepwiseModel, domains: tuple[DomainTest, ...], *, has_laws: bool = False) -> Verdict:
     """One word; ``not-testable`` where neither gravity nor rest had a say and the samples show nothing either."""
     if model.accepted:
         return "missing-physics"
-    if any(d.disagrees for d in domains):
+    if has_laws or any(d.disagrees for d in domains):
         return "unexplained"
     # A weak prior fills what the poses leave open; rows that it alone decides test nothing.
     if not any(d.domain in POSE_DOMAINS and d.dof >= LEAST_DOF for d in domains):

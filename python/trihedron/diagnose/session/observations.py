@@ -124,8 +124,9 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         if readings is not None:
             variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s)
         sigma, density = slow[k]
-        if sigma is not None and density is not None and ranges:
-            variances[:, k] += coloured_variance(sigma, density, lasts, moves_last)
+        if readings is not None and sigma is not None and density is not None and ranges:
+            halves = np.array([_second_half_minus_first(readings[a:b]) for a, b in spans])
+            variances[:, k] += coloured_variance(sigma, halves, density, lasts, moves_last)
     return Observations(
         recording=recording,
         segments=segments,
@@ -147,3 +148,9 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         bumped_s=bumped,
         unresolved=dict(zip(holds, variances, strict=True)),
     )
+
+
+def _second_half_minus_first(values: FloatArray) -> FloatArray:
+    first, second = np.array_split(values, 2)
+    out: FloatArray = np.nanmean(second, axis=0) - np.nanmean(first, axis=0)
+    return out

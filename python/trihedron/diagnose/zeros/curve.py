@@ -29,7 +29,7 @@ class DriftCurve:
         return np.asarray(np.ptp(self.values, axis=1))
 
 
-def _covariance(process: ZeroProcess, axis: int, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+def covariance_of(process: ZeroProcess, axis: int, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(n, n) covariance of the readings, and the share of walk and drift in it."""
     r = process.readings
     W, D, _, _ = unit_kernels(r)
@@ -62,7 +62,7 @@ def smooth_curve(process: ZeroProcess, keep: list[int], sigma: FloatArray, time_
     centre = np.eye(len(at)) - 1.0 / len(at)
     values, errors = [], []
     for axis, y in enumerate(r.values):
-        V, _ = _covariance(process, axis, sigma)
+        V, _ = covariance_of(process, axis, sigma)
         _, w, d = (process.axis_factor[axis] * sigma) ** 2
         cross = centre @ kernel(at, t, w, d, r.length_s / span)
         inverse = np.linalg.inv(V)
@@ -84,7 +84,7 @@ def residuals_of_poses(
     poses = np.unique(r.pose)
     out = np.zeros((len(r.values), len(poses)))
     for axis, y in enumerate(r.values):
-        V, _ = _covariance(process, axis, sigma)
+        V, _ = covariance_of(process, axis, sigma)
         inverse = np.linalg.inv(V)
         side = inverse @ X
         P = inverse - side @ np.linalg.pinv(X.T @ side) @ side.T

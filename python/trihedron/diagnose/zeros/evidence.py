@@ -18,8 +18,6 @@ CONFOUNDED_VARIANCE = 10.0
 """A coefficient whose variance walk and drift raise by more than this factor is not told apart from them."""
 KIND_LIMIT = 8.75
 """1 % point of 3/8 χ²(1) + 3/8 χ²(2) + 1/8 χ²(3): one strength more where the others may be 0."""
-SCATTER_LIMIT_BESIDE_WALK = 8.75
-"""1 % point of the scatter's likelihood ratio beside a walk (benches/zero_process.py)."""
 ALL: tuple[int, ...] = (SCATTER, WALK, DRIFT)
 Kind = Literal["", "walk", "drift", "slow"]
 
@@ -85,7 +83,6 @@ def examine(
     s_only, _ = process.maximum((SCATTER,), every, restricted=True)
     s_walk, _ = process.maximum((SCATTER, WALK), every, restricted=True)
     s_drift, _ = process.maximum((SCATTER, DRIFT), every, restricted=True)
-    slow, at_slow = process.maximum((WALK, DRIFT), every, restricted=True)
     ratio_walk, ratio_drift = 2.0 * (s_walk - s_only), 2.0 * (s_drift - s_only)
     p_slow = min(1.0, 2.0 * _half(max(ratio_walk, ratio_drift)))
     kind: Kind = ""
@@ -95,8 +92,8 @@ def examine(
         kind = "slow"
         if readings.n_poses >= FEWEST_FOR_KIND and is_drift != is_walk:
             kind = "drift" if is_drift else "walk"
-    p_scatter = _scatter_p(2.0 * (top - slow), has_slow=bool(at_slow.any()))
-    worst, p_spared = _without_worst(process, every, sigma, is_norm=is_norm)
+    p_scatter = _scatter_p(process, every, top, is_slow=p_slow < 0.01)
+    worst, p_spared = _without_worst(process, every, sigma, is_slow=p_slow < 0.01, is_norm=is_norm)
     scatter, scatter_std = _scatter_sizes(process, every, sigma)
     return ZeroEvidence(
         process, readings.n_poses, sigma, scatter, scatter_std, p_slow, p_scatter, max(p_scatter, p_spared), worst,
@@ -109,9 +106,14 @@ def _half(ratio: float) -> float:
     return 0.5 * float(chdtrc(1.0, ratio)) if ratio > 0.0 else 1.0
 
 
-def _scatter_p(ratio: float, *, has_slow: bool) -> float:
-    if not has_slow:
-        return _half(ratio)
+def _scatter_p(process: ZeroProcess, every: list[int], top: float, *, is_slow: bool) -> float:
+    """Scatter against noise alone, or, where something changes slowly, against walk and drift of any strength."""
+    if not is_slow:
+        scatter, _ = process.maximum((SCATTER,), every, restricted=True)
+        nothing, _ = process.maximum((), every, restricted=True)
+        return _half(2.0 * (scatter - nothing))
+    slow, _ = process.maximum((WALK, DRIFT), every, restricted=True)
+    ratio = 2.0 * (top - slow)
     # Beside walk and drift the null is that of KIND_LIMIT, which a simulated walk confirms.
     return float(sum(w * chdtrc(k, max(ratio, 0.0)) for w, k in ((0.375, 1.0), (0.375, 2.0), (0.125, 3.0))))
 
@@ -144,7 +146,9 @@ def _gravity(process: ZeroProcess, every: list[int], columns: list[int]) -> Coef
     return Coefficients(mean[:, place], covariance[:, place][:, :, place], float(chdtrc(dof, max(ratio, 0.0))))
 
 
-def _without_worst(process: ZeroProcess, every: list[int], sigma: FloatArray, *, is_norm: bool) -> tuple[int, float]:
+def _without_worst(
+    process: ZeroProcess, every: list[int], sigma: FloatArray, *, is_slow: bool, is_norm: bool
+) -> tuple[int, float]:
     """The pose whose zero is farthest from the others' prediction, and the scatter's p-value without it."""
     readings = process.readings
     if readings.n_poses <= (12 if is_norm else 6):
@@ -152,8 +156,7 @@ def _without_worst(process: ZeroProcess, every: list[int], sigma: FloatArray, *,
     worst = _worst_pose(process, every, sigma)
     rest = ZeroProcess(readings.without(worst), process.axis_factor, process.noise_factor)
     top, _ = rest.maximum(ALL, every, restricted=True)
-    slow, at = rest.maximum((WALK, DRIFT), every, restricted=True)
-    return worst, _scatter_p(2.0 * (top - slow), has_slow=bool(at.any()))
+    return worst, _scatter_p(rest, every, top, is_slow=is_slow)
 
 
 def _worst_pose(process: ZeroProcess, every: list[int], sigma: FloatArray) -> int:

@@ -24,8 +24,8 @@ class SessionZeros:
     readings: ZeroReadings
     thermal: tuple[int, ...]
     gravity: tuple[int, ...]
-    holds: npt.NDArray[np.intp]
-    """Number of the pose of every reading."""
+    varied: FloatArray
+    """(axes,) variance of the readings before accepted effects were taken off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +78,7 @@ def gyro_zeros(context: Context) -> SessionZeros | None:
     assert halves.rate is not None
     si = context.si_per_raw("gyroscope")
     values = halves.rate * si
+    varied = values.var(axis=0)
     if line.distortion.rate is not None:
         added = (line.distortion.rate[: obs.n_holds] @ twin.effect) @ np.linalg.inv(context.gyro_axes).T
         values = values - added[halves.pose]
@@ -95,7 +96,7 @@ def gyro_zeros(context: Context) -> SessionZeros | None:
         values.T, sigma.T, halves.time_s, halves.length_s, halves.pose, np.column_stack(columns),
         np.ones((len(values), 1)),
     )  # fmt: skip
-    return SessionZeros(readings, thermal, gravity, halves.pose)
+    return SessionZeros(readings, thermal, gravity, varied)
 
 
 def accel_zeros(context: Context) -> SessionZeros | None:
@@ -106,6 +107,7 @@ def accel_zeros(context: Context) -> SessionZeros | None:
     obs, twin, line = context.obs, context.fitted.twin, context.fitted.line
     halves = _halves(obs, _temperature(context))
     force = halves.force @ twin.accel_S.T + twin.accel_b
+    varied = np.array([np.linalg.norm(force, axis=1).var()])
     if line.distortion.force is not None:
         force = force - (line.distortion.force[: obs.n_holds] @ twin.effect)[halves.pose]
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
@@ -122,4 +124,4 @@ def accel_zeros(context: Context) -> SessionZeros | None:
     readings = ZeroReadings(
         values[None], sigma[None], halves.time_s, halves.length_s, halves.pose, np.column_stack(columns), up
     )
-    return SessionZeros(readings, thermal, (), halves.pose)
+    return SessionZeros(readings, thermal, (), varied)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -88,7 +88,7 @@ def calibrate_faces(
     used = np.flatnonzero(faces)
     closed = method == "closed-form"
     face_poses.check_sufficient(faces[used], all_six=closed)
-    estimate = _estimate(values[used], noise[used], faces[used], g, closed=closed)
+    estimate = _estimate_placements(values[used], noise[used], faces[used], g, closed=closed)
     S, b = other_form(estimate.S_a, estimate.b_a)
     jacobian = other_form_jacobian(estimate.S_a, estimate.b_a)
     quality, apart = _quality(values, noise, faces, g, estimate, closed=closed)
@@ -114,6 +114,48 @@ def calibrate_faces(
     return sensor, tuple(findings)
 
 
+def _estimate_placements(
+    values: FloatArray, noise: FloatArray, faces: IntArray, g: float, *, closed: bool
+) -> _Estimate:
+    """Fit with one mean for each time that the case was set down: holds between turns on one face share their tilt.
+
+    Poses that follow each other on the same face are one placement. Taken as independent they would seem to show, by
+    agreeing with each other, that nothing is tilted. What they scatter beyond noise (a tilt that turns with the case)
+    goes into the error of their mean.
+    """
+    start = np.flatnonzero(np.concatenate([[True], faces[1:] != faces[:-1]]))
+    if len(start) == len(faces):
+        return _estimate(values, noise, faces, g, closed=closed)
+    count = np.diff(np.concatenate([start, [len(faces)]]))
+    merged = np.add.reduceat(values, start, axis=0) / count[:, None]
+    error = np.add.reduceat(noise, start, axis=0) / (count**2)[:, None, None]
+    level = np.abs(face_poses.direction_of(faces)) < 0.5
+    deviation = np.where(level, values - np.repeat(merged, count, axis=0), 0.0)
+    freedom = 2.0 * float(np.sum(count - 1))
+    scatter = float(np.sum(deviation**2)) / freedom
+    expected = float(np.mean(np.einsum("nii->n", noise))) / 3.0
+    is_tilted = scatter > expected * stats.chi2.isf(verdict.SIGNIFICANCE, freedom) / freedom
+    if is_tilted:
+        across = level[start][:, :, None] * np.eye(3)
+        error = error + across * (scatter / count)[:, None, None]
+    estimate = _estimate(merged, error, faces[start], g, closed=closed)
+    if is_tilted:
+        tilt2 = scatter / (g**2 * float(np.mean(np.sum(estimate.S_a**2, axis=0))))
+        estimate = _with_doubt(estimate, tilt2)
+    residual = values - g * face_poses.direction_of(faces) @ estimate.S_a.T - estimate.b_a
+    return replace(estimate, residual=residual)
+
+
+def _with_doubt(estimate: _Estimate, tilt2: float) -> _Estimate:
+    """A tilted face reads ``g cos t``: the scale may be short by the mean square tilt per component, to second order.
+
+    It is not corrected, for what scatters need not be a tilt; the error bars contain it.
+    """
+    scale = np.concatenate([estimate.S_a.ravel(), np.zeros(3)])
+    covariance = estimate.covariance + np.outer(scale, scale) * tilt2**2
+    return replace(estimate, covariance=covariance, tilt_rad=float(np.sqrt(estimate.tilt_rad**2 + tilt2)))
+
+
 def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float, *, closed: bool) -> _Estimate:
     """Fit with the noise alone; if that is contradicted, with the rms tilt per pose that makes χ² equal its dof."""
     fit = _closed_form if closed else _least_squares
@@ -133,7 +175,9 @@ def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float, 
     widened = _tilted(noise, faces, S_a, g, high)
     S_a, b_a, covariance = fit(values, widened, faces, g)
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
-    return _Estimate(S_a, b_a, covariance, residual, high, chi2_noise, dof)
+    # A tilt estimated from few degrees of freedom has Student's tails: 1.96 standard errors shall hold in 95 %.
+    covariance = covariance * float(stats.t.isf(0.025, dof) / stats.norm.isf(0.025)) ** 2
+    return _with_doubt(_Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof), high**2)
 
 
 def _tilted(noise: FloatArray, faces: IntArray, S_a: FloatArray, g: float, tilt_rad: float) -> FloatArray:

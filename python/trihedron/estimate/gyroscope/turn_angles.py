@@ -67,7 +67,8 @@ class KnownTurn:
     """What a turn was taken for: ``angle_rad`` about ``axis``; ``is_used`` is false when it is no such turn.
 
     ``seen_rad`` is the angle by the nominal scale, ``off_axis_rad`` how far its axis lies from the case axis.
-    ``direction`` is the axis where it is none of the case's, ``axis`` then the nearest one.
+    ``direction`` is the axis where it is none of the case's, ``axis`` then the nearest one. ``is_ambiguous``: the scale
+    is known too badly to tell which multiple it was.
     """
 
     axis: int
@@ -77,6 +78,7 @@ class KnownTurn:
     off_axis_rad: float
     was_given: bool
     direction: tuple[float, float, float] | None = None
+    is_ambiguous: bool = False
 
     @property
     def vector(self) -> FloatArray:
@@ -239,16 +241,25 @@ def identify_turns(
         along = float(vector @ unit) / scale
         off_axis = math.atan2(float(np.linalg.norm(np.cross(vector, unit))), abs(float(vector @ unit)))
         angle = turn.angle_rad if turn.angle_rad is not None else quantum_rad * round(along / quantum_rad)
+        is_ambiguous = False
         if turn.angle_rad is None:
             unsure = abs(along) * (tolerance if sums[axis, 1] == 0.0 else 0.1 * tolerance)
             # A turn of unknown size can only be read when the doubt about the scale is below half a multiple.
             is_used = angle != 0.0 and abs(along - angle) < SLACK_RAD + min(unsure, 0.2 * quantum_rad)
-            is_used = is_used and unsure < 0.5 * quantum_rad
+            is_ambiguous = unsure >= 0.5 * quantum_rad
+            is_used = is_used and not is_ambiguous
         else:
             is_used = angle != 0.0 and abs(along - angle) < max(SLACK_RAD, 0.3 * abs(angle))
         is_used = is_used and off_axis < 2.0 * SLACK_RAD
         known[index] = KnownTurn(
-            axis, float(angle), bool(is_used), float(along), off_axis, turn.angle_rad is not None, turn.direction
+            axis=axis,
+            angle_rad=float(angle),
+            is_used=bool(is_used),
+            seen_rad=float(along),
+            off_axis_rad=off_axis,
+            was_given=turn.angle_rad is not None,
+            direction=turn.direction,
+            is_ambiguous=is_ambiguous,
         )
         if is_used:
             sums[axis] += (float(vector @ unit) * angle, angle * angle)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from scipy.stats import chi2 as chi2_distribution
 
 from trihedron.estimate.gyroscope.turn_angles import (
+    AMBIGUOUS,
     MIN_SPREAD,
     QUARTER,
     SCALE_TOLERANCE,
@@ -35,6 +36,7 @@ from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.sensor_model import other_form, other_form_jacobian
+from trihedron.units import rate_to_si
 
 FloatArray = npt.NDArray[np.float64]
 Route = Literal["least-squares", "zero-turn-first"]
@@ -113,7 +115,7 @@ def calibrate_turns(
     nominal = nominal_matrix(recording, measured, turns, nominal_scale)
     known = identify_turns(measured, turns, nominal, quantum_rad, nominal_tolerance)
     used = np.array([turn.is_used for turn in known], dtype=bool)
-    _require_every_axis(known, used)
+    _require_every_axis(known, used, rate_to_si(recording.gyroscope_unit) is None)
     roughly = np.asarray(np.linalg.inv(nominal), dtype=np.float64)
     sigmas = np.array([turn.sigma_direction_rad for turn in turns])
     system = TurnSystem(measured, np.array([turn.vector for turn in known]), roughly, sigma_directions=sigmas)
@@ -142,7 +144,7 @@ def calibrate_turns(
     )
 
 
-def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_]) -> None:
+def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_], recording_is_counts: bool) -> None:
     if any(turn.direction is not None for turn in known):
         vectors = np.array([turn.vector for turn in known])[used]
         directions = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
@@ -153,6 +155,8 @@ def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_])
             )
         return
     missing = [axis for axis in range(3) if not any(t.axis == axis and u for t, u in zip(known, used, strict=True))]
+    if missing and recording_is_counts and any(turn.is_ambiguous for turn in known):
+        raise ValueError(AMBIGUOUS)
     if missing:
         names = " and ".join(str(axis + 1) for axis in missing)
         raise ValueError(

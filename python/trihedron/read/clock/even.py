@@ -188,7 +188,7 @@ def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:
     edges = np.concatenate([[0], pauses + 1, [len(error)]])
     longest = int(np.argmax(np.diff(edges)))
     piece = error[edges[longest] : edges[longest + 1]][: 1 << 20]
-    far = min(len(piece) // 8, 1024)
+    far = min(len(piece) // 8, 256)
     near = max(far // 16, 1)
 
     def typical(lag: int) -> float:

@@ -1,0 +1,46 @@
+"""Accelerometer zero that is another in every pose."""
+
+from __future__ import annotations
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.laws.find import MOST_FOLLOWS, accel_zero_laws
+from trihedron.diagnose.zeros.of_session import (
+    FEWEST_NORM_POSES,
+    accel_evidence,
+    exceeds_noise,
+    scatter_parameters,
+    share_of_zeros,
+    with_accel_scatter,
+)
+from trihedron.units import mm_s2_from_m_s2
+
+
+class AccelZeroScatter(DirectEffect):
+    """Zeros drawn anew in every pose, one size for three axes: the length of gravity does not tell axes apart."""
+
+    id = "accel-zero-scatter"
+    mechanism = "the accelerometer's zero is another in every pose"
+    experiment = "hold one pose, turn away and come back to it ten times: what differs is scatter, what repeats is not"
+    is_proof = True
+    is_late = True
+
+    def unavailable(self, context: Context) -> str | None:
+        few = context.obs.n_holds < FEWEST_NORM_POSES
+        return f"fewer than {FEWEST_NORM_POSES} still poses" if few else None
+
+    def find(self, context: Context) -> Evidence | None:
+        found = accel_evidence(context)
+        if found is None or not exceeds_noise(found) or accel_zero_laws(context).share > MOST_FOLLOWS:
+            return None  # what follows something is a law, not scatter
+        sigma, si = float(found.evidence.scatter[0]), context.si_per_raw("accelerometer")
+        return Evidence(
+            found.evidence.p_scatter_spared,
+            0.0,
+            scatter_parameters(found, "m/s^2"),
+            f"The accelerometer's zero is another in every pose, by {mm_s2_from_m_s2(sigma):.2g} mm/s² per axis (one "
+            "standard deviation), beyond noise and drift; no pose or temperature accounts for it.",
+            "static-accel",
+            reweigh=lambda obs: with_accel_scatter(obs, sigma, si),
+            share=share_of_zeros(found),
+        )

@@ -1,0 +1,48 @@
+"""Gyro zero that is another in every pose."""
+
+from __future__ import annotations
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.laws.find import MOST_FOLLOWS, gyro_zero_laws
+from trihedron.diagnose.zeros.of_session import (
+    FEWEST_FOR_SIZE,
+    exceeds_noise,
+    gyro_evidence,
+    scatter_parameters,
+    share_of_zeros,
+    with_gyro_scatter,
+)
+from trihedron.units import degrees_from_radians
+
+
+class GyroZeroScatter(DirectEffect):
+    """The zero of every axis is drawn anew in every pose, beyond noise and drift."""
+
+    id = "gyro-zero-scatter"
+    mechanism = "the gyro's zero is another in every pose"
+    experiment = "hold one pose, turn away and come back to it ten times: what differs is scatter, what repeats is not"
+    is_proof = True
+    is_late = True
+
+    def unavailable(self, context: Context) -> str | None:
+        if context.obs.raw_rate is None:
+            return "the log has no gyro"
+        return f"fewer than {FEWEST_FOR_SIZE} still poses" if context.obs.n_holds < FEWEST_FOR_SIZE else None
+
+    def find(self, context: Context) -> Evidence | None:
+        found = gyro_evidence(context)
+        if found is None or not exceeds_noise(found) or gyro_zero_laws(context).share > MOST_FOLLOWS:
+            return None  # what follows something is a law, not scatter
+        sigma, si = found.evidence.scatter, context.si_per_raw("gyroscope")
+        sizes = ", ".join(f"{degrees_from_radians(s):.2g}" for s in sigma)
+        return Evidence(
+            found.evidence.p_scatter_spared,
+            0.0,
+            scatter_parameters(found, "rad/s"),
+            f"The gyro's zero is another in every pose, by {sizes} °/s (x, y, z; one standard deviation), beyond noise "
+            "and drift; it follows neither gravity nor a logged temperature.",
+            "static-gyro",
+            reweigh=lambda obs: with_gyro_scatter(obs, sigma, si),
+            share=share_of_zeros(found),
+        )

@@ -1,0 +1,230 @@
+"""Laws of what stays unexplained, sensor by sensor, as the record that a diagnosis shows."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.laws.misfit import Judged, Misfit
+from trihedron.diagnose.laws.moves import move_misfit
+from trihedron.diagnose.laws.poses import Zeros, accel_misfits, gyro_misfits
+from trihedron.diagnose.laws.room import RoomLaw, search_room
+from trihedron.diagnose.laws.search import Accepted, search
+from trihedron.diagnose.zeros.of_session import accel_evidence, gyro_evidence
+from trihedron.records.diagnosis import Domain, DomainTest, EffectParameter, HeldOut, Law
+
+Sensor = Literal["accelerometer", "gyroscope"]
+OUT: dict[Sensor, str] = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
+ZERO_WORD: dict[Sensor, str] = {"gyroscope": "gyro", "accelerometer": "accelerometer"}
+EXPERIMENTS = {
+    "room": "hold the same poses with the table turned by 90° about the vertical, and once more with a magnet near by",
+    "force": "hold poses on edges and corners as well as on faces, each twice",
+    "previous pose": "reach one pose from six different ones, twice each",
+    "last turn": "reach one pose by turns of either sign, small and large, waiting unlike times",
+    "temperature": "repeat a few poses while the temperature takes another course: up, down, and held",
+    "supply": "repeat one pose at three supply voltages",
+    "vibration": "hold one pose with the shaking on and off",
+    "rate products": "turn about one axis at a time, then about two at once, at three rates; pivot about a fixed point",
+    "rate": "turn about each axis at three rates, both ways",
+    "rate times force": "turn about a level and about a vertical axis at the same rate",
+    "angular acceleration": "pivot about a fixed point, starting and stopping briskly, then smoothly",
+    "force rate": "shake along one axis without turning",
+}
+RESEMBLES = {
+    "room": ("a magnetic field",),
+    "previous pose": ("hysteresis", "creep after a turn"),
+    "last turn": ("play or slip in a mounting", "memory of the readout"),
+    "rate products": ("coupled drive modes", "displaced accelerometers"),
+    "rate times force": ("a drive frame bent by weight",),
+    "vibration": ("rectification",),
+    "supply": ("a ratiometric readout",),
+    "temperature": ("a thermal bias of another shape",),
+    "angular acceleration": ("a lever arm",),
+    "force": ("unequal stiffness",),
+}
+ROOM_VECTOR = "vector fixed in the room"
+EARTH_RATE_RAD_S = 7.292115e-5
+
+
+@dataclass(frozen=True, eq=False)
+class ZeroLaws:
+    """Laws of one sensor's zeros; ``share`` of the held-out sum of squares of all its axes that they remove."""
+
+    laws: tuple[Law, ...]
+    share: float
+
+
+def find_laws(context: Context, domains: Collection[Domain]) -> tuple[Law, ...]:
+    """Laws of the misfit in ``domains``, the largest share first; empty where nothing predicts."""
+    out: list[Law] = []
+    if "static-gyro" in domains:
+        out += gyro_zero_laws(context).laws
+    if "static-accel" in domains:
+        out += accel_zero_laws(context).laws
+    if "moves" in domains or "dynamics" in domains:
+        out += _motion_laws(context, is_gyro_only="moves" in domains and "dynamics" not in domains)
+    return tuple(sorted(out, key=lambda law: -law.share))
+
+
+MOST_FOLLOWS = 0.4
+"""Share of the held-out misfit at rest that a law may remove before the rest is still called scatter."""
+SCATTERS = 1e-4
+"""p-value of a zero that differs from pose to pose, from which its law is looked for even where the session's walk has
+swallowed it."""
+
+
+def laws_of_rest(context: Context, remaining: tuple[DomainTest, ...]) -> tuple[Law, ...]:
+    """Laws of what remains: of domains that disagree, and of zeros that differ from pose to pose."""
+    domains: set[Domain] = {d.domain for d in remaining if d.disagrees}
+    gyro = None if "static-gyro" in domains else gyro_evidence(context)
+    if gyro is not None and gyro.evidence.p_scatter_spared < SCATTERS:
+        domains.add("static-gyro")
+    accel = None if "static-accel" in domains else accel_evidence(context)
+    if accel is not None and accel.evidence.p_scatter_spared < SCATTERS:
+        domains.add("static-accel")
+    return find_laws(context, domains)
+
+
+@lru_cache(maxsize=4)
+def gyro_zero_laws(context: Context) -> ZeroLaws:
+    """What the gyros' zeros at rest follow, beyond gravity as the catalogue has it."""
+    return _of_zeros(gyro_misfits(context) if context.obs.raw_rate is not None else None)
+
+
+@lru_cache(maxsize=4)
+def accel_zero_laws(context: Context) -> ZeroLaws:
+    """What the accelerometers' zeros at rest follow."""
+    return _of_zeros(accel_misfits(context))
+
+
+def _of_zeros(zeros: Zeros | None) -> ZeroLaws:
+    if zeros is None:
+        return ZeroLaws((), 0.0)
+    sensor: Sensor = "gyroscope" if zeros.sensor == "gyroscope" else "accelerometer"
+    domain: Domain = "static-gyro" if sensor == "gyroscope" else "static-accel"
+    n_tried = sum(len(c) for c in zeros.candidates) + 1
+    found = [search(m, list(c), n_tried) for m, c in zip(zeros.misfits, zeros.candidates, strict=True)]
+    of_terms = sum(a.judged.gain for a in found if a is not None)
+    if sensor == "gyroscope" and zeros.room is not None:
+        room = search_room(zeros.misfits, zeros.room, n_tried)
+        if room is not None and room.gain > of_terms + 5.0:
+            return ZeroLaws((_room_law(room),), room.share)
+    squares = [_squares_before(z) for z in zeros.misfits]
+    laws = _laws_of(sensor, domain, [a for a in found if a is not None], sum(squares))
+    return ZeroLaws(laws, sum(law.share for law in laws))
+
+
+def _squares_before(misfit: Misfit) -> float:
+    total, _, n = misfit.held_out()
+    return misfit.variance * total / n
+
+
+def _laws_of(sensor: Sensor, domain: Domain, found: list[Accepted], before: float) -> tuple[Law, ...]:
+    """One law per family of variables; axes that follow the same family share it."""
+    families: dict[str, list[tuple[str, tuple[str, ...], str, np.ndarray, np.ndarray, Judged]]] = {}
+    for one in found:
+        for term in one.terms:
+            if term.candidate.is_known:
+                continue
+            c = term.candidate
+            families.setdefault(c.family, []).append((c.target, c.names, c.unit, term.value, term.sigma, one.judged))
+    out = []
+    for family, terms in families.items():
+        judged = list({id(t[5]): t[5] for t in terms}.values())
+        removed = sum(j.held_before - j.held_after for j in judged)
+        share = float(np.clip(removed / max(before, 1e-300), 0.0, 1.0))
+        coefficients = tuple(
+            EffectParameter(f"{target}: {name}", float(v), float(s), _unit_of(sensor, unit, name))
+            for target, names, unit, value, sigma, _ in terms
+            for name, v, s in zip(names, value, sigma, strict=True)
+        )
+        depends = tuple(dict.fromkeys(name for _, names, *_ in terms for name in names))
+        axes = ", ".join(dict.fromkeys(t[0] for t in terms))
+        rms = [float(np.sqrt(sum(getattr(j, side) for j in judged))) for side in ("held_before", "held_after")]
+        held = HeldOut(domain, 1.0, (rms[1] / max(rms[0], 1e-300)) ** 2, rms[0], rms[1], _unit_of_misfit(domain))
+        what = "zero" if domain.startswith("static") else "reading in motion"
+        out.append(
+            Law(
+                sensor, depends, _form(axes, depends), coefficients, share, held, RESEMBLES.get(family, ()),
+                EXPERIMENTS.get(family, ""),
+                f"The {ZERO_WORD[sensor]}'s {what} ({axes}) follows {_listed(depends)}: {100.0 * share:.0f} % of the "
+                "held-out misfit.",
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
+def _unit_of_misfit(domain: Domain) -> str:
+    return {"static-gyro": "rad/s", "static-accel": "m/s^2"}.get(domain, "sigma")
+
+
+def _form(axes: str, depends: tuple[str, ...]) -> str:
+    return f"reading of {axes} grows by " + " + ".join(f"c{k + 1}·({name})" for k, name in enumerate(depends))
+
+
+def _unit_of(sensor: Sensor, unit: str, name: str) -> str:
+    if name.endswith("^2") and unit == "K":
+        unit = "K^2"
+    return OUT[sensor] if unit == "1" else f"({OUT[sensor]})/({unit})"
+
+
+def _listed(words: tuple[str, ...]) -> str:
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
+
+
+def _room_law(room: RoomLaw) -> Law:
+    axes = ("x", "y", "z")
+    coefficients = [
+        EffectParameter(f"{axes[a]}: m_{axes[k]}", float(room.coupling[a, k]), float(room.sigma[a, k]), "rad/s")
+        for a in range(3)
+        for k in range(3)
+    ]
+    coefficients.append(
+        EffectParameter("angle to the vertical", room.inclination_deg, room.inclination_sigma_deg, "deg")
+    )
+    before = sum(j.held_before for j in room.judged)
+    after = sum(j.held_after for j in room.judged)
+    held = HeldOut("static-gyro", 1.0, after / before, before**0.5, after**0.5, "rad/s")
+    words: tuple[str, ...] = ("a magnetic field",)
+    if _is_rotation(room):
+        words = ("the Earth's turn",)
+    return Law(
+        "gyroscope", (ROOM_VECTOR,), "zero = K Rᵀ m, m a unit vector fixed in the room",
+        tuple(coefficients), room.share, held, words, EXPERIMENTS["room"],
+        f"The gyro's zero follows a vector fixed in the room, {room.inclination_deg:.0f}° ± "
+        f"{room.inclination_sigma_deg:.0f}° from the vertical: {100.0 * room.share:.0f} % of the held-out misfit.",
+    )  # fmt: skip
+
+
+def _is_rotation(room: RoomLaw) -> bool:
+    """Whether the coupling is the unit matrix times the Earth's rate, within three standard errors everywhere."""
+    for sign in (1.0, -1.0):
+        away = (room.coupling - sign * EARTH_RATE_RAD_S * np.eye(3)) / np.maximum(room.sigma, 1e-300)
+        if (np.abs(away) < 3.0).all():
+            return True
+    return False
+
+
+def _motion_laws(context: Context, *, is_gyro_only: bool) -> list[Law]:
+    motion = move_misfit(context)
+    if motion is None:
+        return []
+    n_tried = len(motion.gyro) + len(motion.accel)
+    before = _squares_before(motion.misfit)
+    sides: list[tuple[Sensor, Domain, Accepted]] = []
+    gyro = search(motion.misfit, list(motion.gyro), n_tried)
+    if gyro is not None:
+        sides.append(("gyroscope", "moves", gyro))
+    accel = None if is_gyro_only else search(motion.misfit, list(motion.accel), n_tried)
+    if accel is not None:
+        sides.append(("accelerometer", "dynamics", accel))
+    if not sides:
+        return []
+    # One misfit, one sensor: that which predicts more of it.
+    sensor, domain, best = max(sides, key=lambda side: side[2].judged.gain)
+    return list(_laws_of(sensor, domain, [best], before))

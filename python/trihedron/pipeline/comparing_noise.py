@@ -1,0 +1,270 @@
+"""Noise and sampling of a simulated log against those of a recording, axis by axis, and what a ratio resembles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.diagnose.against import FittedModel
+from trihedron.estimate.noise import noise_of_holds, ratio_of
+from trihedron.records import Recording, Segments
+from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
+from trihedron.records.hold_noise import HoldNoise, Measured
+
+FloatArray = npt.NDArray[np.float64]
+Sensor = Literal["accelerometer", "gyroscope"]
+
+LEAST_RATIO = 1.05
+"""White noise of one part differs by 5 % over 30 K (its resistors' noise goes with the root of temperature)."""
+LEAST_STEP_RATIO = math.sqrt(2.0)
+"""Ranges of a converter come in powers of two: halfway between two of them."""
+LEAST_CORNER_RATIO = 1.2
+"""Filters are chosen from lists whose neighbours differ by 1.5 to 2; within a fifth they are the same entry."""
+LEAST_RATE_RATIO = 1.02
+"""Oscillators of cheap parts are specified to 1 to 2 %."""
+LEAST_OCTAVE_RATIO = 1.5
+"""Octaves below the white floor hold a few periods a hold each: smaller differences belong to the day."""
+LEAST_JITTER = 0.05
+"""Scatter of the stamps, in steps, from which on it matters to a session (0.05 of 10 ms is 0.5 ms)."""
+SAME_ON_ALL_AXES = 1.03
+"""Three axes of a real part agree within 3 % by chance once in some hundred parts."""
+UNLIKE_AXES = 1.25
+RESEMBLES = 1.06
+"""A ratio this near to √rate, or to its inverse, is taken for it."""
+NORMAL_EXCESS, UNIFORM_EXCESS = 0.0, -0.6
+"""Excess kurtosis of differences of two normal and of two uniform numbers."""
+
+_AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Noise of both sensors in SI along their own axes, and the clock."""
+
+    noise: dict[Sensor, tuple[HoldNoise, ...]]
+    excess: dict[Sensor, FloatArray]
+    n_differences: dict[Sensor, int]
+    rate_hz: float
+    jitter_steps: float
+
+
+def sampled(recording: Recording, segments: Segments, model: FittedModel) -> Sampled:
+    """Noise inside the still poses of a recording, by the scale of its own fit."""
+    holds = [(hold.start, hold.stop) for hold in segments.holds]
+    noise: dict[Sensor, tuple[HoldNoise, ...]] = {}
+    excess: dict[Sensor, FloatArray] = {}
+    count: dict[Sensor, int] = {}
+    both: tuple[tuple[Sensor, FloatArray | None, FloatArray | None], ...] = (
+        ("accelerometer", recording.accelerometer, model.accel_S),
+        ("gyroscope", recording.gyroscope, model.gyro_S),
+    )
+    for sensor, readings, S in both:
+        if readings is None or S is None:
+            continue
+        si = readings / np.linalg.norm(np.linalg.inv(S), axis=1)
+        try:
+            noise[sensor] = noise_of_holds(si, recording.rate_hz, holds)
+        except ValueError:
+            continue  # no hold is long enough: nothing to compare
+        differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in holds if b - a > 2])
+        differences = differences[np.isfinite(differences).all(axis=1)]
+        centred = differences - differences.mean(axis=0)
+        power = np.maximum((centred**2).mean(axis=0), 1e-300)
+        excess[sensor] = (centred**4).mean(axis=0) / power**2 - 3.0
+        count[sensor] = len(differences)
+    steps = np.diff(recording.time_s)
+    nominal = 1.0 / recording.rate_hz
+    away = steps[np.abs(steps - nominal) < 0.9 * nominal] / nominal - 1.0
+    jitter = float(np.std(away)) / math.sqrt(2.0) if len(away) else 0.0
+    return Sampled(noise, excess, count, recording.rate_hz, jitter)
+
+
+def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
+    """Every figure that both logs have, ratio model over recording; significant beyond chance and beyond what parts do.
+
+    ``alpha``: chance that any white density of two logs of one unit is called different.
+    """
+    out: list[NoiseDifference] = []
+    sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
+    for sensor in sensors:
+        if sensor not in model.noise or sensor not in recording.noise:
+            continue
+        pairs = list(zip(_AXES, model.noise[sensor], recording.noise[sensor], strict=True))
+        n_tests = 6 + 6 * sum(len(r.octaves) for _, _, r in pairs) // 3
+        white = [_white(sensor, axis, m, r, alpha / 12.0) for axis, m, r in pairs]
+        out += _resembling(sensor, [w for w in white if w is not None], recording.rate_hz)
+        for axis, m, r in pairs:
+            out += _step(sensor, axis, m, r)
+            out += _corner(sensor, axis, m, r, alpha / 12.0)
+            out += _octaves(sensor, axis, m, r, alpha / n_tests)
+        out += _distribution(sensor, model, recording)
+    out += _sampling(model, recording)
+    return tuple(out)
+
+
+def _measured(
+    sensor: Sensor, axis: str, term: NoiseTerm, pair: tuple[Measured, Measured], unit: str, least: float, alpha: float
+) -> NoiseDifference:
+    ratio = ratio_of(*pair)
+    is_far = max(ratio.value, 1.0 / ratio.value) > least
+    return NoiseDifference(
+        sensor, axis, term, pair[0].value, pair[1].value, ratio.value, (ratio.lower, ratio.upper), unit, ratio.p_value,
+        bool(ratio.p_value < alpha and is_far),
+    )  # fmt: skip
+
+
+def _value(figure: Measured | None) -> float | None:
+    return None if figure is None else figure.value
+
+
+def _white(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> NoiseDifference | None:
+    unit = "m/s^2/sqrt(Hz)" if sensor == "accelerometer" else "rad/s/sqrt(Hz)"
+    if m.white is None or r.white is None or not (m.white.value > 0.0 and r.white.value > 0.0):
+        if (m.white is None) == (r.white is None):
+            return None
+        quiet = "model" if m.white is None else "recording"
+        values = _value(m.white), _value(r.white)
+        remark = f"The converter of the {quiet} hides its noise."
+        return NoiseDifference(sensor, axis, "N", *values, None, None, unit, None, False, remark)
+    return _measured(sensor, axis, "N", (m.white, r.white), unit, LEAST_RATIO, alpha)
+
+
+def _resembling(
+    sensor: Sensor,
+    white: Sequence[NoiseDifference],
+    rate_hz: float,
+) -> list[NoiseDifference]:
+    """White densities with what their ratio resembles: mistakes that simulators have made."""
+    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    known = [w for w in white if w.ratio is not None]
+    out = list(white)
+    if len(known) < 3 or not any(w.significant for w in known):
+        return out
+    ratios = np.array([w.ratio for w in known], dtype=np.float64)
+    common = float(np.exp(np.mean(np.log(ratios))))
+    root = math.sqrt(rate_hz)
+    for factor, words in (
+        (root, "the density was multiplied by the root of the rate once too often"),
+        (1.0 / root, "the density was not multiplied by the root of the rate when it was sampled"),
+    ):
+        if max(common / factor, factor / common) < RESEMBLES:
+            times = f"√{rate_hz:.4g}" if factor > 1.0 else f"1/√{rate_hz:.4g}"
+            said = f"White noise of the {name} is {common:.3g} = {times} times the recording's: {words}."
+            return [replace(w, remark=said) if w in known else w for w in out]
+    values = np.array([[w.model or 0.0, w.recording or 0.0] for w in known])
+    if values[:, 0].max() < SAME_ON_ALL_AXES * values[:, 0].min() and (
+        values[:, 1].max() > UNLIKE_AXES * values[:, 1].min()
+    ):
+        spread = float(values[:, 1].max() / values[:, 1].min())
+        said = f"White noise of the {name} is the same on all axes of the model; "
+        said += f"the recording's axes differ {spread:.2g} times."
+        return [replace(w, remark=said) if w.significant else w for w in out]
+    if ratios.max() < LEAST_OCTAVE_RATIO * ratios.min():
+        low = min(w.interval[0] for w in known if w.interval)
+        high = max(w.interval[1] for w in known if w.interval)
+        said = f"White noise of the {name} is {common:.3g} ({low:.3g} to {high:.3g}) times the recording's."
+        return [replace(w, remark=said) if w.significant else w for w in out]
+    return out
+
+
+def _step(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise) -> Iterator[NoiseDifference]:
+    unit = "m/s^2" if sensor == "accelerometer" else "rad/s"
+    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    if m.step == 0.0 and r.step == 0.0:
+        return
+    if m.step == 0.0 or r.step == 0.0:
+        # Readings finer than their noise shows: only a step that matters beside the noise is missed.
+        step, noise = (r.step, r.white) if m.step == 0.0 else (m.step, m.white)
+        floor = None if noise is None else noise.value * math.sqrt(r.rate_hz)
+        matters = floor is None or step > floor
+        side = "model" if m.step == 0.0 else "recording"
+        remark = f"The {side} has no converter steps on the {name}." if matters else ""
+        yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, None, None, unit, None, matters, remark)
+        return
+    ratio = m.step / r.step
+    is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO
+    remark = f"The converter steps of the {name} are {ratio:.3g} times the recording's." if is_far else ""
+    yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
+
+
+def _corner(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> Iterator[NoiseDifference]:
+    if m.corner_hz is not None and r.corner_hz is not None:
+        yield _measured(sensor, axis, "bandwidth", (m.corner_hz, r.corner_hz), "Hz", LEAST_CORNER_RATIO, alpha)
+        return
+    seen, other = (m, r) if m.corner_hz is not None else (r, m)
+    if seen.corner_hz is None:
+        return
+    is_clear = seen.corner_hz.upper * LEAST_CORNER_RATIO < other.corner_above_hz
+    values = _value(m.corner_hz), _value(r.corner_hz)
+    side = "recording" if seen is r else "model"
+    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    remark = f"The noise of the {name} is filtered in the {side} only (corner {seen.corner_hz.value:.3g} Hz)."
+    yield NoiseDifference(
+        sensor, axis, "bandwidth", *values, None, None, "Hz", None, is_clear, remark if is_clear else ""
+    )
+
+
+def _octaves(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> Iterator[NoiseDifference]:
+    """Octave by octave; significant where it differs otherwise than the white noise does."""
+    if m.white is None or r.white is None:
+        return
+    white = ratio_of(m.white, r.white)
+    there = {o.low_hz: o for o in m.octaves}
+    for octave in r.octaves:
+        twin = there.get(octave.low_hz)
+        if twin is None or not (twin.density.value > 0.0 and octave.density.value > 0.0):
+            continue
+        ratio = ratio_of(twin.density, octave.density)
+        beyond = ratio.value / white.value**2
+        is_far = max(beyond, 1.0 / beyond) > LEAST_OCTAVE_RATIO**2
+        is_off = ratio.p_value < alpha and not ratio.lower < white.value**2 < ratio.upper
+        band = f"{octave.low_hz:g} to {octave.high_hz:g} Hz"
+        name = "accelerometer" if sensor == "accelerometer" else "gyro"
+        remark = f"Noise of the {name} {axis} at {band} is {math.sqrt(ratio.value):.3g} times the recording's."
+        yield NoiseDifference(
+            sensor, axis, "octave", math.sqrt(twin.density.value), math.sqrt(octave.density.value),
+            math.sqrt(ratio.value), (math.sqrt(ratio.lower), math.sqrt(ratio.upper)),
+            f"{'m/s^2' if sensor == 'accelerometer' else 'rad/s'}/sqrt(Hz), {band}", ratio.p_value,
+            bool(is_far and is_off), remark if is_far and is_off else "",
+        )  # fmt: skip
+
+
+def _distribution(sensor: Sensor, model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
+    """Uniform noise for normal: the fourth moment of differences tells, where the converter's steps are finer."""
+    n = min(model.n_differences[sensor], recording.n_differences[sensor])
+    middle = 0.5 * (NORMAL_EXCESS + UNIFORM_EXCESS)
+    is_fine = all(
+        axis.white is not None and axis.step < axis.white.value * math.sqrt(axis.rate_hz)
+        for side in (model, recording)
+        for axis in side.noise[sensor]
+    )
+    # Four standard errors of a kurtosis of n correlated differences must fit between the two.
+    if not is_fine or 4.0 * math.sqrt(48.0 / max(n, 1)) > -middle:
+        return
+    m, r = float(model.excess[sensor].mean()), float(recording.excess[sensor].mean())
+    if m < middle < r:
+        name = "accelerometer" if sensor == "accelerometer" else "gyro"
+        remark = f"The noise of the model's {name} is uniformly distributed; the recording's is normal."
+        yield NoiseDifference(sensor, "", "distribution", m, r, None, None, "excess kurtosis", None, True, remark)
+
+
+def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
+    ratio = model.rate_hz / recording.rate_hz
+    is_far = max(ratio, 1.0 / ratio) > LEAST_RATE_RATIO
+    remark = (
+        f"The model samples at {model.rate_hz:.5g} Hz, the recording at {recording.rate_hz:.5g} Hz." if is_far else ""
+    )
+    yield NoiseDifference("both", "", "rate", model.rate_hz, recording.rate_hz, ratio, None, "Hz", None, is_far, remark)
+    m, r = model.jitter_steps / model.rate_hz, recording.jitter_steps / recording.rate_hz
+    larger, smaller = max(model.jitter_steps, recording.jitter_steps), min(model.jitter_steps, recording.jitter_steps)
+    is_far = larger > LEAST_JITTER and larger > 2.0 * smaller
+    which = "model" if m > r else "recording"
+    remark = f"The stamps of the {which} scatter by {1e3 * max(m, r):.2g} ms, the other's by {1e3 * min(m, r):.2g} ms."
+    yield NoiseDifference(
+        "both", "", "jitter", m, r, m / r if r > 0.0 else None, None, "s", None, is_far, remark if is_far else ""
+    )

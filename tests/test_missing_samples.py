@@ -1,0 +1,50 @@
+"""Samples lost from a log whose stamps were made anew: the calibration says that its gyro is not to be trusted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.estimate.gyroscope.missing_samples import missing_samples
+from trihedron.records import FindingCode, Severity
+from trihedron.segment import segment_recording
+from trihedron.simulate import hand_session, simulate
+from trihedron.simulate.named import _of
+from trihedron.simulate.profiles import profile_by_name
+
+
+def session(share, seed, move_s=2.0, grade="mpu"):
+    """A session at 100 Hz from which a share of all rows is missing, numbered anew."""
+    scenario = _of(
+        profile_by_name(grade), hand_session(14, hold_s=2, first_hold_s=6, move_s=move_s, layout=seed), "s", seed
+    )
+    log, _ = simulate(scenario, seed)
+    kept = np.random.default_rng(seed).random(log.n_samples) >= share
+    return replace(
+        log, time_s=np.arange(kept.sum()) / 100.0, accelerometer=log.accelerometer[kept], gyroscope=log.gyroscope[kept],
+        temperature_degc=None, supply_v=None,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_three_per_cent_of_lost_samples_are_serious_and_about_as_many_as_said(seed):
+    log = session(0.03, seed)
+    (found,) = missing_samples(log, segment_recording(log))
+    assert found.severity is Severity.SERIOUS
+    # Losses next to each other hide one another: a half to all of them are told.
+    assert 0.01 < found.numbers["lost_share"] < 0.045
+
+
+def test_calibrate_does_not_call_such_a_gyro_usable():
+    result = trihedron.calibrate(session(0.03, 1), gravity_m_s2=9.80665)
+    lost = [finding for finding in result.findings if finding.code is FindingCode.SAMPLES_LOST]
+    assert [finding.severity for finding in lost] == [Severity.SERIOUS]
+
+
+@pytest.mark.parametrize("grade", ["mpu", "adis"])
+@pytest.mark.parametrize("move_s", [0.4, 1.0, 2.0])
+def test_healthy_logs_with_brisk_or_slow_moves_lose_nothing(grade, move_s):
+    for seed in (5, 6):
+        log = session(0.0, seed, move_s, grade)
+        assert missing_samples(log, segment_recording(log)) == []
