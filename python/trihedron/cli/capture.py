@@ -24,9 +24,12 @@ LOSSES_NOT_TRUSTED = 0.05
 
 
 def capture(
-    port: Annotated[str, typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin).")],
+    port: Annotated[
+        Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+        typer.Argument(metavar="[PORT]", help="Port, tcp://host:port, a file of bytes, or - (stdin)."),
+    ] = None,
     output: Annotated[
-        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+        Optional[Path],  # noqa: UP045
         typer.Option("--output", "-o", metavar="LOG", help="Log to write (text; every command reads it)."),
     ] = None,
     protocol: Annotated[
@@ -80,6 +83,8 @@ def capture(
         for name, sentence in PROTOCOLS.items():
             typer.echo(f"{name:20s}{sentence}")
         return
+    if port is None:
+        raise typer.BadParameter("say what to read: a port (`trihedron ports` lists them), tcp://host:port or a file")
     if output is None:
         raise typer.BadParameter("say where the log goes with -o LOG")
     from trihedron.files.output import check_free
