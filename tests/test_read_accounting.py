@@ -96,6 +96,21 @@ def test_a_damaged_first_row_is_not_taken_for_a_preamble(tmp_path):
     assert accounts(recording)
 
 
+def test_a_row_without_a_number_below_the_names_is_counted(tmp_path):
+    lines = rows_of(readings(50))
+    lines[0] = ",,,,,,"
+    recording = read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
+    assert recording.rows_in_file == 50
+    assert accounts(recording)
+
+
+def test_a_column_that_disappears_after_a_few_rows_is_refused(tmp_path):
+    table = readings(50)
+    lines = rows_of(table[:13]) + rows_of(table[13:, :6])
+    with pytest.raises(ReadError, match="13 lines of numbers from line 2 on have another layout"):
+        read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
+
+
 def test_rows_behind_a_remark_sign_are_counted(tmp_path):
     lines = rows_of(readings(50))
     lines[20] = "#" + lines[20]

@@ -44,7 +44,19 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from trihedron.estimate.noise import allan_deviation, identify_noise
     from trihedron.files.calibration import read_calibration, write_calibration
-    from trihedron.pipeline import apply, calibrate, check, diagnose, export, kalman, noise, read, segment, verify
+    from trihedron.pipeline import (
+        apply,
+        calibrate,
+        check,
+        convert,
+        diagnose,
+        export,
+        kalman,
+        noise,
+        read,
+        segment,
+        verify,
+    )
     from trihedron.records import Calibration, Finding, Recording, Segments
     from trihedron.records.diagnosis import Diagnosis
 
@@ -58,6 +70,7 @@ __all__ = [
     "apply",
     "calibrate",
     "check",
+    "convert",
     "diagnose",
     "export",
     "identify_noise",
@@ -70,7 +83,19 @@ __all__ = [
     "write_calibration",
 ]
 
-_VERBS = ("apply", "calibrate", "check", "diagnose", "export", "kalman", "noise", "read", "segment", "verify")
+_VERBS = (
+    "apply",
+    "calibrate",
+    "check",
+    "convert",
+    "diagnose",
+    "export",
+    "kalman",
+    "noise",
+    "read",
+    "segment",
+    "verify",
+)
 _ROOMS = ("capture",)
 """Rooms of which people use more than one name: ``trihedron.capture.Recorder``."""
 _HOME = dict.fromkeys(_VERBS, "trihedron.pipeline")

@@ -18,6 +18,7 @@ from trihedron.cli.apply import apply
 from trihedron.cli.calibrate import calibrate
 from trihedron.cli.capture import capture
 from trihedron.cli.check import check
+from trihedron.cli.convert import convert
 from trihedron.cli.demo import demo
 from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
@@ -44,6 +45,7 @@ COMMANDS = (
     verify,
     diagnose,
     apply,
+    convert,
     export,
     simulate,
 )

@@ -7,12 +7,14 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 from scipy.signal import savgol_filter
 
 from trihedron.diagnose.session.observations import FloatArray, Observations
 from trihedron.diagnose.session.solve import Fit
 
+TEMPERATURE_WINDOW_S = 10.0
+"""Over which a logged temperature is smoothed before its rate of change is taken: its steps are a tenth of a kelvin."""
 VIBRATION_WINDOW_S = 0.25
 """Stretch over which a parabola follows the motion while vibration is measured in a move."""
 
@@ -157,6 +159,17 @@ class Context:
         values = self.at_points(logged)
         centred: FloatArray = values - np.nanmean(values[: self.obs.n_holds])
         return np.where(np.isfinite(centred), centred, 0.0)
+
+    @cached_property
+    def temperature_rate(self) -> FloatArray | None:
+        """(points,) rate of change of the logged temperature, smoothed over ten seconds, K/s."""
+        recording = self.obs.recording
+        logged = recording.temperature_degc
+        if logged is None or not np.isfinite(logged).any():
+            return None
+        filled = np.where(np.isfinite(logged), logged, np.nanmean(logged))
+        smooth = gaussian_filter1d(filled, max(TEMPERATURE_WINDOW_S * recording.rate_hz, 1.0), mode="nearest")
+        return self.at_points(np.gradient(smooth, recording.time_s))
 
     @cached_property
     def supply(self) -> FloatArray | None:

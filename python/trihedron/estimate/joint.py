@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -11,11 +12,18 @@ from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, M
 from trihedron.estimate.gyroscope.findings import findings_of
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.moves import gyroscope_of
+from trihedron.estimate.gyroscope.observability import describe
 from trihedron.estimate.gyroscope.start import starts
 from trihedron.estimate.gyroscope.verification import held_out
+from trihedron.estimate.session.figures import carried, move_quality, norm_quality
+from trihedron.estimate.session.figures import held_out as held_out_of_session
+from trihedron.estimate.session.fit import SessionSolution, solve_session
+from trihedron.estimate.session.observed import arranged
 from trihedron.records.calibration import Calibration, FitQuality, Frame, SensorCalibration
+from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.sensor_model import in_frame, reframing
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -56,6 +64,116 @@ def calibrate_joint(
     first = starts(recording, measured, accelerometer, options.nominal())
     part = AccelerometerPart(accelerometer, basis, is_given=False)
     aligned = align_screened(measured, part, gravity_m_s2, first, options)
+    is_determined = aligned.fit.rank == len(aligned.fit.singular_values)
+    if frame == "case" or options.is_offset_free or not is_determined:
+        # Moves that leave directions open, or a zero hidden inside a step of the converter: the moves alone are judged.
+        return _by_moves_alone(recording, measured, accelerometer, part, aligned, options, gravity_m_s2, gravity_source)
+    answer = _by_session(recording, segments, measured, accelerometer, aligned, options, gravity_m_s2, gravity_source)
+    return in_frame(answer, frame)
+
+
+def _by_session(
+    recording: Recording,
+    segments: Segments,
+    measured: MoveMeasurements,
+    accelerometer: SensorCalibration,
+    aligned: Aligned,
+    options: MoveOptions,
+    gravity_m_s2: float,
+    gravity_source: str,
+) -> Calibration:
+    """The session model from where the moves alone stand, in the lower frame (docs/model-session.md)."""
+    S_start, b_start = np.asarray(aligned.fit.accelerometer_scale), np.asarray(aligned.fit.accelerometer_bias)
+    R = reframing(S_start, b_start, "lower").rotation
+    observed = arranged(recording, segments, measured, gravity_m_s2, aligned.used)
+    solution = solve_session(observed, np.tril(R @ S_start), R @ b_start, R @ np.asarray(aligned.fit.gyroscope_scale))
+    anchors = segments.time_mid_s[measured.links]
+    seen = carried(recording.time_s, measured, anchors, solution.S_a, solution.b_a, solution.S_w)
+    left_out = held_out_of_session(recording.time_s, observed, measured, anchors, solution, options.n_folds)
+    covariance = solution.covariance.copy()
+    if measured.attitude is not None:
+        more = solution.S_w @ np.diag(measured.attitude.var_zero) @ solution.S_w.T
+        covariance[21:, 21:] += np.diag(np.maximum(np.diag(more) - np.diag(covariance[21:, 21:]), 0.0))
+    used = np.where(aligned.used, 1.0, 0.0)
+    held = None if left_out is None else left_out.norm
+    alone = accelerometer.quality
+    quality = norm_quality(observed, solution, held, None if left_out is None else left_out.norm_sigma)
+    if left_out is None and alone is not None:
+        quality = replace(
+            quality, held_out=alone.held_out, held_out_sigma=alone.held_out_sigma, held_out_rms=alone.held_out_rms
+        )
+    gyroscope = SensorCalibration(
+        S=solution.S_w,
+        b=solution.b_w,
+        covariance=covariance[12:, 12:],
+        raw_unit=recording.gyroscope_unit.value,
+        si_unit="rad/s",
+        method="joint",
+        quality=move_quality(measured, solution, seen, None if left_out is None else left_out.moves, used),
+        observability=describe(aligned.fit, covariance[12:21, 12:21], solution.S_w, aligned.n_gyroscope),
+    )
+    return Calibration(
+        accelerometer=SensorCalibration(
+            S=solution.S_a,
+            b=solution.b_a,
+            covariance=covariance[:12, :12],
+            raw_unit=accelerometer.raw_unit,
+            si_unit=accelerometer.si_unit,
+            method="joint",
+            quality=quality,
+            observability=accelerometer.observability,
+        ),
+        gyroscope=gyroscope,
+        covariance=covariance,
+        frame="lower",
+        gravity_m_s2=gravity_m_s2,
+        gravity_source=gravity_source,
+        recording_source=recording.source,
+        recording_sha256=recording.sha256,
+        findings=_findings(aligned, measured, solution),
+    )
+
+
+def _findings(aligned: Aligned, measured: MoveMeasurements, solution: SessionSolution) -> tuple[Finding, ...]:
+    """What the moves showed, with the end of the fit and the widening of the noise as the session has them."""
+    about_fit = (FindingCode.NOT_CONVERGED, FindingCode.RESIDUAL_ABOVE_NOISE)
+    found = [one for one in findings_of(aligned, measured, None) if one.code not in about_fit]
+    if not solution.is_converged:
+        found.append(
+            Finding(
+                FindingCode.NOT_CONVERGED,
+                Severity.SERIOUS,
+                f"the fit of the session did not settle ({solution.stopped_because}).",
+                "moves that contradict each other, or a start far from the truth",
+                "Look at the residual per move; give the nominal scale.",
+            )
+        )
+    if solution.inflation[0] > 1.0:
+        chi2_per_dof = solution.moves_chi2 / max(solution.moves_dof, 1.0)
+        found.append(
+            Finding(
+                FindingCode.RESIDUAL_ABOVE_NOISE,
+                Severity.WARNING,
+                f"gravity after the moves is missed by more than the noise explains: χ²/dof = {chi2_per_dof:.1f} "
+                f"with {solution.moves_dof:.0f} degrees of freedom; the moves count with the noise that they show.",
+                "an effect outside the linear model: g-sensitivity, a time offset between the sensors, nonlinearity",
+                "Run trihedron diagnose to see which.",
+                MappingProxyType({"chi2_per_dof": chi2_per_dof, "dof": solution.moves_dof}),
+            )
+        )
+    return tuple(found)
+
+
+def _by_moves_alone(
+    recording: Recording,
+    measured: MoveMeasurements,
+    accelerometer: SensorCalibration,
+    part: AccelerometerPart,
+    aligned: Aligned,
+    options: MoveOptions,
+    gravity_m_s2: float,
+    gravity_source: str,
+) -> Calibration:
     held = held_out(aligned, measured, part, gravity_m_s2, options)
     return Calibration(
         accelerometer=SensorCalibration(
@@ -65,12 +183,12 @@ def calibrate_joint(
             raw_unit=accelerometer.raw_unit,
             si_unit=accelerometer.si_unit,
             method="joint",
-            quality=_norm_quality(aligned, measured, accelerometer.quality, gravity_m_s2, basis.shape[1]),
+            quality=_norm_quality(aligned, measured, accelerometer.quality, gravity_m_s2, part.basis.shape[1]),
             observability=accelerometer.observability,
         ),
         gyroscope=gyroscope_of(aligned, measured, recording, gravity_m_s2, held, "joint"),
         covariance=aligned.covariance,
-        frame=frame,
+        frame=free_directions(accelerometer.S)[1],
         gravity_m_s2=gravity_m_s2,
         gravity_source=gravity_source,
         recording_source=recording.source,

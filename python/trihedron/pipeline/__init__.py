@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.calibrating import METHODS, calibrate
     from trihedron.pipeline.checking import check
     from trihedron.pipeline.choices import settle_gravity
+    from trihedron.pipeline.converting import convert
     from trihedron.pipeline.diagnosing import diagnose, extend
     from trihedron.pipeline.exporting import export
     from trihedron.pipeline.filtering import KalmanResult, kalman
@@ -30,6 +31,7 @@ __all__ = [
     "apply",
     "calibrate",
     "check",
+    "convert",
     "diagnose",
     "driven",
     "export",
@@ -55,6 +57,7 @@ _HOME = {
     "METHODS": "trihedron.pipeline.calibrating",
     "calibrate": "trihedron.pipeline.calibrating",
     "check": "trihedron.pipeline.checking",
+    "convert": "trihedron.pipeline.converting",
     "settle_gravity": "trihedron.pipeline.choices",
     "diagnose": "trihedron.pipeline.diagnosing",
     "extend": "trihedron.pipeline.diagnosing",

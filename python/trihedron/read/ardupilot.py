@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import os
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError
-from trihedron.read.table import Progress, StatedClock, Table, file_sha256
+from trihedron.read.table import StatedClock, Table, file_sha256
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
-from trihedron.records import Finding
+from trihedron.records import Finding, FindingCode, Severity
 
 MAGIC = b"\xa3\x95"
 _TYPES = ["IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
@@ -25,7 +30,7 @@ _FIELDS = {
 _UNITS = {"Acc": "m/s^2", "Gyr": "rad/s"}
 
 
-def read_dataflash(path: Path, choice: Choice, progress: Progress | None = None) -> tuple[Table, ...]:
+def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     """IMU messages of one instance, or with topic ``ACC`` its raw accelerometer and gyro, each on its clock.
 
     Raises
@@ -39,27 +44,64 @@ def read_dataflash(path: Path, choice: Choice, progress: Progress | None = None)
         raise missing_extra(path, "an ArduPilot .bin log", "pymavlink", "ardupilot") from None
     rows: dict[tuple[str, str], list[list[float]]] = {}
     names: dict[tuple[str, str], list[str]] = {}
+    # What pymavlink meets on the way it prints on stderr; that it skipped damaged bytes is a finding.
+    said = io.StringIO()
+    # Made before it is filled, so that its file can be closed when it gives up while it is filled.
+    log: Any = DFReader.DFReader_binary.__new__(DFReader.DFReader_binary)
     try:
-        log = DFReader.DFReader_binary(str(path))
-        while (message := log.recv_match(type=_TYPES)) is not None:
-            _keep(message, rows, names)
-            if progress is not None and sum(map(len, rows.values())) % 20000 == 0:
-                progress(min(log.percent / 100.0, 1.0), f"reading {path.name}")
+        with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), _quiet():
+            log.__init__(str(path))
+            while (message := log.recv_match(type=_TYPES)) is not None:
+                _keep(message, rows, names)
     # pymavlink answers damage with whatever its unpacking met.
     except Exception as error:
         raise ReadError(f"{path}: pymavlink cannot read this log ({first_line(error)}); copy it again.") from None
+    finally:
+        for name in ("data_map", "filehandle"):
+            if hasattr(log, name):
+                getattr(log, name).close()
     imu = [Stream("IMU", len(r), i) for (t, i), r in sorted(rows.items()) if t == "IMU"]
     raw = [Stream("ACC", len(r), i) for (t, i), r in sorted(rows.items()) if t == "ACC" and ("GYR", i) in rows]
     streams = imu + raw
     offered = streams if choice.topic is not None or not imu else imu
     taken = pick(path, offered, choice, "this log")
-    note = choice_note("This log", taken, streams)
+    note = (*choice_note("This log", taken, streams), *_skipped(said.getvalue()))
     sha256 = file_sha256(path)
     if taken.topic == "IMU":
         return (_table(path, ("IMU", taken.instance), rows, names, sha256, note, None),)
     return (
         _table(path, ("ACC", taken.instance), rows, names, sha256, note, "accelerometer"),
         _table(path, ("GYR", taken.instance), rows, names, sha256, (), "gyroscope"),
+    )
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """The part of pymavlink that is written in C prints past Python, a line for each damaged byte."""
+    kept = os.dup(2)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(nowhere)
+        os.close(kept)
+
+
+def _skipped(said: str) -> tuple[Finding, ...]:
+    skips = [int(n) for n in re.findall(r"Skipped (\d+) bad bytes", said)]
+    if not skips:
+        return ()
+    return (
+        Finding(
+            FindingCode.SAMPLES_LOST,
+            Severity.WARNING,
+            f"{sum(skips)} bytes at {len(skips)} places of the log are damaged and were skipped, readings among them.",
+            "A log that was cut off, or a memory card with errors.",
+            "Copy it again from the vehicle; gaps in time show where readings are missing.",
+            MappingProxyType({"count": float(len(skips)), "bytes": float(sum(skips))}),
+        ),
     )
 
 

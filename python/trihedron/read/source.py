@@ -82,7 +82,7 @@ def _ecosystem(path: Path, magic: bytes, choice: Choice, progress: Progress | No
     if magic.startswith(b"\xa3\x95"):
         from trihedron.read.ardupilot import read_dataflash
 
-        return read_dataflash(path, choice, progress)
+        return read_dataflash(path, choice)
     if magic.startswith(b"\x89HDF") or magic.startswith(b"MATLAB 7.3"):
         from trihedron.read.tree import read_hdf5
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import struct
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -35,8 +38,12 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
         from pyulog import ULog
     except ImportError:
         raise missing_extra(path, "a PX4 ULog", "pyulog", "px4") from None
+    _check_definitions(path)
     try:
-        log = ULog(str(path), _TOPICS)
+        # pyulog prints what it meets; stdout belongs to results.
+        # The stream is ours, because pyulog leaves its own open when it gives up.
+        with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as stream:
+            log = ULog(stream, _TOPICS)
     # pyulog answers damage with whatever its unpacking met.
     except Exception as error:
         raise ReadError(f"{path}: pyulog cannot read this log ({first_line(error)}); copy it again.") from None
@@ -54,7 +61,7 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
         full = [s for s in raw if s.count >= 0.5 * combined]
         offered = full or [s for s in streams if s.topic == _COMBINED] or raw
     taken = pick(path, offered, choice, "this log")
-    findings = (*choice_note("This log", taken, streams), *_dropouts(log))
+    findings = (*choice_note("This log", taken, streams), *_losses(log))
     sha256 = file_sha256(path)
     if taken.topic == _COMBINED:
         return (_table(path, data[(_COMBINED, 0)], "", sha256, findings),)
@@ -63,6 +70,25 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
         _table(path, data[(_RAW, i)], "sensor_accel", sha256, findings),
         _table(path, data[("sensor_gyro", i)], "sensor_gyro", sha256, ()),
     )
+
+
+def _check_definitions(path: Path) -> None:
+    """Walk the messages before the data: where they are damaged near the end of a file, pyulog never comes back.
+
+    Each is its size (16 bits), its type and so many bytes, from byte 16 to the first subscription or log message.
+    """
+    with path.open("rb") as stream:
+        size = stream.seek(0, io.SEEK_END)
+        at = stream.seek(16)
+        while len(head := stream.read(3)) == 3:
+            length, kind = struct.unpack("<Hc", head)
+            if kind in b"ALC":
+                return
+            at += 3 + length
+            if kind not in b"BFIMPQ" or at > size:
+                raise ReadError(f"{path}: the definitions of this ULog are damaged before byte {at}; copy it again.")
+            stream.seek(at)
+    raise ReadError(f"{path}: this ULog ends before its first message; 0 messages were logged.")
 
 
 def _table(path: Path, data: dict[str, Any], topic: str, sha256: str, findings: tuple[Finding, ...]) -> Table:
@@ -79,11 +105,23 @@ def _table(path: Path, data: dict[str, Any], topic: str, sha256: str, findings: 
     return Table(path, tuple(names), tuple(columns), sha256, findings=findings, sensor=sensors.get(topic), clock=clock)
 
 
-def _dropouts(log: Any) -> tuple[Finding, ...]:
+def _losses(log: Any) -> tuple[Finding, ...]:
+    damaged: tuple[Finding, ...] = ()
+    if log.file_corruption:
+        damaged = (
+            Finding(
+                FindingCode.SAMPLES_LOST,
+                Severity.WARNING,
+                "The log is damaged inside; what could not be read of it was skipped, readings among it.",
+                "A log that was cut off, or a memory card with errors.",
+                "Copy it again from the vehicle; gaps in time show where readings are missing.",
+            ),
+        )
     if not log.dropouts:
-        return ()
+        return damaged
     lost_s = sum(drop.duration for drop in log.dropouts) / 1e3
     return (
+        *damaged,
         Finding(
             FindingCode.SAMPLES_LOST,
             Severity.WARNING,

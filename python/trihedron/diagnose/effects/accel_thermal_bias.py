@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only
+from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants
 
 
 class AccelThermalBias(Effect):
-    """Bias linear, then quadratic, in temperature (about its mean over the holds)."""
+    """Bias linear, then quadratic in temperature; with its rate of change, or a branch of its own while it cools."""
 
     id = "accel-thermal-bias"
     leaves_open = ("accel-zero",)
@@ -27,17 +28,4 @@ class AccelThermalBias(Effect):
         return None
 
     def variants(self, context: Context) -> list[Variant]:
-        assert context.temperature is not None
-        t = context.temperature[:, None] * np.ones(3)
-        linear = context.on_accelerometers(t)
-        both = np.concatenate([linear, context.on_accelerometers(t**2)], axis=2)
-        units = ("m/s^2/K",) * 3
-        return [
-            Variant(force_only(linear), per_axis("bias_per_kelvin"), units, label="linear"),
-            Variant(
-                force_only(both),
-                per_axis("bias_per_kelvin") + per_axis("bias_per_kelvin2"),
-                units + ("m/s^2/K^2",) * 3,
-                label="quadratic",
-            ),
-        ]
+        return thermal_bias_variants(context, context.on_accelerometers, force_only, "m/s^2")

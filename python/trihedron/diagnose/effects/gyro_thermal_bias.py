@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, rate_only
+from trihedron.diagnose.effects.contract import Effect, Variant, rate_only
+from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants
 from trihedron.diagnose.zeros.of_session import STANDS_OUT, gyro_evidence
 
 
 class GyroThermalBias(Effect):
-    """Bias linear, then quadratic, in temperature (about its mean over the holds)."""
+    """Bias linear, then quadratic in temperature; with its rate of change, or a branch of its own while it cools."""
 
     id = "gyro-thermal-bias"
     leaves_open = ("gyro-zero",)
@@ -33,17 +34,4 @@ class GyroThermalBias(Effect):
         return thermal is None or thermal.p_value < STANDS_OUT
 
     def variants(self, context: Context) -> list[Variant]:
-        assert context.temperature is not None
-        t = context.temperature[:, None] * np.ones(3)
-        linear = context.on_gyros(t)
-        both = np.concatenate([linear, context.on_gyros(t**2)], axis=2)
-        units = ("rad/s/K",) * 3
-        return [
-            Variant(rate_only(linear), per_axis("bias_per_kelvin"), units, label="linear"),
-            Variant(
-                rate_only(both),
-                per_axis("bias_per_kelvin") + per_axis("bias_per_kelvin2"),
-                units + ("rad/s/K^2",) * 3,
-                label="quadratic",
-            ),
-        ]
+        return thermal_bias_variants(context, context.on_gyros, rate_only, "rad/s")

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import FloatArray
@@ -84,9 +83,8 @@ def _logged(context: Context) -> list[Signal]:
         filled = np.where(np.isfinite(logged), logged, np.nanmean(logged))
         T = context.at_points(filled)[:h]
         if np.ptp(T) > 0.2:
-            rate = context.obs.recording.rate_hz
-            smooth = gaussian_filter1d(filled, max(10.0 * rate, 1.0), mode="nearest")
-            speed = context.at_points(np.gradient(smooth, context.obs.time_s))[:h]
+            assert context.temperature_rate is not None
+            speed = context.temperature_rate[:h]
             T = T - T.mean()
             out.append(Signal("temperature", ("T",), T[:, None], "K", is_smooth=True))
             out.append(Signal("temperature", ("T", "T^2"), np.column_stack([T, T**2]), "K", is_smooth=True))

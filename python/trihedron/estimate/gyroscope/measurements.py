@@ -42,7 +42,9 @@ class MoveMeasurements:
     its limit. ``attitude`` is the dependence of the zero reading on specific force where it was removed: ``rate``
     (samples, 3) are the raw gyro readings without it, and so are the zeros. ``zero_weights`` (n, 3) make the
     session's zero reading ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,). ``is_undithered`` (3,) are the axes
-    whose zero lies hidden inside a step of the converter.
+    whose zero lies hidden inside a step of the converter. ``zero_read``, ``var_zero_read`` (n, 3) are the zeros as each
+    hold alone shows them, ``var_reading_noise`` (n, 3) the variance of the hold means by noise alone,
+    ``reading_variance`` (samples, 3) that of gyro readings which were bridged or rounded.
     """
 
     moves: Moves
@@ -66,6 +68,10 @@ class MoveMeasurements:
     attitude: AttitudeDependence | None
     rate: FloatArray
     is_undithered: BoolArray
+    zero_read: FloatArray
+    var_zero_read: FloatArray
+    var_reading_noise: FloatArray
+    reading_variance: FloatArray | None
 
     @property
     def is_lost(self) -> BoolArray:
@@ -188,6 +194,7 @@ def measure_moves(
     )
 
     var_reading = _mean_variance(segments.accelerometer_sigma_mean, segments.accelerometer_sigma, raw_force)
+    var_reading_noise, zero_read, var_zero_read = var_reading, zero, var_zero
     var_reading = var_reading + _unexplained_reading_variance(accelerometer)
     walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_zero[links[:, 1]] + var_zero[links[:, 0]])
     weights, mean, var_mean, excess, _ = pool_zeros(zero, var_zero)
@@ -226,6 +233,10 @@ def measure_moves(
         attitude=attitude,
         rate=rate,
         is_undithered=undithered,
+        zero_read=zero_read,
+        var_zero_read=var_zero_read,
+        var_reading_noise=var_reading_noise,
+        reading_variance=extra,
     )
 
 

@@ -7,7 +7,7 @@ import gzip
 import io
 import lzma
 import zlib
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,7 +44,9 @@ def open_binary(path: Path, compression: str | None) -> io.BufferedIOBase:
     return path.open("rb")
 
 
-def blocks(path: Path, compression: str | None, cursor: Cursor, content: bytes | None = None) -> Iterator[bytes]:
+def blocks(
+    path: Path, compression: str | None, cursor: Cursor, content: bytes | None = None
+) -> Generator[bytes, None, None]:
     """Blocks that end with a complete line; ``content`` stands for the file's bytes where it was unpacked already.
 
     Raises

@@ -110,11 +110,9 @@ def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[int]] | None
             numbers.append(group[0][0])
             k += len(cycle)
             continue
-        # A greeting above the first row is a remark; anything else is left for the reader to refuse by its number.
-        greeting = not rows and not pairs[0]
-        rows_or_remark = f"# {group[0][1]}" if greeting else group[0][1]
-        if greeting or len(cycle) == 1 or pairs[0]:
-            rows.append(rows_or_remark)
+        # A greeting above the first row is no row; anything else is left for the reader to refuse by its number.
+        if pairs[0] or (rows and len(cycle) == 1):
+            rows.append(group[0][1])
             numbers.append(group[0][0])
         k += 1
     return names, rows, numbers

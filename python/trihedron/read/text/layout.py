@@ -18,6 +18,8 @@ _UNIT_WORD = re.compile(
 _QUALIFIERS = frozenset({"cal", "uncal", "raw", "calibrated", "uncalibrated"})
 MAX_STRAY_LINES = 20
 """Lines of numbers above the table that a preamble (a matrix, a list of offsets) may hold; more are rows lost."""
+MAX_STRAY_ROWS = 2
+"""Of these, lines as wide as rows of a log (four numbers or more): two may be damaged, more are another layout."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,9 @@ class Layout:
     header_ignored: str = ""
     stray: tuple[int, ...] = ()
     """Lines (from 1) above the first row that look like rows of another layout, or stand between names and rows."""
+    n_wide_stray: int = 0
+    remarks: tuple[int, ...] = ()
+    """Lines (from 1) of remarks between the names and the first row."""
 
 
 def is_comment(line: str) -> bool:
@@ -90,6 +95,7 @@ def detect(text: str) -> Layout | None:
     trailing = separator != " " and n_fields > 1 and all(line.rstrip(" ").endswith(separator) for line in tail)
     n_kept = n_fields - trailing
     header = _header(lines[:first], separator, n_kept)
+    stray = () if rate else _stray(lines[:first], header, decimal_comma)
     return Layout(
         separator,
         decimal_comma,
@@ -99,7 +105,9 @@ def detect(text: str) -> Layout | None:
         header.names,
         header.metadata | rate,
         header.ignored,
-        () if rate else _stray(lines[:first], header, decimal_comma),
+        stray,
+        sum(_looks_like_row(lines[i - 1], decimal_comma, 4) for i in stray),
+        tuple(i + 1 for i in range(max(header.used, default=first) + 1, first) if is_comment(lines[i].strip())),
     )
 
 
@@ -117,11 +125,14 @@ def _past_start_and_rate(lines: list[str], first: int, separator: str) -> tuple[
     return 2, {"start": start[0], "rate": rate[0]}
 
 
-def _looks_like_row(line: str, decimal_comma: bool) -> bool:
-    """Three numbers or more, under any separator, and nothing much else."""
+def _looks_like_row(line: str, decimal_comma: bool, at_least: int = 3) -> bool:
+    """So many numbers or more, under any separator, and nothing much else."""
     for separator in (",", "\t", ";", " "):
         fields = split(line, separator)
-        if sum(is_number(f, decimal_comma) for f in fields) >= 3 and _numeric_fraction(fields, decimal_comma) >= 0.5:
+        if (
+            sum(is_number(f, decimal_comma) for f in fields) >= at_least
+            and _numeric_fraction(fields, decimal_comma) >= 0.5
+        ):
             return True
     return False
 
@@ -134,7 +145,8 @@ def _stray(lines: list[str], header: _Header, decimal_comma: bool) -> tuple[int,
         if not line or is_comment(line) or i in header.used:
             continue
         is_below_names = header.names is not None and header.used and i > max(header.used)
-        if is_below_names or _looks_like_row(line, decimal_comma):
+        is_empty_row = not any(c.isalnum() for c in line) and any(c in line for c in ",;\t")
+        if is_below_names or is_empty_row or _looks_like_row(line, decimal_comma):
             found.append(i + 1)
     return tuple(found)
 
@@ -169,7 +181,7 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
             continue
         plain = re.sub(r"^(#+|%+|//+)\s*", "", line) if is_comment(line) else line
         fields = _header_fields(plain, separator, n_fields)
-        if fields is not None and not any(is_number(f, False) for f in fields):
+        if fields is not None and any(fields) and not any(is_number(f, False) for f in fields):
             matching.append((i, fields))
             continue
         pair = re.match(r"\s*([^:=,;\t]+?)\s*[:=,;\t]\s*([^,;\t]+?)[\s,;]*$", plain)

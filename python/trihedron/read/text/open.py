@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -35,7 +36,8 @@ def read_text(
         As :class:`TextReader`.
     """
     cursor = Cursor()
-    first = next(blocks(path, compression, cursor, content), b"")
+    with closing(blocks(path, compression, cursor, content)) as parts:
+        first = next(parts, b"")
     # A zero byte is complained about by the reader, with its line.
     sample = first[:_SAMPLE_BYTES] if b"\x00" in first else as_utf8(path, first, 1)[:_SAMPLE_BYTES]
     head = sample.decode("utf-8", errors="replace")
@@ -56,8 +58,8 @@ def _whole(path: Path, compression: str | None, size: int, content: bytes | None
     # Lines as Python strings take about ten times their bytes; counted as cells of 24.
     check_memory(path, size // 2, 1)
     cursor = Cursor()
-    parts = [as_utf8(path, part, 1) for part in blocks(path, compression, cursor, content)]
-    return b"".join(parts).decode("utf-8", errors="replace")
+    with closing(blocks(path, compression, cursor, content)) as parts:
+        return b"".join(as_utf8(path, part, 1) for part in parts).decode("utf-8", errors="replace")
 
 
 def _of_rewritten(path: Path, size: int, progress: Progress | None, rewritten: Rewritten, sha256: str | None) -> Table:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
 from types import MappingProxyType
 
@@ -14,7 +16,7 @@ from trihedron.read.table import FloatArray, Progress, Table, check_memory, file
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks
 from trihedron.read.text.cells import MAX_WORDS, TextColumn, find_text_columns, numbers, parse, refuse_words
 from trihedron.read.text.dates import past_midnight
-from trihedron.read.text.layout import MAX_STRAY_LINES, Layout, detect, is_comment, split
+from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect, is_comment, split
 from trihedron.read.text.lines import Lines, data_lines, offset_of_line, regular
 from trihedron.records import Finding, FindingCode, Severity
 
@@ -52,8 +54,13 @@ class TextReader:
 
     def read(self) -> Table:
         """The whole file as a table."""
+        # Closed whatever is raised in between: a refusal must not leave the file open until the next collection.
+        with closing(blocks(self.path, self.compression, self.cursor, self.content)) as parts:
+            return self._read(parts)
+
+    def _read(self, parts: Iterable[bytes]) -> Table:
         layout: Layout | None = None
-        for raw in blocks(self.path, self.compression, self.cursor, self.content):
+        for raw in parts:
             data = as_utf8(self.path, raw, self.cursor.lines + 1)
             if b"\n" not in data and b"\r" in data:
                 data = data.replace(b"\r", b"\n")
@@ -98,11 +105,12 @@ class TextReader:
                 )
             )
         self._account_for_stray(layout)
+        self.comments.append(np.array(layout.remarks, dtype=np.int64))
         self.parts = [[] for _ in range(layout.n_fields)]
         return layout
 
     def _account_for_stray(self, layout: Layout) -> None:
-        if len(layout.stray) > MAX_STRAY_LINES:
+        if len(layout.stray) > MAX_STRAY_LINES or layout.n_wide_stray > MAX_STRAY_ROWS:
             raise ReadError(
                 f"{self.path}: {len(layout.stray)} lines of numbers from line {self.line(layout.stray[0])} on have "
                 f"another layout than those from line {self.line(layout.first_line)} on ({layout.n_fields} fields): "

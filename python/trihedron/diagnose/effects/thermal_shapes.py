@@ -1,0 +1,61 @@
+"""How a bias may follow a logged temperature: linear, quadratic, with its rate, unlike while heating and cooling."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Variant, per_axis
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.twin import Distortion
+
+LEAST_RATE_RANGE = 0.3
+"""Share of its largest value that the rate of temperature must differ by between points, to be told from a constant."""
+BRANCH_K_S = 0.002
+"""Rate of change at which three quarters of a branch are reached: an oven has ten times as much, a room a tenth."""
+
+
+def thermal_bias_variants(
+    context: Context,
+    on_axes: Callable[[FloatArray], FloatArray],
+    only: Callable[[FloatArray], Distortion],
+    unit: str,
+) -> list[Variant]:
+    """Forward models, simplest first. Temperature is counted from its mean over the poses, its rate from 0."""
+    assert context.temperature is not None
+    three = np.ones(3)
+    t = context.temperature[:, None] * three
+    linear, square = on_axes(t), on_axes(t**2)
+    names, units = per_axis("bias_per_kelvin"), (f"{unit}/K",) * 3
+    out = [
+        Variant(only(linear), names, units, label="linear"),
+        Variant(
+            only(np.concatenate([linear, square], axis=2)), names + per_axis("bias_per_kelvin2"),
+            units + (f"{unit}/K^2",) * 3, label="quadratic",
+        ),
+    ]  # fmt: skip
+    speed = context.temperature_rate
+    # Taken off another log the shape is what was fitted, whatever that log's temperature does.
+    is_fitted = context.obs.n_holds > 0
+    if speed is None:
+        return out
+    if is_fitted and (not speed.any() or np.ptp(speed) < LEAST_RATE_RANGE * np.abs(speed).max()):
+        return out
+    by_rate = on_axes(speed[:, None] * three)
+    out.append(
+        Variant(
+            only(np.concatenate([linear, by_rate], axis=2)), names + per_axis("bias_per_kelvin_per_s"),
+            units + (f"{unit}/(K/s)",) * 3, label="rate",
+        )
+    )  # fmt: skip
+    if not is_fitted or (speed.min() < -BRANCH_K_S and speed.max() > BRANCH_K_S):
+        branch = on_axes(np.tanh(speed / BRANCH_K_S)[:, None] * three)
+        out.append(
+            Variant(
+                only(np.concatenate([linear, branch], axis=2)), names + per_axis("half_gap"), units + (unit,) * 3,
+                label="hysteresis",
+            )
+        )  # fmt: skip
+    return out

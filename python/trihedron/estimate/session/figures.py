@@ -1,0 +1,206 @@
+"""The published figures of a calibration, in sample and held out: always those of the saved S and b.
+
+Norm of gravity at rest with one zero for the session; gravity carried through each move with a zero per pose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.estimate.session.fit import SessionSolution, fitted
+from trihedron.estimate.session.observed import Observed
+from trihedron.records.calibration import FitQuality
+
+FloatArray = npt.NDArray[np.float64]
+
+N_ACCELEROMETER, N_GYROSCOPE = 9, 9
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """Gravity carried through moves: ``residual``, ``sigma`` (m, 3) m/s², ``angle_deg`` (m,), noise ``floor2`` (m,)."""
+
+    residual: FloatArray
+    sigma: FloatArray
+    angle_deg: FloatArray
+    floor2: FloatArray
+
+
+def carried(
+    time_s: FloatArray,
+    measured: MoveMeasurements,
+    anchors_s: FloatArray,
+    S_a: FloatArray,
+    b_a: FloatArray,
+    S_w: FloatArray,
+) -> Carried:
+    """``B f_i - f_j`` of every move with the hold means at both ends, each hold with a zero of its own."""
+    zero = -measured.zero @ S_w.T
+    before, after = measured.links[:, 0], measured.links[:, 1]
+    rotation, _, wrt_before, wrt_after, cov_rate = _core.integrate_moves(
+        time_s, measured.rate, measured.edges, np.ascontiguousarray(anchors_s), np.ascontiguousarray(S_w),
+        np.ascontiguousarray(zero[before]), np.ascontiguousarray(zero[after]), 3,
+        measured.noise_density, measured.sigma_time_s, measured.nominal_step_s,
+    )  # fmt: skip
+    force = measured.reading @ S_a.T + b_a
+    start, end = force[before], force[after]
+    moved = np.einsum("mij,mj->mi", rotation, start)
+    residual = moved - end
+    unit_moved = moved / np.linalg.norm(moved, axis=1, keepdims=True)
+    unit_end = end / np.linalg.norm(end, axis=1, keepdims=True)
+    angle = np.degrees(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(unit_moved - unit_end, axis=1), 1.0)))
+    skew = np.zeros((len(start), 3, 3))
+    skew[:, [0, 1, 2], [1, 2, 0]] = -start[:, [2, 0, 1]]
+    skew[:, [1, 2, 0], [0, 1, 2]] = start[:, [2, 0, 1]]
+    turn = rotation @ skew
+
+    def spread(part: FloatArray, covariance: FloatArray) -> FloatArray:
+        out: FloatArray = part @ covariance @ np.swapaxes(part, 1, 2)
+        return out
+
+    of_force = np.einsum("ij,nj,kj->nik", S_a, measured.var_reading, S_a)
+    of_zero = np.einsum("ij,nj,kj->nik", S_w, measured.var_zero, S_w)
+    covariance = spread(turn, cov_rate) + spread(rotation, of_force[before]) + of_force[after]
+    covariance = covariance + spread(turn @ wrt_before, of_zero[before]) + spread(turn @ wrt_after, of_zero[after])
+    across = np.eye(3) - unit_end[:, :, None] * unit_end[:, None, :]
+    floor2 = np.einsum("mii->m", across @ covariance @ across)
+    return Carried(residual, np.sqrt(np.einsum("mii->mi", covariance)), angle, floor2)
+
+
+def norm_quality(
+    observed: Observed, solution: SessionSolution, held: FloatArray | None, held_sigma: FloatArray | None
+) -> FitQuality:
+    """Norm of every hold at the saved S, b of the accelerometer; ``held`` (n,) is that of fits without the hold."""
+    residual, sigma = norm_errors(observed, solution.S_a, solution.b_a)
+    dof = max(len(residual) - N_ACCELEROMETER, 0)
+    total = float(np.sum(residual**2))
+    return FitQuality(
+        unit="m/s^2",
+        residual=residual,
+        sigma=sigma,
+        chi2=float(np.sum((residual / np.maximum(sigma, 1e-300)) ** 2)),
+        dof=dof,
+        rms=float(np.sqrt(total / len(residual))),
+        rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
+        floor=float(np.sqrt(np.mean(sigma**2))),
+        held_out=held,
+        held_out_sigma=held_sigma,
+        held_out_rms=None if held is None else float(np.sqrt(np.mean(held**2))),
+        n_iterations=solution.iterations,
+        stopped_because=solution.stopped_because,
+    )
+
+
+def norm_errors(observed: Observed, S_a: FloatArray, b_a: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """``|S a' + b| - |g|`` (n,) and its noise."""
+    force = (observed.hold_force + observed.force_origin) @ S_a.T + b_a
+    norm = np.linalg.norm(force, axis=1)
+    gain = (force / norm[:, None]) @ S_a
+    return norm - observed.gravity_m_s2, np.sqrt(np.sum(gain**2 * observed.hold_force_sigma**2, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """What fits without them leave of every hold's norm (n,) with its sigma, and of every move."""
+
+    norm: FloatArray
+    norm_sigma: FloatArray
+    moves: Carried
+
+
+def held_out(
+    time_s: FloatArray,
+    observed: Observed,
+    measured: MoveMeasurements,
+    anchors_s: FloatArray,
+    solution: SessionSolution,
+    n_folds: int,
+) -> HeldOut | None:
+    """Every k-th hold, then every k-th move, left out of the whole fit; ``None`` where too few would remain.
+
+    Strengths of the zeros and widening of the moves are those of the whole session.
+    """
+    n, m = len(observed.hold_force), len(observed.before)
+    if n_folds < 2 or m - -(-m // n_folds) < N_GYROSCOPE // 2 + 1 or n - -(-n // n_folds) < N_ACCELEROMETER:
+        return None
+    observed = replace(observed, inflation=solution.inflation)
+    b_a = solution.b_a + solution.S_a @ observed.force_origin
+    norm, norm_sigma = np.full(n, np.nan), np.full(n, np.nan)
+    empty = np.full((measured.n_moves, 3), np.nan)
+    parts = Carried(empty.copy(), empty.copy(), empty[:, 0].copy(), empty[:, 0].copy())
+    number = {int(hold): k for k, hold in enumerate(measured.links[:, 0])}
+    is_move = np.zeros(m, dtype=bool)
+    is_hold = np.zeros(n, dtype=bool)
+    for fold in range(n_folds):
+        holds = np.arange(n) % n_folds == fold
+        core = fitted(
+            observed.without(holds, is_move), solution.S_a, b_a, solution.S_w, solution.core,
+            is_tuned=False, scatter_unit=observed.scatter_unit,
+        )  # fmt: skip
+        S, b = np.asarray(core.force_scale), np.asarray(core.force_bias)
+        residual, noise = norm_errors(observed, S, b - S @ observed.force_origin)
+        covariance, _ = core.linear_covariance(observed.force_origin, observed.rate_origin)
+        norm[holds] = residual[holds]
+        norm_sigma[holds] = np.sqrt(noise**2 + _of_model(observed, S, b, covariance[:12, :12]))[holds]
+        moves = np.arange(m) % n_folds == fold
+        core = fitted(
+            observed.without(is_hold, moves), solution.S_a, b_a, solution.S_w, solution.core,
+            is_tuned=False, scatter_unit=observed.scatter_unit,
+        )  # fmt: skip
+        S = np.asarray(core.force_scale)
+        seen = carried(
+            time_s, measured, anchors_s, S, core.force_bias - S @ observed.force_origin, np.asarray(core.rate_scale)
+        )
+        which = [number[int(hold)] for hold in observed.before[moves]]
+        for mine, theirs in ((parts.residual, seen.residual), (parts.sigma, seen.sigma),
+                             (parts.angle_deg, seen.angle_deg), (parts.floor2, seen.floor2)):  # fmt: skip
+            mine[which] = theirs[which]
+    return HeldOut(norm, norm_sigma, parts)
+
+
+def _of_model(observed: Observed, S: FloatArray, b_centred: FloatArray, covariance: FloatArray) -> FloatArray:
+    """(n,) variance of the norm by the model's own uncertainty, ``J C Jᵀ`` with ``J = (u ⊗ a', u)``."""
+    force = observed.hold_force @ S.T + b_centred
+    up = force / np.linalg.norm(force, axis=1, keepdims=True)
+    means = observed.hold_force + observed.force_origin
+    jacobian = np.concatenate([(up[:, :, None] * means[:, None, :]).reshape(-1, 9), up], axis=1)
+    out: FloatArray = np.maximum(np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian), 0.0)
+    return out
+
+
+def move_quality(
+    measured: MoveMeasurements, solution: SessionSolution, seen: Carried, held: Carried | None, used: FloatArray
+) -> FitQuality:
+    """The gyro's residuals in sample and held out; a move is two numbers, so rms is per tangent component."""
+    is_used = used > 0.0
+    g = np.linalg.norm(measured.reading @ solution.S_a.T + solution.b_a, axis=1).mean()
+    n = 2 * int(np.count_nonzero(is_used))
+    dof = max(n - N_GYROSCOPE, 0)
+    total = float(np.sum((g * np.radians(seen.angle_deg[is_used])) ** 2))
+    held_rms = None
+    if held is not None:
+        known = is_used & np.isfinite(held.angle_deg)
+        held_rms = float(np.sqrt(np.sum((g * np.radians(held.angle_deg[known])) ** 2) / (2 * known.sum())))
+    return FitQuality(
+        unit="m/s^2",
+        residual=seen.residual,
+        sigma=seen.sigma,
+        chi2=solution.moves_chi2,
+        dof=round(solution.moves_dof),
+        rms=float(np.sqrt(total / n)),
+        rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
+        floor=float(np.sqrt(np.sum(seen.floor2[is_used]) / n)),
+        held_out=None if held is None else held.residual,
+        held_out_sigma=None if held is None else held.sigma,
+        held_out_rms=held_rms,
+        angle_deg=seen.angle_deg,
+        held_out_angle_deg=None if held is None else held.angle_deg,
+        weights=used,
+        n_iterations=solution.iterations,
+        stopped_because=solution.stopped_because,
+    )

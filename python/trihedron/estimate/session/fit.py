@@ -1,0 +1,147 @@
+"""The session solved without effects: both sensors, one zero for the session, and the certainty of all of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import fdtrc
+
+from trihedron import _core
+from trihedron.estimate.session.observed import Observed
+
+FloatArray = npt.NDArray[np.float64]
+
+FALSE_ALARM = 1e-3
+"""Chance that the moves of a sound session are taken for noisier than their samples."""
+NOISE_DOF = 100.0
+"""The predicted noise is itself measured in the recording: to about 7 %, as 100 degrees of freedom give."""
+START_CORNER_S = 160.0
+NO_SCATTER = 1e-3
+DEAF = 1e3
+"""Widening at which a row no longer says anything beside the others."""
+MOST_WIDENINGS = 8
+MOVES, DYNAMICS = 2, 3
+"""Labels of rows: gravity after a move, velocity over it."""
+
+
+@dataclass(frozen=True, eq=False)
+class SessionSolution:
+    """A session at its optimum, in the lower frame, on raw readings.
+
+    ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); ``b_w`` is that of one zero for the session.
+    ``moves_chi2`` over ``moves_dof`` degrees of freedom of gravity after the moves, in the noise of the samples.
+    ``inflation`` of the moves' standard errors; ``accel_zero_rms``, ``gyro_zero_rms`` what the zeros of the holds
+    differ from the session's by, m/s² and rad/s: as far as S, b alone must miss; ``is_walk_at_edge`` says for either
+    sensor that its zero walks as fast as the model allows.
+    """
+
+    S_a: FloatArray
+    b_a: FloatArray
+    S_w: FloatArray
+    b_w: FloatArray
+    covariance: FloatArray
+    moves_chi2: float
+    moves_dof: float
+    inflation: tuple[float, float]
+    accel_zero_rms: float
+    gyro_zero_rms: float
+    is_walk_at_edge: tuple[bool, bool]
+    is_converged: bool
+    stopped_because: str
+    iterations: int
+    core: _core.SessionFit
+
+
+def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> SessionSolution:
+    """Fit a session from a start on raw readings (``S_a`` lower triangular).
+
+    Moves that miss by more than their samples' noise explains count with the noise that they show, and a velocity that
+    does is left out: what the linear model lacks there must not be spread over the accelerometer.
+    """
+    # Strengths of the zeros are chosen by a session that hardly listens to moves: one that moves had bent would explain
+    # their misfit as scatter of the accelerometer's zero, and then believe the poses even less.
+    core = fitted(replace(observed, inflation=(DEAF, DEAF)), S_a, b_a + S_a @ observed.force_origin, S_w, None)
+    inflation = (1.0, 1.0)
+    for _ in range(MOST_WIDENINGS):
+        core = fitted(
+            replace(observed, inflation=inflation), core.force_scale, core.force_bias, core.rate_scale, core,
+            is_tuned=False,
+        )  # fmt: skip
+        wider = _inflation(core, inflation)
+        if wider == inflation:
+            break
+        inflation = wider
+    chi2, dof = _misfit(core, MOVES)
+    covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
+    S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
+    away = core.force_zero @ S_a.T, (core.rate_zero - core.rate_zero.mean(axis=0)) @ S_w.T
+    return SessionSolution(
+        S_a=S_a,
+        b_a=np.asarray(core.force_bias) - S_a @ observed.force_origin,
+        S_w=S_w,
+        b_w=b_w,
+        covariance=covariance,
+        moves_chi2=chi2 * inflation[0] ** 2,
+        moves_dof=dof,
+        inflation=inflation,
+        accel_zero_rms=float(np.sqrt(np.mean(away[0] ** 2))),
+        gyro_zero_rms=float(np.sqrt(np.mean(away[1] ** 2))),
+        is_walk_at_edge=core.is_walk_at_edge,
+        is_converged=core.is_converged,
+        stopped_because=core.stopped_because,
+        iterations=core.iterations,
+        core=core,
+    )
+
+
+def fitted(
+    observed: Observed,
+    S_a: FloatArray,
+    b_a: FloatArray,
+    S_w: FloatArray,
+    at: _core.SessionFit | None,
+    *,
+    is_tuned: bool = True,
+    scatter_unit: FloatArray | None = None,
+) -> _core.SessionFit:
+    """One fit on centred readings; ``at`` gives zeros and strengths to begin with."""
+    force = observed.hold_force @ S_a.T + b_a
+    n = len(force)
+    return observed.model(scatter_unit).fit(
+        force_scale=np.ascontiguousarray(S_a),
+        force_bias=np.ascontiguousarray(b_a),
+        rate_scale=np.ascontiguousarray(S_w),
+        up=np.ascontiguousarray(force / np.linalg.norm(force, axis=1, keepdims=True) if at is None else at.up),
+        rate_zero=np.ascontiguousarray(observed.hold_rate),
+        force_zero=np.zeros((n, 3)),
+        effect=np.zeros(0),
+        corners_s=(START_CORNER_S, START_CORNER_S) if at is None else at.corners_s,
+        scatter=(NO_SCATTER, NO_SCATTER) if at is None else at.scatter,
+        force_effect=None,
+        rate_effect=None,
+        is_tuned=is_tuned,
+    )
+
+
+def _misfit(core: _core.SessionFit, domain: int) -> tuple[float, float]:
+    rows = core.labels[:, 0] == domain
+    used = core.leverage()
+    return float((core.residual[rows] ** 2).sum()), float((1.0 - used[rows]).sum())
+
+
+def _inflation(core: _core.SessionFit, now: tuple[float, float]) -> tuple[float, float]:
+    """Widening of gravity after moves as their rows show, never below one; a velocity that misses is not heard at all.
+
+    What makes the velocity miss (arms between the accelerometers, a delay) follows the motion and is no noise: widened
+    to its size it still pulled a real accelerometer by five of its standard errors.
+    """
+    moves, dynamics = now
+    chi2, dof = _misfit(core, DYNAMICS)
+    if dynamics < DEAF and dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
+        return moves, DEAF  # and gravity after the moves is judged once it no longer bends the fit
+    chi2, dof = _misfit(core, MOVES)
+    if dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
+        moves *= float(np.sqrt(chi2 / dof))
+    return moves, dynamics

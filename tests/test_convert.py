@@ -1,0 +1,36 @@
+"""Converted logs hold the numbers of the log, and say what was left out on the way."""
+
+import numpy as np
+import pytest
+
+import trihedron
+from test_read import HEADER, readings, write
+from trihedron.cli import main
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
+def test_a_converted_log_is_read_again_as_the_same(tmp_path, suffix, capsys):
+    log = write(tmp_path / "log.txt", readings(), HEADER.replace("gx,gy,gz", "gx [rad/s],gy [rad/s],gz [rad/s]"))
+    out = tmp_path / f"out{suffix}"
+    assert main(["convert", str(log), "-o", str(out)]) == 0
+    said = capsys.readouterr()
+    assert "200 rows in the file = 200 read + 0 reported" in said.err
+    assert said.out == ""
+    first, second = trihedron.read(log), trihedron.read(out)
+    np.testing.assert_array_equal(first.accelerometer, second.accelerometer)
+    np.testing.assert_array_equal(first.gyroscope, second.gyroscope)
+    # Written to the nanosecond.
+    np.testing.assert_allclose(first.time_s, second.time_s, rtol=0, atol=1e-9)
+    assert first.gyroscope_unit is second.gyroscope_unit
+    assert main(["convert", str(log), "-o", str(out)]) == 1
+    assert main(["convert", str(log), "-o", str(tmp_path / "out.xlsx")]) == 1
+    assert "give it one of these endings" in capsys.readouterr().err
+
+
+def test_missing_readings_stay_missing_and_python_converts_what_it_reads(tmp_path):
+    table = readings()
+    table[40:45, 2] = np.nan
+    recording = trihedron.convert(table, tmp_path / "out.csv")
+    again = trihedron.read(tmp_path / "out.csv")
+    assert np.isnan(again.accelerometer[40:45, 1]).all()
+    np.testing.assert_array_equal(recording.accelerometer, again.accelerometer)
