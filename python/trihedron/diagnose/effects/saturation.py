@@ -236,15 +236,21 @@ class _Saturation(DirectEffect):
 
     def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:
         scale, zero = self._scale_and_zero(context)
+        obs = context.obs
         unit = "rad/s" if self.sensor == "gyro" else "m/s^2"
         out = []
         for axis in range(3):
             for sign in (1, -1):
                 levels = [r.level for r in runs if r.axis == axis and r.sign == sign]
+                origin = obs.rate_origin if self.sensor == "gyro" else obs.force_origin
                 if levels:
                     name = f"limit_{AXES[axis]}{'+' if sign > 0 else '-'}"
                     value = float(levels[0] * scale[axis] + zero[axis])
                     out.append(EffectParameter(name, value, float(sigma[axis] * scale[axis]), unit))
+                    raw = float(levels[0] + origin[axis])
+                    is_rail = any(r.is_rail for r in runs if r.axis == axis and r.sign == sign)
+                    if is_rail:  # every sample is the same number: it is exact, whatever the scale factor
+                        out.append(EffectParameter(f"raw_{name}", round(raw, 9), 0.0, "raw"))
         out.append(EffectParameter("samples", float(sum(run.stop - run.start for run in runs)), 0.0, "1"))
         return tuple(out)
 

@@ -17,7 +17,7 @@ from trihedron.diagnose.selection.model import Accepted, StepwiseModel, with_onl
 from trihedron.diagnose.selection.stepwise import MIN_DELTA_BIC
 
 LEAST_SHARE = 0.5
-"""Of the misfit in the worst domain of its sensor an effect must remove this share, all else being in the model: what
+"""Of the misfit in the domain that it helps most an effect must remove this share, all else being in the model: what
 removes less is the least bad guess at a mechanism that is not in the catalogue. Those of benches/blind.py --foreign 15
 --seed 5 reached 0.46, flaws of data-sheet size among small faults (benches/blind_nuisances.py) 0.54 and more."""
 AGREES = 1.5
@@ -75,11 +75,14 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
 
 
 def explains(against: Comparison) -> bool:
-    """Whether the effect removes its share of the misfit in the domain of its own sensor that has most of it."""
+    """Whether the effect removes its share of the misfit in the domain of its own sensor where it removes most.
+
+    Not of all domains together: another fault may spoil the others, and that is not this effect's to explain.
+    """
     before, after = domain_chi2(against.base), domain_chi2(against.fitted)
     own = own_domains(against.variant.distortion)
-    worst = max(own, key=lambda d: before[d][0] - before[d][1])
-    (chi2, dof), (left, left_dof) = before[worst], after[worst]
+    helped = max(own, key=lambda d: before[d][0] - after[d][0])
+    (chi2, dof), (left, left_dof) = before[helped], after[helped]
     if chi2 <= AGREES * dof or left <= AGREES * left_dof:
         return True
     return bool(1.0 - (left - left_dof) / (chi2 - dof) > LEAST_SHARE)
