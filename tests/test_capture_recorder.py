@@ -242,6 +242,13 @@ def test_bad_input_is_refused_in_one_sentence_with_status_1(words, sentence, tmp
     assert not (tmp_path / "log.csv").exists()
 
 
+def test_the_protocols_are_listed_without_a_port(capsys):
+    assert main(["capture", "--list"]) == 0
+    assert "xsens-mtdata2" in capsys.readouterr().out
+    assert main(["capture", "-o", "log.csv"]) == 1
+    assert "say what to read" in capsys.readouterr().err
+
+
 def test_a_silent_board_is_told_from_a_wrong_protocol():
     import pty
 

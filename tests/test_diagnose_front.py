@@ -179,7 +179,7 @@ def test_an_extended_calibration_holds_on_another_session_where_the_linear_one_d
     assert found.verdict == "consistent"
     capsys.readouterr()
     assert main(["export", str(extended), "--to", "c"]) == 0
-    assert "left out: accel-quadratic" in capsys.readouterr().err
+    assert "cannot hold it: accel-quadratic" in capsys.readouterr().err
 
 
 def test_extended_is_refused_in_another_frame(folder, capsys):

@@ -96,10 +96,11 @@ def test_a_damaged_first_row_is_not_taken_for_a_preamble(tmp_path):
     assert accounts(recording)
 
 
-def test_a_row_without_a_number_below_the_names_is_counted(tmp_path):
-    lines = rows_of(readings(50))
-    lines[0] = ",,,,,,"
-    recording = read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
+@pytest.mark.parametrize("separator", [",", "\t"])
+def test_a_row_without_a_number_below_the_names_is_counted(tmp_path, separator):
+    lines = rows_of(readings(50), separator)
+    lines[0] = 6 * separator
+    recording = read_recording(text(tmp_path, HEADER.replace(",", separator) + "\n".join(lines) + "\n"))
     assert recording.rows_in_file == 50
     assert accounts(recording)
 

@@ -16,4 +16,8 @@ class SourceEndedError(CaptureError):
 
 
 class DiskError(CaptureError):
-    """The log could not be written on; what stands on the disk before stays readable."""
+    """The log could not be written on; ``rows_saved`` stand on the disk and stay readable."""
+
+    def __init__(self, sentence: str, rows_saved: int = 0) -> None:
+        super().__init__(sentence)
+        self.rows_saved = rows_saved

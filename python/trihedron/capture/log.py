@@ -9,7 +9,7 @@ from pathlib import Path
 
 from trihedron.capture.errors import CaptureError, DiskError
 
-FLUSH_S = 0.25
+FLUSH_S = 0.1
 """What a killed process loses at most, with the pieces that wait for their successors (docs/capture.md, section 4)."""
 
 SYNC_S = 5.0
@@ -157,7 +157,8 @@ class GrowingLog:
         why = "the disk is full" if full else f"the disk refuses to write ({error.strerror})"
         remedy = "free some space and capture anew" if full else "check the disk"
         return DiskError(
-            f"{self.path}: {why}; {self.rows_saved} rows are saved and readable, nothing after them: {remedy}."
+            f"{self.path}: {why}; {self.rows_saved} rows are saved and readable, nothing after them: {remedy}.",
+            self.rows_saved,
         )
 
 

@@ -56,6 +56,14 @@ COULD_NOT_RUN = 1
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
 
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version as installed
+
+        typer.echo(f"trihedron {installed('trihedron')}")
+        raise typer.Exit
+
+
 def build_app() -> typer.Typer:
     """The command with all its subcommands."""
     app = typer.Typer(
@@ -73,14 +81,11 @@ def build_app() -> typer.Typer:
 
 
 def trihedron(
-    version: bool = typer.Option(False, "--version", help="Say which version this is.", is_eager=True),
+    version: bool = typer.Option(
+        False, "--version", help="Say which version this is.", is_eager=True, callback=_version
+    ),
 ) -> None:
     """Calibrate an IMU from a raw log, with honest error bars."""
-    if version:
-        from importlib.metadata import version as installed
-
-        typer.echo(f"trihedron {installed('trihedron')}")
-        raise typer.Exit
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import signal
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Optional
 
@@ -22,9 +24,12 @@ LOSSES_NOT_TRUSTED = 0.05
 
 
 def capture(
-    port: Annotated[str, typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin).")],
+    port: Annotated[
+        Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+        typer.Argument(metavar="[PORT]", help="Port, tcp://host:port, a file of bytes, or - (stdin)."),
+    ] = None,
     output: Annotated[
-        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+        Optional[Path],  # noqa: UP045
         typer.Option("--output", "-o", metavar="LOG", help="Log to write (text; every command reads it)."),
     ] = None,
     protocol: Annotated[
@@ -78,6 +83,8 @@ def capture(
         for name, sentence in PROTOCOLS.items():
             typer.echo(f"{name:20s}{sentence}")
         return
+    if port is None:
+        raise typer.BadParameter("say what to read: a port (`trihedron ports` lists them), tcp://host:port or a file")
     if output is None:
         raise typer.BadParameter("say where the log goes with -o LOG")
     from trihedron.files.output import check_free
@@ -102,37 +109,44 @@ def capture(
     from trihedron.pipeline import read
 
     stop_on_signals(recorder)
-    made = run_guided(
-        recorder,
-        output,
-        accuracy,
-        gravity,
-        browser=browser,
-        bell=bell,
-        open_browser=not no_open,
-        seconds=seconds,
-    )
+    with full_disk_is_status_2():
+        made = run_guided(
+            recorder,
+            output,
+            accuracy,
+            gravity,
+            browser=browser,
+            bell=bell,
+            open_browser=not no_open,
+            seconds=seconds,
+        )
     conclude(recorder, output, recorder.count.tally.saved, is_ended_well=made.is_done)
     finish(read(output), made.cut_s, gravity, calibration, force=force)
 
 
 def record(recorder: Recorder, output: Path, seconds: float | None) -> None:
     """Run a recorder to its end and say what was saved; status 2 where that is not what was wanted."""
-    from trihedron.capture import DiskError
-
     stop_on_signals(recorder)
     progress = Progress()
-    try:
+    with full_disk_is_status_2():
         for block in recorder:
             progress.show(recorder, block)
             if seconds is not None and progress.elapsed_s >= seconds:
                 recorder.stop()
-    except DiskError as error:
-        progress.clear()
-        _say(f"trihedron: {error}")
-        raise typer.Exit(2 if progress.n else 1) from None
     progress.clear()
     conclude(recorder, output, progress.n)
+
+
+@contextmanager
+def full_disk_is_status_2() -> Iterator[None]:
+    """A recording that a disk ended has saved something: not what was wanted, and not nothing."""
+    from trihedron.capture import DiskError
+
+    try:
+        yield
+    except DiskError as error:
+        _say(f"\ntrihedron: {error}" if sys.stderr.isatty() else f"trihedron: {error}")
+        raise typer.Exit(2 if error.rows_saved else 1) from None
 
 
 def conclude(recorder: Recorder, output: Path, n: int, *, is_ended_well: bool = False) -> None:

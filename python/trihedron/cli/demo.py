@@ -10,7 +10,7 @@ from typing import Annotated, Optional
 import typer
 
 from trihedron.cli.options import Force
-from trihedron.cli.output import leave, say
+from trihedron.cli.output import columns, leave, say
 
 FOLDER = "trihedron-demo"
 
@@ -34,7 +34,7 @@ def demo(
     from trihedron.report import to_text
 
     done = demonstrate(target, overwrite=force, say=say)
-    typer.echo(to_text(done.document), nl=False)
+    typer.echo(to_text(done.document, width=columns()), nl=False)
     from trihedron.pipeline.disagreeing import disagree
 
     drawn = secrets.randbelow(1_000_000) if seed is None else seed

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,7 +76,14 @@ def show(document: Document, json_target: Path | None, *, sections: int | None) 
     if json_target is None or str(json_target) != "-":
         from trihedron.report import to_text
 
-        typer.echo(to_text(document, sections=sections), nl=False)
+        typer.echo(to_text(document, sections=sections, width=columns()), nl=False)
+
+
+def columns() -> int:
+    """Columns of the terminal; those of a file where stdout is none."""
+    from trihedron.report.text import WIDTH
+
+    return shutil.get_terminal_size((WIDTH, 24)).columns if sys.stdout.isatty() else WIDTH
 
 
 def say(sentence: str) -> None:

@@ -105,7 +105,7 @@ def _parameters(known: Examination | None, *, tall: bool) -> Text:
     """Error bars now, after the next pose and as wanted: all of them where there is room, else the worst of each."""
     if known is None:
         return Text("error bars come with the first poses", style=DIM)
-    room = 30 if tall else 14
+    room = 32 if tall else 14
     out = Text(f"{'error bar, %':{room}s}{'now':>6}{'next':>7}{'goal':>6}\n", style=DIM)
     rows = list(known.uncertain) if tall else _groups(known.uncertain)
     for one in rows:

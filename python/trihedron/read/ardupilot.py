@@ -58,7 +58,8 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
         raise ReadError(f"{path}: pymavlink cannot read this log ({first_line(error)}); copy it again.") from None
     finally:
         for name in ("data_map", "filehandle"):
-            if hasattr(log, name):
+            # A map that pymavlink still looks into cannot be closed; it goes with the reader.
+            with contextlib.suppress(AttributeError, BufferError):
                 getattr(log, name).close()
     imu = [Stream("IMU", len(r), i) for (t, i), r in sorted(rows.items()) if t == "IMU"]
     raw = [Stream("ACC", len(r), i) for (t, i), r in sorted(rows.items()) if t == "ACC" and ("GYR", i) in rows]

@@ -141,7 +141,7 @@ def _stray(lines: list[str], header: _Header, decimal_comma: bool) -> tuple[int,
     """Lines above the first row that are neither names nor units nor remarks, but may have been rows."""
     found = []
     for i, raw in enumerate(lines):
-        line = raw.strip()
+        line = raw.strip(" \r")
         if not line or is_comment(line) or i in header.used:
             continue
         is_below_names = header.names is not None and header.used and i > max(header.used)

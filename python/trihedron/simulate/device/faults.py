@@ -15,7 +15,8 @@ class Faults:
     ``missing``: the frame is never sent. ``cut``: only its beginning. ``flipped``: one bit turned over. ``garbage``: 1
     to 40 random bytes before it. ``byte_lost``, ``byte_doubled``: one byte inside. ``twice``: sent again.
     ``drift_ppm``: the board clock is fast by that. ``start_text``: lines printed first. ``disconnect_s``: instants at
-    which it goes away for ``away_s``.
+    which it goes away for ``away_s``. ``clean_ends`` frames at either end stay whole: what is lost before the first
+    and after the last frame saved is nobody's to count.
     """
 
     missing: float = 0.0
@@ -29,6 +30,7 @@ class Faults:
     disconnect_s: tuple[float, ...] = ()
     away_s: float = 1.0
     start_text: bool = False
+    clean_ends: int = 0
 
     @property
     def any_per_frame(self) -> bool:

@@ -50,6 +50,7 @@ class Device:
         zero = (0.0, 0.0, 0.0)
         accel = [zero] * recording.n_samples if recording.accelerometer is None else recording.accelerometer.tolist()
         gyro = [zero] * recording.n_samples if recording.gyroscope is None else recording.gyroscope.tolist()
+        none = Faults()
         fast = 1.0 + faults.drift_ppm * 1e-6
         if faults.start_text:
             yield 0.0, _BOOT_TEXT
@@ -60,7 +61,8 @@ class Device:
             if piece and t - start_s >= PIECE_S:
                 yield t, bytes(piece)
                 piece, start_s = bytearray(), t
-            piece += spoil(encode(n, t * fast, accel[n], gyro[n]), n, faults, rng, sent)
+            is_end = n < faults.clean_ends or n >= recording.n_samples - faults.clean_ends
+            piece += spoil(encode(n, t * fast, accel[n], gyro[n]), n, none if is_end else faults, rng, sent)
         yield float(recording.time_s[-1]), bytes(piece)
 
 
@@ -157,10 +159,11 @@ class PseudoTerminal:
 
     def close(self) -> None:
         """Wait until what was sent has been read, then hang up."""
-        until = time.monotonic() + 5.0
-        while time.monotonic() < until and _unread(self._slave) > 0:
-            time.sleep(0.01)
-        time.sleep(0.1)
+        # The count leaves out what the system still has on its way: only half a second of silence is the end.
+        until, quiet = time.monotonic() + 10.0, 0
+        while time.monotonic() < until and quiet < 10 and self.patience_s > 0.0:
+            quiet = quiet + 1 if _unread(self._slave) == 0 else 0
+            time.sleep(0.05)
         self.disconnect()
 
 
@@ -216,12 +219,13 @@ def serve(
     line: Line,
     said: Callable[[str], None] = lambda _text: None,
     is_wanted: Callable[[], bool] = lambda: True,
+    sent: Sent | None = None,
 ) -> Sent:
     """Send the recording once, in real or faster time, with the device's faults; then hang up.
 
-    Ends before its time where ``is_wanted`` says no.
+    Ends before its time where ``is_wanted`` says no. ``sent`` counts along, for those who look on meanwhile.
     """
-    sent = Sent()
+    sent = Sent() if sent is None else sent
     away = sorted(device.faults.disconnect_s)
     start = time.monotonic()
     for time_s, data in device.pieces(sent):
