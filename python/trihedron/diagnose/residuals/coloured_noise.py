@@ -23,8 +23,8 @@ def coloured_variance(
     """Variance that slow noise adds to every move's integral, beyond that of white noise.
 
     The integral of white noise over T has the variance N²T. Flicker and walk add what the poses' means show of them: a
-    mean over τ with c² times the white variance stands for c²N² as long as T is of the order of τ. Without it a healthy
-    consumer part (0.3 mg, 20 °/h) disagreed in 15 of 20 sessions (benches/blind_nuisances.py --flicker).
+    mean over τ with c² times the white variance stands for c²N² as long as T is of the order of τ. Without it most
+    healthy sessions of a consumer part (0.3 mg, 20 °/h) disagree (benches/blind_nuisances.py --flicker).
 
     Parameters
     ----------
