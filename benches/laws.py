@@ -16,7 +16,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from blind_trial.draw import grade_profile
 from trihedron.diagnose.context import Context
@@ -202,9 +201,8 @@ def laws_of(log: Recording, gravity: float, domains: tuple[str, ...]) -> tuple:
     segments = segment(log)
     calibration = calibrate(log, segments=segments, gravity_m_s2=gravity).calibration
     obs = observe(log, segments)
-    with threadpool_limits(limits=1, user_api="blas"):
-        fitted = tune_noise(obs, start_twin(obs, calibration), NO_DISTORTION, None)
-        return find_laws(Context(obs, fitted), domains)
+    fitted = tune_noise(obs, start_twin(obs, calibration), NO_DISTORTION, None)
+    return find_laws(Context(obs, fitted), domains)
 
 
 def main() -> None:

@@ -21,6 +21,7 @@ type Grams<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray3<f64>>);
 ///
 /// A row of strengths: scatter, walk, drift, slope, factor on `variance` `(n,)`. `direction` is `(n, k)`.
 #[pyfunction]
+#[allow(clippy::too_many_arguments)]
 fn zero_process_grams<'py>(
     py: Python<'py>,
     columns: PyReadonlyArray2<'py, f64>,

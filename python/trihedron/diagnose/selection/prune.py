@@ -18,8 +18,8 @@ from trihedron.diagnose.selection.stepwise import MIN_DELTA_BIC
 
 LEAST_SHARE = 0.5
 """Of the misfit in the domain that it helps most an effect must remove this share, all else being in the model: what
-removes less is the least bad guess at a mechanism that is not in the catalogue. Set where wrong answers of benches/blind.py
---foreign 15 --seed 5 and right ones of benches/blind_nuisances.py part; those seeds are no test of it."""
+removes less is the least bad guess at a mechanism that is not in the catalogue. Set where wrong answers of
+benches/blind.py --foreign 15 --seed 5 and right ones of benches/blind_nuisances.py part; those seeds are no test."""
 AGREES = 1.5
 """Chi-square per degree of freedom at which a domain holds so little misfit that no share of it is asked for."""
 
