@@ -52,7 +52,7 @@ def guide(
     from trihedron.units import STANDARD_GRAVITY_M_S2
 
     wanted = Accuracy.parse(accuracy)
-    check_outputs(output, force=force)
+    check_outputs(output, force=force, inputs=source.files)
     recording = source.read()
     now = {"s": 0.0}
     made = _guide(

@@ -40,7 +40,7 @@ def apply(calibration: AnyCalibration, recording: Recording) -> Recording:
     check_units(known, recording)
     recording, more = without_effects(known, recording)
     accelerometer, gyroscope = recording.accelerometer, recording.gyroscope
-    findings = (*recording.findings, *more)
+    findings = (*recording.findings, *more, *untrusted(known))
     if gyroscope is not None and known.gyroscope is None:
         gyroscope = None
         findings = (*findings, _left_out())
@@ -108,6 +108,23 @@ def check_units(calibration: Calibration, recording: Recording) -> None:
 
 def _corrected(readings: FloatArray | None, sensor: SensorCalibration | None) -> FloatArray | None:
     return None if readings is None or sensor is None else correct(readings, sensor.S, sensor.b)
+
+
+def untrusted(calibration: Calibration) -> tuple[Finding, ...]:
+    """What a calibration that its own report calls untrustworthy does to everything made with it."""
+    reasons = [finding.seen for finding in calibration.findings if finding.severity is Severity.SERIOUS]
+    if not reasons:
+        return ()
+    return (
+        Finding(
+            FindingCode.CALIBRATION_UNTRUSTED,
+            Severity.SERIOUS,
+            f"The calibration is itself not to be trusted: {reasons[0]}",
+            "It was written with a serious finding.",
+            "Calibrate again as that finding says.",
+            MappingProxyType({"count": float(len(reasons))}),
+        ),
+    )
 
 
 def _left_out() -> Finding:

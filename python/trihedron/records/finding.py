@@ -85,6 +85,7 @@ class FindingCode(str, Enum):
     EFFECT_NOT_APPLIED = "effect-not-applied"
     PROTOCOL_DIFFERS = "protocol-differs"
     # verify, check
+    CALIBRATION_UNTRUSTED = "calibration-untrusted"
     LIMIT_EXCEEDED = "limit-exceeded"
     SAME_RECORDING = "same-recording"
     NOT_FIT = "not-fit"
