@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterable
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
 
 STEP_S = 0.25
 """Of a replayed log: as the blocks of a live one."""
+
+MOST_COLUMNS = 120
+"""A wider screen only draws the eye apart."""
 
 DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 Show = Callable[["GuideView"], None]
@@ -70,11 +74,17 @@ def guide(
             n_events = view.n_events
             typer.echo(_line(view))
             if every:
-                typer.echo(as_text(view))
+                typer.echo(as_text(view, *_size()))
         if made.is_done:
             break
-    typer.echo(as_text(made.view()))
+    typer.echo(as_text(made.view(), *_size()))
     finish(part_of(recording, -math.inf, now["s"] + 1e-9), made.cut_s, gravity, output, force=force)
+
+
+def _size() -> tuple[int, int]:
+    """Columns and lines of the terminal; what COLUMNS and LINES say, or 80 x 24, elsewhere."""
+    size = shutil.get_terminal_size((80, 24))
+    return max(60, min(size.columns, MOST_COLUMNS)), max(size.lines, 24)
 
 
 def _guide(wanted: Any, examine: Callable[[], Any]) -> Any:
@@ -229,7 +239,7 @@ class _Shown:
             from trihedron.cli.screen import screen
 
             size = self._live.console.size
-            shown = screen(view, min(size.width, 120), size.height, lost=lost, seconds=now - self._started)
+            shown = screen(view, min(size.width, MOST_COLUMNS), size.height, lost=lost, seconds=now - self._started)
             self._live.update(shown, refresh=True)
         elif rings or (view.instruction.split(":")[0] != self._said and self._page is None):
             self._said = view.instruction.split(":")[0]
