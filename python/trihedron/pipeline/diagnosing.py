@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -26,6 +27,9 @@ from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
 
+GivenModel = Recording | Scenario | str | os.PathLike[str]
+"""A simulated recording or its file, or a scenario or its .toml."""
+
 
 def diagnose(
     recording: AnyRecording,
@@ -35,7 +39,7 @@ def diagnose(
     height_m: float | None = None,
     segments: Segments | None = None,
     calibration: AnyCalibration | None = None,
-    against: AnyRecording | Scenario | None = None,
+    against: GivenModel | None = None,
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
@@ -158,9 +162,7 @@ def _start(
     return (replace(known, gravity_m_s2=gravity), False) if is_poor else (own, True)
 
 
-def _simulated_log(
-    against: AnyRecording | Scenario, recording: Recording, segments: Segments, gravity: float
-) -> Recording:
+def _simulated_log(against: GivenModel, recording: Recording, segments: Segments, gravity: float) -> Recording:
     if isinstance(against, Recording):
         return against
     if not isinstance(against, Scenario):

@@ -32,8 +32,9 @@ def calibration_report(
         Section("Result", _result(calibration, segments, recording)),
         Section("Findings", (findings_block(calibration.findings),)),
     ]
-    if segments is not None and recording is not None:
-        sections.append(Section("Figures", tuple(_figures(calibration, segments, recording))))
+    figures = tuple(_figures(calibration, segments, recording))
+    if figures:
+        sections.append(Section("Figures", figures))
     sections += [
         Section("Axes", _meaning(calibration)),
         Section("Certainty", tuple(_certainty(calibration))),
@@ -271,14 +272,11 @@ def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
     return Table(head, tuple(rows), "Gyroscope: angle between predicted and measured gravity after every move")
 
 
-def _figures(calibration: Calibration, segments: Segments, recording: Recording) -> list[Block]:
-    blocks: list[Block] = [
-        Picture(
-            "signals",
-            "The recording; shaded where the sensor stood still.",
-            later("figures", "draw_signals", recording, segments),
-        ),
-    ]
+def _figures(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> list[Block]:
+    blocks: list[Block] = []
+    if segments is not None and recording is not None:
+        draw = later("figures", "draw_signals", recording, segments)
+        blocks.append(Picture("signals", "The recording; shaded where the sensor stood still.", draw))
     quality = calibration.accelerometer.quality
     if quality is not None:
         blocks.append(
@@ -289,7 +287,7 @@ def _figures(calibration: Calibration, segments: Segments, recording: Recording)
                 later("figures", "draw_residuals", quality),
             )
         )
-        if segments.accelerometer_mean is not None:
+        if segments is not None and segments.accelerometer_mean is not None:
             blocks.append(
                 Picture(
                     "poses",

@@ -22,8 +22,10 @@ def verification_report(
         Section("Findings", (findings_block(verification.findings),)),
         Section("Poses and moves", tuple(_tables(verification, segments))),
     ]
+    figures: list[Block] = [_errors_picture(verification)]
     if segments is not None and recording is not None:
-        sections.append(Section("Figures", (_errors_picture(verification), signals_picture(recording, segments))))
+        figures.append(signals_picture(recording, segments))
+    sections.append(Section("Figures", tuple(figures)))
     return Document(
         title="Verification",
         subtitle=verification.source,
