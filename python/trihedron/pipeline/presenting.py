@@ -27,7 +27,7 @@ from trihedron.report.text import to_text
 from trihedron.report.verification import verification_report
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from trihedron.report.figures import ShownFigure
 
 REPORT_ENDINGS = (".html", ".txt", ".json")
 
@@ -109,7 +109,7 @@ def pictures(result: object) -> dict[str, document.Picture]:
     return found
 
 
-def plot(result: object, name: str | None = None) -> Figure:
+def plot(result: object, name: str | None = None) -> ShownFigure:
     """A figure of a result's report: the first, or the one of that name; a notebook shows it, ``savefig`` writes it.
 
     Raises

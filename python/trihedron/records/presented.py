@@ -5,10 +5,7 @@ from __future__ import annotations
 import copyreg
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from typing import Any, Literal
 
 Library = Literal["polars", "pandas"]
 
@@ -34,8 +31,8 @@ class Presented:
 
         return as_frame(self, library)
 
-    def plot(self, name: str | None = None) -> Figure:
-        """One of the figures of the report: the first, or the one of that name. A notebook shows it.
+    def plot(self, name: str | None = None) -> Any:
+        """A matplotlib figure of the report: the first, or the one of that name. A notebook shows it.
 
         Raises
         ------

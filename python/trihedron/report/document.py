@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from trihedron.records import Finding
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from trihedron.report.figures import ShownFigure
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Picture:
 
     name: str
     caption: str
-    draw: Callable[[], Figure]
+    draw: Callable[[], ShownFigure]
 
 
 Block = Paragraph | Facts | Table | FindingList | Picture
