@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.documents import DocumentError, of_path, parse_json, read_text
 from trihedron.files.output import write_whole
 from trihedron.records import (
     PARAMETER_NAMES,
@@ -82,22 +83,15 @@ def read_calibration(path: str | os.PathLike[str]) -> Calibration:
         When the file is missing, is not JSON, is not a calibration, or is of a format this version does not know.
     """
     path = Path(path)
-    if path.is_dir():
-        raise CalibrationFileError(f"{path}: this is a directory; name the calibration file inside it.")
     try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise CalibrationFileError(f"{path}: there is no such file; check the name and the folder.") from None
-    except PermissionError:
-        raise CalibrationFileError(f"{path}: no permission to read this file; change its permissions.") from None
-    except (UnicodeDecodeError, OSError):
-        raise CalibrationFileError(f"{path}: this is not a calibration file (not text); name the .json file.") from None
+        text = read_text(path, "calibration file")
+    except DocumentError as error:
+        raise CalibrationFileError(of_path(path, error)) from None
     try:
-        document = json.loads(text, parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
-        line = f" (line {error.lineno})" if isinstance(error, json.JSONDecodeError) else ""
+        document = parse_json(text)
+    except DocumentError as error:
         raise CalibrationFileError(
-            f"{path}: this is not JSON{line}; name a calibration file written by `trihedron calibrate -o`."
+            f"{path}: {error}; name a calibration file written by `trihedron calibrate -o`."
         ) from None
     return calibration_from_document(document, str(path))
 
@@ -167,7 +161,7 @@ def calibration_from_document(document: object, source: str = "document") -> Cal
         )
     try:
         return _from_checked(document)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
         raise CalibrationFileError(f"{source}: {error}; the file was changed by hand or damaged.") from None
 
 
@@ -218,10 +212,6 @@ def _written_by() -> str:
         return f"trihedron {version('trihedron')}"
     except PackageNotFoundError:
         return "trihedron (not installed)"
-
-
-def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is not a number")
 
 
 def _sensor_document(sensor: SensorCalibration) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from trihedron.documents import DocumentError, of_path, parse_json, read_text
 from trihedron.files.calibration import plain
 from trihedron.records.diagnosis import SCHEMA_VERSION, Diagnosis
 
@@ -41,15 +42,13 @@ def read_diagnosis(path: str | os.PathLike[str]) -> dict[str, Any]:
     """
     path = Path(path)
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise DiagnosisFileError(f"{path}: there is no such file; check the name and the folder.") from None
-    except (OSError, UnicodeDecodeError):
-        raise DiagnosisFileError(f"{path}: this file cannot be read as text; name a diagnosis (.json).") from None
-    except (ValueError, RecursionError):
-        raise DiagnosisFileError(
-            f"{path}: this is not JSON; name a file written by `trihedron diagnose --json`."
-        ) from None
+        text = read_text(path, "diagnosis")
+    except DocumentError as error:
+        raise DiagnosisFileError(of_path(path, error)) from None
+    try:
+        document = parse_json(text)
+    except DocumentError as error:
+        raise DiagnosisFileError(f"{path}: {error}; name a file written by `trihedron diagnose --json`.") from None
     if not isinstance(document, dict) or "verdict" not in document:
         raise DiagnosisFileError(
             f"{path}: this JSON is not a diagnosis; name a file written by `trihedron diagnose --json`."

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from trihedron.documents import DocumentError, check_values, of_path, read_text
 from trihedron.records.frame_declaration import (
     CHECKSUM_SIZES,
     CHECKSUMS,
@@ -37,10 +38,13 @@ def read_frame_declaration(path: str | Path) -> FrameDeclaration:
     """
     path = Path(path)
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ValueError(f"{path}: there is no such protocol file.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        table = tomllib.loads(read_text(path, "declaration of a frame"))
+        check_values(table)
+    except DocumentError as error:
+        raise ValueError(of_path(path, error)) from None
+    except RecursionError:
+        raise ValueError(f"{path}: this is nested too deeply.") from None
+    except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path} is not TOML: {error}.") from None
     try:
         return _declaration(table, path.stem)

@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 
 from trihedron.files.output import OutputError, write_whole
+from trihedron.forked import check_tables
 from trihedron.records.recording import FloatArray, Recording
 
 LOG_SUFFIXES = (".csv", ".npz", ".parquet")
@@ -24,6 +25,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str], *, overw
         When the ending is none of .csv, .npz, .parquet, or the file exists and may not be replaced.
     """
     target = Path(path)
+    check_tables()
     columns = _columns(recording)
     suffix = target.suffix.lower()
     buffer = io.BytesIO()

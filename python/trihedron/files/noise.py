@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from pathlib import Path
 from typing import Any
 
+from trihedron.documents import DocumentError, of_path, parse_json, read_text
 from trihedron.files.export.contract import NoiseFigure, SensorNoise
 
 _SENSORS = {"m/s^2": "accelerometer", "rad/s": "gyroscope"}
@@ -29,11 +29,13 @@ def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], fl
     """
     path = Path(path)
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise NoiseFileError(f"{path}: there is no such file; check the name and the folder.") from None
-    except (OSError, ValueError, RecursionError):
-        raise NoiseFileError(f"{path}: this is not JSON; name a file written by `trihedron allan --json`.") from None
+        text = read_text(path, "file of noise terms")
+    except DocumentError as error:
+        raise NoiseFileError(of_path(path, error)) from None
+    try:
+        document = parse_json(text)
+    except DocumentError as error:
+        raise NoiseFileError(f"{path}: {error}; name a file written by `trihedron allan --json`.") from None
     return noise_figures(document, str(path))
 
 
@@ -53,7 +55,7 @@ def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict
             if any(axis["unit"] == unit for axis in axes)
         }
         rate = float(document["rate_hz"])
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, IndexError, ArithmeticError):
         raise NoiseFileError(
             f"{source}: this JSON holds no noise terms; name a file written by `trihedron allan --json`."
         ) from None

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from trihedron.files.output import OutputError, write_whole
+from trihedron.forked import check_tables
 from trihedron.records import Recording
 
 ACCELEROMETER_NAMES = ("acc_x", "acc_y", "acc_z")
@@ -36,6 +37,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str], *, overw
         When the ending names no format, or as :func:`trihedron.files.output.write_whole`.
     """
     check_format(path)
+    check_tables()
     # Imported here: it costs more than the rest of a short run.
     import polars
 

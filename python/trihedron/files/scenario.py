@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, Item
 
+from trihedron.documents import DocumentError, of_path, read_text
 from trihedron.files.output import write_whole
 
 
@@ -40,8 +40,10 @@ def improved_scenario(
         When the file is not TOML.
     """
     try:
-        document = tomlkit.parse(Path(path).read_text(encoding="utf-8"))
-    except (TOMLKitError, UnicodeDecodeError) as error:
+        document = tomlkit.parse(read_text(path, "scenario file"))
+    except DocumentError as error:
+        raise ValueError(of_path(path, error)) from None
+    except (TOMLKitError, RecursionError) as error:
         raise ValueError(f"{path}: this is not a TOML file: {error}") from None
     for name, values in tables.items():
         if values:

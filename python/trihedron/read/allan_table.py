@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import re
 from dataclasses import dataclass
@@ -11,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.errors import ReadError, check_readable, from_os_error
+from trihedron.documents import DocumentError, of_path, read_text
+from trihedron.read.errors import ReadError, check_readable
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -46,11 +48,12 @@ def read_allan_table(path: Path) -> AllanTable:
     """
     check_readable(path)
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = [row for row in csv.reader(stream) if row]
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    except (UnicodeDecodeError, csv.Error) as error:
+        text = read_text(path, "table of Allan deviations").removeprefix("\ufeff")
+    except DocumentError as error:
+        raise ReadError(of_path(path, error)) from None
+    try:
+        rows = [row for row in csv.reader(io.StringIO(text, newline="")) if row]
+    except csv.Error as error:
         raise ReadError(f"{path}: this is not a comma-separated table ({error}); export it as CSV.") from None
     if len(rows) < 2:
         raise ReadError(f"{path}: a table of Allan deviations has a line of names and a line per averaging time.")

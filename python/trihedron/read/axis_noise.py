@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import fields
 from pathlib import Path
 
-from trihedron.read.errors import ReadError, check_readable
+from trihedron.documents import DocumentError, of_path, parse_json, read_text
+from trihedron.read.errors import ReadError
 from trihedron.records import AxisNoise
 
 TERMS = tuple(field.name for field in fields(AxisNoise))
@@ -22,11 +22,14 @@ def read_axis_noise(path: str | os.PathLike[str]) -> tuple[AxisNoise, AxisNoise,
         (a ``ValueError``) when the file is no such JSON, or a term is unknown or negative.
     """
     file = Path(path)
-    check_readable(file)
     try:
-        said = json.loads(file.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise ReadError(f"{file}: this is not JSON ({error}); write one object with the noise terms.") from None
+        text = read_text(file, "file of noise terms")
+    except DocumentError as error:
+        raise ReadError(of_path(file, error)) from None
+    try:
+        said = parse_json(text)
+    except DocumentError as error:
+        raise ReadError(f"{file}: {error}; write one object with the noise terms.") from None
     if not isinstance(said, dict) or not said:
         raise ReadError(f'{file}: write the noise terms as one object, such as {{"white": 0.002, "walk": 1e-5}}.')
     unknown = sorted(set(said) - set(TERMS))

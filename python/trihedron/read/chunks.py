@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.errors import ReadError, check_readable, from_os_error
+from trihedron.read.errors import ReadError, check_readable, from_os_error, refuse_after_fork
 
 ROWS = 1 << 18
 ROLES = ("ax", "ay", "az", "gx", "gy", "gz")
@@ -91,6 +91,7 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
     elif magic[:4] == b"PAR1":
         import polars
 
+        refuse_after_fork(path)
         try:
             table = polars.scan_parquet(path)
             n_rows = int(table.select(polars.len()).collect().item())

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from trihedron.forked import check_tables
+
 
 class ReadError(ValueError):
     """A file that cannot become a recording. The text is one sentence: which file, which line, what to do."""
@@ -19,6 +21,20 @@ def from_os_error(path: Path, error: OSError) -> ReadError:
     if isinstance(error, PermissionError):
         return ReadError(f"{path}: no permission to read this file; change its permissions or copy it.")
     return ReadError(f"{path}: the system cannot read this file ({error.strerror or error}); copy it to a local disk.")
+
+
+def refuse_after_fork(path: Path) -> None:
+    """Refuse what would wait for ever in a forked child.
+
+    Raises
+    ------
+    ReadError
+        Where the library that parses tables does not answer any more.
+    """
+    try:
+        check_tables()
+    except ValueError as error:
+        raise ReadError(f"{path}: {error}") from None
 
 
 def check_readable(path: Path) -> int:

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.errors import ReadError, from_os_error, refuse_after_fork
 from trihedron.read.table import FloatArray, Table, check_memory, file_sha256
 from trihedron.records import Finding, FindingCode, Severity
 
 
 def read_parquet(path: Path) -> Table:
     """Numeric and time columns of a Parquet file; anything else is left out and said so."""
+    refuse_after_fork(path)
     try:
         n_rows = pl.scan_parquet(path).select(pl.len()).collect().item()
         schema = pl.read_parquet_schema(path)

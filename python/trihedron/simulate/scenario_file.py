@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from trihedron.documents import DocumentError, check_values, of_path, read_text
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.motion import LEVEL, Disturb, Hold, Motion, MoveTo, Oscillate, Turn, Vibrate, attitude_with_up
 from trihedron.simulate.named import SESSIONS
@@ -41,13 +42,16 @@ def read_scenario(path: str | Path) -> Scenario:
     ------
     ValueError
         When the file is not TOML or asks for something that does not exist, naming the table and the key.
-    FileNotFoundError
-        When there is no such file.
     """
     path = Path(path)
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        table = tomllib.loads(read_text(path, "scenario file"))
+        check_values(table)
+    except DocumentError as error:
+        raise ValueError(of_path(path, error)) from None
+    except RecursionError:
+        raise ValueError(f"{path}: this is nested too deeply.") from None
+    except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{path.name} is not a TOML file: {error}") from None
     try:
         return scenario_from_table(table, path.stem)

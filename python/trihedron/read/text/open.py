@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
-from trihedron.read.errors import ReadError
+from trihedron.read.errors import ReadError, refuse_after_fork
 from trihedron.read.table import Progress, Table, check_memory
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks
 from trihedron.read.text.dialect import Rewritten, rewrite
@@ -35,6 +35,7 @@ def read_text(
     ReadError
         As :class:`TextReader`.
     """
+    refuse_after_fork(path)
     cursor = Cursor()
     with closing(blocks(path, compression, cursor, content)) as parts:
         first = next(parts, b"")

@@ -1,0 +1,122 @@
+"""Small text files that people write, edit and pass on: read with bounds, whatever lies behind the name."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+MOST_BYTES = 64_000_000
+"""A diagnosis of a day's log with all its curves has 3 MB."""
+MOST_DEPTH = 64
+"""Our own documents nest eight deep; what walks through them walks recursively."""
+MOST_DIGITS = 300
+"""Of a whole number: more do not fit into a float."""
+
+
+class DocumentError(ValueError):
+    """What is wrong with a file, as the rest of a sentence that begins with its name."""
+
+
+def read_text(path: str | os.PathLike[str], what: str) -> str:
+    """The text of a plain file of sane size; ``what`` it should be ("calibration file") is for the sentence.
+
+    Raises
+    ------
+    DocumentError
+        When there is no such file, it is no plain file, too large, unreadable, or not text.
+    """
+    try:
+        # Without waiting: a pipe without a writer would be waited for.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
+    except FileNotFoundError:
+        raise DocumentError("there is no such file; check the name and the folder.") from None
+    except PermissionError:
+        raise DocumentError("no permission to read this file; change its permissions.") from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise DocumentError(f"this file cannot be opened ({why}); check the name.") from None
+    try:
+        with os.fdopen(descriptor, "rb") as stream:
+            found = os.fstat(stream.fileno())
+            if not stat.S_ISREG(found.st_mode):
+                raise DocumentError(f"this is not a plain file; save the {what} to a file and name that.")
+            if found.st_size > MOST_BYTES:
+                raise DocumentError(f"{found.st_size / 1e6:.0f} MB is no {what}; check the name.")
+            data = stream.read(MOST_BYTES + 1)
+    except IsADirectoryError:
+        raise DocumentError(f"this is a directory; name the {what} inside it.") from None
+    except OSError as error:
+        raise DocumentError(f"the system cannot read this file ({error.strerror or error}).") from None
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise DocumentError(f"this is not a {what} (not text); check the name.") from None
+
+
+def parse_json(text: str) -> Any:
+    """JSON with finite numbers and sane depth.
+
+    Raises
+    ------
+    DocumentError
+        When it is not; the line is said where the text breaks.
+    """
+    try:
+        document = json.loads(text, parse_constant=_constant, parse_int=_whole, parse_float=_real)
+    except DocumentError:
+        raise
+    except json.JSONDecodeError as error:
+        raise DocumentError(f"this is not JSON (line {error.lineno}: {error.msg})") from None
+    except RecursionError:
+        raise DocumentError("this is not JSON of ours (nested too deeply)") from None
+    check_values(document)
+    return document
+
+
+def check_values(document: Any) -> None:
+    """Refuse what no document of ours holds, from whatever notation it was parsed.
+
+    Raises
+    ------
+    DocumentError
+        For nesting that is too deep, and whole numbers that no float holds.
+    """
+    level = [document]
+    for _ in range(MOST_DEPTH):
+        deeper: list[Any] = []
+        for value in level:
+            if isinstance(value, dict):
+                deeper += value.values()
+            elif isinstance(value, list):
+                deeper += value
+            elif isinstance(value, int) and abs(value) > 10**MOST_DIGITS:
+                raise DocumentError("this holds a number too large for any quantity")
+        level = deeper
+        if not level:
+            return
+    raise DocumentError("this is nested too deeply")
+
+
+def of_path(path: str | os.PathLike[str], error: DocumentError) -> str:
+    """The whole sentence."""
+    return f"{Path(path)}: {error}"
+
+
+def _constant(name: str) -> float:
+    raise DocumentError(f"this holds {name}, which is not a number")
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > MOST_DIGITS:
+        raise DocumentError(f"this holds a number of {len(digits)} digits")
+    return int(digits)
+
+
+def _real(digits: str) -> float:
+    value = float(digits)
+    if value in (float("inf"), float("-inf")):
+        raise DocumentError(f"this holds the number {digits[:20]}, too large for any quantity")
+    return value
