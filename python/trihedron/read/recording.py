@@ -199,6 +199,8 @@ def audited(
     temperature, supply = sensors.columns.temperature, sensors.columns.supply
     for triad in present.values():
         triad.setflags(write=False)
+        if isinstance(triad.base, np.ndarray):
+            triad.base.setflags(write=False)
     time_s.setflags(write=False)
     return Recording(
         time_s=time_s,

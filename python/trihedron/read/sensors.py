@@ -18,6 +18,7 @@ from trihedron.read.names import parse_name
 from trihedron.read.rest import is_integer
 from trihedron.read.sensing import WHOLE, order_of_triads
 from trihedron.read.table import FloatArray, Progress, Table
+from trihedron.read.text.store import side_by_side
 from trihedron.records import Finding, FindingCode, Sampling, Severity
 from trihedron.records.sampling import UNJUDGED
 
@@ -76,6 +77,9 @@ class Sensors:
 def _triad(table: Table, triad: tuple[int, int, int] | None, rows: npt.NDArray[np.int64] | None) -> FloatArray | None:
     if triad is None:
         return None
+    together = side_by_side([table.columns[column] for column in triad])
+    if together is not None and rows is None:
+        return together
     out = np.empty((table.n_rows if rows is None else len(rows), 3))
     for k, column in enumerate(triad):
         values = table.columns[column]
@@ -130,7 +134,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         clock.start_s,
         accelerometer,
         gyroscope,
-        table,
+        _without_used(table, chosen),
         chosen,
         clock.rows,
         0,
@@ -140,6 +144,14 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         rows_in_file=table.n_in_file,
         rows_read=len(clock.time_s),
     )
+
+
+def _without_used(table: Table, chosen: Columns) -> Table:
+    """The table without the columns that are on the time base now: a long log has no room for both."""
+    kept = {chosen.temperature, chosen.supply, chosen.counter}
+    done = {chosen.time, *(chosen.accelerometer or ()), *(chosen.gyroscope or ())} - kept
+    columns = tuple(np.empty(0) if i in done else column for i, column in enumerate(table.columns))
+    return replace(table, columns=columns, rows_in_file=table.n_in_file)
 
 
 def _words_left_out(table: Table) -> list[Finding]:

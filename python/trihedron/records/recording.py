@@ -16,9 +16,16 @@ from trihedron.units import AccelerationUnit, RateUnit
 FloatArray = npt.NDArray[np.float64]
 
 
+def _is_frozen(array: object) -> bool:
+    """Whether nobody can write to an array: neither through it nor through what it is a view of."""
+    while isinstance(array, np.ndarray) and not array.flags.writeable:
+        array = array.base
+    return array is None
+
+
 def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:
     # An array that nobody can write to is shared, not copied: a log of 1e8 rows must not exist twice.
-    frozen = isinstance(array, np.ndarray) and not array.flags.writeable and array.base is None
+    frozen = _is_frozen(array)
     out: FloatArray = np.array(array, dtype=np.float64, order="C", copy=None if frozen else True)
     if out.ndim != len(shape) or any(
         want is not None and got != want for got, want in zip(out.shape, shape, strict=True)

@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.read.clock.rate import usual_step
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Sampling, Severity, StampKind
 from trihedron.records.sampling import UNJUDGED
@@ -36,11 +37,10 @@ def audit_timing(
     """
     if len(time_s) < 3:
         return []
-    step = np.diff(time_s)
-    positive = step[step > 0]
-    if not len(positive):
+    usual = usual_step(time_s)
+    if not usual > 0:
         return []
-    usual = float(np.median(positive))
+    step = np.diff(time_s)
     findings = _duplicates(step if stamps_s is None else np.diff(stamps_s), place, is_mended=stamps_s is not None)
     if lost_behind is not None:
         findings += _lost(step, lost_behind, place)
@@ -53,9 +53,10 @@ def audit_timing(
         lost[gaps] = np.maximum(np.rint(step[gaps] / usual) - 1, 0)
         findings += _gap(step, gaps, lost, place) if len(gaps) else []
     if stamps_s is not None:
+        usual = usual_step(stamps_s)
         step = np.diff(stamps_s)
-        usual = float(np.median(step[step > 0]))
-    inside = step[(step <= GAP_STEPS * usual) & (step > 0)]
+    is_inside = (step <= GAP_STEPS * usual) & (step > 0)
+    inside = step if is_inside.all() else step[is_inside]
     jitter = float(inside.std())
     mean = float(inside.mean())
     if jitter > JITTER_STEPS * mean:

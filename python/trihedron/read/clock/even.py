@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -9,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
 
-from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, earliest, track
+from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, earliest, lateness, track
 from trihedron.read.clock.period import find_period
 from trihedron.read.table import FloatArray
 from trihedron.records.sampling import StampKind
@@ -51,7 +52,9 @@ class EvenClock:
     @property
     def lost_behind(self) -> IntArray:
         """(n - 1,) samples lost behind each row; those of pauses too, as far as the clock tells."""
-        return np.asarray(np.diff(self.tick) - 1, dtype=np.int64)
+        lost = np.diff(self.tick)
+        lost -= 1
+        return lost
 
 
 def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> EvenClock | None:
@@ -81,13 +84,15 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
     error = time_s - even
     for _ in range(3 if counter is None and sees else 0):
         # Followed loosely: a loss counted too early makes a dip that the clock must not follow.
-        moved = behind_late_rows(tick, error / period)
+        moved = behind_late_rows(tick, error, period)
         if moved is tick:
             break
         tick = moved
+        del even, error
         even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False)
         error = time_s - even
     if wanders:
+        del even, error
         even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, CLOSE_PIECES)
         error = time_s - even
     on_grid = 0.0 < found.grid_s < 1.3 * period and _range(error) < 1.3 * found.grid_s
@@ -97,9 +102,11 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
     kind = _kind(error, period, found.grid_s)
     if kind is not StampKind.LATE:
         # Two-sided errors have their middle, not their edge, on the clock.
+        del even, error
         even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, True, CLOSE_PIECES)
         error = time_s - even
-    rms = float(np.sqrt(np.mean((error - error.mean()) ** 2)))
+    middle = error.mean()
+    rms = float(np.sqrt(sum(float(np.sum((error[p] - middle) ** 2)) for p in _parts(0, n)) / n))
     return EvenClock(kind, mean_period, sigma, tick, even, rms, sees, pauses, found.grid_s, wanders)
 
 
@@ -127,8 +134,9 @@ def _lay(
     """The even clock (n,) under the earliest stamps, or through the middle of all; its mean period over the
     longest stretch and the standard error of that;
     whether its rate wanders, followed in so many ``pieces``."""
-    late = time_s - period * tick
-    even = np.empty_like(late)
+    late = lateness(time_s, tick.astype(np.float64), period)
+    # Each stretch of the clock takes the place of the lateness that it was found from.
+    even = late
     edges = np.concatenate([[0], pauses + 1, [len(late)]])
     sigma, longest, wanders, slope = np.inf, 0, False, 0.0
     for a, b in pairwise(edges):
@@ -139,7 +147,10 @@ def _lay(
         if through_middle:
             cut = (b - a) // width * width
             x = tick[a : a + cut].reshape(-1, width).mean(axis=1)
-            y = each = np.median(piece[:cut].reshape(-1, width), axis=1)
+            rows = piece[:cut].reshape(-1, width)
+            # In parts: a median works on a copy.
+            step = max((1 << 18) // width, 1)
+            y = each = np.concatenate([np.median(rows[i : i + step], axis=1) for i in range(0, len(rows), step)])
         else:
             at = earliest(piece, width)
             x, each = tick[a:b][at].astype(np.float64), piece[at]
@@ -153,13 +164,15 @@ def _lay(
         smooth = median_filter(left, size, mode="nearest")
         # Wander: the smoothed rest is far more than the blocks' own scatter leaves in it.
         curved = float(np.std(smooth)) > max(8.0 * noise / np.sqrt(size), UNSEEN * period)
-        even[a:b] = np.polyval(line, (tick[a:b] - x0) / scale)
+        course = None
         if curved and len(y) >= 24:
             wanders = True
-            even[a:b] += np.interp(
-                tick[a:b], x, median_filter(left, min(max(len(y) // pieces, 5), 101) | 1, mode="nearest")
-            )
-        even[a:b] += period * tick[a:b]
+            course = median_filter(left, min(max(len(y) // pieces, 5), 101) | 1, mode="nearest")
+        for p in _parts(a, b):
+            even[p] = np.polyval(line, (tick[p] - x0) / scale)
+            if course is not None:
+                even[p] += np.interp(tick[p], x, course)
+            even[p] += period * tick[p]
         if b - a > longest:
             longest, slope = b - a, float(line[0]) / scale
             spread = float(np.std(left - smooth if curved else left))
@@ -167,6 +180,12 @@ def _lay(
             sigma = spread / scale / max(float(np.std(u)), 1e-9) / np.sqrt(max(len(y) / 4.0, 1.0))
     digits = float(np.spacing(np.abs(time_s).max())) / max(int(tick[-1] - tick[0]), 1)
     return even, period + slope, float(np.hypot(sigma, digits)), wanders
+
+
+def _parts(first: int, stop: int) -> Iterator[slice]:
+    """Rows in parts that need little room beside the log itself."""
+    for a in range(first, stop, 1 << 18):
+        yield slice(a, min(a + (1 << 18), stop))
 
 
 def _robust_line(u: FloatArray, y: FloatArray) -> FloatArray:
@@ -214,7 +233,8 @@ def _kind(error: FloatArray, period: float, grid: float) -> StampKind:
     if 0.0 < grid < 1.3 * period and _range(error) < 1.3 * grid:
         return StampKind.ROUNDED
     # One-sided: the early edge is sharp, the late one runs out; or samples come in packets.
-    together = float(np.mean(np.diff(error) < -0.7 * period))
+    falls = sum(np.count_nonzero(np.diff(error[p.start : p.stop + 1]) < -0.7 * period) for p in _parts(0, len(error)))
+    together = falls / max(len(error) - 1, 1)
     if high - middle > 2.0 * (middle - low) or together > 0.02 or high - low > 1.0 * period:
         return StampKind.LATE
     return StampKind.SCATTERED

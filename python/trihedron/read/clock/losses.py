@@ -49,6 +49,13 @@ def earliest(late: FloatArray, width: int) -> IntArray:
     return np.asarray(at, dtype=np.int64)
 
 
+def lateness(time_s: FloatArray, rows: FloatArray, period: float) -> FloatArray:
+    """``time_s - period * rows`` in the place of ``rows``."""
+    rows *= -period
+    rows += time_s
+    return rows
+
+
 def ahead(values: FloatArray, reach: int) -> FloatArray:
     """Minimum over each value and the ``reach`` that follow it."""
     out = values.copy()
@@ -71,10 +78,9 @@ def track(
     n = len(time_s)
     pauses = np.flatnonzero(np.diff(time_s) > PAUSE_STEPS * period)
     edges = np.concatenate([[0], pauses + 1, [n]])
-    row = np.arange(n, dtype=np.int64)
     reach = STALL_STEPS // width + 1
     for _ in range(0 if sees else 3):
-        late = time_s - period * row
+        late = lateness(time_s, np.arange(n, dtype=np.float64), period)
         slopes, weights = [], []
         for a, b in pairwise(edges):
             if b - a >= 4 * width:
@@ -83,18 +89,23 @@ def track(
                 weights.append(b - a)
         if slopes:
             period += float(np.average(slopes, weights=weights))
-    late = time_s - period * row
+    late = lateness(time_s, np.arange(n, dtype=np.float64), period)
+    late /= period
     lost = np.zeros(n, dtype=np.int64)
     back = blocks = 0
     for a, b in pairwise(edges):
         if not sees or b - a < 2 * width:
             continue
-        moved_back, n_blocks = _count_losses(late[a:b] / period, width, reach, is_sharp, lost[a:b])
+        moved_back, n_blocks = _count_losses(late[a:b], width, reach, is_sharp, lost[a:b])
         back, blocks = back + moved_back, blocks + n_blocks
     for k in pauses:
         # How many a pause cost is told no better than its own length.
         lost[k + 1] += max(round(float(time_s[k + 1] - time_s[k]) / period) - 1, 0)
-    return period, row + np.cumsum(lost), pauses.astype(np.int64), back / max(blocks, 1)
+    del late
+    # The ticks in the place of the losses: a log of 1e8 rows has no room for both.
+    tick = np.cumsum(lost, out=lost)
+    tick += np.arange(n)
+    return period, tick, pauses.astype(np.int64), back / max(blocks, 1)
 
 
 def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost: IntArray) -> tuple[int, int]:
@@ -158,22 +169,21 @@ def _settle(first: FloatArray, count: IntArray) -> None:
             return
 
 
-def behind_late_rows(tick: IntArray, error: FloatArray) -> IntArray:
+def behind_late_rows(tick: IntArray, error: FloatArray, period: float) -> IntArray:
     """Ticks with every loss put behind the rows that it would have stamped before they were taken.
 
-    A row late by most of a period in front of a loss looks like one behind it; counted so its ``error`` (n,), in
-    periods about the earliest stamps, is negative.
+    A row late by most of a period in front of a loss looks like one behind it; counted so its ``error`` (n,) about the
+    earliest stamps is negative.
     """
-    lost = np.diff(tick, prepend=tick[0] - 1) - 1
-    at = np.flatnonzero(lost > 0)
+    at = np.flatnonzero(tick[1:] > tick[:-1] + 1) + 1
     if not len(at):
         return tick
-    early = -0.1
+    early = -0.1 * period
     shift = np.zeros(len(tick), dtype=np.int64)
     moved = False
     for i in at:
-        k, count = int(i), int(lost[i])
-        while k < len(tick) and k < i + STALL_STEPS and error[k] < early and lost[k] == (count if k == i else 0):
+        k, count = int(i), int(tick[i] - tick[i - 1] - 1)
+        while k < len(tick) and k < i + STALL_STEPS and error[k] < early and (k == i or tick[k] == tick[k - 1] + 1):
             shift[k] += count
             k += 1
         moved = moved or k > int(i)

@@ -61,7 +61,7 @@ def settle_clock(
         return Settled(time_s, start_s, Sampling(StampKind.IRREGULAR, clock.period_s), None, ())
     lost = clock.lost_behind
     share, sigma = 0.0, float("inf")
-    shared = float(np.mean(np.diff(time_s) == 0.0))
+    shared = float(np.mean(time_s[1:] == time_s[:-1]))
     is_even = False
     if clock.stamp_error_s > WORTH * clock.period_s:
         share, sigma = followed(time_s, clock.even_s, clock.tick, triads)

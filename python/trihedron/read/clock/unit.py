@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from trihedron.read.clock.rate import usual_step
 from trihedron.read.errors import ReadError
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Severity
@@ -63,13 +64,12 @@ def time_unit(
         return parse_time_unit(given)
     if named:
         return named
-    step = np.diff(raw)
-    positive = step[step > 0]
-    if not len(positive):
+    n_steps, n_forward = len(raw) - 1, int(np.count_nonzero(raw[1:] > raw[:-1]))
+    if not n_forward:
         return "s"
     # Stamps that several rows share: a row lasts the span over the rows, not the step between stamps.
-    shared = len(positive) < 0.8 * len(step)
-    usual = float((raw[-1] - raw[0]) / len(step)) if shared else float(np.median(positive))
+    shared = n_forward < 0.8 * n_steps
+    usual = float((raw[-1] - raw[0]) / n_steps) if shared else usual_step(raw)
     start = float(raw[0])
     possible = [
         u for u in _CANDIDATES if PLAUSIBLE_HZ[0] <= 1.0 / (usual * SECONDS[u]) <= PLAUSIBLE_HZ[1]

@@ -25,6 +25,33 @@ class Lines:
     """First line that opens a quote and does not close it; 0 where there is none."""
 
 
+class RowLines:
+    """The line of every row; one number is enough as long as no line is left out."""
+
+    def __init__(self) -> None:
+        self.first = 0
+        self._next = 0
+        self._parts: list[Counts | range] = []
+
+    def append(self, lines: Counts) -> None:
+        """The lines (k,) of the next rows."""
+        start, stop = int(lines[0]), int(lines[-1]) + 1
+        if not self._parts:
+            self.first = start
+        is_run = stop - start == len(lines)
+        if is_run and self._parts and start == self._next and isinstance(self._parts[-1], range):
+            self._parts[-1] = range(self._parts[-1].start, stop)
+        else:
+            self._parts.append(range(start, stop) if is_run else lines)
+        self._next = stop
+
+    def all(self) -> Counts | None:
+        """Lines (n,) of all rows; None where each follows the one before."""
+        if len(self._parts) == 1 and isinstance(self._parts[0], range):
+            return None
+        return np.concatenate([np.asarray(part, dtype=np.int64) for part in self._parts])
+
+
 def regular(data: bytes, layout: Layout) -> bytes:
     """One separator between fields, none around lines."""
     separator = layout.separator.encode()

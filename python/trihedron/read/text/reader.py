@@ -11,13 +11,15 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from trihedron.read.columns import find_columns
 from trihedron.read.errors import ReadError
 from trihedron.read.table import FloatArray, Progress, Table, check_memory, file_sha256
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks
 from trihedron.read.text.cells import MAX_WORDS, TextColumn, find_text_columns, numbers, parse, refuse_words
 from trihedron.read.text.dates import past_midnight
 from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect, is_comment, split
-from trihedron.read.text.lines import Lines, data_lines, offset_of_line, regular
+from trihedron.read.text.lines import Lines, RowLines, data_lines, offset_of_line, regular
+from trihedron.read.text.store import Store
 from trihedron.records import Finding, FindingCode, Severity
 
 _SAMPLE_BYTES = 1 << 18
@@ -43,8 +45,8 @@ class TextReader:
         self.path, self.compression, self.size, self.progress = path, compression, size, progress
         self.content, self.true_lines, self.sha256 = content, lines, sha256
         self.cursor = Cursor()
-        self.parts: list[list[FloatArray]] = []
-        self.lines: list[npt.NDArray[np.int64]] = []
+        self.store = Store(0)
+        self.lines = RowLines()
         self.text_columns: dict[int, TextColumn] = {}
         self.findings: list[Finding] = []
         self.n_rows = 0
@@ -107,7 +109,6 @@ class TextReader:
             )
         self._account_for_stray(layout)
         self.comments.append(np.array(layout.remarks, dtype=np.int64))
-        self.parts = [[] for _ in range(layout.n_fields)]
         return layout
 
     def _account_for_stray(self, layout: Layout) -> None:
@@ -210,14 +211,28 @@ class TextReader:
         if suspects:
             as_text = parse(self.path, data, dict.fromkeys(frame.columns, pl.String), layout, int(lines[0]))
             refuse_words(self.path, frame, as_text.select(suspects), lines, layout)
-        for i in range(layout.n_fields):
-            self.parts[i].append(numbers(frame[str(i)], self.text_columns.get(i)))
-        self.lines.append(lines)
-        self.n_rows += len(lines)
-        rows_per_byte = self.n_rows / max(self.n_bytes + len(data), 1)
-        expected = int(self.size * rows_per_byte) if self.compression is None else self.n_rows
+        columns = [numbers(frame[str(i)], self.text_columns.get(i)) for i in range(layout.n_fields)]
+        if self.n_rows == 0:
+            self.store = Store(layout.n_fields, self._triads(layout, columns))
+        rows = self.n_rows + len(lines)
+        rows_per_byte = rows / max(self.n_bytes + len(data), 1)
+        expected = int(self.size * rows_per_byte) if self.compression is None else rows
         if expected > 1_000_000:
             check_memory(self.path, expected, layout.n_fields, n_held=self.n_rows)
+        self.store.append(columns, max(expected, rows))
+        self.lines.append(lines)
+        self.n_rows = rows
+
+    def _triads(self, layout: Layout, columns: list[FloatArray]) -> tuple[tuple[int, int, int], ...]:
+        """Which columns will be wanted side by side; what is guessed wrong costs memory and nothing else."""
+        head = Table(self.path, layout.names, tuple(column[:1000] for column in columns), first_line=1)
+        try:
+            chosen = find_columns(head, None, None)
+        except ReadError:
+            return ()
+        found = [triad for triad in (chosen.accelerometer, chosen.gyroscope) if triad is not None]
+        taken = [column for triad in found for column in triad]
+        return tuple(found) if len(set(taken)) == len(taken) else ()
 
     def _table(self, layout: Layout) -> Table:
         if self.n_rows == 0:
@@ -236,9 +251,8 @@ class TextReader:
         words: dict[int, str] = {}
         labels: dict[int, tuple[tuple[str, ...], npt.NDArray[np.int64]]] = {}
         dated = {i for i, column in self.text_columns.items() if column.form and column.form != "date"}
-        for i in range(layout.n_fields):
-            parts, self.parts[i] = self.parts[i], []
-            values = np.concatenate(parts) if len(parts) != 1 else parts[0]
+        for i, given in enumerate(self.store.columns()):
+            values = given
             name = layout.names[i] if layout.names else ""
             text = self.text_columns.get(i)
             if text is not None and i not in dated:
@@ -250,16 +264,14 @@ class TextReader:
                 values = past_midnight(values) if text.form == "time-of-day" else values
             columns.append(values)
             names.append(name)
-        lines = np.concatenate(self.lines)
-        contiguous = int(lines[-1]) - int(lines[0]) == len(lines) - 1
         return Table(
             path=self.path,
             names=tuple(names) if layout.names or dated else None,
             columns=tuple(columns),
             sha256=file_sha256(self.path) if self.sha256 is None else self.sha256,
             metadata=layout.metadata,
-            first_line=int(lines[0]),
-            line_of_row=None if contiguous else lines,
+            first_line=self.lines.first,
+            line_of_row=self.lines.all(),
             findings=tuple(self.findings),
             words=words,
             labels=labels,
