@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.read.audit.repeats import CHUNK
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Severity
 
@@ -40,29 +41,26 @@ def find_walls(readings: FloatArray, noise: FloatArray) -> list[Wall]:
     walls = []
     for axis in range(3):
         values = readings[:, axis]
-        finite = values[np.isfinite(values)]
-        if not len(finite):
-            continue
-        low, high = float(finite.min()), float(finite.max())
-        if low == high:
+        low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
+        if not low < high:
             continue
         for value in (high, low):
-            wall = _wall(values, finite, value, 0.01 * (high - low), float(noise[axis]))
+            wall = _wall(values, value, 0.01 * (high - low), float(noise[axis]))
             if wall is not None:
                 count, stretches, sample = wall
                 walls.append(Wall(axis, value, value == high, count, stretches, sample))
     return walls
 
 
-def _wall(
-    values: FloatArray, finite: FloatArray, value: float, depth: float, noise: float
-) -> tuple[int, int, int] | None:
+def _wall(values: FloatArray, value: float, depth: float, noise: float) -> tuple[int, int, int] | None:
     at = np.flatnonzero(values == value)
     if len(at) < 3:
         return None
-    distance = np.abs(finite - value)
-    near = int(np.count_nonzero(distance <= depth)) - len(at)
-    width = float(distance[distance > 0].min())
+    near, width = -len(at), math.inf
+    for start in range(0, len(values), CHUNK):
+        distance = np.abs(values[start : start + CHUNK] - value)
+        near += int(np.count_nonzero(distance <= depth))
+        width = min(width, float(np.min(distance, where=distance > 0, initial=math.inf)))
     # Towards the top of a smooth peak the density grows as one over the root of the distance, so the share of the
     # topmost level among all within `depth` is the root of its width.
     by_shape = near * min(math.sqrt(width / depth), 1.0)

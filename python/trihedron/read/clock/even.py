@@ -28,6 +28,8 @@ GROWTH = 4.0
 stamps: 16 for steps drawn anew, 1 for an even clock."""
 TAKEN_BACK = 0.02
 """Share of blocks whose earliest stamp may move back by a whole period: an even clock's never do."""
+MOST_BLOCKS = 1 << 18
+"""Blocks of a stretch whose earliest stamps the clock is laid under."""
 CLOSE_PIECES = 60
 """Pieces of a log over which a wandering rate is followed: a thermal drift takes minutes."""
 
@@ -81,20 +83,20 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
         width = block_rows(time_s, period, found.coherence)
         period, tick, pauses, moved_back = track(time_s, period, width, sees, found.coherence > 0.9)
     even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False)
-    error = time_s - even
+    error = _error(time_s, even)
     for _ in range(3 if counter is None and sees else 0):
         # Followed loosely: a loss counted too early makes a dip that the clock must not follow.
         moved = behind_late_rows(tick, error, period)
         if moved is tick:
             break
         tick = moved
-        del even, error
+        del error
         even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False)
-        error = time_s - even
+        error = _error(time_s, even)
     if wanders:
-        del even, error
+        del error
         even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, CLOSE_PIECES)
-        error = time_s - even
+        error = _error(time_s, even)
     on_grid = 0.0 < found.grid_s < 1.3 * period and _range(error) < 1.3 * found.grid_s
     growth = 0.0 if on_grid else _growth(error, pauses, UNSEEN * period)
     if moved_back > TAKEN_BACK or growth > GROWTH or (not sees and growth > 0.5 * GROWTH):
@@ -102,12 +104,19 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
     kind = _kind(error, period, found.grid_s)
     if kind is not StampKind.LATE:
         # Two-sided errors have their middle, not their edge, on the clock.
-        del even, error
+        del error
         even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, True, CLOSE_PIECES)
-        error = time_s - even
+        error = _error(time_s, even)
     middle = error.mean()
     rms = float(np.sqrt(sum(float(np.sum((error[p] - middle) ** 2)) for p in _parts(0, n)) / n))
-    return EvenClock(kind, mean_period, sigma, tick, even, rms, sees, pauses, found.grid_s, wanders)
+    return EvenClock(
+        kind, mean_period, sigma, tick, np.subtract(time_s, error, out=error), rms, sees, pauses, found.grid_s, wanders
+    )
+
+
+def _error(time_s: FloatArray, even: FloatArray) -> FloatArray:
+    """``time_s - even`` in the place of ``even``, which is the stamps less their error again when it is wanted."""
+    return np.subtract(time_s, even, out=even)
 
 
 def _long_run(time_s: FloatArray, tick: IntArray) -> float:
@@ -127,13 +136,14 @@ def _lay(
     tick: IntArray,
     period: float,
     pauses: IntArray,
-    width: int,
+    least: int,
     through_middle: bool,
     pieces: int = 12,
 ) -> tuple[FloatArray, float, float, bool]:
     """The even clock (n,) under the earliest stamps, or through the middle of all; its mean period over the
-    longest stretch and the standard error of that;
-    whether its rate wanders, followed in so many ``pieces``."""
+    longest stretch and the standard error of that; whether its rate wanders, followed in so many ``pieces``.
+
+    ``least`` rows make a block at least."""
     late = lateness(time_s, tick.astype(np.float64), period)
     # Each stretch of the clock takes the place of the lateness that it was found from.
     even = late
@@ -141,6 +151,8 @@ def _lay(
     sigma, longest, wanders, slope = np.inf, 0, False, 0.0
     for a, b in pairwise(edges):
         piece = late[a:b]
+        # A clock drifts over minutes: more blocks than this show no more of it and take room.
+        width = max(least, (b - a) // MOST_BLOCKS)
         if b - a < 4 * width:
             even[a:b] = piece.min() + period * tick[a:b]
             continue
@@ -178,7 +190,7 @@ def _lay(
             spread = float(np.std(left - smooth if curved else left))
             # Neighbouring blocks share what delays them: four count as one.
             sigma = spread / scale / max(float(np.std(u)), 1e-9) / np.sqrt(max(len(y) / 4.0, 1.0))
-    digits = float(np.spacing(np.abs(time_s).max())) / max(int(tick[-1] - tick[0]), 1)
+    digits = float(np.spacing(max(abs(time_s[0]), abs(time_s[-1])))) / max(int(tick[-1] - tick[0]), 1)
     return even, period + slope, float(np.hypot(sigma, digits)), wanders
 
 
