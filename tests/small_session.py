@@ -58,6 +58,16 @@ def made_once() -> Path:
     return folder
 
 
+def made_elsewhere() -> Path:
+    """The same, made by a process of its own: this one has then read no table and can be forked."""
+    code = "from small_session import made_once; print(made_once())"
+    path = os.pathsep.join([str(Path(__file__).parent), *(p for p in sys.path if p)])
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": path}
+    )
+    return Path(done.stdout.strip())
+
+
 def quietly(*arguments: str) -> int:
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         return main(list(arguments))

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import tokenize
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.table import FloatArray, Table, check_memory, file_sha256
+from trihedron.read.room import check_memory, check_unpacked
+from trihedron.read.table import FloatArray, Table, file_sha256
 
 _BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
 # NumPy evaluates a header as Python text, so a damaged one fails in the ways of a parser.
@@ -27,24 +29,61 @@ _DAMAGE = (
 def read_npy(path: Path) -> Table:
     """An array (n, k) or a structured array (n,), memory-mapped while it is taken apart."""
     try:
-        array = np.load(path, mmap_mode="r", allow_pickle=False)
+        with path.open("rb") as stream:
+            shape, dtype = _header(stream)
+            cells = math.prod(shape)
+            if min(shape, default=1) < 0 or dtype.itemsize * cells != path.stat().st_size - stream.tell():
+                raise ValueError(f"its header says {dtype} of shape {shape}, and it has another length")
+            check_memory(path, cells, 1)
+            stream.seek(0)
+            # Read, not mapped: a mapped file that somebody shortens ends the process.
+            array = np.load(stream, allow_pickle=False)
     except OSError as error:
         raise from_os_error(path, error) from None
     except _DAMAGE as error:
+        if isinstance(error, ReadError):
+            raise
         raise ReadError(f"{path}: this .npy file is damaged or holds Python objects ({_first(error)}).") from None
     return _from_arrays(path, {"data": array}, None)
+
+
+def _header(stream: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of the array that follows; the stream stands behind them."""
+    version = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(stream)
+    if dtype.hasobject:
+        raise ValueError("objects of Python are not read")
+    return shape, dtype
 
 
 def read_npz(path: Path, device: int | None) -> Table:
     """Named arrays: one per column, or a block ``counts`` (n, k) or (n, units, k), ``t_s``, ``fs_hz``."""
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+            _check_members(path, archive)
             arrays = {name: archive[name] for name in archive.files}
     except OSError as error:
         raise from_os_error(path, error) from None
     except _DAMAGE as error:
+        if isinstance(error, ReadError):
+            raise
         raise ReadError(f"{path}: this .npz archive is damaged or holds Python objects ({_first(error)}).") from None
     return _from_arrays(path, arrays, device)
+
+
+def _check_members(path: Path, archive: Any) -> None:
+    """Refuse an archive whose members do not fit, by what it and they say of themselves."""
+    packed = unpacked = 0
+    for info in archive.zip.infolist():
+        packed, said = packed + info.compress_size, info.file_size
+        with archive.zip.open(info) as member:
+            if member.peek(6)[:6] == b"\x93NUMPY":
+                shape, dtype = _header(member)
+                if min(shape, default=1) < 0 or dtype.itemsize * math.prod(shape) > info.file_size:
+                    raise ValueError(f"{info.filename} says {dtype} of shape {shape} and is shorter")
+        unpacked += said
+    check_unpacked(path, packed, unpacked)
 
 
 def _first(error: BaseException) -> str:

@@ -8,7 +8,8 @@ import numpy as np
 import polars as pl
 
 from trihedron.read.errors import ReadError, from_os_error, refuse_after_fork
-from trihedron.read.table import FloatArray, Table, check_memory, file_sha256
+from trihedron.read.room import check_memory
+from trihedron.read.table import FloatArray, Table, file_sha256
 from trihedron.records import Finding, FindingCode, Severity
 
 

@@ -11,14 +11,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.errors import from_os_error
 from trihedron.records import Finding
 
 FloatArray = npt.NDArray[np.float64]
 Progress = Callable[[float, str], None]
-
-BYTES_PER_CELL_AT_PEAK = 24
-"""Columns (8 bytes), the sensors' own (n, 3) arrays (8) and one pass of the audit (at most 8)."""
 
 
 @dataclass(frozen=True)
@@ -118,32 +115,3 @@ def file_sha256(path: Path) -> str:
     except OSError as error:
         raise from_os_error(path, error) from None
     return digest.hexdigest()
-
-
-def available_memory_bytes() -> int | None:
-    """Memory this process may still take, or None where the system does not say."""
-    try:
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) * 1024
-    except (OSError, ValueError, IndexError):
-        return None
-    return None
-
-
-def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None = None, n_held: int = 0) -> None:
-    """Refuse a log that would not fit, before it takes the machine down.
-
-    Raises
-    ------
-    ReadError
-        When ``n_rows * n_columns * 24`` bytes, less 8 for every cell of the ``n_held`` rows already read, exceed what
-        the machine has left.
-    """
-    left = available_memory_bytes() if available is None else available
-    needed = n_rows * n_columns * BYTES_PER_CELL_AT_PEAK
-    if left is not None and needed - 8 * n_held * n_columns > left:
-        raise ReadError(
-            f"{path}: about {n_rows:.3g} rows of {n_columns} columns need {needed / 1e9:.1f} GB of memory and this "
-            f"machine has {left / 1e9:.1f} GB left; cut the log into parts and read them one by one."
-        )

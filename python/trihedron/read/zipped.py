@@ -11,7 +11,8 @@ from pathlib import Path, PurePosixPath
 from trihedron.read.archive import read_npz
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.table import Progress, Table, check_memory, file_sha256
+from trihedron.read.room import check_unpacked
+from trihedron.read.table import Progress, Table, file_sha256
 from trihedron.records import Finding, FindingCode, Severity
 
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")
@@ -117,8 +118,13 @@ def _member(
     from trihedron.read.columns import sensor_of_file_name
     from trihedron.read.text import read_text
 
-    check_memory(path, archive.getinfo(name).file_size // 2, 1)
-    content = archive.read(name)
+    info = archive.getinfo(name)
+    check_unpacked(path, info.compress_size, info.file_size, f"its member {name}")
+    with archive.open(name) as member:
+        # Not more than was said: a header that lies is found out here.
+        content = member.read(info.file_size + 1)
+    if len(content) != info.file_size:
+        raise ReadError(f"{path}: its member {name} is not as long as the archive says; export it again.")
     if not content.strip():
         raise ReadError(f"{path}: its member {name} is empty; record or export again.")
     tables = read_text(path / name, None, len(content), progress, content, sha256)

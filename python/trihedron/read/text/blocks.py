@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.room import check_unpacked
 
 BLOCK_BYTES = 1 << 23
 """Text parsed at a time: large enough for polars to use every core, small enough not to matter (a block takes some
@@ -55,7 +56,7 @@ def blocks(
     ReadError
         When the file is damaged, or has no line ends.
     """
-    rest, lines = b"", 0
+    rest, lines, unpacked = b"", 0, 0
     try:
         with open_binary(path, compression) if content is None else io.BytesIO(content) as stream:
             while True:
@@ -65,7 +66,10 @@ def blocks(
                 while size < BLOCK_BYTES and (piece := stream.read1(_PIECE_BYTES)):
                     pieces.append(piece)
                     size += len(piece)
+                    unpacked += len(piece)
                     lines += piece.count(b"\n") if compression else 0
+                if compression is not None:
+                    check_unpacked(path, path.stat().st_size, unpacked)
                 data = b"".join(pieces)
                 cursor.is_last = size < BLOCK_BYTES
                 if cursor.is_last:

@@ -8,7 +8,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 from trihedron.read.errors import ReadError, refuse_after_fork
-from trihedron.read.table import Progress, Table, check_memory
+from trihedron.read.room import check_memory
+from trihedron.read.table import Progress, Table
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks
 from trihedron.read.text.dialect import Rewritten, rewrite
 from trihedron.read.text.reader import TextReader

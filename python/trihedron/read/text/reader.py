@@ -13,7 +13,8 @@ import polars as pl
 
 from trihedron.read.columns import find_columns
 from trihedron.read.errors import ReadError
-from trihedron.read.table import FloatArray, Progress, Table, check_memory, file_sha256
+from trihedron.read.room import check_memory
+from trihedron.read.table import FloatArray, Progress, Table, file_sha256
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks
 from trihedron.read.text.cells import MAX_WORDS, TextColumn, find_text_columns, numbers, parse, refuse_words
 from trihedron.read.text.dates import past_midnight

@@ -1,0 +1,1 @@
+"""Attacks on everything that takes what a stranger gives it."""
