@@ -97,7 +97,7 @@ def test_an_error_of_the_disk_is_said(tmp_path, monkeypatch, opener):
 
 
 def test_a_log_larger_than_the_memory_is_refused_before_it_is_read(tmp_path):
-    with pytest.raises(ReadError, match=r"about 1e\+08 rows of 7 columns need 16.8 GB .* cut the log into parts"):
+    with pytest.raises(ReadError, match=r"about 1e\+08 rows of 7 columns need 11.2 GB .* cut the log into parts"):
         check_memory(tmp_path / "huge.csv", 10**8, 7, available=8 * 10**9)
     check_memory(tmp_path / "huge.csv", 10**6, 7, available=8 * 10**9)
 

@@ -26,6 +26,7 @@ from small_session import G, made_elsewhere
 from trihedron.cli import COMMANDS, build_app, main
 
 LONGEST_S = 10
+Files = dict[str, str]
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]")
 
 
@@ -253,7 +254,7 @@ class Commands(Attack):
             value = self._value(rng, flag, parameter, is_tame)
             if is_argument:
                 words.append(value)
-            elif "bool" in repr(parameter.bare_type):
+            elif "bool" in repr(parameter.type_descriptor.annotation):
                 words.append(flag)
             else:
                 words += [flag, value]
@@ -267,7 +268,7 @@ class Commands(Attack):
     def _value(self, rng: np.random.Generator, flag: str, parameter: Any, is_tame: bool) -> str:
         if flag in BY_OPTION:
             return str(rng.choice(BY_OPTION[flag]))
-        kind = repr(parameter.bare_type)
+        kind = repr(parameter.type_descriptor.annotation)
         if "Path" in kind:
             name = flag.lstrip("-")
             if name in ("calibration",):
@@ -315,7 +316,8 @@ class Commands(Attack):
         finally:
             os.chdir("/")
         took = time.monotonic() - began
-        return self._judged(words, status, out.getvalue(), err.getvalue(), (before, _content(folder)), took)
+        files = (before, _content(folder))
+        return self._judged(words, status, out.getvalue(), err.getvalue(), files, took)
 
     def _sandbox(self, rng: np.random.Generator) -> Path:
         folder = self.folder / f"{os.getpid()}"
@@ -349,10 +351,10 @@ class Commands(Attack):
         status: int,
         out: str,
         err: str,
-        before: dict[str, str],
-        after: dict[str, str],
+        files: tuple[dict[str, str], dict[str, str]],
         took: float,
     ) -> str:
+        before, after = files
         said = f"status {status}: {err[-300:]!r}"
         if status not in (0, 1, 2):
             return f"FAILED: {said}"

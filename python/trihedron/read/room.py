@@ -10,18 +10,18 @@ from pathlib import Path
 from trihedron.read.errors import ReadError
 
 BYTES_PER_CELL_AT_PEAK = 16
-"""A number (8 bytes), its share of the clock's stamps and ticks, and of what one pass of the audit needs: 10^7 rows of 7
-columns take 0.97 GB (benches/read_large.py), 12 bytes per cell beside the interpreter's."""
+"""A number (8 bytes), its share of the clock's stamps and ticks, and of what one pass of the audit needs: 10^7 rows of
+7 columns take 0.97 GB (benches/read_large.py), 12 bytes per cell beside the interpreter's."""
 KEPT_FREE = 150_000_000
 """For a block of text that is being parsed, libraries not yet loaded, and threads."""
 MOST_RATIO = 500.0
-"""Logs of still sensors in whole counts shrink up to a hundred times; archives made to harm, a thousand times and more."""
+"""Logs of still sensors in whole counts shrink up to a hundred times; archives made to harm, a thousand and more."""
 RATIO_MATTERS_FROM = 100_000_000
 """Unpacked bytes below which no ratio does harm."""
 
 
 def available_memory_bytes() -> int | None:
-    """Memory this process may still take: of the machine, of its container, of its own limit. None where nothing tells."""
+    """What this process may still take, of the machine, its container, its own limit; None where nothing tells."""
     known = [left for left in (_of_machine(), _of_container(), _of_process()) if left is not None]
     return max(min(known), 0) if known else None
 
@@ -76,27 +76,38 @@ def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None 
         fits = room // (n_columns * BYTES_PER_CELL_AT_PEAK)
         how = f"about {fits:.2g} rows would fit" if fits >= 1000 else "it does not fit at all"
         raise ReadError(
-            f"{path}: about {n_rows:.3g} rows of {n_columns} columns need {needed / 1e9:.1f} GB of memory and there are "
-            f"{left / 1e9:.1f} GB left ({how}); cut the log into parts and read them one by one."
+            f"{path}: about {n_rows:.3g} rows of {n_columns} columns need {needed / 1e9:.1f} GB of memory and there "
+            f"are {left / 1e9:.1f} GB left ({how}); cut the log into parts and read them one by one."
         )
 
 
-def check_unpacked(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
+def check_ratio(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
     """Refuse what was packed to do harm.
 
     Raises
     ------
     ReadError
-        When ``unpacked`` bytes come from a ``packed`` five hundred times smaller, or do not fit into memory.
+        When ``unpacked`` bytes come from a ``packed`` five hundred times smaller.
     """
     if unpacked > RATIO_MATTERS_FROM and unpacked > MOST_RATIO * max(packed, 1):
         raise ReadError(
             f"{path}: {what} unpacks to {unpacked / 1e6:.0f} MB or more from {packed / 1e6:.2g} MB, which no log does; "
             "unpack it yourself if you trust it."
         )
+
+
+def check_unpacked(path: Path, packed: int, unpacked: int, what: str = "the file") -> None:
+    """Refuse what was packed to do harm, and what would be held whole and does not fit into memory.
+
+    Raises
+    ------
+    ReadError
+        As :func:`check_ratio`, or when ``unpacked`` bytes are more than there is room for.
+    """
+    check_ratio(path, packed, unpacked, what)
     left = available_memory_bytes()
     if left is not None and unpacked > max(left - KEPT_FREE, 0):
         raise ReadError(
-            f"{path}: {what} unpacks to {unpacked / 1e9:.1f} GB and there are {left / 1e9:.1f} GB of memory left; unpack it "
-            "and cut it into parts."
+            f"{path}: {what} unpacks to {unpacked / 1e9:.1f} GB and there are {left / 1e9:.1f} GB of memory left; "
+            "unpack it and cut it into parts."
         )

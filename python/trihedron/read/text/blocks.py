@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.room import check_unpacked
+from trihedron.read.room import check_ratio
 
 BLOCK_BYTES = 1 << 23
 """Text parsed at a time: large enough for polars to use every core, small enough not to matter (a block takes some
@@ -69,7 +69,7 @@ def blocks(
                     unpacked += len(piece)
                     lines += piece.count(b"\n") if compression else 0
                 if compression is not None:
-                    check_unpacked(path, path.stat().st_size, unpacked)
+                    check_ratio(path, path.stat().st_size, unpacked)
                 data = b"".join(pieces)
                 cursor.is_last = size < BLOCK_BYTES
                 if cursor.is_last:
