@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from trihedron.interruption import SENTENCE, Interrupted, install, status_of
@@ -9,6 +10,8 @@ from trihedron.interruption import SENTENCE, Interrupted, install, status_of
 
 def main() -> int:
     """Run the command line; interrupted while it still loads, it ends as it would later."""
+    # The allocator of the library of tables complains aloud where threads are short, and goes on without one.
+    os.environ.setdefault("_RJEM_MALLOC_CONF", "background_thread:false")
     try:
         install()
         from trihedron.cli import main as run

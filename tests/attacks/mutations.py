@@ -1,5 +1,6 @@
 """Damage to files: what copying, editing, and malice do to them. Every function takes a generator and is repeatable."""
 
+import copy
 import json
 import re
 
@@ -81,6 +82,6 @@ def of_json(rng: np.random.Generator, data: bytes) -> bytes:
             elif kind < 0.3 and isinstance(node, list):
                 node.append(child)
             else:
-                node[place] = VALUES[int(rng.integers(len(VALUES)))]
+                node[place] = copy.deepcopy(VALUES[int(rng.integers(len(VALUES)))])
             break
     return json.dumps(document).encode()

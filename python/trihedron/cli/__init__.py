@@ -120,7 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _silence_stdout()
         return 0
     except MemoryError:
-        return _refuse("this log does not fit into memory; cut it into parts, or use a machine with more memory.")
+        return _refuse(_memory_sentence())
     except OSError as error:
         if os.environ.get("TRIHEDRON_TRACEBACK"):
             raise
@@ -167,6 +167,24 @@ def _silence_stdout() -> None:
     """Let nothing of what could not be written be tried again when the interpreter ends."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _memory_sentence() -> str:
+    from trihedron.read.room import KEPT_FREE, available_memory_bytes, rows_that_fit
+
+    left = available_memory_bytes()
+    if left is None:
+        return "this log does not fit into memory; cut it into parts, or use a machine with more memory."
+    rows = rows_that_fit(left, 7)
+    if rows < 1000:
+        return (
+            f"there is too little memory to work in ({left / 1e6:.0f} MB left, {KEPT_FREE / 1e6:.0f} MB are needed "
+            "beside a log); raise the limit of memory (`ulimit -v`), or end other programs."
+        )
+    return (
+        f"this does not fit into memory: {left / 1e9:.1f} GB are left, in which a log of about {rows:.2g} rows of 7 "
+        "columns would fit; cut it into parts, or use a machine with more memory."
+    )
 
 
 def _defect_sentence(error: BaseException) -> str:

@@ -58,6 +58,11 @@ def _of_process() -> int | None:
     return None
 
 
+def rows_that_fit(left: int, n_columns: int) -> int:
+    """Rows of a log for which ``left`` bytes are enough."""
+    return max(left - KEPT_FREE, 0) // (n_columns * BYTES_PER_CELL_AT_PEAK)
+
+
 def check_memory(path: Path, n_rows: int, n_columns: int, available: int | None = None, n_held: int = 0) -> None:
     """Refuse a log that would not fit.
 
