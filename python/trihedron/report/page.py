@@ -3,23 +3,51 @@
 from __future__ import annotations
 
 import base64
+from functools import cache
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as installed
+from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
-from trihedron.report.document import Block, Document, Facts, FindingList, Paragraph, Picture, Table
+from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 
 _KINDS: dict[type, str] = {
     Paragraph: "paragraph",
+    Code: "code",
     Facts: "facts",
     Table: "table",
     FindingList: "findings",
     Picture: "picture",
 }
+LONG = 14
+"""Rows of a table that is folded from here on: what fits beside its figure on a screen is not."""
+WORDY = 28
+"""A column with longer cells holds sentences: they wrap, and begin at the left."""
 
 
 def to_html(document: Document) -> str:
     """The whole report, figures drawn and embedded."""
+    sections = [
+        {"heading": section.heading, "blocks": [_shown(block) for block in section.blocks]}
+        for section in document.sections
+    ]
+    lead = None if document.lead is None else _shown(document.lead)
+    text: str = _template().render(
+        document=document,
+        sections=sections,
+        lead=lead,
+        version=_version(),
+        style=Markup(_file("page.css")),
+        script=Markup(_file("page.js")),
+    )
+    return text
+
+
+@cache
+def _template() -> Any:
     environment = Environment(
         loader=PackageLoader("trihedron.report", "."),
         autoescape=True,
@@ -27,15 +55,35 @@ def to_html(document: Document) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    sections = [
-        {"heading": section.heading, "blocks": [_shown(block) for block in section.blocks]}
-        for section in document.sections
-    ]
-    head: dict[str, Any] = {"title": document.title, "subtitle": document.subtitle, "verdict": document.verdict}
-    head |= {"is_trustworthy": document.is_trustworthy, "sections": sections}
-    return environment.get_template("page.html.j2").render(document=head)
+    return environment.get_template("page.html.j2")
+
+
+@cache
+def _file(name: str) -> str:
+    return (files("trihedron.report") / name).read_text(encoding="utf-8")
+
+
+def _version() -> str:
+    try:
+        return installed("trihedron")
+    except PackageNotFoundError:
+        return ""
 
 
 def _shown(block: Block) -> dict[str, Any]:
-    png = base64.b64encode(block.draw()).decode() if isinstance(block, Picture) else ""
-    return {"kind": _KINDS[type(block)], "it": block, "png": png}
+    shown: dict[str, Any] = {"kind": _KINDS[type(block)], "it": block}
+    if isinstance(block, Picture):
+        shown |= {"name": block.name, "caption": block.caption, "drawn": Markup(_drawn(block))}
+    if isinstance(block, Table):
+        shown["is_long"] = len(block.rows) > LONG
+        shown["words"] = [k > 0 and any(len(row[k]) > WORDY for row in block.rows) for k in range(len(block.head))]
+    return shown
+
+
+def _drawn(picture: Picture) -> str:
+    if picture.chart is not None:
+        from trihedron.report.drawn import drawn
+
+        return drawn(picture.chart(), picture.caption)
+    png = base64.b64encode(picture.draw()).decode()
+    return str(Markup('<img alt="{}" src="data:image/png;base64,{}">').format(picture.caption, png))
