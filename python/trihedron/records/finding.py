@@ -84,6 +84,8 @@ class FindingCode(str, Enum):
     EFFECTS_MODELLED = "effects-modelled"
     EFFECT_NOT_APPLIED = "effect-not-applied"
     PROTOCOL_DIFFERS = "protocol-differs"
+    # apply
+    CALIBRATION_DOUBTED = "calibration-doubted"
     # verify, check
     LIMIT_EXCEEDED = "limit-exceeded"
     SAME_RECORDING = "same-recording"

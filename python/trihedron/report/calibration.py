@@ -16,6 +16,7 @@ from trihedron.report.calibration_charts import (
     sphere_chart,
 )
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import (
     duration,
@@ -41,8 +42,9 @@ def calibration_report(
         Section("Result", _result(calibration, segments, recording)),
         Section("Findings", (findings_block(calibration.findings),)),
     ]
-    if segments is not None and recording is not None:
-        sections.append(Section("Figures", tuple(_figures(calibration, segments, recording))))
+    figures = tuple(_figures(calibration, segments, recording))
+    if figures:
+        sections.append(Section("Figures", figures))
     sections += [
         Section("Axes", _meaning(calibration)),
         Section("Certainty", tuple(_certainty(calibration))),
@@ -332,18 +334,15 @@ def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
     return Table(head, tuple(rows), "Gyroscope: angle between predicted and measured gravity after every move")
 
 
-def _figures(calibration: Calibration, segments: Segments, recording: Recording) -> list[Block]:
-    # Drawing is imported when something is drawn: text and JSON need none of it.
-    from trihedron.report import figures
-
+def _figures(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> list[Block]:
     blocks: list[Block] = []
-    if segments.accelerometer_mean is not None:
+    if segments is not None and segments.accelerometer_mean is not None:
         blocks.append(
             Picture(
                 "poses",
                 "Directions of 'up' in the sensor's trihedron, upper and lower hemisphere. Empty regions are poses "
                 "that were not recorded; triangles are the poses that the fit would gain most from, in that order.",
-                partial(figures.draw_poses, calibration.accelerometer, segments.accelerometer_mean),
+                later("figures", "draw_poses", calibration.accelerometer, segments.accelerometer_mean),
                 partial(sphere_chart, calibration.accelerometer, segments.accelerometer_mean),
             )
         )
@@ -353,11 +352,12 @@ def _figures(calibration: Calibration, segments: Segments, recording: Recording)
             Picture(
                 "moves",
                 "Angle between predicted and measured gravity after every move, in sample and held out.",
-                partial(figures.draw_moves, gyroscope.quality),
+                later("figures", "draw_moves", gyroscope.quality),
                 partial(move_chart, gyroscope.quality, segments),
             )
         )
-    blocks.append(signals_picture(recording, segments))
+    if segments is not None and recording is not None:
+        blocks.append(signals_picture(recording, segments))
     return blocks
 
 
@@ -366,15 +366,10 @@ def _residual_picture(calibration: Calibration) -> Picture | None:
     if quality is None:
         return None
 
-    def png() -> bytes:
-        from trihedron.report import figures
-
-        return figures.draw_residuals(quality)
-
     return Picture(
         "residuals",
         "Norm of gravity minus its true value in every still pose, against three standard errors of noise alone; "
         "circles: predicted by a fit that did not see that pose.",
-        png,
+        later("figures", "draw_residuals", quality),
         partial(residual_chart, quality),
     )

@@ -19,6 +19,7 @@ from trihedron.report.diagnosis_numbers import (
     stages_blocks,
 )
 from trihedron.report.document import Block, Document, Facts, Headline, Level, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -382,23 +383,14 @@ def _physics(diagnosis: Diagnosis) -> list[Picture]:
         if chart is not None:
             caption = f"{effect.id}: data (dots) against what drives it, with the model. "
             caption += _without_strongest(effect.statement)
-            out.append(Picture(f"effect-{effect.id}", caption, _no_png, lambda drawn=chart: drawn))  # type: ignore[misc]
+            out.append(Picture(f"effect-{effect.id}", caption, None, lambda drawn=chart: drawn))  # type: ignore[misc]
     return out
-
-
-def _no_png() -> bytes:
-    raise NotImplementedError("this figure is drawn in pages only")
 
 
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     has_effects = bool(diagnosis.effects)
 
-    def draw() -> bytes:
-        # Drawing is imported when something is drawn: text and JSON need none of it.
-        from trihedron.report import diagnosis_figures
-
-        return diagnosis_figures.draw_before_after(residuals, has_effects=has_effects)
-
+    draw = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
     n = len(residuals.before)
     caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'hold' else 'move')}; "
     caption += "bars: twice the noise predicted for one number."

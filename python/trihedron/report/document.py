@@ -10,6 +10,7 @@ from trihedron.records import Finding, Severity
 
 if TYPE_CHECKING:
     from trihedron.report.chart import Chart
+    from trihedron.report.figures import ShownFigure
 
 Level = Literal["good", "usable", "bad"]
 """The colour of a verdict: nothing speaks against it, something does, not to be trusted."""
@@ -54,11 +55,14 @@ class FindingList:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure that is drawn when a writer can show it: ``draw`` returns a PNG file, ``chart`` what a page draws."""
+    """A figure that is drawn when a writer can show it, ``chart`` by a page.
+
+    ``draw`` is for a notebook or a file, and raises ``NoFiguresError`` without matplotlib; None where only pages draw.
+    """
 
     name: str
     caption: str
-    draw: Callable[[], bytes]
+    draw: Callable[[], ShownFigure] | None
     chart: Callable[[], Chart] | None = None
 
 

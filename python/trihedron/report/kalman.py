@@ -19,6 +19,7 @@ from trihedron.records import (
 )
 from trihedron.report.calibration import parameter_table
 from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.kalman_charts import (
     convergence_chart,
@@ -100,7 +101,7 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
             f"convergence-{AXES[axis.axis]}",
             f"Constants of axis {AXES[axis.axis]} after every pose by every method, with the filter's 3σ band around "
             "its last value.",
-            partial(_draw, "draw_convergence", axis),
+            later("kalman_figures", "draw_convergence", axis),
             partial(convergence_chart, axis, outcome.accelerometer.raw_unit),
         )
         for axis in outcome.axes
@@ -110,19 +111,19 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
             "innovations",
             "Normalised innovations squared: every pose that is judged, their running mean, and where 99 % of such "
             "means lie when the noise model is right.",
-            partial(_draw, "draw_innovations", outcome.axes),
+            later("kalman_figures", "draw_innovations", outcome.axes),
             partial(innovations_chart, outcome.axes),
         ),
         Picture(
             "drift",
             "Slow noise that the filter saw: while it ran, and smoothed with all readings, with 1σ bands.",
-            partial(_draw, "draw_drift", outcome.axes),
+            later("kalman_figures", "draw_drift", outcome.axes),
             partial(drift_chart, outcome.axes, outcome.accelerometer.raw_unit),
         ),
         Picture(
             "residual",
             "Corrected minus reference specific force of every pose.",
-            partial(_draw, "draw_residual", outcome.residual_m_s2),
+            later("kalman_figures", "draw_residual", outcome.residual_m_s2),
             partial(residual_chart, outcome.residual_m_s2),
         ),
     ]
@@ -148,20 +149,20 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
         Picture(
             "convergence",
             "S and b after every pose, with the 3σ band around their last values.",
-            partial(_draw, "draw_norm_convergence", outcome),
+            later("kalman_figures", "draw_norm_convergence", outcome),
             partial(norm_convergence_chart, outcome),
         ),
         Picture(
             "innovations",
             "Normalised innovations squared: every pose that is judged, their running mean, and where 99 % of such "
             "means lie when the noise model is right.",
-            partial(_draw, "draw_innovations", (outcome,)),
+            later("kalman_figures", "draw_innovations", (outcome,)),
             partial(innovations_chart, (outcome,)),
         ),
         Picture(
             "residual",
             "Length of the corrected reading minus |g| in every pose.",
-            partial(_draw, "draw_residual", outcome.residual_m_s2[:, None]),
+            later("kalman_figures", "draw_residual", outcome.residual_m_s2[:, None]),
             partial(residual_chart, outcome.residual_m_s2[:, None]),
         ),
     )
@@ -171,13 +172,6 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
         Section("Innovations", (_consistency_table(_consistencies(outcome)),)),
         Section("Figures", pictures),
     ]
-
-
-def _draw(name: str, *what: object) -> bytes:
-    # Drawing is imported when something is drawn: text and JSON need none of it.
-    from trihedron.report import kalman_figures
-
-    return bytes(getattr(kalman_figures, name)(*what))
 
 
 def _residual_words(residual: FloatArray) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from trihedron.records import Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
 from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.noise_charts import allan_chart
 from trihedron.report.noise_units import TERM_WORDS, customary, unit_of
@@ -320,18 +321,12 @@ def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
     return Picture(
         f"allan-{axes[0].name.split()[0]}",
         caption,
-        partial(_draw, noise, [(unit, axes)]),
+        later("noise_figures", "draw_allan", noise.curve, [(unit, axes)]),
         partial(allan_chart, noise.curve, unit, axes),
     )
 
 
-def draw_noise(noise: Noise) -> bytes:
-    """All curves of a log in one PNG file, a row for each sensor."""
-    return _draw(noise, _groups(noise))
-
-
-def _draw(noise: Noise, sensors: list[tuple[str, list[NoiseAxis]]]) -> bytes:
-    # Drawing is imported when something is drawn: text and JSON need none of it.
-    from trihedron.report.noise_figures import draw_allan
-
-    return draw_allan(noise.curve, sensors)
+def noise_picture(noise: Noise) -> Picture:
+    """All curves of a log in one figure, a row for each sensor."""
+    draw = later("noise_figures", "draw_allan", noise.curve, _groups(noise))
+    return Picture("allan", "Allan deviation of every axis.", draw)

@@ -9,12 +9,13 @@ from importlib.metadata import version as installed
 from importlib.resources import files
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
+from trihedron.report.drawing import NoFiguresError
 
-_KINDS: dict[type, str] = {
+KINDS: dict[type, str] = {
     Paragraph: "paragraph",
     Code: "code",
     Facts: "facts",
@@ -35,7 +36,7 @@ def to_html(document: Document) -> str:
         for section in document.sections
     ]
     lead = None if document.lead is None else _shown(document.lead)
-    text: str = _template().render(
+    return template("page.html.j2").render(
         document=document,
         sections=sections,
         lead=lead,
@@ -43,19 +44,34 @@ def to_html(document: Document) -> str:
         style=Markup(_file("page.css")),
         script=Markup(_file("page.js")),
     )
-    return text
 
 
 @cache
-def _template() -> Any:
-    environment = Environment(
+def template(name: str) -> Template:
+    """A template of this room; whatever goes into it is escaped."""
+    return Environment(
         loader=PackageLoader("trihedron.report", "."),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-    )
-    return environment.get_template("page.html.j2")
+    ).get_template(name)
+
+
+def png_of(picture: Picture) -> bytes:
+    """A figure drawn, as a PNG file.
+
+    Raises
+    ------
+    NoFiguresError
+        When matplotlib is not installed.
+    """
+    if picture.draw is None:
+        raise NoFiguresError(f"the figure {picture.name} is drawn in reports alone: write a report to an .html file.")
+    figure = picture.draw()
+    from trihedron.report.figures import png
+
+    return png(figure)
 
 
 @cache
@@ -71,7 +87,7 @@ def _version() -> str:
 
 
 def _shown(block: Block) -> dict[str, Any]:
-    shown: dict[str, Any] = {"kind": _KINDS[type(block)], "it": block}
+    shown: dict[str, Any] = {"kind": KINDS[type(block)], "it": block}
     if isinstance(block, Picture):
         shown |= {"name": block.name, "caption": block.caption, "drawn": Markup(_drawn(block))}
     if isinstance(block, Table):
@@ -85,5 +101,9 @@ def _drawn(picture: Picture) -> str:
         from trihedron.report.drawn import drawn
 
         return drawn(picture.chart(), picture.caption)
-    png = base64.b64encode(picture.draw()).decode()
+    try:
+        png = base64.b64encode(png_of(picture)).decode()
+    except NoFiguresError as error:
+        # A page without its figures is still the whole answer; it says what is missing and how to have it.
+        return str(Markup("<p>[Not drawn: {}]</p>").format(error))
     return str(Markup('<img alt="{}" src="data:image/png;base64,{}">').format(picture.caption, png))

@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron.records import Recording, Segments
 from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
 from trihedron.report.session_charts import signals_chart
@@ -97,13 +98,7 @@ def hold_table(recording: Recording, segments: Segments) -> Table:
 
 def signals_picture(recording: Recording, segments: Segments) -> Picture:
     """The signals with the holds shaded."""
-
-    def draw() -> bytes:
-        # Drawing is imported when something is drawn: text and JSON need none of it.
-        from trihedron.report import figures
-
-        return figures.draw_signals(recording, segments)
-
+    draw = later("figures", "draw_signals", recording, segments)
     return Picture(
         "signals",
         "The recording; shaded where the sensor stood still, orange where a still pose was bumped.",

@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron.records import Recording, Segments, Verification
 from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 from trihedron.report.segments import signals_picture
@@ -124,12 +125,7 @@ def _tables(verification: Verification, segments: Segments | None) -> list[Block
 
 
 def _errors_picture(verification: Verification) -> Picture:
-    def draw() -> bytes:
-        # Drawing is imported when something is drawn: text and JSON need none of it.
-        from trihedron.report import figures
-
-        return figures.draw_verification(verification)
-
+    draw = later("figures", "draw_verification", verification)
     return Picture(
         "errors",
         "Error in every still pose and after every move, with what was to be expected.",
