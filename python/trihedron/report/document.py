@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from trihedron.records import Finding, Severity
@@ -115,3 +115,10 @@ class Document:
         lists = [b for section in self.sections for b in section.blocks if isinstance(b, FindingList)]
         is_warned = any(f.severity is Severity.WARNING for found in lists for f in found.findings)
         return "usable" if is_warned else "good"
+
+
+def with_its_making(document: Document) -> Document:
+    """The document with how it was made as its last section, for writers that have no foot."""
+    if not document.provenance:
+        return document
+    return replace(document, sections=(*document.sections, Section("How this was made", (Facts(document.provenance),))))

@@ -27,7 +27,7 @@ def noise_report(
     noise: Noise, lengths: Mapping[str, Mapping[TermName, float | None]] | None = None, accuracy: float = 0.1
 ) -> Document:
     """Lay out the noise of one log; ``lengths`` are seconds of recording per axis and term for ``accuracy``."""
-    findings = told_once(noise)
+    findings = all_findings(noise)
     length = noise.curve.n_samples / noise.curve.rate_hz
     facts = [
         ("length", f"{duration(length)}, {noise.curve.n_samples} samples at {plain_number(noise.curve.rate_hz, 5)} Hz"),
@@ -112,23 +112,6 @@ def all_findings(noise: Noise) -> tuple[Finding, ...]:
         for f in axis.findings
     ]
     return (*noise.findings, *named)
-
-
-def told_once(noise: Noise) -> tuple[Finding, ...]:
-    """The same: what several axes have in common in one finding, each axis with its own figures."""
-    groups: dict[tuple[str, str, str, str], list[Finding]] = {}
-    for finding in all_findings(noise):
-        key = (finding.code.value, finding.severity.value, finding.cause, finding.action)
-        groups.setdefault(key, []).append(finding)
-    return tuple(
-        Finding(first.code, first.severity, " ".join(_capital(f.seen) for f in same), first.cause, first.action)
-        for first, *_ in groups.values()
-        for same in [groups[first.code.value, first.severity.value, first.cause, first.action]]
-    )
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _coloured(noise: Noise) -> list[tuple[str, str]]:
