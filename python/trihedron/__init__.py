@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline import (
         apply,
         calibrate,
+        calibrate_sessions,
         check,
         convert,
         diagnose,
@@ -69,6 +70,7 @@ __all__ = [
     "allan_deviation",
     "apply",
     "calibrate",
+    "calibrate_sessions",
     "check",
     "convert",
     "diagnose",
@@ -86,6 +88,7 @@ __all__ = [
 _VERBS = (
     "apply",
     "calibrate",
+    "calibrate_sessions",
     "check",
     "convert",
     "diagnose",

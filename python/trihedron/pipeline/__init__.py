@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.improving import driven, improve
     from trihedron.pipeline.reading import read, segment
     from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
+    from trihedron.pipeline.sessions import SessionsResult, calibrate_sessions
     from trihedron.pipeline.simulating import simulate, twin, with_effects
     from trihedron.pipeline.verifying import verify
 
@@ -27,9 +28,11 @@ __all__ = [
     "CheckResult",
     "DiagnosisResult",
     "KalmanResult",
+    "SessionsResult",
     "VerificationResult",
     "apply",
     "calibrate",
+    "calibrate_sessions",
     "check",
     "convert",
     "diagnose",
@@ -76,6 +79,8 @@ _HOME = {
     "CheckResult": "trihedron.pipeline.results",
     "DiagnosisResult": "trihedron.pipeline.results",
     "VerificationResult": "trihedron.pipeline.results",
+    "SessionsResult": "trihedron.pipeline.sessions",
+    "calibrate_sessions": "trihedron.pipeline.sessions",
     "simulate": "trihedron.pipeline.simulating",
     "twin": "trihedron.pipeline.simulating",
     "with_effects": "trihedron.pipeline.simulating",
