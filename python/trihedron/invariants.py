@@ -107,7 +107,7 @@ def triad_jacobian(S_a: FloatArray, S_g: FloatArray) -> FloatArray:
 @dataclass(frozen=True, eq=False)
 class Anchor:
     """What the numbers leave open: ``signs`` (3,) of the accelerometer's axes in frame lower, and ``triad`` (3, 3), the
-    signed permutation of axes nearest to the gyro triad against the accelerometer's, from which its rotation is counted.
+    signed permutation of axes nearest to the gyro triad against the accelerometer's: its rotation is counted from it.
     """
 
     signs: FloatArray

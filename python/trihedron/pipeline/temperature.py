@@ -73,8 +73,8 @@ def _missing(low: float, high: float) -> Finding:
     return Finding(
         FindingCode.TEMPERATURE_MISSING,
         Severity.SERIOUS,
-        f"The calibration follows temperature ({low:.1f} to {high:.1f} °C) and the log has none: S and b of its reference "
-        "temperature were used.",
+        f"The calibration follows temperature ({low:.1f} to {high:.1f} °C) and the log has none: S and b of its "
+        "reference temperature were used.",
         "No temperature column was logged, or it was not recognised.",
         "Log the sensor's temperature; name its column with --columns temperature=N.",
         MappingProxyType({"low_degc": low, "high_degc": high}),
