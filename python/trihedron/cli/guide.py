@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Optional
 
@@ -16,10 +16,7 @@ from trihedron.cli.options import Force, LogSource, with_options
 if TYPE_CHECKING:
     from trihedron.capture import Block, Recorder
     from trihedron.records import Recording
-    from trihedron.records.guiding import FloatArray, GuideView
-
-STEP_S = 0.25
-"""Of a replayed log: as the blocks of a live one."""
+    from trihedron.records.guiding import GuideView
 
 DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 Show = Callable[["GuideView"], None]
@@ -47,59 +44,26 @@ def guide(
     """Replay a log through the guide: what it would have said pose by pose, then calibrate and verify."""
     from trihedron.cli.output import check_outputs
     from trihedron.cli.screen import as_text
-    from trihedron.pipeline.guiding import examine, part_of
+    from trihedron.pipeline.replaying import replay
     from trihedron.records.guiding import Accuracy
-    from trihedron.units import STANDARD_GRAVITY_M_S2
 
     wanted = Accuracy.parse(accuracy)
     check_outputs(output, force=force)
-    recording = source.read()
-    now = {"s": 0.0}
-    made = _guide(
-        wanted,
-        lambda: examine(
-            part_of(recording, -math.inf, now["s"] + 1e-9), wanted, gravity_m_s2=gravity or STANDARD_GRAVITY_M_S2
-        ),
-    )
-    readings = readings_of(recording)
-    n_events = 0
-    for first, last in steps(recording.time_s):
-        now["s"] = float(recording.time_s[last - 1])
-        view = made.advance(recording.time_s[first:last], readings[first:last])
-        if view.n_events > n_events:
-            n_events = view.n_events
-            typer.echo(_line(view))
-            if every:
-                typer.echo(as_text(view))
-        if made.is_done:
-            break
-    typer.echo(as_text(made.view()))
-    finish(part_of(recording, -math.inf, now["s"] + 1e-9), made.cut_s, gravity, output, force=force)
+
+    def tell(view: GuideView) -> None:
+        typer.echo(_line(view))
+        if every:
+            typer.echo(as_text(view))
+
+    done = replay(source.read(), wanted, gravity_m_s2=gravity, on_pose=tell)
+    typer.echo(as_text(done.view))
+    finish(done.recording, done.cut_s, gravity, output, force=force)
 
 
 def _guide(wanted: Any, examine: Callable[[], Any]) -> Any:
     from trihedron.capture.guide import Guide
 
     return Guide(wanted, examine)
-
-
-def steps(time_s: FloatArray) -> Iterable[tuple[int, int]]:
-    """Ranges of samples of about ``STEP_S``."""
-    import numpy as np
-
-    edges = np.searchsorted(time_s, np.arange(time_s[0], time_s[-1] + STEP_S, STEP_S))
-    edges = np.unique([*edges, len(time_s)])
-    return zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
-
-
-def readings_of(recording: Recording) -> FloatArray:
-    """(n, 3) or (n, 6), the accelerometer first."""
-    import numpy as np
-
-    parts = [part for part in (recording.accelerometer, recording.gyroscope) if part is not None]
-    if recording.accelerometer is None:
-        raise ValueError(f"{recording.source}: a guide needs the accelerometer; this log has a gyro alone.")
-    return np.hstack(parts)
 
 
 def _line(view: GuideView) -> str:

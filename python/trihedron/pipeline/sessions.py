@@ -16,10 +16,11 @@ import numpy.typing as npt
 from trihedron.estimate.sessions import changes_among, repeated_parameters, thermal_model
 from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector, numbers_jacobian, numbers_of
 from trihedron.pipeline.calibrating import calibrate
-from trihedron.pipeline.reading import Progress
+from trihedron.pipeline.reading import AnyRecording, Progress, recording_of
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.pipeline.session_findings import findings_about
 from trihedron.records import Calibration, Frame, Recording, SensorCalibration
+from trihedron.records.presented import Presented
 from trihedron.records.sessions import PARAMETERS, By, Repeated, Session, SessionsModel, ThermalModel
 from trihedron.sensor_model import in_frame
 
@@ -36,7 +37,7 @@ thermometers in parts is 0.1 to 0.5 °C."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SessionsResult:
+class SessionsResult(Presented):
     """Many recordings as one model, with each recording's own calibration. ``print`` gives the report."""
 
     model: SessionsModel
@@ -62,7 +63,7 @@ class SessionsResult:
 
 
 def calibrate_sessions(
-    recordings: Sequence[Recording | CalibrationResult],
+    recordings: Sequence[AnyRecording | CalibrationResult],
     *,
     by: By = "session",
     labels: Sequence[str] | None = None,
@@ -77,7 +78,7 @@ def calibrate_sessions(
 
     Parameters
     ----------
-    recordings : sequence of Recording or CalibrationResult
+    recordings : sequence of Recording, CalibrationResult, or what trihedron.read takes
         Two or more, in their order in time; each is calibrated by :func:`calibrate` where it is not yet.
     by : "session", "date", "device" or "temperature"
         Groups within which sessions belong together: every recording for itself, those of one day, those of one device;
@@ -105,7 +106,7 @@ def calibrate_sessions(
     groups: list[str] = []
     left_out: list[tuple[str, str]] = []
     for k, given in enumerate(recordings):
-        recording = given.recording if isinstance(given, CalibrationResult) else given
+        recording = recording_of(given)
         label = _label(recording, by) if labels is None else labels[k]
         tell(k / len(recordings), f"calibrating {Path(recording.source).name}")
         try:
@@ -113,7 +114,7 @@ def calibrate_sessions(
                 result = given
             else:
                 place = {"gravity_m_s2": gravity_m_s2, "latitude_deg": latitude_deg, "height_m": height_m}
-                result = calibrate(given, **place)  # type: ignore[arg-type]
+                result = calibrate(recording, **place)  # type: ignore[arg-type]
         except ValueError as error:
             left_out.append((recording.source, str(error)))
             continue

@@ -90,6 +90,8 @@ class FindingCode(str, Enum):
     SESSION_LEFT_OUT = "session-left-out"
     OUTSIDE_VALID_RANGE = "outside-valid-range"
     TEMPERATURE_MISSING = "temperature-missing"
+    # apply
+    CALIBRATION_DOUBTED = "calibration-doubted"
     # verify, check
     LIMIT_EXCEEDED = "limit-exceeded"
     SAME_RECORDING = "same-recording"

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.frames import Columns
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
@@ -41,11 +44,15 @@ def sessions_report(model: SessionsModel) -> Document:
         usable = f"{how_many(n, 'recording')} of which {_and([change.id for change in changed])} changed"
     return Document(
         title="Many recordings",
-        subtitle=", ".join(session.name for session in model.sessions),
+        subtitle=_named([session.name for session in model.sessions]),
         verdict=verdict_of(model.findings, good, usable, "NOT TO BE TRUSTED"),
         is_trustworthy=model.is_trustworthy,
         sections=tuple(sections),
     )
+
+
+def _named(names: list[str]) -> str:
+    return ", ".join(names) if len(names) <= 6 else f"{', '.join(names[:3])} ... {names[-1]}"
 
 
 def _and(words: list[str]) -> str:
@@ -201,18 +208,28 @@ def _sessions(model: SessionsModel) -> Table:
 
 
 def _picture(model: SessionsModel) -> Picture:
-    def draw() -> bytes:
-        # Drawing is imported when something is drawn: text and JSON need none of it.
-        from trihedron.report import sessions_figures
-
-        return sessions_figures.draw_sessions(model)
-
     return Picture(
         "sessions",
         "Every number in every recording with its own error (bars), about the common value; the band is one standard "
         "deviation from recording to recording.",
-        draw,
+        later("sessions_figures", "draw_sessions", model),
     )
+
+
+def sessions_columns(model: SessionsModel) -> Columns:
+    """A row per parameter: common value, error, spreads with their ends (SI)."""
+    columns: dict[str, list[Any]] = {
+        "id": [one.parameter.id for one in model.repeated],
+        "name": [one.parameter.name for one in model.repeated],
+        "unit": [one.parameter.unit for one in model.repeated],
+        "value": [one.value for one in model.repeated],
+        "std": [one.std for one in model.repeated],
+    }
+    for kind in ("within", "between"):
+        spreads: list[Spread | None] = [getattr(one, kind) for one in model.repeated]
+        for part in ("sd", "low", "high"):
+            columns[f"{kind}_{part}"] = [None if s is None else getattr(s, part) for s in spreads]
+    return dict(columns)
 
 
 def session_record(session: Session) -> dict[str, object]:

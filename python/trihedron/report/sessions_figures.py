@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from trihedron.records.sessions import PARAMETERS, SessionsModel
-from trihedron.report.figures import AXIS_COLOURS, INK, panels, png
+from trihedron.report.figures import AXIS_COLOURS, INK, panels
 from trihedron.report.sessions import shown
 
 
-def draw_sessions(model: SessionsModel) -> bytes:
+def draw_sessions(model: SessionsModel) -> Figure:
     """One panel an id: departures of every recording from the common value, with error bars; along temperature where
     that is the model."""
     ids = list(dict.fromkeys(one.parameter.id for one in model.repeated))
@@ -50,7 +51,7 @@ def draw_sessions(model: SessionsModel) -> bytes:
         axes[-1].set_xticks(
             place, [_short(session.name) for session in model.sessions], rotation=20, ha="right", fontsize=7
         )
-    return png(figure)
+    return figure
 
 
 def _short(name: str) -> str:
