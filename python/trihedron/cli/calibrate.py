@@ -68,7 +68,7 @@ def calibrate(
 
     With several logs of one unit: one model, and how far every parameter repeats.
     """
-    check_outputs(output, json, force=force, report=report)
+    check_outputs(output, json, force=force, report=report, inputs=sources.files)
     choices = _choices(method, frame, faces, turns, axis_signs, loss)
     if sources.are_many(by):
         if extended or gyro_nominal is not None or {k for k, v in choices.items() if v} - {"method", "loss", "frame"}:

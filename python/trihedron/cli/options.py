@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -84,6 +85,11 @@ class LogSource(ReadingOptions):
         typer.Option("--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own."),
     ] = None
 
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """What is read: no output may lie there."""
+        return self.log, self.accel, self.gyro
+
     def read(self) -> Recording:
         """The audited recording, with progress shown when it takes long."""
         if self.log is None and self.accel is None and self.gyro is None:
@@ -128,6 +134,11 @@ class LogsSource(ReadingOptions):
             "--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own; once for each log."
         ),
     ] = None
+
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """What is read: no output may lie there."""
+        return tuple(path for paths in (self.log, self.accel, self.gyro) for path in paths or ())
 
     def are_many(self, by: str | None) -> bool:
         """Whether several logs were named, or grouping was asked for."""
@@ -226,7 +237,8 @@ def progress(task: str, after_s: float = 1.0) -> Iterator[Callable[[float, str],
     def report(done: float, text: str) -> None:
         nonlocal bar, handle
         if bar is None:
-            if time.monotonic() - began < after_s:
+            # A bar in a file or a pipe would be garbage.
+            if time.monotonic() - began < after_s or not sys.stderr.isatty():
                 return
             from rich.console import Console
             from rich.progress import Progress

@@ -58,7 +58,9 @@ def changes_among(units: Sequence[Sequence[Session]], *, alpha: float) -> tuple[
 def _change(sessions: Sequence[Session], name: str) -> Change:
     picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == name]
     values = np.array([session.numbers[picked] for session in sessions])
-    weights = np.array([_weight(session, picked) for session in sessions])
+    # The wander of one session is read off few poses: that of the unit is the mean over its sessions.
+    wander = np.mean([session.wander[picked] for session in sessions], axis=0)
+    weights = np.array([_weight(session, picked, wander) for session in sessions])
     names = tuple(PARAMETERS[k].name for k in picked)
     p_value, values, weights, name, names = _as_gravity(name, names, values, weights)
     best, rest_p = _best(values, weights, name)
@@ -85,8 +87,8 @@ MIN_REST_P = 0.01
 """What is left after the change named may be chance: at 1 % one change in a hundred is called scatter instead."""
 
 
-def _weight(session: Session, picked: list[int]) -> FloatArray:
-    covariance = session.covariance[np.ix_(picked, picked)] + np.diag(session.wander[picked])
+def _weight(session: Session, picked: list[int], wander: FloatArray) -> FloatArray:
+    covariance = session.covariance[np.ix_(picked, picked)] + np.diag(wander)
     ridge = RIDGE * max(float(np.trace(covariance)) / len(picked), 1e-300)
     return np.asarray(np.linalg.inv(covariance + ridge * np.eye(len(picked))), dtype=np.float64)
 
