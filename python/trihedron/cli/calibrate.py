@@ -62,7 +62,7 @@ def calibrate(
     force: Force = False,
 ) -> None:
     """Calibrate both sensors from a log of still poses and moves."""
-    check_outputs(output, json, force=force, report=report)
+    check_outputs(output, json, force=force, report=report, inputs=source.files)
     choices = _choices(method, frame, faces, turns, axis_signs, loss)
     recording = source.read()
     from trihedron import pipeline

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -78,6 +79,11 @@ class LogSource:
         Optional[str],  # noqa: UP045
         typer.Option("--instance", metavar="N", help="Which of several IMUs whose readings one file holds."),
     ] = None
+
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """What is read: no output may lie there."""
+        return self.log, self.accel, self.gyro
 
     def read(self) -> Recording:
         """The audited recording, with progress shown when it takes long."""
@@ -166,7 +172,8 @@ def progress(task: str, after_s: float = 1.0) -> Iterator[Callable[[float, str],
     def report(done: float, text: str) -> None:
         nonlocal bar, handle
         if bar is None:
-            if time.monotonic() - began < after_s:
+            # A bar in a file or a pipe would be garbage.
+            if time.monotonic() - began < after_s or not sys.stderr.isatty():
                 return
             from rich.console import Console
             from rich.progress import Progress

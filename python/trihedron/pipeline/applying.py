@@ -84,7 +84,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     check_units(known, recording)
     recording, more = without_effects(known, recording)
     accelerometer, gyroscope = recording.accelerometer, recording.gyroscope
-    findings = (*recording.findings, *more, *_doubted(known))
+    findings = (*recording.findings, *more, *doubted(known))
     if gyroscope is not None and known.gyroscope is None:
         gyroscope = None
         findings = (*findings, _left_out())
@@ -164,7 +164,7 @@ def _left_out() -> Finding:
     )
 
 
-def _doubted(calibration: Calibration) -> tuple[Finding, ...]:
+def doubted(calibration: Calibration) -> tuple[Finding, ...]:
     """What the calibration said of itself goes with everything that it is applied to."""
     grave = [finding for finding in calibration.findings if finding.severity is Severity.SERIOUS]
     if not grave:

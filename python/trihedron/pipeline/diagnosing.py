@@ -20,6 +20,7 @@ from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
+from trihedron.pipeline.diagnosing_rest import at_rest, diagnosed_at_rest
 from trihedron.pipeline.improving import driven
 from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segments_of
 from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
@@ -88,6 +89,10 @@ def diagnose(
     tell(0.02, "finding still poses")
     segments = segments_of(segments, recording)
     findings += segments.findings
+    resting = None if against is not None else at_rest(recording, segments, known, gravity)
+    if resting is not None:
+        tell(0.1, "looking at zeros and lines")
+        return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
     simulated: _Free | None = None
     if against is not None:
         tell(0.05, "diagnosing the simulated recording")
