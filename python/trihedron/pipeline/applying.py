@@ -15,6 +15,7 @@ from trihedron.files.calibration import write_calibration as write_file
 from trihedron.files.plausible import require_plausible
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.reading import AnyRecording, recording_of
+from trihedron.pipeline.results import CheckResult
 from trihedron.pipeline.temperature import check_range, thermally_corrected
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
 from trihedron.sensor_model import correct
@@ -47,12 +48,13 @@ def calibration_of(given: AnyCalibration) -> Calibration:
         return given
     if isinstance(given, str | os.PathLike):
         return read_calibration(given)
-    inside = getattr(given, "calibration", None)
+    # A check's is made with a standard gravity, for its error bars alone.
+    inside = None if isinstance(given, CheckResult) else getattr(given, "calibration", None)
     if isinstance(inside, Calibration):
         return inside
     raise WrongTypeError(
         "a calibration is what trihedron.calibrate gives, one that was read from a file, or the name of its file, not "
-        f"a {type(given).__name__}{' without one' if hasattr(given, 'calibration') else ''}."
+        f"{type(given).__name__}."
     )
 
 

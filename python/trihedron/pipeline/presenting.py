@@ -87,7 +87,7 @@ def _kind(result: object) -> _Shown:
         if isinstance(result, known):
             return shown
     names = ", ".join(sorted(known.__name__ for known in _KINDS))
-    raise TypeError(f"a {type(result).__name__} is no result of trihedron; there are {names}.")
+    raise TypeError(f"{type(result).__name__} is no result of trihedron; there are {names}.")
 
 
 def as_dict(result: object) -> dict[str, Any]:
