@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 import time
 from collections.abc import Callable
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from trihedron.capture import Block, Recorder
     from trihedron.records import Recording
     from trihedron.records.guiding import GuideView
+
+MOST_COLUMNS = 120
+"""A wider screen only draws the eye apart."""
 
 DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 Show = Callable[["GuideView"], None]
@@ -48,16 +52,22 @@ def guide(
     from trihedron.records.guiding import Accuracy
 
     wanted = Accuracy.parse(accuracy)
-    check_outputs(output, force=force)
+    check_outputs(output, force=force, inputs=source.files)
 
     def tell(view: GuideView) -> None:
         typer.echo(_line(view))
         if every:
-            typer.echo(as_text(view))
+            typer.echo(as_text(view, *_size()))
 
     done = replay(source.read(), wanted, gravity_m_s2=gravity, on_pose=tell)
-    typer.echo(as_text(done.view))
+    typer.echo(as_text(done.view, *_size()))
     finish(done.recording, done.cut_s, gravity, output, force=force)
+
+
+def _size() -> tuple[int, int]:
+    """Columns and lines of the terminal; what COLUMNS and LINES say, or 80 x 24, elsewhere."""
+    size = shutil.get_terminal_size((80, 24))
+    return max(60, min(size.columns, MOST_COLUMNS)), max(size.lines, 24)
 
 
 def _guide(wanted: Any, examine: Callable[[], Any]) -> Any:
@@ -190,7 +200,7 @@ class _Shown:
             from trihedron.cli.screen import screen
 
             size = self._live.console.size
-            shown = screen(view, min(size.width, 120), size.height, lost=lost, seconds=now - self._started)
+            shown = screen(view, min(size.width, MOST_COLUMNS), size.height, lost=lost, seconds=now - self._started)
             self._live.update(shown, refresh=True)
         elif rings or (view.instruction.split(":")[0] != self._said and self._page is None):
             self._said = view.instruction.split(":")[0]

@@ -7,6 +7,7 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from trihedron.printable import printable
 from trihedron.records import Finding
 from trihedron.report.ascii import ascii_of
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
@@ -33,8 +34,8 @@ class Style:
         return f"\x1b[{code}m{text}\x1b[0m" if self.has_colour and text else text
 
     def plain(self, text: str) -> str:
-        """In the characters there are."""
-        return ascii_of(text) if self.is_ascii else text
+        """In the characters there are, and none that steers a terminal: a log's names are somebody else's."""
+        return printable(ascii_of(text) if self.is_ascii else text)
 
 
 def to_text(document: Document, *, sections: int | None = None, width: int = WIDTH, style: Style | None = None) -> str:
