@@ -8,7 +8,7 @@ import pytest
 
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.effects.stamp_errors import stamp_errors
-from trihedron.diagnose.residuals.aliasing import unresolved_variance
+from trihedron.session.aliasing import unresolved_variance
 from trihedron.diagnose.session.observations import observe
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint

@@ -13,6 +13,7 @@ use crate::error::Result as KernelResult;
 
 mod accelerometer;
 mod allan;
+mod arrays;
 mod chi_square;
 mod gyro_alignment;
 mod kalman;
