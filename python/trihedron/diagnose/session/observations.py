@@ -76,14 +76,16 @@ class Observations:
         """(h, 3) what the means at rest may differ by: noise and scatter of the zeros, accelerometer."""
         if self.zero_scatter is None:
             return self.hold_force_sigma
-        return np.hypot(self.hold_force_sigma, self.zero_scatter[0])
+        out: FloatArray = np.hypot(self.hold_force_sigma, self.zero_scatter[0])
+        return out
 
     @property
     def hold_rate_spread(self) -> FloatArray | None:
         """(h, 3) the same of the gyro."""
         if self.hold_rate_sigma is None or self.zero_scatter is None:
             return self.hold_rate_sigma
-        return np.hypot(self.hold_rate_sigma, self.zero_scatter[1])
+        out: FloatArray = np.hypot(self.hold_rate_sigma, self.zero_scatter[1])
+        return out
 
     @cached_property
     def core_moves(self) -> _core.SessionMoves:
