@@ -29,6 +29,7 @@ mod loss;
 use nalgebra::DVector;
 
 use crate::error::{Error, Result};
+use crate::interrupt;
 pub use dense::{Problem, Solution, minimise, minimise_problem};
 pub use linear::{Certainty, Linear, certainty};
 pub use loss::Loss;
@@ -177,6 +178,9 @@ pub fn descend<D: Descent>(
     let mut damping = 0.0_f64;
     let mut iterations = 0;
     loop {
+        if interrupt::is_requested() {
+            return Err(Error::not_determined("the fit was interrupted"));
+        }
         let local = problem.linearise(&point, previous.as_ref())?;
         iterations += 1;
         if !local.cost().is_finite() || !local.is_finite() {

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 use super::chain::{Chain, Layout};
 use super::fit::{Fit, gradient};
 use super::rows::{Domain, Group};
+use super::strengths::possible_scatters;
 use super::{LOWER, Session, State};
 use crate::error::Result;
 
@@ -76,12 +77,14 @@ impl Fit {
 
     /// `(24, 24)` covariance of `(S_a, b_a, S_ω, b_ω)` row by row, on raw readings whose centres were `origins`
     /// (accelerometer, gyro), and `b_ω` itself.
-    #[must_use]
+    ///
+    /// # Errors
+    /// When a way in which the zeros may scatter leaves the session undetermined.
     pub fn linear_covariance(
         &self,
         session: &Session,
         origins: &[Vector3<f64>; 2],
-    ) -> (DMatrix<f64>, Vector3<f64>) {
+    ) -> Result<(DMatrix<f64>, Vector3<f64>)> {
         let layout = self.layout();
         let mut map = force_map(layout, &origins[0], 24);
         let mut bias = Vector3::zeros();
@@ -101,12 +104,20 @@ impl Fit {
                 }
             }
         }
-        let solved = self.factor.solve(&map);
-        let mut covariance = map.tr_mul(&solved);
+        let mut covariance = DMatrix::zeros(24, 24);
+        let possible = possible_scatters(self, session)?;
+        for one in &possible {
+            let shift = map.tr_mul(&one.step);
+            covariance += map.tr_mul(&one.factor.solve(&map)) * one.weight;
+            covariance.ger(one.weight, &shift, &shift, 1.0);
+        }
+        if possible.is_empty() {
+            covariance = map.tr_mul(&self.factor.solve(&map));
+        }
         let mut corner = covariance.view_mut((21, 21), (3, 3));
         corner += beyond;
         let covariance = (&covariance + covariance.transpose()) * 0.5;
-        (covariance, bias)
+        Ok((covariance, bias))
     }
 
     /// Covariance of the border: both linear models, then effects.

@@ -1,8 +1,9 @@
 //! Strengths of the processes behind the zeros, by marginal likelihood (docs/model-session.md, 11.12).
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::chain::Chain;
+use super::factor::Factor;
 use super::fit::{Fit, RIDGE, chi2_of, fit, gradient};
 use super::move_rows::{Weights, Whitening};
 use super::moves::N_MOVE;
@@ -27,6 +28,12 @@ const SCATTER_GATE: f64 = 5.41;
 /// How far a zero leaves the line between its poses, tried in units of its scatter: a leap at an instant that may be any
 /// is √(1/12) of a leap of √2 (0.4), a leap at either end of the move √2/2 (0.7), a third zero √(3/2) (1.2).
 const BETWEEN: [f64; 8] = [0.15, 0.3, 0.42, 0.6, 0.85, 1.2, 1.7, 2.4];
+/// Scatters of the accelerometer's zero that its error bars allow for, in units of the reference, together as likely
+/// beforehand as none; and corner times of its walk beside them, s.
+const POSSIBLE_SCATTER: [f64; 8] = [0.35, 0.55, 0.85, 1.3, 2.0, 3.2, 5.0, 10.0];
+const POSSIBLE_CORNER_S: [f64; 4] = [20.0, 80.0, 320.0, 2560.0];
+/// Possibilities less likely than this beside the best change no error bar.
+const LEAST_WEIGHT: f64 = 1e-2;
 /// Rows of moves count this much less while strengths of walk and scatter are chosen.
 const DEAF: f64 = 1e-3;
 
@@ -111,8 +118,13 @@ impl Evidence {
         }
     }
 
-    /// Log-evidence at other strengths, from the linear problem here, with the rows of the moves as they are given.
-    fn with(&self, strengths: &Strengths, moves: &Part, hearing: f64) -> f64 {
+    /// Normal equations, `Jᵀr`, `Σ r²` and normalisation at other strengths, with the rows of the moves as given.
+    fn combined(
+        &self,
+        strengths: &Strengths,
+        moves: &Part,
+        hearing: f64,
+    ) -> (Chain, DMatrix<f64>, f64, f64) {
         let factors = [
             strengths.corner_s[0] / self.at.corner_s[0],
             strengths.corner_s[1] / self.at.corner_s[1],
@@ -131,6 +143,12 @@ impl Evidence {
             sum += part.sum * squared;
             weight += part.n as f64 * factor.ln();
         }
+        (chain, side, sum, weight)
+    }
+
+    /// Log-evidence at other strengths, from the linear problem here.
+    fn with(&self, strengths: &Strengths, moves: &Part, hearing: f64) -> f64 {
+        let (chain, side, sum, weight) = self.combined(strengths, moves, hearing);
         let Ok(factor) = chain.factor(RIDGE, None) else {
             return f64::NEG_INFINITY;
         };
@@ -205,7 +223,8 @@ impl Evidence {
         let coarse = best_of(&mut (0..N_SCATTER).step_by(COARSE));
         let reach = COARSE as i32 - 1;
         let fine = best_of(&mut ((coarse - reach).max(0)..(coarse + reach + 1).min(N_SCATTER)));
-        best.scatter[sensor] = SCATTER_FROM * SCATTER_RATIO.powi(fine);
+        let shift = peak([fine - 1, fine, fine + 1].map(|k| value(k).0));
+        best.scatter[sensor] = SCATTER_FROM * SCATTER_RATIO.powf(f64::from(fine) + shift);
     }
 
     /// How far zeros that scatter leave the line between their poses, from the rows of the moves weighed anew.
@@ -230,6 +249,71 @@ impl Evidence {
         }
         best.between
     }
+}
+
+/// Where a parabola through three values at -1, 0, 1 is highest, within half a step.
+fn peak([before, here, after]: [f64; 3]) -> f64 {
+    let bend = before - 2.0 * here + after;
+    if bend < 0.0 && bend.is_finite() {
+        (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    }
+}
+
+/// One way the accelerometer's zeros may scatter: how likely, the step that the fit would make, its normal equations.
+pub(super) struct Possible {
+    pub weight: f64,
+    pub step: DVector<f64>,
+    pub factor: Factor,
+}
+
+/// Ways the accelerometer's zeros may scatter and walk, weighed by their evidence (11.12b); nothing where that is not
+/// asked, or known.
+///
+/// Some twenty lengths of gravity less nine unknowns tell a scatter as large as their noise in half of all sessions
+/// only: error bars that take the one best answer for true cover too little there.
+pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Possible>> {
+    if session.scatter.is_none() || session.is_scatter_given {
+        return Ok(Vec::new());
+    }
+    let evidence = Evidence::of(fit);
+    let n_some = POSSIBLE_SCATTER.len() as f64;
+    let mut tried = Vec::new();
+    let some = POSSIBLE_SCATTER.map(|scatter| (scatter, -n_some.ln()));
+    for (scatter, prior) in std::iter::once((NO_SCATTER, 0.0)).chain(some) {
+        for corner in POSSIBLE_CORNER_S {
+            let mut at = fit.strengths;
+            at.scatter[0] = scatter;
+            at.corner_s[0] = corner;
+            tried.push((evidence.at(&at) + prior, at));
+        }
+    }
+    let best = tried
+        .iter()
+        .map(|(v, _)| *v)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let mut out = Vec::new();
+    for (value, at) in tried {
+        let weight = (value - best).exp();
+        if weight < LEAST_WEIGHT {
+            continue;
+        }
+        let (moves, _) = reweighed(fit, &at)?;
+        let (chain, side, _, _) = evidence.combined(&at, &moves, 1.0);
+        let factor = chain.factor(RIDGE, None)?;
+        let step = -factor.solve(&side).column(0).into_owned();
+        out.push(Possible {
+            weight,
+            step,
+            factor,
+        });
+    }
+    let total: f64 = out.iter().map(|one| one.weight).sum();
+    for one in &mut out {
+        one.weight /= total;
+    }
+    Ok(out)
 }
 
 /// The rows of the moves at other strengths, and the logarithm of their normalisation.

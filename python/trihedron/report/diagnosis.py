@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis, DomainResiduals, DomainTest, HeldOut
@@ -16,6 +16,7 @@ from trihedron.report.diagnosis_numbers import (
     stages_blocks,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -98,6 +99,12 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
             f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
             f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it"
             + (f"; numbers differ too ({listed(numbers)})." if numbers else ".")
+        )
+    if diagnosis.verdict == "not-testable":
+        tested = listed([d.domain for d in diagnosis.domains]) if diagnosis.domains else "nothing"
+        return (
+            f"NOT TESTABLE: this recording does not carry the question ({tested} looked at, nothing named); hold 18 or "
+            "more poses of 3 to 5 s in different directions."
         )
     if diagnosis.verdict == "parameters-differ":
         return f"PARAMETERS DIFFER: {listed(numbers)}; nothing else, no physics is missing."
@@ -312,13 +319,11 @@ def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
         if density is not None:
             unit = str(diagnosis.noise.get(f"{name}_unit", ""))
             words = ", ".join(plain_number(float(d)) for d in density)
-            corner = plain_number(float(diagnosis.noise[f"{name}_corner_s"]))
-            facts.append(
-                (
-                    f"{name} noise",
-                    f"{words} {unit_in_print(unit).replace('sqrt(Hz)', '√Hz')}; bias walk from {corner} s on",
-                )
-            )
+            words += f" {unit_in_print(unit).replace('sqrt(Hz)', '√Hz')}"
+            corner = diagnosis.noise[f"{name}_corner_s"]
+            if corner is not None:
+                words += f"; bias walk from {plain_number(float(corner))} s on"
+            facts.append((f"{name} noise", words))
     blocks.append(Facts(tuple(facts)))
     return tuple(blocks)
 
@@ -341,13 +346,7 @@ def _number_with_sigma(value: float, sigma: float) -> str:
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     has_effects = bool(diagnosis.effects)
 
-    def draw() -> bytes:
-        # Drawing is imported when something is drawn: text and JSON need none of it.
-        from trihedron.report import diagnosis_figures
-
-        return diagnosis_figures.draw_before_after(residuals, has_effects=has_effects)
-
-    made: Callable[[], bytes] = draw
+    made = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
     n = len(residuals.before)
     caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'hold' else 'move')}; "
     caption += "bars: twice the noise predicted for one number."

@@ -86,9 +86,12 @@ def _second_half_minus_first(values: FloatArray) -> FloatArray:
 
 
 def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None) -> FloatArray:
-    """(2, 3) the scatter that strength one means: the median standard error of a pose, accelerometer and gyro, raw."""
+    """(2, 3) the scatter that strength one means: the usual standard error of a pose, accelerometer and gyro, raw.
+
+    One size for three axes: an axis that is noisier than the others need not scatter more.
+    """
     out = np.ones((2, 3))
-    out[0] = np.median(force_sigma, axis=0)
+    out[0] = np.sqrt(np.mean(np.median(force_sigma, axis=0) ** 2))
     if rate_sigma is not None:
-        out[1] = np.median(rate_sigma, axis=0)
+        out[1] = np.sqrt(np.mean(np.median(rate_sigma, axis=0) ** 2))
     return np.maximum(out, 1e-300)

@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use super::{Corners, distortion};
 use crate::python::arrays::{dmatrix, matrix, of3, vectors};
 use crate::python::poisson::vector3;
-use crate::python::run;
+use crate::python::{run, run_long};
 use crate::session_model::Session;
 use crate::session_model::fit::Fit;
 use crate::session_model::predict::domain_of;
@@ -246,7 +246,7 @@ impl SessionFit {
         let effects = distortion(force.as_ref(), rate.as_ref(), self.session.n_points())?;
         let fit = Arc::clone(&self.fit);
         let session = Arc::clone(&self.session);
-        let parts = run(py, || {
+        let parts = run_long(py, || {
             session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, &effects)
         })?;
         let n = self.fit.n_rows();
@@ -309,7 +309,7 @@ impl SessionFit {
             .map(|row| (0..firsts.len()).filter(|&g| row[firsts[g]]).collect())
             .collect();
         let fit = Arc::clone(&self.fit);
-        let out = run(py, || fit.held_out(&lists))?;
+        let out = run_long(py, || fit.held_out(&lists))?;
         let flat: Vec<f64> = out.chi2.iter().flatten().copied().collect();
         Ok((
             flat.to_pyarray(py).reshape([out.chi2.len(), 4])?,
@@ -338,7 +338,8 @@ impl SessionFit {
             vector3("force_origin", &force_origin)?,
             vector3("rate_origin", &rate_origin)?,
         ];
-        let (covariance, bias) = self.fit.linear_covariance(&self.session, &origins);
+        let (fit, session) = (Arc::clone(&self.fit), Arc::clone(&self.session));
+        let (covariance, bias) = run(py, || fit.linear_covariance(&session, &origins))?;
         Ok((matrix(py, &covariance)?, bias.as_slice().to_pyarray(py)))
     }
 

@@ -164,7 +164,7 @@ impl SessionModel {
             between: pair(strengths.2),
         };
         let session = Arc::clone(&self.session);
-        let found = super::run(py, || {
+        let found = super::run_long(py, || {
             if is_tuned {
                 tune(&session, start, strengths, &effects)
             } else {
