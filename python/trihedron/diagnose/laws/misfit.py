@@ -125,7 +125,7 @@ class Misfit:
 
     @cached_property
     def held_out(self) -> tuple[float, float, float]:
-        """Sum of squares, log-determinant and number of what blocks left out are predicted by the rest, no law beside."""
+        """Sum of squares, log-determinant and number of what blocks left out are predicted by the rest, no law."""
         total = sum(float(block.along @ block.along) for block in self._blocks)
         count = float(sum(len(block.along) for block in self._blocks))
         return max(total, 1e-300), sum(block.log_det for block in self._blocks), max(count, 1.0)
