@@ -31,9 +31,9 @@ def accepted_effects(model: StepwiseModel) -> tuple[AcceptedEffect, ...]:
             assert found.variant is not None
             parameters = found.effect.parameters(found.variant, values, cov)
             statement = found.effect.statement(parameters)
-        is_footnote = found.effect.is_spread or (_stated(found) is not None and share < HEADLINE)
+        is_behind = found.effect.is_spread or (_stated(found) is not None and share < HEADLINE)
         record = replace(_accepted(found, values, parameters, statement), share=share)
-        out.append(((is_footnote, -share), record))
+        out.append(((is_behind, -share), record))
     return tuple(one for _, one in sorted(out, key=lambda pair: pair[0]))
 
 
@@ -51,6 +51,14 @@ def shares(model: StepwiseModel) -> tuple[float, ...]:
     whole = max(sum(gains) + excess(model.fitted), 1e-9)
     return tuple(
         gain / whole if (own := _stated(one)) is None else own for one, gain in zip(model.accepted, gains, strict=True)
+    )
+
+
+def are_footnotes(model: StepwiseModel) -> bool:
+    """Whether nothing accepted is an answer: single poses, a faint line, scatter that is little of what zeros do."""
+    return all(
+        share < HEADLINE and (_stated(one) is not None or one.effect.is_spread or one.effect.is_local)
+        for one, share in zip(model.accepted, shares(model), strict=True)
     )
 
 
