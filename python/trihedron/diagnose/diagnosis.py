@@ -17,6 +17,7 @@ from trihedron.diagnose.residuals.within_holds import test_within_static
 from trihedron.diagnose.selection.accepted import accepted_effects
 from trihedron.diagnose.selection.evidence import with_evidence
 from trihedron.diagnose.selection.model import StepwiseModel, begin
+from trihedron.diagnose.selection.numbers import final_numbers
 from trihedron.diagnose.selection.prune import judged_again
 from trihedron.diagnose.selection.score import Scored
 from trihedron.diagnose.selection.stages import held_out_stages
@@ -75,15 +76,16 @@ def diagnose_recording(
     laws = laws_of_rest(run.model.context, run.remaining)
     model, base = run.model, run.bare.fitted
     twin = model.fitted.twin
+    final = final_numbers(model, run.remaining)
     accel_hidden, gyro_hidden = hidden_zeros(model.fitted)
     result = Diagnosis(
         verdict=verdict_of(model, run.domains, run.remaining, has_laws=bool(laws)),
         domains=run.domains,
-        effects=accepted_effects(model),
+        effects=accepted_effects(model, final),
         remaining=run.remaining,
         candidates=tuple(run.candidates[key] for key in sorted(run.candidates)),
         baseline=with_covariance(linear_model(base), base),
-        extended=with_covariance(linear_model(model.fitted), model.fitted),
+        extended=with_covariance(linear_model(final), final),
         noise=MappingProxyType(
             {
                 "accelerometer_density": (np.sqrt((twin.accel_S**2) @ obs.force_density**2)).tolist(),

@@ -10,13 +10,18 @@ import numpy as np
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.compare import excess
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel
+from trihedron.diagnose.session.solve import Fit
 from trihedron.records.diagnosis import AcceptedEffect, EffectParameter
 
 
-def accepted_effects(model: StepwiseModel) -> tuple[AcceptedEffect, ...]:
-    """Every accepted effect with its parameters, the one that explains most of the misfit first."""
-    covariance = model.fitted.covariance()
-    n = model.fitted.n_effect
+def accepted_effects(model: StepwiseModel, numbers: Fit | None = None) -> tuple[AcceptedEffect, ...]:
+    """Every accepted effect with its parameters, the one that explains most of the misfit first.
+
+    ``numbers`` is the fit that parameters and their errors are taken from, where it is another than the model's.
+    """
+    final = model.fitted if numbers is None else numbers
+    covariance = final.covariance()
+    n = final.n_effect
     effect_cov = covariance[len(covariance) - n :, len(covariance) - n :]
     first = 0
     out = []
@@ -24,7 +29,7 @@ def accepted_effects(model: StepwiseModel) -> tuple[AcceptedEffect, ...]:
         k = 0 if found.variant is None else found.variant.distortion.n_parameters
         span = slice(first, first + k)
         first += k
-        values, cov = model.fitted.twin.effect[span], effect_cov[span, span]
+        values, cov = final.twin.effect[span], effect_cov[span, span]
         if found.evidence is not None:
             parameters, statement = found.evidence.parameters, found.evidence.statement
         else:
