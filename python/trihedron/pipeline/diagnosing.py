@@ -15,6 +15,7 @@ from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
+from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
@@ -171,6 +172,9 @@ def _simulated_log(against: GivenModel, recording: Recording, segments: Segments
     if isinstance(against, Recording):
         return against
     if not isinstance(against, Scenario):
+        if not isinstance(against, str | os.PathLike):
+            kind = type(against).__name__
+            raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
         if Path(against).suffix.lower() != ".toml":
             return read(against)
         against = read_scenario(Path(against))
@@ -228,6 +232,8 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
     ValueError
         When the calibration is in another frame than ``lower``.
     """
+    if not isinstance(result, CalibrationResult):
+        raise WrongTypeError(f"trihedron.extend takes what trihedron.calibrate gave, not {type(result).__name__}.")
     base = result.calibration
     if base.frame != "lower":
         raise ValueError(

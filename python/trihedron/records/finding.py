@@ -84,6 +84,12 @@ class FindingCode(str, Enum):
     EFFECTS_MODELLED = "effects-modelled"
     EFFECT_NOT_APPLIED = "effect-not-applied"
     PROTOCOL_DIFFERS = "protocol-differs"
+    # many recordings, temperature
+    NUMBERS_CHANGED = "numbers-changed"
+    FEW_SESSIONS = "few-sessions"
+    SESSION_LEFT_OUT = "session-left-out"
+    OUTSIDE_VALID_RANGE = "outside-valid-range"
+    TEMPERATURE_MISSING = "temperature-missing"
     # apply
     CALIBRATION_DOUBTED = "calibration-doubted"
     # verify, check
