@@ -74,9 +74,9 @@ def _spline_slopes(context: Context, values: FloatArray) -> FloatArray:
     band[2, k - 1], band[1, k], band[0, k + 1] = h[k], 2.0 * (h[k - 1] + h[k]), h[k - 1]
     left, after = (y[k] - y[k - 1]) / h[k - 1][:, None], (y[k + 1] - y[k]) / h[k][:, None]
     right[k] = 3.0 * (h[k][:, None] * left + h[k - 1][:, None] * after)
-    slope: FloatArray = solve_banded((1, 1), band, right)
-    known.append((values, slope))
-    return slope
+    found: FloatArray = solve_banded((1, 1), band, right)
+    known.append((values, found))
+    return found
 
 
 def by_delay(context: Context, values: FloatArray, delay_s: float) -> FloatArray:
