@@ -84,6 +84,13 @@ class FindingCode(str, Enum):
     EFFECTS_MODELLED = "effects-modelled"
     EFFECT_NOT_APPLIED = "effect-not-applied"
     PROTOCOL_DIFFERS = "protocol-differs"
+    # reference
+    REFERENCE_LAG_AMBIGUOUS = "reference-lag-ambiguous"
+    REFERENCE_MISFIT = "reference-misfit"
+    REFERENCE_OUTLIERS = "reference-outliers"
+    REFERENCE_UPSIDE_DOWN = "reference-upside-down"
+    REFERENCE_TURNED_ROUND = "reference-turned-round"
+    SHARED_MOTION = "shared-motion"
     # verify, check
     LIMIT_EXCEEDED = "limit-exceeded"
     SAME_RECORDING = "same-recording"
