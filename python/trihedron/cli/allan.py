@@ -103,9 +103,10 @@ def allan(
         write_whole(csv, curve_csv(found), overwrite=force)
         say(f"curve: {csv}")
     if plot is not None:
-        from trihedron.report.noise import draw_noise
+        from trihedron.report.noise import noise_picture
+        from trihedron.report.page import png_of
 
-        write_whole(plot, draw_noise(found), overwrite=force)
+        write_whole(plot, png_of(noise_picture(found)), overwrite=force)
         say(f"plot: {plot}")
     write_json(machine, json, force=force)
     write_report(document, machine, report, force=force)

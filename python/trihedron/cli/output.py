@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 from collections.abc import Iterable
@@ -48,6 +47,8 @@ def write_report(document: Document, machine: dict[str, Any], report: Path | Non
 
         content = to_text(document)
     else:
+        from trihedron.report.machine import json_text
+
         content = json_text(machine)
     write_whole(report, content, overwrite=force)
     say(f"report: {report}")
@@ -57,18 +58,13 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool) -> 
     """The result for machines, to a file or ('-') to stdout."""
     if target is None:
         return
+    from trihedron.report.machine import json_text
+
     if str(target) == "-":
         typer.echo(json_text(machine), nl=False)
         return
     write_whole(target, json_text(machine), overwrite=force)
     say(f"JSON: {target}")
-
-
-def json_text(machine: dict[str, Any]) -> str:
-    """Strict JSON: what is not a finite number is ``null``."""
-    from trihedron.files.calibration import plain
-
-    return json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:

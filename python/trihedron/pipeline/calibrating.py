@@ -26,7 +26,7 @@ from trihedron.estimate.gyroscope.missing_samples import missing_samples
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.pipeline.choices import settle_gravity
-from trihedron.pipeline.reading import Progress, segment
+from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segments_of
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.sensor_model import in_frame
@@ -46,7 +46,7 @@ Found = tuple[Finding, ...]
 
 
 def calibrate(
-    recording: Recording,
+    recording: AnyRecording,
     *,
     segments: Segments | None = None,
     gravity_m_s2: float | None = None,
@@ -65,8 +65,8 @@ def calibrate(
 
     Parameters
     ----------
-    recording : Recording
-        As :func:`trihedron.read` gives it. Without a gyro the accelerometer is calibrated alone.
+    recording : Recording, or what trihedron.read takes
+        Without a gyro the accelerometer is calibrated alone.
     segments : Segments, optional
         Still poses and moves; found when not given.
     gravity_m_s2 or latitude_deg, height_m : float
@@ -96,7 +96,8 @@ def calibrate(
     if method not in METHODS:
         raise ValueError(f"there is no method {method!r}; choose one of {', '.join(METHODS)}.")
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
-    segments = segment(recording, progress=progress) if segments is None else segments
+    recording = recording_of(recording)
+    segments = segments_of(segments, recording, progress)
     _require_poses(recording, segments)
     if method == "faces":
         calibration = _by_faces(recording, segments, gravity, source, faces, turns_deg, gyroscope_nominal)

@@ -20,14 +20,15 @@ from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
 from trihedron.pipeline.improving import driven
-from trihedron.pipeline.reading import Progress, read, segment
+from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segments_of
 from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
 
-AnyRecording = Recording | str | os.PathLike[str]
+GivenModel = Recording | Scenario | str | os.PathLike[str]
+"""A simulated recording or its file, or a scenario or its .toml."""
 
 
 def diagnose(
@@ -38,7 +39,7 @@ def diagnose(
     height_m: float | None = None,
     segments: Segments | None = None,
     calibration: AnyCalibration | None = None,
-    against: AnyRecording | Scenario | None = None,
+    against: GivenModel | None = None,
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
@@ -46,7 +47,7 @@ def diagnose(
 
     Parameters
     ----------
-    recording : Recording or path
+    recording : Recording, or what trihedron.read takes
         Still poses and moves of one sensor.
     gravity_m_s2 or latitude_deg, height_m : float
         |g| at the place; with a ``calibration`` that of the calibration unless said.
@@ -70,8 +71,7 @@ def diagnose(
     if not 0.0 < alpha < 0.5:
         raise ValueError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
     tell = progress or (lambda _fraction, _text: None)
-    if not isinstance(recording, Recording):
-        recording = read(recording)
+    recording = recording_of(recording)
     known = None if calibration is None else calibration_of(calibration)
     said: tuple[Finding, ...] = ()
     if known is not None and gravity_m_s2 is None and latitude_deg is None and height_m is None:
@@ -85,7 +85,7 @@ def diagnose(
         findings += more
         segments = None if known.extensions.get("effects") else segments
     tell(0.02, "finding still poses")
-    segments = segment(recording) if segments is None else segments
+    segments = segments_of(segments, recording)
     findings += segments.findings
     simulated: _Free | None = None
     if against is not None:
@@ -162,9 +162,7 @@ def _start(
     return (replace(known, gravity_m_s2=gravity), False) if is_poor else (own, True)
 
 
-def _simulated_log(
-    against: AnyRecording | Scenario, recording: Recording, segments: Segments, gravity: float
-) -> Recording:
+def _simulated_log(against: GivenModel, recording: Recording, segments: Segments, gravity: float) -> Recording:
     if isinstance(against, Recording):
         return against
     if not isinstance(against, Scenario):

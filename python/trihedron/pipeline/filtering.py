@@ -17,7 +17,7 @@ from trihedron.estimate.noise import identify_noise, noise_of_holds
 from trihedron.estimate.noise.holds import SHORTEST as SHORTEST_HOLD
 from trihedron.estimate.noise.resolution import converter_step
 from trihedron.pipeline.choices import settle_gravity
-from trihedron.pipeline.reading import Progress, segment
+from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segments_of
 from trihedron.read import read_axis_noise, read_pose_table, read_recording
 from trihedron.records import (
     AxisNoise,
@@ -31,12 +31,13 @@ from trihedron.records import (
     Severity,
 )
 from trihedron.records.noise import Noise
+from trihedron.records.presented import Presented
 
 NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class KalmanResult:
+class KalmanResult(Presented):
     """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report."""
 
     outcome: KalmanCalibration | NormKalmanCalibration
@@ -64,7 +65,7 @@ class KalmanResult:
 
 
 def kalman(
-    recording: Recording,
+    recording: AnyRecording,
     reference: PoseTable | str | os.PathLike[str] | None = None,
     *,
     segments: Segments | None = None,
@@ -80,8 +81,8 @@ def kalman(
 
     Parameters
     ----------
-    recording : Recording
-        As :func:`trihedron.read` gives it.
+    recording : Recording, or what trihedron.read takes
+        The log of still poses.
     reference : PoseTable or file, optional
         Attitudes of the still poses: pitch and roll, or directions. Without it the length of gravity must do.
     sigma_angle_deg : float
@@ -98,11 +99,12 @@ def kalman(
         When the question cannot be answered; one sentence says why and what to do.
     """
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    recording = recording_of(recording)
     table = reference
     if isinstance(table, str | os.PathLike):
         table = read_pose_table(table, gravity_m_s2=gravity, sigma_angle_deg=sigma_angle_deg)
     given, noted, identified = _settle_noise(noise, recording)
-    segments = segment(recording, progress=progress) if segments is None else segments
+    segments = segments_of(segments, recording, progress)
     if identified and isinstance(given, Sequence):
         _check_converter(given, recording, segments)
     outcome: KalmanCalibration | NormKalmanCalibration

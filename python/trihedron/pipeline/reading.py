@@ -15,6 +15,8 @@ from trihedron.records import Recording, Segments
 from trihedron.units import AccelerationUnit, RateUnit
 
 Progress = Callable[[float, str], None]
+AnyRecording = object
+"""A recording, a result that holds one, or what :func:`read` takes: a file, arrays, a dictionary, a data frame."""
 
 
 def read(
@@ -112,8 +114,38 @@ def of_arrays(
     )
 
 
-def segment(recording: Recording, *, progress: Progress | None = None) -> Segments:
+def recording_of(given: AnyRecording) -> Recording:
+    """A recording, whether it is one, belongs to a result, or is what :func:`read` takes (a file, arrays, a frame).
+
+    Raises
+    ------
+    ReadError
+        (a ``ValueError``) when it cannot be read, or is nothing of the kind.
+    """
+    if isinstance(given, Recording):
+        return given
+    inside = getattr(given, "recording", None)
+    return inside if isinstance(inside, Recording) else read(given)
+
+
+def segments_of(given: Segments | None, recording: Recording, progress: Progress | None = None) -> Segments:
+    """Segments as given, or found in the recording.
+
+    Raises
+    ------
+    ValueError
+        When what was given are no segments.
+    """
+    if given is None:
+        return segment(recording, progress=progress)
+    if not isinstance(given, Segments):
+        raise ValueError(f"segments are what trihedron.segment(recording) gives, not a {type(given).__name__}.")
+    return given
+
+
+def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Segments:
     """Still poses and the moves between them, told apart by the sensor's own noise: nothing to set."""
+    recording = recording_of(recording)
     # Loaded when it is needed: half of what a command that only reads would wait for.
     from trihedron.segment import segment_recording
 

@@ -7,10 +7,11 @@ from typing import Any
 
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
+from trihedron.records.presented import Presented
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CalibrationResult:
+class CalibrationResult(Presented):
     """A calibration with the segments and the recording that it was made from. ``print`` gives the report."""
 
     calibration: Calibration
@@ -48,7 +49,7 @@ class CalibrationResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VerificationResult:
+class VerificationResult(Presented):
     """A calibration judged on another recording. ``print`` gives the report."""
 
     verification: Verification
@@ -76,7 +77,7 @@ class VerificationResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CheckResult:
+class CheckResult(Presented):
     """Is a log fit for calibration? ``calibration`` holds the error bars to expect, ``None`` where it cannot be
     made."""
 
@@ -100,7 +101,7 @@ class CheckResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DiagnosisResult(Diagnosis):
+class DiagnosisResult(Diagnosis, Presented):
     """A diagnosis with what it was made from. ``print`` gives a short laboratory report.
 
     ``calibration`` is the linear model at the start: fitted to this recording, or given (``model_is_given``);

@@ -90,7 +90,12 @@ class FindingCode(str, Enum):
     REFERENCE_OUTLIERS = "reference-outliers"
     REFERENCE_UPSIDE_DOWN = "reference-upside-down"
     REFERENCE_TURNED_ROUND = "reference-turned-round"
+    REFERENCE_OF_ITSELF = "reference-of-itself"
+    REFERENCE_ONLY = "reference-only"
+    ACCELEROMETER_NOMINAL = "accelerometer-nominal"
     SHARED_MOTION = "shared-motion"
+    # apply
+    CALIBRATION_DOUBTED = "calibration-doubted"
     # verify, check
     LIMIT_EXCEEDED = "limit-exceeded"
     SAME_RECORDING = "same-recording"

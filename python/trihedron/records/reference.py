@@ -62,13 +62,17 @@ class ReferenceMotion:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Named numbers (n,) with their covariance (n, n) in one SI unit; ``p_value`` that all of them are zero."""
+    """Named numbers (n,) with their covariance (n, n) in one SI unit.
+
+    ``p_value`` that all of them are zero; ``held_out`` rms [SI] of rows left out in turn, without and with them.
+    """
 
     names: tuple[str, ...]
     value: FloatArray
     covariance: FloatArray
     unit: str
     p_value: float | None = None
+    held_out: tuple[float, float] | None = None
 
     @property
     def std(self) -> FloatArray:
@@ -83,6 +87,7 @@ class Estimate:
             "std": self.std.tolist(),
             "unit": self.unit,
             "p_value": self.p_value,
+            "rms_held_out": None if self.held_out is None else list(self.held_out),
         }
 
 
@@ -104,7 +109,22 @@ class FitToReference:
     n_rows: int
     n_left_out: int
     widened: float
-    spectrum: tuple[tuple[float, float], ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        sigma = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return {
+            "S": self.S.tolist(),
+            "b": self.b.tolist(),
+            "sigma_S": sigma[:9].reshape(3, 3).tolist(),
+            "sigma_b": sigma[9:].tolist(),
+            "rms": self.rms,
+            "rms_held_out": self.rms_held_out,
+            "band_hz": self.band_hz,
+            "rows": self.n_rows,
+            "left_out": self.n_left_out,
+            "widened": self.widened,
+        }
 
 
 @dataclass(frozen=True)
@@ -141,3 +161,29 @@ class AgainstReference:
     findings: tuple[Finding, ...] = ()
     residual_time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     residual_rate: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types (the ``reference`` entry of the diagnosis schema)."""
+        rate = self.clock_rate_ppm
+        return {
+            "source": self.source,
+            "kind": self.kind,
+            "overlap_s": self.overlap_s,
+            "correlation": self.correlation,
+            "clock": {
+                "offset_s": self.clock_offset_s[0],
+                "offset_std_s": self.clock_offset_s[1],
+                "at_s": self.clock_middle_s,
+                "rate_ppm": None if rate is None else rate[0],
+                "rate_std_ppm": None if rate is None else rate[1],
+            },
+            "mounting": self.mounting.to_dict(),
+            "lever_arm": None if self.lever_arm is None else self.lever_arm.to_dict(),
+            "vertical": None if self.vertical is None else self.vertical.to_dict(),
+            "gyroscope": self.gyroscope.to_dict(),
+            "accelerometer": None if self.accelerometer is None else self.accelerometer.to_dict(),
+            "effects": {name: one.to_dict() for name, one in self.effects.items()},
+            "replay": [
+                {"stage": r.stage, "horizon_s": r.horizon_s, "error_rad": r.error_rad, "n": r.n} for r in self.replay
+            ],
+        }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis, DomainResiduals, DomainTest, HeldOut
@@ -16,6 +16,7 @@ from trihedron.report.diagnosis_numbers import (
     stages_blocks,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -341,13 +342,7 @@ def _number_with_sigma(value: float, sigma: float) -> str:
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     has_effects = bool(diagnosis.effects)
 
-    def draw() -> bytes:
-        # Drawing is imported when something is drawn: text and JSON need none of it.
-        from trihedron.report import diagnosis_figures
-
-        return diagnosis_figures.draw_before_after(residuals, has_effects=has_effects)
-
-    made: Callable[[], bytes] = draw
+    made = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
     n = len(residuals.before)
     caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'hold' else 'move')}; "
     caption += "bars: twice the noise predicted for one number."

@@ -36,6 +36,8 @@ TRAINED = 0.6
 LEAST_HELD_OUT_S = 12.0
 FORCE_WINDOW_S = 0.1
 """Forces are compared up to 5 Hz: beyond it a position differentiated twice is noise."""
+TURNED_ROUND = 0.2
+"""Beyond this part of the motion left the other direction is tried: shared motion leaves some hundredths."""
 _AXES = ("x", "y", "z")
 
 
@@ -67,6 +69,8 @@ def fit_reference(
     windows = _windows(grid, reference, seen)
     clock = 0 if motion.is_stepwise else 2
     gyro = fit_gyroscope(grid, reference, windows, found.offset_s, found.rate, clock=clock)
+    reference, gyro, is_turned = _right_way_round(grid, reference, windows, gyro, clock)
+    motion = reference.motion
     _refuse_units(recording, gyro, motion)
     _refuse_still(grid, gyro, windows, motion)
     handedness = float(np.sign(np.linalg.det(gyro.A)))
@@ -96,7 +100,27 @@ def fit_reference(
         residual_time_s=grid.time_s[windows.middle],
         residual_rate=gyro.solution.residual,
     )
-    return replace(result, findings=(*motion.findings, *remarks(result, found, gravity_m_s2)))
+    return replace(result, findings=(*motion.findings, *remarks(result, found, is_turned)))
+
+
+def _right_way_round(
+    grid: Grid, reference: Reference, windows: Windows, gyro: GyroFit, clock: int
+) -> tuple[Reference, GyroFit, bool]:
+    """The reference as given, or with attitudes from world to body where only that is the log's motion."""
+    attitude = reference.motion.attitude
+    if attitude is None or _share_left(gyro) < TURNED_ROUND:
+        return reference, gyro, False
+    other = Reference(replace(reference.motion, attitude=np.ascontiguousarray(np.swapaxes(attitude, 1, 2))))
+    turned = fit_gyroscope(grid, other, windows, gyro.offset_s, gyro.rate, clock=clock)
+    if _share_left(turned) < 0.5 * _share_left(gyro):
+        return other, turned, True
+    return reference, gyro, False
+
+
+def _share_left(gyro: GyroFit) -> float:
+    """Rms of what is left over that of the reference's rate, middle rows (medians: knocks do not decide)."""
+    left = np.linalg.norm(gyro.solution.residual, axis=1)
+    return float(np.median(left) / max(float(np.median(gyro.size)), 1e-300))
 
 
 def _stamped(recording: Recording, motion: ReferenceMotion) -> float | None:
@@ -219,6 +243,7 @@ def _effects(
             continue
         value, covariance = -fit.solution.theta[12:], fit.solution.covariance[12:, 12:]
         n = len(value)
+        held_out = (gyro.solution.rms_held_out, fit.solution.rms_held_out)
         if not np.all(np.diag(covariance) > 0.0):
             continue
         sigma = np.sqrt(np.diag(covariance))
@@ -226,7 +251,7 @@ def _effects(
         distance = float((value / sigma) @ np.linalg.solve(correlation, value / sigma)) / n
         # Blocks of time decide how wide the bars are: their number bounds what may be believed of a large distance.
         p = max(float(f_distribution.sf(distance, n, max(4 * BLOCKS - n, BLOCKS))), 1e-300)
-        out[ident] = Estimate(tuple(labels), value, covariance, unit, p)
+        out[ident] = Estimate(tuple(labels), value, covariance, unit, p, held_out)
     return out
 
 

@@ -18,7 +18,8 @@ TURNS = 6
 
 @dataclass(frozen=True, eq=False)
 class GyroFit:
-    """θ = A (3, 3) row by row, a (3), clock offset at ``middle_s`` and rate, then effects; ``offset_s`` is that at zero."""
+    """θ = A (3, 3) row by row, a (3), clock offset at ``middle_s`` and rate, then effects; ``offset_s`` is that at
+    zero; ``size`` (k,) the reference's rate in each window."""
 
     A: FloatArray
     a: FloatArray
@@ -28,6 +29,7 @@ class GyroFit:
     is_clock_free: bool
     has_rate: bool
     middle_s: float
+    size: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,7 @@ def fit_gyroscope(
         if abs(change) < 1e-7 and abs(rate_change) * (grid.time_s[-1] - grid.time_s[0]) < 1e-7:
             break
     A, a = solution.theta[:9].reshape(3, 3), solution.theta[9:12]
-    return GyroFit(A, a, offset_s, rate, solution, clock > 0, clock > 1, middle)
+    return GyroFit(A, a, offset_s, rate, solution, clock > 0, clock > 1, middle, size)
 
 
 def _quick(target: FloatArray, design: FloatArray) -> FloatArray:

@@ -17,9 +17,17 @@ COLOURED = 3.0
 LEFT_OUT = 0.05
 
 
-def remarks(result: AgainstReference, found: Alignment, gravity: float) -> tuple[Finding, ...]:
+def remarks(result: AgainstReference, found: Alignment, is_turned: bool) -> tuple[Finding, ...]:
     """Findings of a fit: which way is up, doubts of the clock, rows left out, what the noise model does not hold."""
     out = []
+    if is_turned:
+        out.append(
+            Finding(
+                FindingCode.REFERENCE_TURNED_ROUND, Severity.WARNING,
+                "The reference's attitudes turn world into body: only so are they the log's motion, and so they were read.",
+                "Two conventions of attitude.", "Nothing, unless another program will read this file.",
+            )  # fmt: skip
+        )
     if found.is_ambiguous:
         out.append(
             Finding(

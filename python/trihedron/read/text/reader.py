@@ -62,8 +62,9 @@ class TextReader:
         layout: Layout | None = None
         for raw in parts:
             data = as_utf8(self.path, raw, self.cursor.lines + 1)
-            if b"\n" not in data and b"\r" in data:
-                data = data.replace(b"\r", b"\n")
+            if b"\r" in data:
+                # Before the layout is judged: a lone carriage return ends a row for whoever counts rows afterwards.
+                data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
             if layout is None:
                 layout = self._layout(data)
                 start = offset_of_line(data, layout.first_line)
