@@ -1,12 +1,16 @@
 """A rig that moves a unit and knows how: an independent generator for references, in plain finite differences.
 
-Nothing here comes from the package: attitudes are products of elementary turns at 1 kHz, rates their finite
+Nothing of the package but its records is used: attitudes are products of elementary turns at 1 kHz, rates their finite
 differences, readings an instrument of its own. Angles in rad, times in s.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import lfilter
+
+from trihedron.records import Recording
+from trihedron.records.reference import ReferenceMotion
 
 G = 9.81
 FINE_HZ = 1000
@@ -85,9 +89,9 @@ def read_gyro(rng, u, rate, force, step):
         own = (w @ u.M.T) / scale
         out = out + scale * u.cubic * own**3
     out = out + u.gyro_noise * np.degrees(1) * 0.5 * rng.normal(size=out.shape)
-    # A zero that wanders a little: a walk of 0.03 °/s in a minute.
-    out = out + scale * np.radians(0.03) * np.cumsum(rng.normal(size=out.shape), axis=0) / np.sqrt(60 * FINE_HZ / step)
-    return np.round(out * 8) / 8
+    # A zero that wanders a little: a walk of 0.03 °/s in a minute, about its mean over the session.
+    walk = scale * np.radians(0.03) * np.cumsum(rng.normal(size=out.shape), axis=0) / np.sqrt(60 * FINE_HZ / step)
+    return np.round((out + walk - walk.mean(axis=0)) * 8) / 8
 
 
 def read_accelerometer(rng, u, force, step):
@@ -115,3 +119,94 @@ def jittered(C, rng, sigma_rad):
     """Attitudes with white errors of a tracker."""
     v = sigma_rad * rng.normal(size=(len(C), 3))
     return C @ turn(0, v[:, 0]) @ turn(1, v[:, 1]) @ turn(2, v[:, 2])
+
+
+@dataclass
+class Trial:
+    """A log, its reference, and the truth: unit, lead of the clock at the log's zero [s], its rate [ppm], arm [m]."""
+
+    log: Recording
+    motion: ReferenceMotion
+    unit: Unit
+    lead_s: float
+    ppm: float
+    arm: np.ndarray
+
+
+def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, track_hz=100, **more):
+    """A hand before an optical tracker."""
+    rng = np.random.default_rng(seed)
+    u = unit(rng, **more)
+    t, C, path = hand(rng, seconds)
+    arm = rng.uniform(-0.1, 0.1, 3) if has_path else np.zeros(3)
+    f, w = forces(C, path, arm), rates_of(C)
+    gyro, accelerometer = read_gyro(rng, u, w, f, 10), read_accelerometer(rng, u, f, 10)
+    lead, ppm = rng.uniform(-3, 3), rng.uniform(-100, 100)
+    k = np.arange(0, len(t), FINE_HZ // track_hz)
+    k = k[t[k] > 1.0]
+    stamps = t[k] * (1 + 1e-6 * ppm) + lead
+    seen = jittered(C[k], rng, np.radians(sigma_deg))
+    position = path[k] + 3e-4 * rng.normal(size=(len(k), 3)) if has_path else None
+    log = Recording.from_arrays(
+        times(len(gyro), 10), accelerometer, gyro, accelerometer_unit="counts", gyroscope_unit="counts"
+    )
+    motion = ReferenceMotion(stamps - stamps[0], attitude=seen, position=position, source="tracker.csv")
+    return Trial(log, motion, u, lead - stamps[0], ppm, arm)
+
+
+def measured_table(seed, seconds=90, wobble_deg=0.15):
+    """A rate table that measures its own rate, and wobbles about the other two axes unseen; motor ripple besides."""
+    rng = np.random.default_rng(seed)
+    u = unit(rng, 3.0)
+    t = np.arange(0, seconds, 1 / FINE_HZ)
+    rate = np.zeros((len(t), 3))
+    part = seconds / 3
+    for axis in range(3):
+        s = (t >= axis * part) & (t < (axis + 1) * part)
+        x = (t[s] - axis * part) / part
+        rate[s, axis] = rng.uniform(1.5, 3) * np.sin(2 * np.pi * rng.integers(2, 5) * x) * np.sqrt(np.sin(np.pi * x))
+    angle = np.cumsum(rate, axis=0).sum(axis=1) / FINE_HZ
+    true = rate.copy()
+    for axis in range(3):
+        for harmonic in (1, 2):
+            size = 0.5 * np.radians(wobble_deg) * rng.normal() * np.abs(rate[:, (axis + 1) % 3])
+            true[:, axis] += size * np.sin(harmonic * angle + rng.uniform(0, 6))
+    true += np.radians(0.1) * np.sin(2 * np.pi * 7.3 * t + rng.uniform(0, 6))[:, None] * rng.normal(size=3)
+    gyro = read_gyro(rng, u, true, np.tile([0.0, 0, G], (len(t), 1)), 10)
+    lead, ppm = rng.uniform(-3, 3), rng.uniform(-50, 50)
+    k = np.arange(0, len(t), 20)
+    stamps = t[k] * (1 + 1e-6 * ppm) + lead
+    log = Recording.from_arrays(times(len(gyro), 10), None, gyro, gyroscope_unit="counts")
+    motion = ReferenceMotion(stamps - stamps[0], rate=rate[k] + 1e-4 * rng.normal(size=(len(k), 3)), source="table.csv")
+    return Trial(log, motion, u, lead - stamps[0], ppm, np.zeros(3))
+
+
+LEVELS_DEG = (0, 30, -30, 60, -60, 120, -120, 0)
+
+
+def commanded_table(seed, hold_s=6.0, wobble_deg=0.05, lag_s=0.15):
+    """The manual's method 1: constant rates about each axis in turn, as commanded; the table follows with a lag."""
+    rng = np.random.default_rng(seed)
+    u = unit(rng, 3.0)
+    levels = np.radians(LEVELS_DEG)
+    commands = [(axis, level) for axis in range(3) for level in levels]
+    t = np.arange(0, hold_s * len(commands), 1 / FINE_HZ)
+    told = np.zeros((len(commands) + 1, 3))
+    for k, (axis, level) in enumerate(commands):
+        told[k, axis] = level
+    wanted = told[np.minimum((t / hold_s).astype(int), len(commands) - 1)]
+    decay = np.exp(-1 / FINE_HZ / lag_s)
+    true = lfilter([1 - decay], [1, -decay], wanted, axis=0)
+    angle = np.cumsum(true, axis=0).sum(axis=1) / FINE_HZ
+    for axis in range(3):
+        size = np.radians(wobble_deg) * rng.normal() * np.abs(true[:, (axis + 1) % 3])
+        true[:, axis] += size * np.sin(angle + rng.uniform(0, 6))
+    f = np.tile([0.0, 0, G], (len(t), 1))
+    gyro, accelerometer = read_gyro(rng, u, true, f, 10), read_accelerometer(rng, u, f, 10)
+    log = Recording.from_arrays(
+        times(len(gyro), 10), accelerometer, gyro, accelerometer_unit="counts", gyroscope_unit="counts"
+    )
+    stamps = hold_s * np.arange(len(commands) + 1)
+    return Trial(
+        log, ReferenceMotion(stamps, rate=told, is_stepwise=True, source="commands.csv"), u, 0.0, 0.0, np.zeros(3)
+    )

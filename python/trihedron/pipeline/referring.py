@@ -134,7 +134,21 @@ def calibration_by(
     calibration = Calibration(
         accelerometer, gyroscope, covariance, "case", gravity, source, recording.source, recording.sha256, findings
     )
-    return calibration if wanted == "case" else in_frame(calibration, wanted)
+    return calibration if wanted == "case" else _without_rounding(in_frame(calibration, wanted))
+
+
+def _without_rounding(calibration: Calibration) -> Calibration:
+    """Entries of S that the lower frame makes zero have no error bar: what is left of one is rounding."""
+    if calibration.frame != "lower" or calibration.gyroscope is None:
+        return calibration
+    covariance = np.array(calibration.covariance)
+    fixed = [1, 2, 5]
+    covariance[fixed], covariance[:, fixed] = 0.0, 0.0
+    return replace(
+        calibration,
+        covariance=covariance,
+        accelerometer=replace(calibration.accelerometer, covariance=covariance[:12, :12]),
+    )
 
 
 def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, Finding]:
@@ -180,17 +194,32 @@ def _accepted(ident: str, one: Estimate, p: float, found: AgainstReference) -> A
         EffectParameter(_written(ident, name), float(v), float(s), units[min(k // per, len(units) - 1)])
         for k, (name, v, s) in enumerate(zip(one.names, one.value, one.std, strict=True))
     )
+    floor = found.gyroscope.rms
+    held = HeldOut("dynamics", (before / floor) ** 2, (after / floor) ** 2, before, after, "rad/s")
     n = 3 * (found.gyroscope.n_rows - found.gyroscope.n_left_out)
     largest = int(np.argmax(np.abs(one.value / one.std)))
-    what = "reads a rate that follows specific force" if ident == "gyro-g-sensitivity" else "has a scale that depends on rate"
+    what = (
+        "reads a rate that follows specific force"
+        if ident == "gyro-g-sensitivity"
+        else "has a scale that depends on rate"
+    )
     return AcceptedEffect(
         ident,
         f"The gyro {what} ({parameters[largest].name} stands out most).",
         parameters,
         p,
         float(n * np.log((after / before) ** 2) + len(one.names) * np.log(n)),
-        (HeldOut("dynamics", (before / found.gyroscope.rms) ** 2, (after / found.gyroscope.rms) ** 2, before, after, "rad/s"),),
+        (held,),
         share=float(1.0 - (after / before) ** 2),
+        # Stated in the reference's body: another recording of the unit may lie in it otherwise.
+        model=MappingProxyType(
+            {
+                "variant": "both" if ident == "gyro-scale-nonlinearity" else "",
+                "shape": {},
+                "values": [float(v) for v in one.value],
+                "applies_to_other_recordings": False,
+            }
+        ),
     )  # fmt: skip
 
 
@@ -282,5 +311,3 @@ def _linear(found: AgainstReference, recording: Recording) -> LinearModel:
         nothing = {"S": np.zeros((3, 3)).tolist(), "b": [0.0] * 3, "sigma_S": None, "sigma_b": None}
         return LinearModel(MappingProxyType({**nothing, "raw_unit": "none", "si_unit": "m/s^2"}), gyro)
     return LinearModel(sensor(found.accelerometer, recording.accelerometer_unit.value, "m/s^2"), gyro)
-
-

@@ -1,4 +1,4 @@
-"""Motion known beside a log (rate table, optical tracking, robot, another unit) and what it says of the log's sensors."""
+"""Motion known beside a log (rate table, tracking, robot, another unit) and what it says of the log's sensors."""
 
 from __future__ import annotations
 

@@ -19,8 +19,11 @@ TURNS = 4
 
 @dataclass(frozen=True, eq=False)
 class ForceFit:
-    """``f_reference = S a' + b`` with ``covariance`` (12, 12); ``up`` (3,) unit vector of the specific force at rest in the reference's world with its
-    covariance (3, 3); ``arm`` (3,) [m] from the reference's origin to the accelerometer, in the reference's body."""
+    """``f_reference = S a' + b`` with ``covariance`` (12, 12).
+
+    ``up`` (3,): unit vector of the specific force at rest in the reference's world, with its covariance (3, 3); ``arm``
+    (3,) [m] from the reference's origin to the accelerometer, in the reference's body.
+    """
 
     S: FloatArray
     b: FloatArray
@@ -151,8 +154,8 @@ def _under_gravity(
     S, b = other_form(M, solution.theta[9:12])
     jacobian = other_form_jacobian(M, solution.theta[9:12])
     covariance = jacobian @ solution.covariance[:12, :12] @ jacobian.T
-    size = float(np.mean(np.linalg.svd(S, compute_uv=False)))
-    in_si = replace(solution, residual=solution.residual * size, rms_held_out=solution.rms_held_out * size)
+    scale = float(np.mean(np.linalg.svd(S, compute_uv=False)))
+    in_si = replace(solution, residual=solution.residual * scale, rms_held_out=solution.rms_held_out * scale)
     return ForceFit(S, b, covariance, up, across @ solution.covariance[12:, 12:] @ across.T, None, None, in_si)
 
 
@@ -169,7 +172,7 @@ def _gravity_seen(readings: FloatArray, back: FloatArray, handedness: float) -> 
         u = np.asarray(start, dtype=np.float64)
         for _ in range(TURNS):
             seen = np.column_stack([back @ u, np.ones(k)])
-            M = np.linalg.lstsq(seen, readings, rcond=None)[0][:3].T
+            M = np.asarray(np.linalg.lstsq(seen, readings, rcond=None)[0][:3].T, dtype=np.float64)
             across = _across(u)
             slope = (M @ back @ across).reshape(3 * k, 2)
             rest = readings - seen @ np.vstack([M.T, np.mean(readings - back @ u @ M.T, axis=0)])

@@ -18,7 +18,7 @@ Mask = npt.NDArray[np.bool_]
 ORDERS = (0, 2, 12)
 """Orders of the autoregression tried: none, one slope or line, wobble of some lines (two poles each)."""
 ROWS_PER_POLE = 15
-"""An autoregression of order p is fitted to at least 15 p rows of an axis: p lags of noise cost 1/15 of its variance."""
+"""An autoregression of order p is fitted to 15 p rows of an axis or more: p lags cost 1/15 of its variance."""
 OUTLIER = 7.0
 """Residuals beyond 7 robust sigmas, and their neighbours, are left out: a normal one is that far once in 4e11."""
 BLOCKS = 16
@@ -95,7 +95,7 @@ def _solve(
         r = target - X @ theta
         weight = _weights(r, size, used) if model.grows else np.ones(k)
         length = np.linalg.norm(r * weight[:, None], axis=1)
-        used = _without_outliers(length, index)
+        used = _without_outliers(length)
         rows = np.repeat(used, 3)
         w = np.repeat(weight, 3)[rows]
         theta = _least_squares(X.reshape(-1, p)[rows] * w[:, None], target.ravel()[rows] * w)
@@ -141,7 +141,7 @@ def _weights(r: FloatArray, size: FloatArray, used: Mask) -> FloatArray:
     return np.asarray(np.median(scale) / scale, dtype=np.float64)
 
 
-def _without_outliers(length: FloatArray, index: IntArray) -> Mask:
+def _without_outliers(length: FloatArray) -> Mask:
     limit = OUTLIER * float(np.median(length)) / 1.538  # the median length of three standard normals
     odd = length > limit
     if odd.mean() > MOST_OUT:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -11,7 +10,7 @@ import numpy.typing as npt
 from scipy.stats import f as f_distribution
 
 from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer
-from trihedron.estimate.reference.clocks import Alignment, align
+from trihedron.estimate.reference.clocks import align
 from trihedron.estimate.reference.coloured import BLOCKS, Solution
 from trihedron.estimate.reference.gyroscope import GyroFit, Signals, fit_gyroscope
 from trihedron.estimate.reference.remarks import remarks
@@ -36,6 +35,8 @@ TRAINED = 0.6
 LEAST_HELD_OUT_S = 12.0
 FORCE_WINDOW_S = 0.1
 """Forces are compared up to 5 Hz: beyond it a position differentiated twice is noise."""
+STRANGERS = 0.6
+"""A fit that leaves this part of the reference's rate has found no shared motion, whatever the sizes correlate."""
 TURNED_ROUND = 0.2
 """Beyond this part of the motion left the other direction is tried: shared motion leaves some hundredths."""
 _AXES = ("x", "y", "z")
@@ -50,8 +51,8 @@ def fit_reference(
 ) -> AgainstReference:
     """Hold a log against known motion.
 
-    ``given`` is a gyro's (S, b) whose replay is shown beside (in a frame of its own: the turn to the reference's body is
-    taken from the fit).
+    ``given`` is a gyro's (S, b) whose replay is shown beside; it lies in a frame of its own, and the turn from there to
+    the reference's body is taken from the fit.
 
     Raises
     ------
@@ -71,8 +72,9 @@ def fit_reference(
     gyro = fit_gyroscope(grid, reference, windows, found.offset_s, found.rate, clock=clock)
     reference, gyro, is_turned = _right_way_round(grid, reference, windows, gyro, clock)
     motion = reference.motion
+    _refuse_strangers(gyro, motion)
     _refuse_units(recording, gyro, motion)
-    _refuse_still(grid, gyro, windows, motion)
+    _refuse_still(gyro, motion)
     handedness = float(np.sign(np.linalg.det(gyro.A)))
     spacing = max(windows.spacing, round(FORCE_WINDOW_S / grid.step_s))
     wide = windows_on(seen, grid.step_s, spacing)
@@ -141,7 +143,7 @@ def _sigma(gyro: GyroFit, k: int) -> float:
 
 
 def _offset(gyro: GyroFit, recording: Recording, motion: ReferenceMotion) -> float:
-    """By how much the reference's stamps run ahead of the log's, on both clocks' own counts where they have one epoch."""
+    """By how much the reference's stamps run ahead of the log's, in both clocks' own counts if they share an epoch."""
     offset = gyro.offset_s + gyro.rate * gyro.middle_s
     if abs(recording.start_epoch_s - motion.start_epoch_s) > 1e5:
         return offset
@@ -177,6 +179,15 @@ def _mounting(gyro: GyroFit) -> Estimate:
     return Estimate(_AXES, axis / size * angle if size > 0.0 else axis, covariance, "rad")
 
 
+def _refuse_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
+    left = _share_left(gyro)
+    if left > STRANGERS and not motion.is_stepwise:
+        raise ValueError(
+            f"{motion.source}: this reference and the log share no motion: their turning rates look alike in size, but "
+            f"no mounting makes them one ({100 * left:.0f} % of the rate is left); name the reference of this very log."
+        )
+
+
 def _refuse_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -> None:
     """A factor of 57.3 or of a power of ten between two that both state their unit is a unit misread."""
     nominal = rate_to_si(recording.gyroscope_unit)
@@ -200,7 +211,7 @@ def _refuse_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) 
             )
 
 
-def _refuse_still(grid: Grid, gyro: GyroFit, windows: Windows, motion: ReferenceMotion) -> None:
+def _refuse_still(gyro: GyroFit, motion: ReferenceMotion) -> None:
     sigma = np.sqrt(np.maximum(np.diag(gyro.solution.covariance)[:9], 0.0)).reshape(3, 3)
     size = np.linalg.norm(gyro.A, axis=0)
     weak = [_AXES[j] for j in range(3) if not np.linalg.norm(sigma[:, j]) < 0.5 * size[j]]
@@ -220,10 +231,10 @@ def _effects(
     own = (grid.gyroscope + np.linalg.solve(gyro.A, gyro.a)) * scale
     along = gyro.A / scale
     # What the gyro reads too much is taken off what is corrected: coefficients are minus those of the columns.
-    bend = Signals(np.column_stack([own**2, own**3]), np.vstack([along.T, along.T]))
-    names = [f"quadratic {a}" for a in _AXES] + [f"cubic {a}" for a in _AXES]
+    bend = Signals(np.column_stack([own**3, own**2]), np.vstack([along.T, along.T]))
+    names = [f"cubic {a}" for a in _AXES] + [f"quadratic {a}" for a in _AXES]
     for ident, signals, labels, unit in (
-        ("gyro-scale-nonlinearity", bend, names, "s/rad, s²/rad²"),
+        ("gyro-scale-nonlinearity", bend, names, "1/(rad/s)^2, 1/(rad/s)"),
         ("gyro-g-sensitivity", _by_force(grid, force), [f"{a}{b}" for a in _AXES for b in _AXES], "(rad/s)/(m/s^2)"),
     ):
         if signals is None:

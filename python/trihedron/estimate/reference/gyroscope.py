@@ -48,10 +48,11 @@ def fit_gyroscope(
     middle = float(np.mean(grid.time_s[windows.middle]))
     n_clock = clock
     noise = settled_noise
-    for turn in range(TURNS if clock else 1):
+    solution: Solution | None = None
+    for _ in range(TURNS if clock else 1):
         target, design = _rows(grid, reference, windows, offset_s, rate, extra)
         if n_clock:
-            theta = _quick(target, design) if turn == 0 else solution.theta[: design.shape[2]]
+            theta = _quick(target, design) if solution is None else solution.theta[: design.shape[2]]
             half = 0.25 * grid.step_s
             slope = [
                 t - d @ theta
@@ -77,6 +78,7 @@ def fit_gyroscope(
         rate += rate_change
         if abs(change) < 1e-7 and abs(rate_change) * (grid.time_s[-1] - grid.time_s[0]) < 1e-7:
             break
+    assert solution is not None
     A, a = solution.theta[:9].reshape(3, 3), solution.theta[9:12]
     return GyroFit(A, a, offset_s, rate, solution, clock > 0, clock > 1, middle, size)
 
@@ -85,7 +87,7 @@ def _quick(target: FloatArray, design: FloatArray) -> FloatArray:
     p = design.shape[2]
     scale = np.sqrt(np.mean(design**2, axis=(0, 1))) + 1e-300
     theta: FloatArray = np.linalg.lstsq((design / scale).reshape(-1, p), target.ravel(), rcond=None)[0]
-    return theta / scale
+    return np.asarray(theta / scale)
 
 
 def _rows(

@@ -23,10 +23,12 @@ def remarks(result: AgainstReference, found: Alignment, is_turned: bool) -> tupl
     if is_turned:
         out.append(
             Finding(
-                FindingCode.REFERENCE_TURNED_ROUND, Severity.WARNING,
-                "The reference's attitudes turn world into body: only so are they the log's motion, and so they were read.",
-                "Two conventions of attitude.", "Nothing, unless another program will read this file.",
-            )  # fmt: skip
+                FindingCode.REFERENCE_TURNED_ROUND,
+                Severity.WARNING,
+                "The reference's attitudes turn world into body: only so do they move as the log does.",
+                "Two conventions of attitude.",
+                "Nothing, unless another program will read this file.",
+            )
         )
     if found.is_ambiguous:
         out.append(
@@ -37,7 +39,7 @@ def remarks(result: AgainstReference, found: Alignment, is_turned: bool) -> tupl
                 f"{result.clock_offset_s[0]:.4g} s.",
                 "Turns that are alike.",
                 "Shake the unit once, irregularly, at the start.",
-            )  # fmt: skip
+            )
         )
     if result.vertical is not None:
         out += _up(result)
@@ -54,7 +56,7 @@ def remarks(result: AgainstReference, found: Alignment, is_turned: bool) -> tupl
                     "A reference that wobbles or was corrected on the way, a zero that drifts, an effect.",
                     "Look at --report FILE.html for where; repeat the motion.",
                     MappingProxyType({"widened": fit.widened}),
-                )  # fmt: skip
+                )
             )
         if fit.n_left_out > LEFT_OUT * fit.n_rows:
             out.append(
@@ -65,7 +67,7 @@ def remarks(result: AgainstReference, found: Alignment, is_turned: bool) -> tupl
                     "Jumps of a tracker that lost its markers, or knocks.",
                     "Look at the reference's own quality flags.",
                     MappingProxyType({"left_out": float(fit.n_left_out), "rows": float(fit.n_rows)}),
-                )  # fmt: skip
+                )
             )
     return tuple(out)
 
@@ -85,7 +87,7 @@ def _up(result: AgainstReference) -> list[Finding]:
                 "gravity instead of specific force.",
                 "If z is up there, turn the sign of one axis of the reference, or of the accelerometer.",
                 numbers,
-            )  # fmt: skip
+            )
         ]
     if lean > TILT_DEG:
         return [
@@ -96,6 +98,6 @@ def _up(result: AgainstReference) -> list[Finding]:
                 "A world frame that is not level.",
                 "Nothing, if you know that: the plumb line was estimated.",
                 numbers,
-            )  # fmt: skip
+            )
         ]
     return []

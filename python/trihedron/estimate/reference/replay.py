@@ -48,4 +48,4 @@ def _product(rotations: FloatArray) -> FloatArray:
         if len(rotations) % 2:
             rotations = np.concatenate([rotations, np.eye(3)[None]])
         rotations = rotations[0::2] @ rotations[1::2]
-    return rotations[0]
+    return np.asarray(rotations[0], dtype=np.float64)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
@@ -18,7 +16,7 @@ ROUNDING = 0.02
 """Matrices and quaternions printed with three digits are off by less than this."""
 
 
-def attitude_of(table: Table, roles: list[Role], rows: FloatArray | slice) -> FloatArray | None:
+def attitude_of(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) -> FloatArray | None:
     """(n, 3, 3) body → world; ``None`` where no column tells an attitude.
 
     Raises
@@ -36,7 +34,7 @@ def attitude_of(table: Table, roles: list[Role], rows: FloatArray | slice) -> Fl
     return None
 
 
-def _quaternion(table: Table, roles: list[Role], rows: FloatArray | slice) -> FloatArray:
+def _quaternion(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) -> FloatArray:
     part = {role.index: role for role in roles}
     if set(part) != set("wxyz") or len(roles) != 4:
         raise ReadError(
@@ -54,7 +52,7 @@ def _quaternion(table: Table, roles: list[Role], rows: FloatArray | slice) -> Fl
     return np.asarray(Rotation.from_quat(q).as_matrix(), dtype=np.float64)
 
 
-def _matrix(table: Table, roles: list[Role], rows: FloatArray | slice) -> FloatArray:
+def _matrix(table: Table, roles: list[Role], rows: npt.NDArray[np.int64]) -> FloatArray:
     base = "1" if any("3" in role.index for role in roles) else "0"
     part = {(int(r.index[0]) - int(base), int(r.index[1]) - int(base)): r for r in roles}
     if len(part) != 9 or len(roles) != 9:
@@ -81,7 +79,7 @@ def _matrix(table: Table, roles: list[Role], rows: FloatArray | slice) -> FloatA
     return np.asarray(Rotation.from_matrix(C).as_matrix(), dtype=np.float64)
 
 
-def _angles(table: Table, turns: list[Role], named: list[Role], rows: FloatArray | slice) -> FloatArray:
+def _angles(table: Table, turns: list[Role], named: list[Role], rows: npt.NDArray[np.int64]) -> FloatArray:
     if turns:
         if len(turns) != 3:
             raise ReadError(f"{table.path}: Euler angles need three columns rot_x, rot_y, rot_z in the order of turns.")
@@ -102,5 +100,4 @@ def _angles(table: Table, turns: list[Role], named: list[Role], rows: FloatArray
         angles = np.radians(angles)
     else:
         angles = angles * np.array([role.to_si for role in parts])
-    # scipy's letters are a closed list; three axes of which neighbours differ are among them.
-    return np.asarray(Rotation.from_euler(cast("str", order), angles).as_matrix(), dtype=np.float64)
+    return np.asarray(Rotation.from_euler(order, angles).as_matrix(), dtype=np.float64)

@@ -100,8 +100,8 @@ def _triad(table: Table, roles: list[Role], what: str, rows: npt.NDArray[np.int6
         raise ReadError(f"{table.path}: the reference's {name} needs columns of x, y and z; found {', '.join(part)}.")
     if what == "w" and any(not role.unit for role in part.values()):
         raise ReadError(
-            f"{table.path}: the unit of the reference's rate is not said; name its columns 'wx [deg/s]' or 'wx [rad/s]', "
-            "in the file or with --reference-columns."
+            f"{table.path}: the unit of the reference's rate is not said; name its columns 'wx [deg/s]' or "
+            "'wx [rad/s]', in the file or with --reference-columns."
         )
     return np.column_stack([part[axis].to_si * table.columns[part[axis].column][rows] for axis in "xyz"])
 
