@@ -21,7 +21,7 @@ impl Standardisation {
     /// Of these readings.
     ///
     /// # Errors
-    /// When all readings are the same.
+    /// When all readings are the same, or one is missing, infinite or beyond any sensor.
     pub fn of(readings: &[Vector3<f64>]) -> Result<Self> {
         let n = readings.len().max(1) as f64;
         let centre = readings.iter().sum::<Vector3<f64>>() / n;
@@ -31,7 +31,12 @@ impl Standardisation {
             .sum::<f64>()
             / n)
             .sqrt();
-        if size.is_nan() || size <= 1e-12 * (1.0 + centre.norm()) {
+        if !size.is_finite() {
+            return Err(Error::bad_input(
+                "the readings hold numbers that are missing, infinite or too large for any sensor",
+            ));
+        }
+        if size <= 1e-12 * (1.0 + centre.norm()) {
             return Err(Error::not_determined(
                 "all still poses read the same: turn the sensor into different orientations between holds",
             ));
@@ -241,6 +246,11 @@ pub fn fit_sphere(u: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
 /// # Errors
 /// When the readings do not determine an ellipsoid, naming the directions that are missing.
 pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Result<Model> {
+    if !(gravity.is_finite() && gravity > 0.0) {
+        return Err(Error::bad_input(format!(
+            "gravity must be a positive number in m/s², got {gravity}"
+        )));
+    }
     let standard = Standardisation::of(readings)?;
     let u: Vec<_> = readings.iter().map(|a| standard.apply(a)).collect();
     let free = fit_quadric(&u)?;
@@ -257,7 +267,14 @@ pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Resul
                 missing_directions(&u)
             ))
         })?;
-    Ok(standard.undo(&model))
+    let model = standard.undo(&model);
+    if model.s.iter().chain(model.b.iter()).all(|v| v.is_finite()) {
+        Ok(model)
+    } else {
+        Err(Error::not_determined(
+            "the ellipsoid through the still poses has no finite size: check the readings",
+        ))
+    }
 }
 
 /// Which half axes no reading points to within 55° (the angle from an axis to the corner of a cube), in words.

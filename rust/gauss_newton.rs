@@ -25,6 +25,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::{Error, Result};
+use crate::interrupt;
 
 /// What a residual costs. `scale` is in standard errors of the (whitened) residual; 2ρ is χ² for small residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -510,6 +511,9 @@ pub fn descend<D: Descent>(
     let mut damping = 0.0_f64;
     let mut iterations = 0;
     loop {
+        if interrupt::is_requested() {
+            return Err(Error::not_determined("the fit was interrupted"));
+        }
         let local = problem.linearise(&point, previous.as_ref())?;
         iterations += 1;
         if !local.cost().is_finite() || !local.is_finite() {

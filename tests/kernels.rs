@@ -26,3 +26,6 @@ mod kalman;
 mod allan;
 #[path = "kernels/simulate.rs"]
 mod simulate;
+
+#[path = "kernels/hostile.rs"]
+mod hostile;

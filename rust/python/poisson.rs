@@ -127,7 +127,7 @@ fn integrate_moves<'py>(
         sigma_time_s,
         nominal_step_s,
     };
-    let turns = super::run(py, || {
+    let turns = super::run_long(py, || {
         let model = RateModel::of_degree(rate_degree)?;
         let prepared = poisson::prepare_all(&time_s, &raw, None, &ranges, model)?;
         Ok(poisson::integrate_all(
@@ -169,7 +169,7 @@ fn integrate_raw_rate<'py>(
     let anchors_s =
         numpy::PyArray::from_vec(py, [0.0, 1.0].repeat(shape[0])).reshape([shape[0], 2])?;
     let ranges = ranges(&moves, &anchors_s.readonly())?;
-    let prepared = super::run(py, || {
+    let prepared = super::run_long(py, || {
         poisson::prepare_all(
             &time_s,
             &raw,

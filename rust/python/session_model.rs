@@ -212,7 +212,7 @@ impl SessionModel {
             scatter: [scatter.0, scatter.1],
         };
         let session = Arc::clone(&self.session);
-        let found = super::run(py, || {
+        let found = super::run_long(py, || {
             if is_tuned {
                 tune(&session, state, strengths, &effects)
             } else {
@@ -619,7 +619,7 @@ impl SessionFit {
         let effects = distortion(force.as_ref(), rate.as_ref(), self.session.n_points())?;
         let fit = Arc::clone(&self.fit);
         let session = Arc::clone(&self.session);
-        let parts = super::run(py, || {
+        let parts = super::run_long(py, || {
             session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, &effects)
         })?;
         let n = self.fit.n_rows();
@@ -682,7 +682,7 @@ impl SessionFit {
             .map(|row| (0..firsts.len()).filter(|&g| row[firsts[g]]).collect())
             .collect();
         let fit = Arc::clone(&self.fit);
-        let out = super::run(py, || fit.held_out(&lists))?;
+        let out = super::run_long(py, || fit.held_out(&lists))?;
         let flat: Vec<f64> = out.chi2.iter().flatten().copied().collect();
         Ok((
             flat.to_pyarray(py).reshape([out.chi2.len(), 4])?,

@@ -80,7 +80,7 @@ def allan(
     stretches = [_stretch(text) for text in exclude or []]
     if not 0.0 < accuracy < 1000.0:
         raise typer.BadParameter(f"--accuracy is a positive number of per cent, not {accuracy:g}")
-    check_outputs(json, csv, plot, force=force, report=report)
+    check_outputs(json, csv, plot, force=force, report=report, inputs=source.files)
     if curve:
         if exclude or stream or keep_events:
             raise typer.BadParameter("--curve has no log: --exclude, --keep-events and --stream do not go with it")

@@ -66,7 +66,7 @@ def diagnose(
         raise typer.BadParameter("--improved goes with --against SCENARIO.toml: that file is what is improved")
     if improved is not None and against is not None and improved.resolve() == against.resolve():
         raise typer.BadParameter("--improved would overwrite the scenario that it improves; give it another name")
-    check_outputs(json, updated, improved, force=force, report=report)
+    check_outputs(json, updated, improved, force=force, report=report, inputs=(*source.files, calibration, against))
     from trihedron.files.calibration import read_calibration, write_calibration
 
     known = None if calibration is None else read_calibration(calibration)

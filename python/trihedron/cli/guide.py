@@ -52,7 +52,7 @@ def guide(
     from trihedron.records.guiding import Accuracy
 
     wanted = Accuracy.parse(accuracy)
-    check_outputs(output, force=force)
+    check_outputs(output, force=force, inputs=source.files)
 
     def tell(view: GuideView) -> None:
         typer.echo(_line(view))

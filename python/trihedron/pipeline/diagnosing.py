@@ -16,11 +16,13 @@ from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
+from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.beside import beside
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
+from trihedron.pipeline.diagnosing_rest import at_rest, diagnosed_at_rest
 from trihedron.pipeline.improving import driven
 from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segments_of
 from trihedron.pipeline.referring import AnyReference
@@ -103,6 +105,10 @@ def diagnose(
     tell(0.02, "finding still poses")
     segments = segments_of(segments, recording)
     findings += segments.findings
+    resting = None if against is not None else at_rest(recording, segments, known, gravity)
+    if resting is not None:
+        tell(0.1, "looking at zeros and lines")
+        return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
     simulated: _Free | None = None
     if against is not None:
         tell(0.05, "diagnosing the simulated recording")
@@ -182,6 +188,9 @@ def _simulated_log(against: GivenModel, recording: Recording, segments: Segments
     if isinstance(against, Recording):
         return against
     if not isinstance(against, Scenario):
+        if not isinstance(against, str | os.PathLike):
+            kind = type(against).__name__
+            raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
         if Path(against).suffix.lower() != ".toml":
             return read(against)
         against = read_scenario(Path(against))
@@ -239,6 +248,8 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
     ValueError
         When the calibration is in another frame than ``lower``.
     """
+    if not isinstance(result, CalibrationResult):
+        raise WrongTypeError(f"trihedron.extend takes what trihedron.calibrate gave, not {type(result).__name__}.")
     base = result.calibration
     if base.frame != "lower":
         raise ValueError(

@@ -11,6 +11,7 @@ from trihedron.files.calibration import calibration_document, plain
 from trihedron.files.output import OutputError, write_whole
 from trihedron.pipeline.filtering import KalmanResult
 from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
+from trihedron.pipeline.sessions import SessionsResult
 from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segments, Verification
 from trihedron.records.plan import ExperimentPlan
 from trihedron.report import document, frames, machine, summaries
@@ -23,6 +24,7 @@ from trihedron.report.noise import noise_picture, noise_report
 from trihedron.report.noise_files import noise_record
 from trihedron.report.page import to_html
 from trihedron.report.plan import plan_record, plan_report
+from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
 from trihedron.report.text import to_text
 from trihedron.report.verification import verification_report
 
@@ -67,6 +69,9 @@ _KINDS: dict[type, _Shown] = {
         lambda r: kalman_record(r.outcome, r.calibration),
         lambda r: frames.calibration_columns(r.calibration),
     ),
+    SessionsResult: _Shown(
+        lambda r: sessions_report(r.model), lambda r: sessions_record(r.model), lambda r: sessions_columns(r.model)
+    ),
     Calibration: _Shown(calibration_report, calibration_document, frames.calibration_columns),
     Verification: _Shown(verification_report, machine.verification_record, frames.verification_columns),
     Noise: _Shown(noise_report, noise_record, frames.noise_columns),
@@ -82,7 +87,7 @@ def _kind(result: object) -> _Shown:
         if isinstance(result, known):
             return shown
     names = ", ".join(sorted(known.__name__ for known in _KINDS))
-    raise TypeError(f"a {type(result).__name__} is no result of trihedron; there are {names}.")
+    raise TypeError(f"{type(result).__name__} is no result of trihedron; there are {names}.")
 
 
 def as_dict(result: object) -> dict[str, Any]:

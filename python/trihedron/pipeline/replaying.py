@@ -75,12 +75,12 @@ def replay(
     ValueError
         When the log has no accelerometer.
     """
-    readings = _readings(recording)
+    readings = readings_of(recording)
     gravity = gravity_m_s2 or STANDARD_GRAVITY_M_S2
     now_s = 0.0
     made = Guide(wanted, lambda: examine(part_of(recording, -math.inf, now_s + 1e-9), wanted, gravity_m_s2=gravity))
     n_events = 0
-    for first, last in _steps(recording.time_s):
+    for first, last in steps(recording.time_s):
         now_s = float(recording.time_s[last - 1])
         view = made.advance(recording.time_s[first:last], readings[first:last])
         if view.n_events > n_events:
@@ -92,14 +92,14 @@ def replay(
     return Replay(made.view(), part_of(recording, -math.inf, now_s + 1e-9), made.cut_s, made.is_done)
 
 
-def _steps(time_s: npt.NDArray[np.float64]) -> Iterable[tuple[int, int]]:
+def steps(time_s: npt.NDArray[np.float64]) -> Iterable[tuple[int, int]]:
     """Ranges of samples of about ``STEP_S``."""
     edges = np.searchsorted(time_s, np.arange(time_s[0], time_s[-1] + STEP_S, STEP_S))
     edges = np.unique([*edges, len(time_s)])
     return zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
 
 
-def _readings(recording: Recording) -> npt.NDArray[np.float64]:
+def readings_of(recording: Recording) -> npt.NDArray[np.float64]:
     """(n, 3) or (n, 6), the accelerometer first."""
     if recording.accelerometer is None:
         raise ValueError(f"{recording.source}: a guide needs the accelerometer; this log has a gyro alone.")

@@ -6,7 +6,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from trihedron.estimate.verification import verify_calibration
-from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
+from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segments_of
 from trihedron.pipeline.results import VerificationResult
@@ -58,6 +58,7 @@ def verify(
         for found in judged.findings
     )
     findings = (*recording.findings, *segments.findings, *missed, *more, *_limits(judged, limit_mg, limit_deg))
+    findings = (*doubted(known), *findings)
     findings += _same_recording(known.recording_sha256, recording.sha256)
     return VerificationResult(replace(judged, findings=findings), known, segments, recording)
 

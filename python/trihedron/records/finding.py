@@ -94,6 +94,12 @@ class FindingCode(str, Enum):
     REFERENCE_ONLY = "reference-only"
     ACCELEROMETER_NOMINAL = "accelerometer-nominal"
     SHARED_MOTION = "shared-motion"
+    # many recordings, temperature
+    NUMBERS_CHANGED = "numbers-changed"
+    FEW_SESSIONS = "few-sessions"
+    SESSION_LEFT_OUT = "session-left-out"
+    OUTSIDE_VALID_RANGE = "outside-valid-range"
+    TEMPERATURE_MISSING = "temperature-missing"
     # apply
     CALIBRATION_DOUBTED = "calibration-doubted"
     # verify, check

@@ -104,6 +104,12 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
             f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it"
             + (f"; numbers differ too ({listed(numbers)})." if numbers else ".")
         )
+    if diagnosis.verdict == "not-testable":
+        tested = listed([d.domain for d in diagnosis.domains]) if diagnosis.domains else "nothing"
+        return (
+            f"NOT TESTABLE: this recording does not carry the question ({tested} looked at, nothing named); hold 18 or "
+            "more poses of 3 to 5 s in different directions."
+        )
     if diagnosis.verdict == "parameters-differ":
         return f"PARAMETERS DIFFER: {listed(numbers)}; nothing else, no physics is missing."
     missing = [effect.id for effect in diagnosis.effects if effect.side == "recording"]
@@ -317,13 +323,11 @@ def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
         if density is not None:
             unit = str(diagnosis.noise.get(f"{name}_unit", ""))
             words = ", ".join(plain_number(float(d)) for d in density)
-            corner = plain_number(float(diagnosis.noise[f"{name}_corner_s"]))
-            facts.append(
-                (
-                    f"{name} noise",
-                    f"{words} {unit_in_print(unit).replace('sqrt(Hz)', '√Hz')}; bias walk from {corner} s on",
-                )
-            )
+            words += f" {unit_in_print(unit).replace('sqrt(Hz)', '√Hz')}"
+            corner = diagnosis.noise[f"{name}_corner_s"]
+            if corner is not None:
+                words += f"; bias walk from {plain_number(float(corner))} s on"
+            facts.append((f"{name} noise", words))
     blocks.append(Facts(tuple(facts)))
     return tuple(blocks)
 

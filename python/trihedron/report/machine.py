@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 from trihedron.files.calibration import calibration_document, plain
+from trihedron.printable import printable_json
 from trihedron.records import AllanCurve, Calibration, Finding, Recording, Segments, Verification
 
 
@@ -25,7 +26,7 @@ def recording_record(recording: Recording) -> dict[str, Any]:
 
 def json_text(machine: dict[str, Any]) -> str:
     """Strict JSON: what is not a finite number is ``null``."""
-    return json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return printable_json(json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
 
 
 def curve_record(curve: AllanCurve) -> dict[str, Any]:

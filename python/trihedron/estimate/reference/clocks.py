@@ -49,13 +49,15 @@ def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> A
     theirs = _reference_size(reference, grid.step_s)
     offset, correlation, is_ambiguous = _best_lag(ours, theirs, grid.step_s, stamped_offset_s)
     offset += reference.motion.time_s[0] - grid.time_s[0]
+    # A clock that jumps spoils the correlation of the whole: stretches are asked first.
+    refined = _refined(ours, grid, reference, offset)
     if correlation < LEAST_CORRELATION:
         raise ValueError(
             f"{reference.motion.source}: this reference and the log share no motion (the turning rates agree best "
             f"with a correlation of {correlation:.2f}; shared ones reach 0.93): name the reference of this very log, "
             "or check its rate and angle units."
         )
-    return Alignment(*_refined(ours, grid, reference, offset), correlation, is_ambiguous)
+    return Alignment(*refined, correlation, is_ambiguous)
 
 
 def _size_of_rate(grid: Grid) -> FloatArray:
