@@ -27,6 +27,7 @@ from trihedron.report.numbers import (
     unit_in_print,
     with_sigma,
 )
+from trihedron.report.reference import reference_blocks
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 MEANING = {
@@ -78,6 +79,9 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         sections.append(Section("Findings", (findings_block(findings),)))
     if diagnosis.residuals:
         sections.append(Section("Figures", tuple(_picture(diagnosis, r) for r in diagnosis.residuals)))
+    found = getattr(diagnosis, "reference", None)
+    if found is not None:
+        sections.insert(0, Section("Against the reference", reference_blocks(found)))
     return Document(
         title="Diagnosis",
         subtitle=diagnosis.recording_source,
