@@ -36,7 +36,7 @@ def table_of(data: object) -> Table:
         # A lazy frame is a question; its answer has the rows.
         data = data.collect()
     if _is_frame(data):
-        return columns_table(type(data).__name__, _frame_columns(data))
+        return columns_table(type(data).__name__, frame_columns(data))
     array = _as_array(data)
     if array.dtype.names:
         return columns_table("array", [(name, array[name]) for name in array.dtype.names])
@@ -85,7 +85,7 @@ def _is_frame(data: object) -> bool:
     )
 
 
-def _frame_columns(frame: Any) -> list[tuple[str, Any]]:
+def frame_columns(frame: Any) -> list[tuple[str, Any]]:
     """Names and columns; an index of pandas that holds times is a column too."""
     columns: list[tuple[str, Any]] = []
     index = getattr(frame, "index", None)
