@@ -49,6 +49,10 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
     diagnosis = None
     if options.get("diagnose", True):
         found = pipeline.diagnose(recording, **place)
+        if found.calibration is None:
+            grave = [f.seen for f in found.findings if f.severity.value != "note"]
+            why = grave[0] if grave else "its poses determine no calibration."
+            raise ValueError(f"{recording.source}: {why} `trihedron diagnose` says what else it shows.")
         result = CalibrationResult(found.calibration, found.segments, recording)
         diagnosis = {
             "verdict": found.verdict,
