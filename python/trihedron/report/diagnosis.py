@@ -27,6 +27,7 @@ from trihedron.report.numbers import (
     unit_in_print,
     with_sigma,
 )
+from trihedron.report.reference import reference_blocks
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 MEANING = {
@@ -78,6 +79,9 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         sections.append(Section("Findings", (findings_block(findings),)))
     if diagnosis.residuals:
         sections.append(Section("Figures", tuple(_picture(diagnosis, r) for r in diagnosis.residuals)))
+    found = getattr(diagnosis, "reference", None)
+    if found is not None:
+        sections.insert(0, Section("Against the reference", reference_blocks(found)))
     return Document(
         title="Diagnosis",
         subtitle=diagnosis.recording_source,
@@ -95,9 +99,12 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "consistent":
         return "CONSISTENT: the model and its noise account for this recording; nothing is missing that it could show."
     if diagnosis.verdict == "unexplained":
+        named = [effect.id for effect in diagnosis.effects if effect.side == "recording"]
+        off = left if named else off
+        beside = f" ({listed(list(dict.fromkeys(named)))} is there too, and explains little)" if named else ""
         return (
             f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
-            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it"
+            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it{beside}"
             + (f"; numbers differ too ({listed(numbers)})." if numbers else ".")
         )
     if diagnosis.verdict == "not-testable":
@@ -324,6 +331,13 @@ def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
             if corner is not None:
                 words += f"; bias walk from {plain_number(float(corner))} s on"
             facts.append((f"{name} noise", words))
+        hidden = diagnosis.noise.get(f"{name}_zero")
+        if hidden:
+            unit = "m/s^2" if name == "accelerometer" else "rad/s"
+            words = f"{_size(hidden['rms'], unit)} rms from pose to pose taken up by its walk"
+            words += f"; a pose's mean is good to {_size(hidden['noise'], unit)}"
+            words += "; the walk is as strong as the model allows" if hidden["is_at_edge"] else ""
+            facts.append((f"{name} zero", words))
     blocks.append(Facts(tuple(facts)))
     return tuple(blocks)
 
