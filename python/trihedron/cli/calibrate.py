@@ -50,6 +50,16 @@ def calibrate(
         Optional[float],  # noqa: UP045
         typer.Option(metavar="X", help="Nominal rad/s per gyro unit, where counts and few moves cannot tell it."),
     ] = None,
+    reference: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."
+        ),
+    ] = None,
+    reference_columns: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz', 't,wx [deg/s],...'."),
+    ] = None,
     extended: Annotated[
         bool, typer.Option("--extended", help="Diagnose the log too, and store the effects it demands; for apply.")
     ] = False,
@@ -94,6 +104,8 @@ def calibrate(
             latitude_deg=place.latitude,
             height_m=place.height,
             gyroscope_nominal=gyro_nominal,
+            reference=reference,
+            reference_columns=reference_columns,
             progress=tell,
             **choices,
         )
