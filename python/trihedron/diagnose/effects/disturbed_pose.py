@@ -74,7 +74,6 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
         jitter_s=obs.jitter_s,
         moves_inflation=obs.moves_inflation,
         dynamics_inflation=obs.dynamics_inflation,
-        is_scatter_free=obs.is_scatter_free,
     )
     force = whole.hold_force @ twin.accel_S.T + twin.accel_b
     n = whole.n_holds

@@ -21,6 +21,16 @@ STEEP = 6.0
 """Height in sigma that a parabola with the slopes at both ends of a plateau would reach: it would not look flat."""
 
 
+AGREE, HALF_STEP = 4.0, 0.5
+"""Errors of its mean, and noises of a sample, by which a run may differ from the level of the others."""
+FEWEST_FOR_CURVE, SPREAD = 4, 5.0
+"""Samples from which slope and curvature are fitted; fewer are flat if they spread by less than five sigma."""
+FLAT = 18.0
+"""Chi-square of slope and curvature (2): one flat run in ten thousand exceeds it."""
+FINE_STEP = 0.3
+"""Steps of the converter over the noise, below which four equal readings are not chance; above, six."""
+
+
 @dataclass(frozen=True)
 class Plateau:
     """One run at the limit: samples ``[start, stop)`` of channel ``axis``, on the side ``sign``.
@@ -85,9 +95,10 @@ def _on_level(
             arrival = (run[0] - x[a + first - REACH]) / REACH
             departure = (run[-1] - x[a + last - 1 + REACH]) / REACH
             # A parabola with these slopes at its edges would rise this high above them.
-            if min(arrival, departure) * n / 4.0 < STEEP * noise or not _is_flat(_middle(run) / noise):
+            rise = min(arrival, departure) * n / 4.0
+            if rise < STEEP * noise or not _is_flat(_middle(run) / noise):
                 continue
-            height = min(arrival, departure) * n / 4.0 / noise
+            height = rise / noise
             runs.append(Plateau(axis, sign, a + int(first), a + int(last), 0.0))
             clear.append(n >= LONG_RUN and height > HIGH)
             means.append(float(_middle(run).mean()))
@@ -96,7 +107,7 @@ def _on_level(
         return []
     # Peaks that merely end in one band differ by more than the error of their means.
     common = float(np.average(means, weights=1.0 / np.square(errors)))
-    agree = [abs(m - common) < 4.0 * e + 0.5 * noise for m, e in zip(means, errors, strict=True)]
+    agree = [abs(m - common) < AGREE * e + HALF_STEP * noise for m, e in zip(means, errors, strict=True)]
     kept = [replace(r, level=sign * common) for r, good in zip(runs, agree, strict=True) if good]
     return kept if len(kept) >= MIN_PLATEAUS or any(c and g for c, g in zip(clear, agree, strict=True)) else []
 
@@ -110,11 +121,11 @@ def _middle(run: FloatArray) -> FloatArray:
 def _is_flat(run: FloatArray) -> bool:
     """Whether a slope and a curvature explain no more of a run (in units of its noise) than chance does."""
     n = len(run)
-    if n < 4:
-        return float(np.ptp(run)) < 5.0
+    if n < FEWEST_FOR_CURVE:
+        return float(np.ptp(run)) < SPREAD
     k = np.linspace(-1.0, 1.0, n)
     basis, _ = np.linalg.qr(np.stack([np.ones(n), k, k * k], axis=1))
-    return bool(float(((basis[:, 1:].T @ run) ** 2).sum()) < 18.0)  # chi-square of 2: one run in ten thousand
+    return bool(float(((basis[:, 1:].T @ run) ** 2).sum()) < FLAT)
 
 
 def _rails(
@@ -124,7 +135,7 @@ def _rails(
     # On a coarse grid equal readings are the rule, at the top of a peak too.
     if not 0.0 < step_size < sigma:
         return []
-    shortest = 4 if step_size < 0.3 * sigma else 6
+    shortest = 4 if step_size < FINE_STEP * sigma else 6
     top = np.nanmax(x)
     found = []
     for a, b in ranges:
