@@ -29,6 +29,16 @@ def diagnose(
             help="Your simulation as model: a log or a scenario (.toml).",
         ),
     ] = None,
+    reference: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."
+        ),
+    ] = None,
+    reference_columns: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz', 't,wx [deg/s],...'."),
+    ] = None,
     improved: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says."),
@@ -74,6 +84,8 @@ def diagnose(
             height_m=place.height,
             calibration=known,
             against=against,
+            reference=reference,
+            reference_columns=reference_columns,
             alpha=alpha,
             progress=tell,
         )

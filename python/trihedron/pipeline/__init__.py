@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.reading import read, segment
     from trihedron.pipeline.replaying import guide
     from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
+    from trihedron.pipeline.sessions import SessionsResult, calibrate_sessions
     from trihedron.pipeline.simulating import simulate, twin, with_effects
     from trihedron.pipeline.verifying import verify
 
@@ -33,10 +34,12 @@ __all__ = [
     "CheckResult",
     "DiagnosisResult",
     "KalmanResult",
+    "SessionsResult",
     "VerificationResult",
     "allan_deviation",
     "apply",
     "calibrate",
+    "calibrate_sessions",
     "capture",
     "check",
     "convert",
@@ -100,6 +103,8 @@ _HOME = {
     "CheckResult": "trihedron.pipeline.results",
     "DiagnosisResult": "trihedron.pipeline.results",
     "VerificationResult": "trihedron.pipeline.results",
+    "SessionsResult": "trihedron.pipeline.sessions",
+    "calibrate_sessions": "trihedron.pipeline.sessions",
     "simulate": "trihedron.pipeline.simulating",
     "twin": "trihedron.pipeline.simulating",
     "with_effects": "trihedron.pipeline.simulating",

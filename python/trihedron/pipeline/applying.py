@@ -15,6 +15,8 @@ from trihedron.files.calibration import write_calibration as write_file
 from trihedron.files.plausible import require_plausible
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.reading import AnyRecording, recording_of
+from trihedron.pipeline.results import CheckResult
+from trihedron.pipeline.temperature import check_range, thermally_corrected
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit
@@ -46,12 +48,13 @@ def calibration_of(given: AnyCalibration) -> Calibration:
         return given
     if isinstance(given, str | os.PathLike):
         return read_calibration(given)
-    inside = getattr(given, "calibration", None)
+    # A check's is made with a standard gravity, for its error bars alone.
+    inside = None if isinstance(given, CheckResult) else getattr(given, "calibration", None)
     if isinstance(inside, Calibration):
         return inside
     raise WrongTypeError(
         "a calibration is what trihedron.calibrate gives, one that was read from a file, or the name of its file, not "
-        f"a {type(given).__name__}{' without one' if hasattr(given, 'calibration') else ''}."
+        f"{type(given).__name__}."
     )
 
 
@@ -69,7 +72,9 @@ def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str],
 def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     """The recording in SI, in the calibration's instrument trihedron: ``S raw + b`` for every row.
 
-    Where the calibration is extended, its effects are taken off first; a finding names those that cannot be.
+    Where the calibration is extended, its effects are taken off first; a finding names those that cannot be. Where it
+    follows temperature, S and b are those of each sample's temperature; outside the range for which it was made the
+    ends are held and a serious finding says so.
 
     Raises
     ------
@@ -82,16 +87,19 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     check_units(known, recording)
     recording, more = without_effects(known, recording)
     accelerometer, gyroscope = recording.accelerometer, recording.gyroscope
-    findings = (*recording.findings, *more, *doubted(known))
+    findings = (*recording.findings, *more, *doubted(known), *check_range(known, recording))
     if gyroscope is not None and known.gyroscope is None:
         gyroscope = None
         findings = (*findings, _left_out())
     if accelerometer is None and gyroscope is None:
         raise ValueError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
+    followed = thermally_corrected(known, recording)
+    if followed is None:
+        followed = _corrected(accelerometer, known.accelerometer), _corrected(gyroscope, known.gyroscope)
     return replace(
         recording,
-        accelerometer=_corrected(accelerometer, known.accelerometer),
-        gyroscope=_corrected(gyroscope, known.gyroscope),
+        accelerometer=followed[0],
+        gyroscope=followed[1],
         accelerometer_unit=AccelerationUnit.M_S2,
         gyroscope_unit=RateUnit.RAD_S,
         source=f"{recording.source}, calibrated",

@@ -22,7 +22,7 @@ def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False
         When the log cannot be read, or the file cannot be written.
     """
     if options and (isinstance(log, Recording) or hasattr(log, "recording")):
-        raise ValueError(f"{', '.join(options)} say how a log is read; this one was read already.")
+        raise ValueError(f"{', '.join(options)}: how a log is read cannot be said of one that was read already.")
     recording = read(log, **options) if options else recording_of(log)
     write_recording(recording, output, overwrite=overwrite)
     return recording

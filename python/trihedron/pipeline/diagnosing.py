@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -15,6 +16,8 @@ from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
+from trihedron.pipeline.asking import WrongTypeError
+from trihedron.pipeline.beside import beside
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
@@ -22,6 +25,7 @@ from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
 from trihedron.pipeline.diagnosing_rest import at_rest, diagnosed_at_rest
 from trihedron.pipeline.improving import driven
 from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segments_of
+from trihedron.pipeline.referring import AnyReference
 from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
@@ -41,6 +45,8 @@ def diagnose(
     segments: Segments | None = None,
     calibration: AnyCalibration | None = None,
     against: GivenModel | None = None,
+    reference: AnyReference | None = None,
+    reference_columns: str | None = None,
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
@@ -59,6 +65,9 @@ def diagnose(
     against : Recording, Scenario or path, optional
         The user's simulation as the model: a simulated recording, with everything that it contains, or a scenario
         (``.toml``), whose instrument is moved as the recording was.
+    reference : path, Recording or ReferenceMotion, optional
+        Known motion beside the log: attitude, rate or pose with a clock of its own, or the log of another unit that
+        moved along (docs/reference.md). ``reference_columns`` says its columns where their names do not.
     alpha : float
         Chance that a healthy recording is called anything but consistent.
 
@@ -73,6 +82,14 @@ def diagnose(
         raise ValueError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
     tell = progress or (lambda _fraction, _text: None)
     recording = recording_of(recording)
+    if reference is not None:
+        ordinary = partial(
+            diagnose, recording, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m,
+            segments=segments, calibration=calibration, against=against, alpha=alpha, progress=progress,
+        )  # fmt: skip
+        given = None if calibration is None else calibration_of(calibration)
+        place = (gravity_m_s2, latitude_deg, height_m)
+        return beside(recording, reference, reference_columns, given, place, alpha, ordinary)
     known = None if calibration is None else calibration_of(calibration)
     said: tuple[Finding, ...] = ()
     if known is not None and gravity_m_s2 is None and latitude_deg is None and height_m is None:
@@ -171,6 +188,9 @@ def _simulated_log(against: GivenModel, recording: Recording, segments: Segments
     if isinstance(against, Recording):
         return against
     if not isinstance(against, Scenario):
+        if not isinstance(against, str | os.PathLike):
+            kind = type(against).__name__
+            raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
         if Path(against).suffix.lower() != ".toml":
             return read(against)
         against = read_scenario(Path(against))
@@ -228,6 +248,8 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
     ValueError
         When the calibration is in another frame than ``lower``.
     """
+    if not isinstance(result, CalibrationResult):
+        raise WrongTypeError(f"trihedron.extend takes what trihedron.calibrate gave, not {type(result).__name__}.")
     base = result.calibration
     if base.frame != "lower":
         raise ValueError(

@@ -16,6 +16,7 @@ from trihedron.estimate.kalman import (
 from trihedron.estimate.noise import identify_noise, noise_of_holds
 from trihedron.estimate.noise.holds import SHORTEST as SHORTEST_HOLD
 from trihedron.estimate.noise.resolution import converter_step
+from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segments_of
 from trihedron.read import read_axis_noise, read_pose_table, read_recording
@@ -101,6 +102,8 @@ def kalman(
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     recording = recording_of(recording)
     table = reference
+    if table is not None and not isinstance(table, PoseTable | str | os.PathLike):
+        raise WrongTypeError(f"a reference is a pose table or the name of its file, not {type(table).__name__}.")
     if isinstance(table, str | os.PathLike):
         table = read_pose_table(table, gravity_m_s2=gravity, sigma_angle_deg=sigma_angle_deg)
     given, noted, identified = _settle_noise(noise, recording)
@@ -141,6 +144,9 @@ def _settle_noise(
         noticed = [*noise.findings, *(finding for axis in noise.axes for finding in axis.findings)]
         weighty = tuple(finding for finding in noticed if finding.severity is not Severity.NOTE)
         return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty, True
+    is_axes = isinstance(noise, Sequence) and all(isinstance(axis, AxisNoise) for axis in noise)
+    if noise is not None and not isinstance(noise, AxisNoise) and not is_axes:
+        raise WrongTypeError(f"noise is what trihedron.noise found, or the name of a file, not {type(noise).__name__}.")
     return noise, (), False
 
 

@@ -11,6 +11,7 @@ from trihedron.files.calibration import calibration_document, plain
 from trihedron.files.output import OutputError, write_whole
 from trihedron.pipeline.filtering import KalmanResult
 from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
+from trihedron.pipeline.sessions import SessionsResult
 from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segments, Verification
 from trihedron.records.plan import ExperimentPlan
 from trihedron.report import document, frames, machine, summaries
@@ -23,6 +24,7 @@ from trihedron.report.noise import noise_picture, noise_report
 from trihedron.report.noise_files import noise_record
 from trihedron.report.page import to_html
 from trihedron.report.plan import plan_record, plan_report
+from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
 from trihedron.report.text import to_text
 from trihedron.report.verification import verification_report
 
@@ -67,6 +69,9 @@ _KINDS: dict[type, _Shown] = {
         lambda r: kalman_record(r.outcome, r.calibration),
         lambda r: frames.calibration_columns(r.calibration),
     ),
+    SessionsResult: _Shown(
+        lambda r: sessions_report(r.model), lambda r: sessions_record(r.model), lambda r: sessions_columns(r.model)
+    ),
     Calibration: _Shown(calibration_report, calibration_document, frames.calibration_columns),
     Verification: _Shown(verification_report, machine.verification_record, frames.verification_columns),
     Noise: _Shown(noise_report, noise_record, frames.noise_columns),
@@ -82,7 +87,7 @@ def _kind(result: object) -> _Shown:
         if isinstance(result, known):
             return shown
     names = ", ".join(sorted(known.__name__ for known in _KINDS))
-    raise TypeError(f"a {type(result).__name__} is no result of trihedron; there are {names}.")
+    raise TypeError(f"{type(result).__name__} is no result of trihedron; there are {names}.")
 
 
 def as_dict(result: object) -> dict[str, Any]:
@@ -104,9 +109,9 @@ def as_html(result: object) -> str:
 def pictures(result: object) -> dict[str, document.Picture]:
     """The figures of a result's report by name."""
     found = {"allan": noise_picture(result)} if isinstance(result, Noise) else {}
-    for section in _kind(result).document(result).sections:
-        found |= {block.name: block for block in section.blocks if isinstance(block, document.Picture)}
-    return found
+    laid_out = _kind(result).document(result)
+    every = [laid_out.lead, *(block for section in laid_out.sections for block in section.blocks)]
+    return found | {b.name: b for b in every if isinstance(b, document.Picture) and b.draw is not None}
 
 
 def plot(result: object, name: str | None = None) -> ShownFigure:
@@ -124,7 +129,9 @@ def plot(result: object, name: str | None = None) -> ShownFigure:
     if chosen is None or chosen not in there:
         listed = ", ".join(repr(key) for key in there) or "none"
         raise ValueError(f"there is no figure {chosen!r} of this {type(result).__name__}; there are: {listed}.")
-    return there[chosen].draw()
+    draw = there[chosen].draw
+    assert draw is not None
+    return draw()
 
 
 def report(result: object, path: str | os.PathLike[str] | None = None, *, overwrite: bool = False) -> str:

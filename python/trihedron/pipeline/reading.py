@@ -37,8 +37,8 @@ def read(
     """Read and audit a log; the parameters are those of :func:`trihedron.read.read_recording`.
 
     ``path`` is a file name, or readings in memory: an array (n, columns), also structured or masked; a dictionary of
-    arrays (n,) or (n, 3); a data frame of pandas, polars or Arrow. Names of columns are understood as in a file; masked
-    cells are missing readings.
+    arrays (n,) or (n, 3); a list of dictionaries, one per sample; a data frame of pandas, polars or Arrow. Names of
+    columns are understood as in a file; masked cells are missing readings. A recording comes back as it is.
 
     Raises
     ------
@@ -53,6 +53,9 @@ def read(
     >>> trihedron.read({"t": np.arange(500) / 100, "acc": a}).rate_hz
     100.0
     """
+    inside = getattr(path, "recording", path)
+    if isinstance(inside, Recording):
+        return inside
     try:
         recording = read_recording(
             path,
@@ -91,6 +94,8 @@ def of_arrays(
         raise ReadError("from_arrays needs accelerometer (n, 3) or gyroscope (n, 3).")
     import numpy as np
 
+    if time_s is not None and np.ndim(time_s) != 1:
+        raise ReadError(f"time_s must have shape (n,), got {np.shape(time_s)}.")
     columns: dict[str, Any] = {} if time_s is None else {"time [s]": time_s}
     mapping = ["time=time [s]"] if time_s is not None else ["time=none"]
     for name, letter, readings in (("accelerometer", "a", accelerometer), ("gyroscope", "g", gyroscope)):
@@ -124,8 +129,7 @@ def recording_of(given: AnyRecording) -> Recording:
     """
     if isinstance(given, Recording):
         return given
-    inside = getattr(given, "recording", None)
-    return inside if isinstance(inside, Recording) else read(given)
+    return read(given)
 
 
 def segments_of(given: Segments | None, recording: Recording, progress: Progress | None = None) -> Segments:
@@ -139,7 +143,7 @@ def segments_of(given: Segments | None, recording: Recording, progress: Progress
     if given is None:
         return segment(recording, progress=progress)
     if not isinstance(given, Segments):
-        raise ValueError(f"segments are what trihedron.segment(recording) gives, not a {type(given).__name__}.")
+        raise ValueError(f"segments are what trihedron.segment(recording) gives, not {type(given).__name__}.")
     return given
 
 

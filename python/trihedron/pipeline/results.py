@@ -8,6 +8,8 @@ from typing import Any
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.presented import Presented
+from trihedron.records.published import published_figures
+from trihedron.records.reference import AgainstReference
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,13 +108,15 @@ class DiagnosisResult(Diagnosis, Presented):
 
     ``calibration`` is the linear model at the start: fitted to this recording, or given (``model_is_given``);
     ``updated`` the recording's own calibration where one was given and the recording can carry another;
+    ``reference`` what known motion beside the log says;
     ``own_effects`` every effect that the recording has, those that the given model has too included.
     """
 
     recording: Recording = field(kw_only=True)
     segments: Segments = field(kw_only=True)
-    calibration: Calibration = field(kw_only=True)
+    calibration: Calibration | None = field(kw_only=True)
     updated: Calibration | None = None
+    reference: AgainstReference | None = None
     own_effects: tuple[AcceptedEffect, ...] = ()
     gravity_source: str = ""
     model_is_given: bool = False
@@ -124,6 +128,8 @@ class DiagnosisResult(Diagnosis, Presented):
             **super().to_dict(),
             "gravity_source": self.gravity_source,
             "model_is_given": self.model_is_given,
+            "figures": None if self.calibration is None or self.model_is_given else published_figures(self.calibration),
+            "reference": None if self.reference is None else self.reference.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
         }
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.pipeline.applying import AnyCalibration, calibration_of
+from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.reading import AnyRecording, recording_of
 from trihedron.records import Recording, Truth
 from trihedron.segment import segment_recording
@@ -37,6 +38,8 @@ def scenario_of(scenario: str | os.PathLike[str] | Scenario) -> Scenario:
     """
     if isinstance(scenario, Scenario):
         return scenario
+    if not isinstance(scenario, str | os.PathLike):
+        raise WrongTypeError(f"a scenario is its name or its .toml file, not {type(scenario).__name__}.")
     path = Path(scenario)
     return read_scenario(path) if path.suffix.lower() == ".toml" else scenario_by_name(str(scenario))
 

@@ -48,6 +48,7 @@ _COMMANDS = {
 }
 _COLUMNS = re.compile(r"--columns ((?:\w[\w.]*=|[\w-]+,)[\w=,.-]*\w)(\.{3})?")
 _TURNS = re.compile(r"--turns (-?\d[\d,.-]*\d),\.\.\.")
+_QUOTED = re.compile(r"(--(?:accel|gyro)-lsb) '([^']*)'")
 _WORD = re.compile(r"--method (\w+)")
 # A place holder behind a flag (`--latitude DEG`) says what the parameter's own name says.
 _FLAG = re.compile(
@@ -64,6 +65,7 @@ def in_python(text: str) -> str:
     """A sentence with ``--columns ax=1`` as ``columns="ax=1"`` and other flags as the parameters they stand for."""
     text = _COLUMNS.sub(lambda m: f'columns="{m[1]}{m[2] or ""}"', text)
     text = _TURNS.sub(lambda m: f"turns_deg=[{m[1].replace(',', ', ')}, ...]", text)
+    text = _QUOTED.sub(lambda m: f'{_PARAMETERS[m[1]]}="{m[2]}"', text)
     text = _WORD.sub(lambda m: f'method="{m[1]}"', text)
     text = _COMMAND.sub(lambda m: f"`{_COMMANDS[m[1]]}`", text)
     return _FLAG.sub(lambda m: _PARAMETERS[m[1]], text)
@@ -101,4 +103,4 @@ def _changed(record: Any) -> Any:
 
 
 def _holds_findings(record: Any) -> bool:
-    return is_dataclass(record) and not isinstance(record, type) and any(f.name == "findings" for f in fields(record))
+    return is_dataclass(record) and not isinstance(record, type) and hasattr(record, "findings")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from functools import partial
 
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis, DomainResiduals, DomainTest, HeldOut
+from trihedron.report.calibration import figures_in_words
+from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
 from trihedron.report.diagnosis_laws import laws_blocks
 from trihedron.report.diagnosis_numbers import (
     differing_in_short,
@@ -15,7 +19,7 @@ from trihedron.report.diagnosis_numbers import (
     numbers_blocks,
     stages_blocks,
 )
-from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Level, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
@@ -27,6 +31,7 @@ from trihedron.report.numbers import (
     unit_in_print,
     with_sigma,
 )
+from trihedron.report.reference import reference_blocks
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 MEANING = {
@@ -45,6 +50,14 @@ _CAPTIONS = {
     "moves": "Angle between gravity carried through a move by the gyro and gravity measured after it.",
     "dynamics": "Velocity over a move that the two poses at its ends do not allow.",
 }
+_LEVELS: dict[str, Level] = {
+    "consistent": "good",
+    "parameters-differ": "usable",
+    "missing-physics": "usable",
+    "not-testable": "usable",
+    "unexplained": "bad",
+}
+"""A diagnosis that names what is missing has done its work; one that cannot is no base for anything."""
 MOST_NAMED = 4
 MOST_PARAMETERS = 9
 
@@ -56,7 +69,7 @@ def first_screen(diagnosis: Diagnosis) -> int:
 
 def diagnosis_report(diagnosis: Diagnosis) -> Document:
     """Lay out a diagnosis; the first sections fit one screen."""
-    sections = [Section("Where recording and model differ", _located(diagnosis))]
+    sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
         numbers = [*differing_numbers(diagnosis), *differing_noise(diagnosis)]
         words = tuple(("", word) for word in numbers) or (("", "None of the given numbers differs."),)
@@ -76,14 +89,21 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
     findings: Iterable[Finding] = getattr(diagnosis, "findings", ())
     if findings:
         sections.append(Section("Findings", (findings_block(findings),)))
-    if diagnosis.residuals:
-        sections.append(Section("Figures", tuple(_picture(diagnosis, r) for r in diagnosis.residuals)))
+    pictures = _pictures(diagnosis)
+    if pictures[1:]:
+        sections.append(Section("Figures", tuple(pictures[1:])))
+    found = getattr(diagnosis, "reference", None)
+    if found is not None:
+        sections.insert(0, Section("Against the reference", reference_blocks(found)))
     return Document(
         title="Diagnosis",
         subtitle=diagnosis.recording_source,
         verdict=verdict_in_words(diagnosis),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
+        headlines=tuple(_headlines(diagnosis)),
+        lead=pictures[0] if pictures else None,
+        stated_level=_LEVELS[diagnosis.verdict],
     )
 
 
@@ -95,9 +115,12 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "consistent":
         return "CONSISTENT: the model and its noise account for this recording; nothing is missing that it could show."
     if diagnosis.verdict == "unexplained":
+        named = [effect.id for effect in diagnosis.effects if effect.side == "recording"]
+        off = left if named else off
+        beside = f" ({listed(list(dict.fromkeys(named)))} is there too, and explains little)" if named else ""
         return (
             f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
-            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it"
+            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it{beside}"
             + (f"; numbers differ too ({listed(numbers)})." if numbers else ".")
         )
     if diagnosis.verdict == "not-testable":
@@ -139,13 +162,16 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         )
         for d in diagnosis.domains
     )
-    head: tuple[str, ...] = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
+    head: tuple[str, ...] = ("what", "domain", "residual, a zero per pose", "χ²/dof", "p", "model", "with the effects")
     if not diagnosis.effects:
         head, rows = head[:-1], tuple(row[:-1] for row in rows)
     blocks: list[Block] = [Table(head, rows)]
     places = tuple((d.domain, place) for d in diagnosis.domains if d.disagrees and (place := where_in_words(d)))
     if places:
         blocks.append(Facts(places))
+    own = getattr(diagnosis, "calibration", None)
+    if own is not None and not getattr(diagnosis, "model_is_given", False):
+        blocks.append(Facts(figures_in_words(own)))
     return tuple(blocks)
 
 
@@ -205,7 +231,11 @@ def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         return (Paragraph("No effect of the catalogue earns its place in the model."),)
     blocks: list[Block] = []
     for k, effect in enumerate(diagnosis.effects):
-        rows = [(f"{k + 1}. {effect.id}", effect.statement), ("", _parameters(effect)), ("", _evidence(effect))]
+        rows = [
+            (f"{k + 1}. {effect.id}", _without_strongest(effect.statement)),
+            ("", _parameters(effect)),
+            ("", _evidence(effect)),
+        ]
         if effect.confounded_with:
             rows.append(
                 ("", f"This recording cannot tell it from {listed(list(effect.confounded_with))}. To separate them: ")
@@ -213,6 +243,15 @@ def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             rows[-1] = ("", rows[-1][1] + (effect.separating_experiment or "record other poses and moves") + ".")
         blocks.append(Facts(tuple(row for row in rows if row[1])))
     return tuple(blocks)
+
+
+def _without_strongest(statement: str) -> str:
+    """The sentence without its strongest term, which stands below it with the digits that its error bar allows."""
+    return _capital(re.sub(r"\s*\(strongest term [^:]*: [^;]*?\)(?=\.|$|;)", "", statement))
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _parameters(effect: AcceptedEffect) -> str:
@@ -324,6 +363,13 @@ def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
             if corner is not None:
                 words += f"; bias walk from {plain_number(float(corner))} s on"
             facts.append((f"{name} noise", words))
+        hidden = diagnosis.noise.get(f"{name}_zero")
+        if hidden:
+            unit = "m/s^2" if name == "accelerometer" else "rad/s"
+            words = f"{_size(hidden['rms'], unit)} rms from pose to pose taken up by its walk"
+            words += f"; a pose's mean is good to {_size(hidden['noise'], unit)}"
+            words += "; the walk is as strong as the model allows" if hidden["is_at_edge"] else ""
+            facts.append((f"{name} zero", words))
     blocks.append(Facts(tuple(facts)))
     return tuple(blocks)
 
@@ -343,13 +389,56 @@ def _number_with_sigma(value: float, sigma: float) -> str:
     return f"({_value(scale * value, scale * sigma)}) {power_of_ten(exponent)}"
 
 
+def _pictures(diagnosis: Diagnosis) -> list[Picture]:
+    """The effects against what drives them, then each domain before and after."""
+    return [*_physics(diagnosis), *(_picture(diagnosis, r) for r in diagnosis.residuals)]
+
+
+def _physics(diagnosis: Diagnosis) -> list[Picture]:
+    """One picture per effect, where the recording is at hand and the effect acts on poses or moves one by one."""
+    made = [getattr(diagnosis, name, None) for name in ("recording", "segments", "calibration")]
+    if any(one is None for one in made):
+        return []
+    out = []
+    for effect in diagnosis.effects:
+        chart = effect_chart(effect, diagnosis.residuals, *made)  # type: ignore[arg-type]
+        if chart is not None:
+            caption = f"{effect.id}: data (dots) against what drives it, with the model. "
+            caption += _without_strongest(effect.statement)
+            out.append(Picture(f"effect-{effect.id}", caption, None, lambda drawn=chart: drawn))  # type: ignore[misc]
+    return out
+
+
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     has_effects = bool(diagnosis.effects)
 
-    made = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
+    draw = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
     n = len(residuals.before)
     caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'hold' else 'move')}; "
     caption += "bars: twice the noise predicted for one number."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."
-    return Picture(f"{residuals.domain}", caption, made)
+    chart = partial(before_after_chart, residuals, has_effects=has_effects)
+    return Picture(f"{residuals.domain}", caption, draw, chart)
+
+
+def _headlines(diagnosis: Diagnosis) -> list[Headline]:
+    """The strongest effect by what it gains on unseen poses and moves; else the worst domain."""
+    for effect in diagnosis.effects:
+        if effect.held_out:
+            held = effect.held_out[0]
+            after, _, unit = _size(held.rms_after, held.unit).partition(" ")
+            before = _size(held.rms_before, held.unit)
+            if effect.share is not None:
+                words = f"{plain_number(100.0 * effect.share, 2)}"
+                return [
+                    Headline(f"{effect.id} explains", words, "%", "of the misfit"),
+                    Headline(MEANING[held.domain], after, unit, f"held out, with it; {before} without"),
+                ]
+            return [Headline(MEANING[held.domain], after, unit, f"held out, with {effect.id}; {before} without")]
+    tests = [d for d in diagnosis.domains if d.dof > 0]
+    if not tests:
+        return []
+    worst = min(tests, key=lambda d: (not d.disagrees, d.p_value))
+    beside = f"χ² per degree of freedom, 1 by noise alone; p {_probability(worst.p_value)}"
+    return [Headline(MEANING[worst.domain], plain_number(worst.chi2_per_dof), "", beside)]

@@ -16,7 +16,8 @@ LEAST_SWING_K = 0.5
 MIN_BIC = 10.0
 """Kass and Raftery's bound for very strong evidence, as among poses."""
 FOLDS = 12
-TEMPERATURE_BINS = 12
+TEMPERATURE_BINS, FEWEST_BINS = 12, 3
+"""Bins of temperature, and how many must have been passed both ways for a difference between branches."""
 VISIBLE = 0.98
 """Held-out rms must fall to this: the same bound as for every effect."""
 ALL = (SCATTER, WALK, DRIFT)
@@ -172,6 +173,6 @@ def branch_gap(pieces: RestPieces, rest: FloatArray) -> tuple[FloatArray, FloatA
         up, down = (place == k) & (speed > BRANCH_K_S), (place == k) & (speed < -BRANCH_K_S)
         if up.sum() >= 2 and down.sum() >= 2:
             gaps.append(rest[up].mean(axis=0) - rest[down].mean(axis=0))
-    if len(gaps) < TEMPERATURE_BINS // 4:
+    if len(gaps) < FEWEST_BINS:
         return None
     return np.mean(gaps, axis=0), np.std(gaps, axis=0, ddof=1) / np.sqrt(len(gaps))

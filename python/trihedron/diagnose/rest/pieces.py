@@ -25,7 +25,7 @@ SAME_POSE_RAD = 0.12
 """Pieces whose force points less than 7° apart hold one orientation: a drifting zero of 0.1 g turns it by less."""
 MOSTLY_STILL = 0.6
 """Share of a log that must be still: in one that moves, what is slow is taken for still."""
-LEAST_SHARE = 0.04
+LEAST_SHARE, FEWEST_OF_POSE = 0.04, 4
 """An orientation that fewer pieces hold is handling."""
 TEMPERATURE_WINDOW_S = 10.0
 
@@ -85,7 +85,8 @@ def rest_pieces(recording: Recording) -> RestPieces | None:
         rough = np.array([np.nanvar(np.diff(values[a : a + 2 * half], axis=0), axis=0) / 2.0 for a in starts])
         step = _at_least(np.zeros(3), values) ** 2
         quiet = np.maximum(np.nanquantile(rough, QUIET_QUANTILE, axis=0), step)
-        loud |= ~(rough <= LOUD * np.maximum(quiet, 1e-300)).all(axis=1)
+        limit = LOUD * np.maximum(quiet, 1e-300)
+        loud |= ~(rough <= limit).all(axis=1)
         noise.append(np.sqrt(np.maximum(np.nanmedian(rough[~loud], axis=0), quiet) if (~loud).any() else quiet))
     means = [np.array([[np.nanmean(v[a + k * half : a + (k + 1) * half], axis=0) for k in (0, 1)] for a in starts])
              for v in sides]  # fmt: skip
@@ -146,7 +147,7 @@ def _orientations(force: FloatArray) -> npt.NDArray[np.int64]:
         # A zero that drifts smears an orientation: once more about the mean of those found.
         centre = up[members].mean(axis=0)
         members = free[np.arccos(np.clip(up[free] @ (centre / np.linalg.norm(centre)), -1.0, 1.0)) < SAME_POSE_RAD]
-        if len(members) < max(LEAST_SHARE * len(up), 4):
+        if len(members) < max(LEAST_SHARE * len(up), FEWEST_OF_POSE):
             break
         out[members] = found
         found += 1

@@ -23,16 +23,16 @@ from trihedron.diagnose.session.twin import (
     Prior,
     System,
     Twin,
+    contiguous,
     core_model,
     core_state,
     stacked,
     twin_of,
 )
+from trihedron.session.noise import START_STRENGTHS
 
 N_DOMAINS = 4
 """Domains of residual rows: the first four labels."""
-START_SCATTER = (1e-3, 1e-3)
-"""Scatter that counts as none, in its units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,26 +80,33 @@ class Fit:
 
     @cached_property
     def linear(self) -> tuple[FloatArray, FloatArray]:
-        """(24, 24) covariance of ``(S_a, b_a, S_w, b_w)`` on raw readings; ``b_w`` with one zero for the session."""
-        obs = self.line.obs
-        return self.line.core.linear_covariance(
-            np.ascontiguousarray(obs.force_origin), np.ascontiguousarray(obs.rate_origin)
-        )
+        """(24, 24) covariance of ``(S_a, b_a, S_w, b_w)`` on raw readings; ``b_w`` with one zero for the session.
+
+        Error bars allow for zeros that scatter, as those of a calibration do (eq. 11.12b).
+        """
+        obs, core = self.line.obs, self.line.core
+        if obs.zero_scatter is None:
+            core = core_model(obs, self.twin.gravity, self.line.prior, is_scatter_free=True).fit(
+                state=core_state(self.twin), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
+                force_effect=contiguous(self.line.distortion.force), rate_effect=contiguous(self.line.distortion.rate),
+                is_tuned=False,
+            )  # fmt: skip
+        return core.linear_covariance(np.ascontiguousarray(obs.force_origin), np.ascontiguousarray(obs.rate_origin))
 
 
 def _fitted(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None, *, is_tuned: bool) -> Fit:
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
+    corners = (float(start.accel_corner_s), float(start.gyro_corner_s))
+    scatter = START_STRENGTHS[1] if obs.zero_scatter is None else (1.0, 1.0)
     core = core_model(obs, start.gravity, prior).fit(
-        **core_state(start),
-        effect=np.ascontiguousarray(start.effect, dtype=np.float64),
-        corners_s=(float(start.accel_corner_s), float(start.gyro_corner_s)),
-        scatter=START_SCATTER,
-        force_effect=None if distortion.force is None else np.ascontiguousarray(distortion.force, dtype=np.float64),
-        rate_effect=None if distortion.rate is None else np.ascontiguousarray(distortion.rate, dtype=np.float64),
+        state=core_state(start),
+        strengths=(corners, scatter, start.between),
+        force_effect=contiguous(distortion.force),
+        rate_effect=contiguous(distortion.rate),
         is_tuned=is_tuned,
     )
-    twin = twin_of(core, obs, start.gravity)
+    twin = twin_of(core, start.gravity)
     return Fit(twin, Linearisation(obs, twin, distortion, prior, core))
 
 
@@ -128,7 +135,7 @@ def extend(base: Fit, accepted: Distortion, added: Distortion, n_iterations: int
 
 def move_misfit(obs: Observations, twin: Twin) -> FloatArray:
     """(moves,) chi-square of gravity and velocity after every move at a point, nothing fitted."""
-    residual = core_model(obs, twin.gravity, None).move_residuals(**core_state(twin))
+    residual = core_model(obs, twin.gravity, None).move_residuals(core_state(twin))
     out: FloatArray = (residual**2).sum(axis=1)
     return out
 
