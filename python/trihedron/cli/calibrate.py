@@ -130,11 +130,18 @@ def _choices(
     return {
         "method": one_of("--method", method, ("joint", "separate", "faces")),
         "frame": None if frame is None else one_of("--frame", frame, ("lower", "symmetric", "case")),
-        "faces": None if faces is None else [int(value) for value in numbers("--faces", faces)],
+        "faces": None if faces is None else _whole("--faces", faces),
         "turns_deg": None if turns is None else numbers("--turns", turns),
         "axis_signs": None if axis_signs is None else signs("--axis-signs", axis_signs),
         "loss": one_of("--loss", loss, ("linear", "huber", "soft_l1", "cauchy")),
     }
+
+
+def _whole(option: str, text: str) -> list[int]:
+    values = numbers(option, text)
+    if not all(abs(value) < 10 and value == int(value) for value in values):
+        raise typer.BadParameter(f"{option} takes whole numbers such as 1,-1,2,-2,3,-3, not {text[:40]!r}")
+    return [int(value) for value in values]
 
 
 def one_of(option: str, value: str, allowed: tuple[str, ...]) -> str:

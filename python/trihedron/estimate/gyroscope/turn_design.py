@@ -39,6 +39,8 @@ def design_least_squares(
     ValueError
         When the turns do not determine an axis, or nothing tells the zero.
     """
+    if not 1e-30 < noise_density < 1e30:
+        raise ValueError(f"a noise density of {noise_density:g} is that of no gyro")
     q, p, t = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
     information = t + zero_s / noise_density**2 - float(np.sum(p**2 / q))
     if not information > 1e-12 * (t + zero_s / noise_density**2):
