@@ -17,6 +17,9 @@ S, b
     raw → truth, *distort* truth → raw.
 calibration
     S and b of both sensors with the covariance of every number. (:func:`calibrate`; :func:`apply`, :func:`verify`)
+attitude
+    Where the body points: the rotation from its frame at a sample to that at the start. (:func:`integrate_rate`, from a
+    corrected rate)
 diagnosis
     Where a recording and its model differ, the effect (physical mechanism) left out, with ± and held-out proof.
     (:func:`diagnose`)
@@ -42,6 +45,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from trihedron.estimate.attitude import integrate_rate
     from trihedron.estimate.noise import allan_deviation, identify_noise
     from trihedron.files.calibration import read_calibration, write_calibration
     from trihedron.pipeline import (
@@ -74,6 +78,7 @@ __all__ = [
     "diagnose",
     "export",
     "identify_noise",
+    "integrate_rate",
     "kalman",
     "noise",
     "read",
@@ -101,6 +106,7 @@ _ROOMS = ("capture",)
 _HOME = dict.fromkeys(_VERBS, "trihedron.pipeline")
 _HOME |= {"Diagnosis": "trihedron.records.diagnosis"}
 _HOME |= dict.fromkeys(("allan_deviation", "identify_noise"), "trihedron.estimate.noise")
+_HOME |= {"integrate_rate": "trihedron.estimate.attitude"}
 _HOME |= dict.fromkeys(("read_calibration", "write_calibration"), "trihedron.files.calibration")
 _HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")
 

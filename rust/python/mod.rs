@@ -1,6 +1,6 @@
 //! THE SEAM: the only place that may name `pyo3` or `numpy`. One file per room of the mathematics.
 //!
-//! Every entry converts its arrays to owned memory, then calls [`run`], which releases the interpreter and
+//! Every entry lends or copies its arrays (`arrays`), then calls [`run`], which releases the interpreter and
 //! turns a kernel's refusal into a `ValueError` with the kernel's own sentence.
 
 // pyo3 hands arguments over by value; that is its calling convention, not a choice of ours.
@@ -13,10 +13,13 @@ use crate::error::Result as KernelResult;
 
 mod accelerometer;
 mod allan;
+mod arrays;
+mod attitude;
 mod chi_square;
 mod gyro_alignment;
 mod kalman;
 mod kalman_norm;
+mod number_text;
 mod poisson;
 mod rotation;
 mod screening;
@@ -24,7 +27,6 @@ mod session_model;
 mod simulate;
 mod spectral_likelihood;
 mod stillness;
-mod trajectory;
 mod zero_process;
 
 /// The one doorway: run a kernel without holding the interpreter, map its refusal to `ValueError`.
@@ -39,8 +41,10 @@ pub(crate) fn run<T: Send>(
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     allan::register(module)?;
+    attitude::register(module)?;
     chi_square::register(module)?;
     gyro_alignment::register(module)?;
+    number_text::register(module)?;
     poisson::register(module)?;
     kalman::register(module)?;
     accelerometer::register(module)?;
@@ -51,7 +55,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     simulate::register(module)?;
     spectral_likelihood::register(module)?;
     stillness::register(module)?;
-    trajectory::register(module)?;
     zero_process::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
     module.delattr("__all__")?;

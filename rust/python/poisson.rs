@@ -8,6 +8,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::arrays::{as_vectors, flat1, flat3};
 use super::rotation::rows3;
 use crate::poisson::{self, MoveRange, RateModel, RateNoise};
 
@@ -108,8 +109,8 @@ fn integrate_moves<'py>(
     sigma_time_s: f64,
     nominal_step_s: f64,
 ) -> PyResult<Integrated<'py>> {
-    let time_s = samples(&time_s);
-    let raw = rows3("gyroscope", &gyroscope)?;
+    let time_s = flat1(&time_s);
+    let raw = flat3("gyroscope", &gyroscope)?;
     let ranges = ranges(&moves, &anchors_s)?;
     let scale = matrix3("scale", &scale)?;
     let before = rows3("bias_before", &bias_before)?;
@@ -129,7 +130,7 @@ fn integrate_moves<'py>(
     };
     let turns = super::run(py, || {
         let model = RateModel::of_degree(rate_degree)?;
-        let prepared = poisson::prepare_all(&time_s, &raw, None, &ranges, model)?;
+        let prepared = poisson::prepare_all(&time_s, as_vectors(&raw), None, &ranges, model)?;
         Ok(poisson::integrate_all(
             &prepared, &scale, &before, &after, &noise,
         ))
@@ -162,8 +163,8 @@ fn integrate_raw_rate<'py>(
     moves: PyReadonlyArray2<'py, i64>,
     rate_degree: u8,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Vec<f64>)> {
-    let time_s = samples(&time_s);
-    let raw = rows3("gyroscope", &gyroscope)?;
+    let time_s = flat1(&time_s);
+    let raw = flat3("gyroscope", &gyroscope)?;
     let shape = moves.shape().to_vec();
     // The raw integral does not involve the bias: any two ordered instants serve as anchors.
     let anchors_s =
@@ -172,7 +173,7 @@ fn integrate_raw_rate<'py>(
     let prepared = super::run(py, || {
         poisson::prepare_all(
             &time_s,
-            &raw,
+            as_vectors(&raw),
             None,
             &ranges,
             RateModel::of_degree(rate_degree)?,

@@ -3,10 +3,13 @@
 //! `|S a' + b| = |g|` is the quadric `a'ᵀ M a' + 2 mᵀ a' = |g|² - c` with `M = SᵀS`, `m = Sᵀb`, `c = bᵀb`. Readings
 //! are centred on their mean and divided by their spread before the linear step.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
+mod moments;
+
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use crate::error::{Error, Result};
 use crate::norm_invariant::{Frame, Model};
+pub(crate) use moments::Moments;
 
 /// Readings moved to the origin and to unit size: `a' = centre + size · u`.
 #[derive(Debug, Clone, Copy)]
@@ -242,6 +245,11 @@ pub fn fit_sphere(u: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
 /// When the readings do not determine an ellipsoid, naming the directions that are missing.
 pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Result<Model> {
     let standard = Standardisation::of(readings)?;
+    if let Some(model) =
+        by_moments(readings, &standard).and_then(|quadric| quadric.model(gravity, frame))
+    {
+        return Ok(standard.undo(&model));
+    }
     let u: Vec<_> = readings.iter().map(|a| standard.apply(a)).collect();
     let free = fit_quadric(&u)?;
     let model = free
@@ -258,6 +266,24 @@ pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Resul
             ))
         })?;
     Ok(standard.undo(&model))
+}
+
+/// [`fit_quadric`] in two passes over readings of which no row is kept: the sums, then one step of refinement, which
+/// gives back the digits that sums of squares lose. `None` where they would lose too many.
+fn by_moments(readings: &[Vector3<f64>], standard: &Standardisation) -> Option<Quadric> {
+    let moments = Moments::of(readings, standard);
+    let first = moments.quadric()?;
+    let mut rest = SVector::<f64, 9>::zeros();
+    for reading in readings {
+        let u = standard.apply(reading);
+        let missing = 1.0 - u.dot(&(first.a * u)) - 2.0 * first.h.dot(&u);
+        rest += SVector::from(row(&u)) * missing;
+    }
+    let more = quadric(moments.correction(&rest)?.as_slice());
+    Some(Quadric {
+        a: first.a + more.a,
+        h: first.h + more.h,
+    })
 }
 
 /// Which half axes no reading points to within 55° (the angle from an axis to the corner of a cube), in words.
