@@ -6,7 +6,7 @@ from pathlib import Path
 from trihedron import calibrate
 from trihedron.files.output import write_whole
 from trihedron.report.body import draw_body_poses
-from trihedron.report.figures import draw_poses, draw_signals
+from trihedron.report.figures import draw_poses, draw_signals, png
 from trihedron.simulate import hand_session, scenario_by_name, simulate, six_faces
 from trihedron.simulate.sessions import EDGES, FACES
 
@@ -28,7 +28,8 @@ def main() -> None:
         "procedure_sphere.png": draw_poses(session.accelerometer, session.segments.accelerometer_mean),
         "procedure_six_faces.png": draw_poses(few.accelerometer, few.segments.accelerometer_mean),
     }
-    for name, content in pictures.items():
+    for name, picture in pictures.items():
+        content = png(picture)
         write_whole(FOLDER / name, content, overwrite=True)
         print(f"{name}: {len(content) // 1000} kB")
 

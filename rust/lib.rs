@@ -11,6 +11,7 @@ pub mod ellipsoid;
 pub mod error;
 pub mod gauss_newton;
 pub mod gyro_alignment;
+pub mod interrupt;
 pub mod kalman;
 pub mod norm_invariant;
 pub mod number_text;

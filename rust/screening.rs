@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use crate::allan::prefix::Prefix;
 use crate::allan::readings::Readings;
 use crate::error::{Error, Result};
+use crate::interrupt;
 
 /// Differences from which a spread is read: its error is 0.8 %, far below that of the limit.
 const SAMPLE: usize = 16384;
@@ -103,6 +104,7 @@ fn at_scale(sums: &[f64], scale: Scale) -> Vec<Jump> {
     for i in (0..count)
         .step_by(RUN)
         .map(|first| first..(first + RUN).min(count))
+        .take_while(|_| !interrupt::is_requested())
         .filter(|run| !quiet(run.start, run.len()))
         .flatten()
     {

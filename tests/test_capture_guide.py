@@ -15,12 +15,12 @@ import trihedron
 from trihedron.capture.guide import Guide
 from trihedron.capture.stillness import Stillness
 from trihedron.cli import main
-from trihedron.cli.guide import readings_of, steps
 from trihedron.cli.page import Page, view_as_json
 from trihedron.cli.screen import as_text
 from trihedron.pipeline import simulate
 from trihedron.pipeline.guiding import conclude, examine, part_of
 from trihedron.pipeline.planning_poses import move_rows, shortest_path
+from trihedron.pipeline.replaying import readings_of, steps
 from trihedron.records.guiding import Accuracy, Examination, Phase
 from trihedron.simulate import scenario_by_name
 from trihedron.simulate.following import FollowingHand

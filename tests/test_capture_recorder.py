@@ -112,6 +112,24 @@ def test_an_unplugged_board_goes_on_in_the_same_file_with_the_gap_said(tmp_path)
     assert trihedron.read(tmp_path / "log.csv").n_samples == len(times)
 
 
+@pytest.mark.parametrize("protocol", ["xsens-mtdata2", "xio", "lines"])
+def test_frames_cut_by_unplugging_are_counted_by_the_device_counter(protocol, tmp_path):
+    link = tmp_path / "tty"
+    faults = Faults(disconnect_s=(0.8, 1.4), away_s=0.4)
+    board = Board(counts_recording(600, 300.0), protocol, faults=faults, speed=1.0, link=link)
+    # The port is open before the first byte: nothing is lost for want of a reader.
+    source = open_source(board.port)
+    with board:
+        make = decoder_factory("lines" if protocol == "lines" else protocol, column_namer())
+        recorder = Recorder(source, make, tmp_path / "log.csv", wait_for_return_s=1.5)
+        blocks = list(recorder)
+    saved = sum(len(block.time_s) for block in blocks)
+    assert recorder.count.disconnections == 3  # the last is for good
+    assert saved + recorder.count.lost == 600
+    # The index of every frame is the one that the device gave it, whatever was cut.
+    assert np.concatenate([block.index for block in blocks])[-1] == 599
+
+
 def test_the_baud_rate_is_found_by_itself():
     with Board(counts_recording(1500, 250.0), "lines", speed=1.0, baud=57_600) as board:
         source, found = open_device(board.port)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import trihedron
 from trihedron.diagnose.against import FittedModel, compare_numbers
-from trihedron.diagnose.against.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
+from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
 from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.profiles import profile_by_name

@@ -206,6 +206,16 @@ def test_a_foreign_format_is_named_with_the_way_in(tmp_path, content, complaint)
     assert "\n" not in str(caught.value)
 
 
+def test_two_rows_glued_by_a_lone_carriage_return_are_two_rows(tmp_path):
+    rows = [",".join(f"{v:.4f}" for v in row) for row in readings(60)]
+    for first, last in ((0, 1), (30, 31)):
+        glued = [*rows[:first], rows[first] + "\r" + rows[last], *rows[last + 1 :]]
+        path = tmp_path / f"{first}.csv"
+        path.write_bytes(("t,ax,ay,az,gx,gy,gz\r\n" + "\r\n".join(glued) + "\r\n").encode())
+        recording = read_recording(path)
+        assert recording.rows_in_file == recording.rows_read == 60
+
+
 def test_readings_in_si_that_step_like_counts_say_their_step(tmp_path):
     rng = np.random.default_rng(3)
     table = readings(2000)

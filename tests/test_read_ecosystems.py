@@ -145,6 +145,81 @@ def test_a_ulog_gives_raw_accelerometer_and_gyro_and_asks_which_of_several(tmp_p
         read_recording(path)
 
 
+@pytest.mark.parametrize("version", ["v7", "v7.3"])
+def test_timetables_of_matlab_mobile_are_both_sensors(tmp_path, version):
+    matio = pytest.importorskip("matio", reason="mat-io (trihedron[matlab]) is not installed")
+    pandas = pytest.importorskip("pandas")
+    start = pandas.Timestamp("2024-03-01 12:00:00.123")
+    index = pandas.Index(start + pandas.to_timedelta(TABLE[:, 0], unit="s"), name="Timestamp")
+    acc, gyr = (pandas.DataFrame(TABLE[:, k : k + 3], columns=list("XYZ"), index=index) for k in (1, 4))
+    path = tmp_path / "sensorlog.mat"
+    matio.save_to_mat(str(path), {"Acceleration": acc, "AngularVelocity": gyr}, version=version)
+    recording = read_recording(path)
+    assert_same(recording)
+    one = pandas.concat([acc.add_prefix("a"), gyr.add_prefix("g")], axis=1)
+    matio.save_to_mat(str(path), {"walk": one, "again": one}, version=version)
+    with pytest.raises(ReadError, match=r"(again|walk) \(300 messages\), (again|walk) \(300 messages\); choose one"):
+        read_recording(path)
+    assert_same(read_recording(path, topic="walk"))
+
+
+def batches(instance, table, n=8):
+    """FIFO messages of ``n`` samples as PX4 logs them, counts of 1/2048 g and 1/16.4 deg/s; the stamp is the last's."""
+    fields = "uint64_t timestamp_sample;float dt;float scale;uint8_t samples;int16_t[32] x;int16_t[32] y;int16_t[32] z;"
+    out = {}
+    for name, columns, scale in (
+        ("sensor_accel_fifo", table[:, 1:4], 9.80665 / 2048),
+        ("sensor_gyro_fifo", table[:, 4:7], np.pi / 180 / 16.4),
+    ):
+        counts = np.rint(columns / scale).astype(int)
+        body = b""
+        for first in range(0, len(table), n):
+            part = counts[first : first + n]
+            last = round(5e6 + 1e6 * table[first + len(part) - 1, 0])
+            step = 1e6 * (table[1, 0] - table[0, 0])
+            padded = np.zeros((3, 32), dtype="<i2")
+            padded[:, : len(part)] = part.T
+            body += struct.pack("<QQffB", last + 900, last, step, scale, len(part)) + padded.tobytes()
+        out[(name, instance)] = (fields, body, counts * np.float32(scale))
+    return out
+
+
+def ulog_of_batches(topics) -> bytes:
+    """The same file with bodies as they are."""
+
+    def message(kind: bytes, body: bytes) -> bytes:
+        return struct.pack("<HB", len(body), kind[0]) + body
+
+    out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + message(b"B", bytes(40))
+    for name, fields in {name: fields for (name, _), (fields, _, _) in topics.items()}.items():
+        out += message(b"F", f"{name}:uint64_t timestamp;{fields}".encode())
+    size = 8 + 8 + 4 + 4 + 1 + 192
+    for k, ((name, instance), (_, body, _)) in enumerate(topics.items()):
+        out += message(b"A", struct.pack("<BH", instance, k) + name.encode())
+        for at in range(0, len(body), size):
+            out += message(b"D", struct.pack("<H", k) + body[at : at + size])
+    return out
+
+
+def test_batches_of_raw_samples_of_a_ulog_are_unrolled(tmp_path):
+    pytest.importorskip("pyulog", reason="pyulog (trihedron[px4]) is not installed")
+    path = tmp_path / "log.ulg"
+    topics = batches(0, TABLE)
+    path.write_bytes(ulog_of_batches(topics))
+    recording = read_recording(path)
+    # 300 samples of each sensor, in 37 messages of eight and one of four.
+    assert recording.rows_in_file == recording.rows_read == 2 * len(TABLE)
+    wanted = [values for _, _, values in topics.values()]
+    # The size of a count is a number of single precision in the message.
+    assert recording.accelerometer == pytest.approx(wanted[0], rel=1e-7)
+    assert recording.gyroscope == pytest.approx(wanted[1], rel=1e-7)
+    assert recording.time_s == pytest.approx(TABLE[:, 0], abs=2e-6)
+    path.write_bytes(ulog_of_batches(topics | batches(1, TABLE)))
+    with pytest.raises(ReadError, match=r"sensor_accel_fifo 0 \(300 messages\).*--instance 0"):
+        read_recording(path)
+    assert read_recording(path, instance=1).n_samples == len(TABLE)
+
+
 def dataflash(n_imu: int) -> bytes:
     """A DataFlash log after ArduPilot's AP_Logger: FMT messages describe themselves and IMU with its instance I."""
 
@@ -210,7 +285,7 @@ def test_matlab_files_of_both_generations_are_read(tmp_path):
     (tmp_path / "new.mat").write_bytes(bytes(content))
     assert_same(read_recording(tmp_path / "new.mat"))
     savemat(tmp_path / "empty.mat", {"note": "nothing"})
-    with pytest.raises(ReadError, match="tables and timetables are objects"):
+    with pytest.raises(ReadError, match="no arrays of numbers"):
         read_recording(tmp_path / "empty.mat")
 
 

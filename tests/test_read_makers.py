@@ -10,6 +10,7 @@ from trihedron.read import read_recording
 from trihedron.records import Severity
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches" / "formats"))
+import more_layouts  # noqa: F401 -- its layouts join the others
 from layouts import LAYOUTS
 
 SENSORS = ("accelerometer", "gyroscope")

@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+import more_layouts  # noqa: F401 -- its layouts join the others
 from layouts import LAYOUTS
 
 from trihedron.read import ReadError, read_recording
@@ -32,7 +33,9 @@ from trihedron.read import ReadError, read_recording
 ROWS = 40
 HANGS_S = 60
 COUNTED = ("euroc", "kalibr", "px4_ulog2csv", "ximu3", "witmotion", "st_mems", "mars_logger", "physics_toolbox")
+COUNTED += ("excel_europe", "american_clock", "plotjuggler", "adis_evaluation")
 OTHERS = ("gnsslogger", "arduino_monitor", "arduino_plotter", "adafruit", "movella_dot", "shimmer_consensys", "axivity")
+OTHERS += ("gcdc_x16", "microstrain_mip", "gyroflow_gcsv")
 OTHERS += ("ardupilot_csv", "actigraph", "openlog_artemis", "androsensor", "i2cdevlib", "empatica", "metabase")
 Lines = list[bytes]
 

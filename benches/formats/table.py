@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+import more_layouts  # noqa: F401 -- its layouts join the others
 from layouts import LAYOUTS, Layout
 
 from trihedron.read import ReadError, read_recording

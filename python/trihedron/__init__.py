@@ -46,23 +46,38 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from trihedron.estimate.attitude import integrate_rate
-    from trihedron.estimate.noise import allan_deviation, identify_noise
-    from trihedron.files.calibration import read_calibration, write_calibration
+    from trihedron.estimate.noise import identify_noise
+    from trihedron.files.calibration import read_calibration
     from trihedron.pipeline import (
+        allan_deviation,
         apply,
         calibrate,
+        calibrate_sessions,
+        capture,
         check,
         convert,
+        demo,
         diagnose,
         export,
+        extend,
+        guide,
         kalman,
         noise,
+        plan,
+        plot,
+        ports,
         read,
+        report,
         segment,
+        simulate,
+        twin,
         verify,
+        write_calibration,
     )
     from trihedron.records import Calibration, Finding, Recording, Segments
     from trihedron.records.diagnosis import Diagnosis
+
+    __version__: str
 
 __all__ = [
     "Calibration",
@@ -70,45 +85,42 @@ __all__ = [
     "Finding",
     "Recording",
     "Segments",
+    "__version__",
     "allan_deviation",
     "apply",
     "calibrate",
+    "calibrate_sessions",
+    "capture",
     "check",
     "convert",
+    "demo",
     "diagnose",
     "export",
+    "extend",
+    "guide",
     "identify_noise",
     "integrate_rate",
     "kalman",
     "noise",
+    "plan",
+    "plot",
+    "ports",
     "read",
     "read_calibration",
+    "report",
     "segment",
+    "simulate",
+    "twin",
     "verify",
     "write_calibration",
 ]
 
-_VERBS = (
-    "apply",
-    "calibrate",
-    "check",
-    "convert",
-    "diagnose",
-    "export",
-    "kalman",
-    "noise",
-    "read",
-    "segment",
-    "verify",
-)
-_ROOMS = ("capture",)
-"""Rooms of which people use more than one name: ``trihedron.capture.Recorder``."""
-_HOME = dict.fromkeys(_VERBS, "trihedron.pipeline")
-_HOME |= {"Diagnosis": "trihedron.records.diagnosis"}
-_HOME |= dict.fromkeys(("allan_deviation", "identify_noise"), "trihedron.estimate.noise")
+_HOME = {"Diagnosis": "trihedron.records.diagnosis"}
 _HOME |= {"integrate_rate": "trihedron.estimate.attitude"}
-_HOME |= dict.fromkeys(("read_calibration", "write_calibration"), "trihedron.files.calibration")
+_HOME |= {"identify_noise": "trihedron.estimate.noise", "read_calibration": "trihedron.files.calibration"}
 _HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")
+# The others are verbs.
+_HOME |= {name: "trihedron.pipeline" for name in __all__ if name not in _HOME and not name.startswith("_")}
 
 
 class _Front(ModuleType):
@@ -124,16 +136,29 @@ class _Front(ModuleType):
         super().__setattr__(name, value)
 
     def __getattr__(self, name: str) -> Any:
-        if name in _ROOMS:
-            return import_module(f"trihedron.{name}")
-        if name not in _HOME:
+        if name == "__version__":
+            value: Any = _installed_version()
+        elif name in _HOME:
+            value = getattr(import_module(_HOME[name]), name)
+            if not isinstance(value, type):
+                # The command calls the same functions as they are: there sentences name flags.
+                value = import_module("trihedron.pipeline.asking").asked_in_python(value)
+        else:
             raise AttributeError(f"module 'trihedron' has no attribute {name!r}")
-        value = getattr(import_module(_HOME[name]), name)
         super().__setattr__(name, value)
         return value
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *__all__})
+        return sorted(__all__)
+
+
+def _installed_version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("trihedron")
+    except PackageNotFoundError:
+        return "0+unknown"
 
 
 # Names are fetched when first asked for: `trihedron --help` must not wait for what it does not use.

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::prefix::compensated_sum;
+use crate::interrupt;
 
 /// `Σ D2²` over disjoint clusters of `m`.
 #[must_use]
@@ -25,6 +26,9 @@ fn modified_one(p: &[f64], m: usize) -> f64 {
     let stretch = m.max(65536);
     let second = |i: usize| (p[i + 2 * m] - p[i + m]) - (p[i + m] - p[i]);
     compensated_sum((0..terms.div_ceil(stretch)).map(|s| {
+        if interrupt::is_requested() {
+            return f64::NAN;
+        }
         let first = s * stretch;
         let stop = (first + stretch).min(terms);
         let mut inner = compensated_sum((first..first + m).map(second));

@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::prefix::compensated_sum;
+use crate::interrupt;
 
 /// Terms per tile: 256 KiB of running sum, a fraction of a second-level cache.
 const TILE: usize = 32768;
@@ -65,6 +66,9 @@ pub fn energies(p: &[f64], lags: &[usize], difference: Difference) -> Vec<f64> {
             loop {
                 let tile = next.fetch_add(1, Ordering::Relaxed);
                 let Some(row) = rows.get(tile) else { return };
+                if interrupt::is_requested() {
+                    return;
+                }
                 // Nobody else holds this row: the lock is taken once and never waits.
                 let mut row = row
                     .lock()

@@ -12,6 +12,7 @@ use super::prefix::compensated_sum;
 use super::readings::Readings;
 use super::{Curve, Kind};
 use crate::error::{Error, Result};
+use crate::interrupt;
 
 /// Variances of a channel with missing readings (not finite), centred on `centre`.
 ///
@@ -35,6 +36,7 @@ pub fn variances(
         .par_iter()
         .with_max_len(1)
         .map(|&m| match kind {
+            _ if interrupt::is_requested() => (f64::NAN, 0, 0.0),
             Kind::Overlapping => every_start(&sums, &counts, m),
             _ => one(&sums, &counts, m, kind),
         })

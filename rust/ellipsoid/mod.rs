@@ -24,7 +24,7 @@ impl Standardisation {
     /// Of these readings.
     ///
     /// # Errors
-    /// When all readings are the same.
+    /// When all readings are the same, or one is missing, infinite or beyond any sensor.
     pub fn of(readings: &[Vector3<f64>]) -> Result<Self> {
         let n = readings.len().max(1) as f64;
         let centre = readings.iter().sum::<Vector3<f64>>() / n;
@@ -34,7 +34,12 @@ impl Standardisation {
             .sum::<f64>()
             / n)
             .sqrt();
-        if size.is_nan() || size <= 1e-12 * (1.0 + centre.norm()) {
+        if !size.is_finite() {
+            return Err(Error::bad_input(
+                "the readings hold numbers that are missing, infinite or too large for any sensor",
+            ));
+        }
+        if size <= 1e-12 * (1.0 + centre.norm()) {
             return Err(Error::not_determined(
                 "all still poses read the same: turn the sensor into different orientations between holds",
             ));
@@ -244,15 +249,36 @@ pub fn fit_sphere(u: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
 /// # Errors
 /// When the readings do not determine an ellipsoid, naming the directions that are missing.
 pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Result<Model> {
-    let standard = Standardisation::of(readings)?;
-    if let Some(model) =
-        by_moments(readings, &standard).and_then(|quadric| quadric.model(gravity, frame))
-    {
-        return Ok(standard.undo(&model));
+    if !(gravity.is_finite() && gravity > 0.0) {
+        return Err(Error::bad_input(format!(
+            "gravity must be a positive number in m/s², got {gravity}"
+        )));
     }
+    let standard = Standardisation::of(readings)?;
+    let by_moments = by_moments(readings, &standard);
+    let model = match by_moments.and_then(|quadric| quadric.model(gravity, frame)) {
+        Some(model) => model,
+        None => by_rows(readings, &standard, gravity, frame)?,
+    };
+    let model = standard.undo(&model);
+    if model.s.iter().chain(model.b.iter()).all(|v| v.is_finite()) {
+        Ok(model)
+    } else {
+        Err(Error::not_determined(
+            "the ellipsoid through the still poses has no finite size: check the readings",
+        ))
+    }
+}
+
+/// From rows: where sums lose too many digits, or the quadric is no ellipsoid.
+fn by_rows(
+    readings: &[Vector3<f64>],
+    standard: &Standardisation,
+    gravity: f64,
+    frame: Frame,
+) -> Result<Model> {
     let u: Vec<_> = readings.iter().map(|a| standard.apply(a)).collect();
-    let free = fit_quadric(&u)?;
-    let model = free
+    fit_quadric(&u)?
         .model(gravity, frame)
         .or_else(|| {
             fit_ellipsoid(&u)
@@ -264,8 +290,7 @@ pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Resul
                 "the quadric through the still poses is not an ellipsoid: {}",
                 missing_directions(&u)
             ))
-        })?;
-    Ok(standard.undo(&model))
+        })
 }
 
 /// [`fit_quadric`] in two passes over readings of which no row is kept: the sums, then one step of refinement, which

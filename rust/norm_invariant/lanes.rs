@@ -16,20 +16,33 @@ pub(super) const LANES: usize = 8;
 pub(super) type Row = [f64; LANES];
 pub(super) const ZERO: Row = [0.0; LANES];
 
-/// Eight readings, the last of them repeated where there are fewer.
+/// Values by eights without a copy; the last ones are filled up.
+pub(super) struct Eights<'a, T> {
+    whole: &'a [[T; LANES]],
+    rest: [T; LANES],
+}
+
+impl<'a, T: Copy> Eights<'a, T> {
+    #[inline(always)]
+    pub(super) fn of(values: &'a [T], missing: T) -> Self {
+        let (whole, few) = values.as_chunks::<LANES>();
+        let mut rest = [missing; LANES];
+        rest[..few.len()].copy_from_slice(few);
+        Self { whole, rest }
+    }
+
+    #[inline(always)]
+    pub(super) fn at(&self, i: usize) -> &[T; LANES] {
+        self.whole.get(i).unwrap_or(&self.rest)
+    }
+}
+
+/// Eight standardised readings.
 #[inline(always)]
-pub(super) fn load(values: &[Vector3<f64>], standard: &Standardisation, out: &mut [Row; 3]) {
-    if let Ok(eight) = <&[Vector3<f64>; LANES]>::try_from(values) {
-        for l in 0..LANES {
-            for c in 0..3 {
-                out[c][l] = eight[l][c];
-            }
-        }
-    } else {
-        for l in 0..LANES {
-            for c in 0..3 {
-                out[c][l] = values[l.min(values.len() - 1)][c];
-            }
+pub(super) fn load(values: &[Vector3<f64>; LANES], standard: &Standardisation, out: &mut [Row; 3]) {
+    for l in 0..LANES {
+        for c in 0..3 {
+            out[c][l] = values[l][c];
         }
     }
     let scale = 1.0 / standard.size;
@@ -40,13 +53,20 @@ pub(super) fn load(values: &[Vector3<f64>], standard: &Standardisation, out: &mu
     }
 }
 
+/// One of the readings, to fill up the last eight with.
 #[inline(always)]
-pub(super) fn pad(values: &[f64], missing: f64, out: &mut Row) {
-    if let Ok(eight) = <&Row>::try_from(values) {
-        *out = *eight;
+pub(super) fn filler(values: &[Vector3<f64>]) -> Vector3<f64> {
+    values.last().copied().unwrap_or_default()
+}
+
+/// Eight numbers, or the first of them where there is room for fewer.
+#[inline(always)]
+pub(super) fn store(found: &Row, out: &mut [f64]) {
+    if let Ok(eight) = <&mut Row>::try_from(&mut *out) {
+        *eight = *found;
     } else {
-        *out = [missing; LANES];
-        out[..values.len()].copy_from_slice(values);
+        let n = out.len();
+        out.copy_from_slice(&found[..n]);
     }
 }
 

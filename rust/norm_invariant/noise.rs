@@ -8,7 +8,7 @@
 use nalgebra::SVector;
 use rayon::prelude::*;
 
-use super::lanes::{LANES, Row, ZERO, columns, dot, force, load, mirrored, pad};
+use super::lanes::{Eights, LANES, Row, ZERO, columns, dot, filler, force, load, mirrored, store};
 use super::sums::{At, SHARE, by_share};
 use super::{N_PARAMETERS, Objective, Readings};
 use crate::simd::{Instructions, fma, for_each_instruction_set};
@@ -65,10 +65,12 @@ fn write_predictions_lanes<const FUSED: bool>(
     let (mut u, mut noise) = ([ZERO; 3], [ZERO; 9]);
     let (mut found_sigma, mut found_excess) = (ZERO, ZERO);
     let is_common = readings.noise.len() == 1;
+    let values = &readings.values[first..first + sigma.len()];
+    let values = Eights::of(values, filler(values));
     let parts = sigma.chunks_mut(LANES).zip(excess.chunks_mut(LANES));
     for (chunk, (sigma, excess)) in parts.enumerate() {
         let (here, n) = (first + chunk * LANES, sigma.len());
-        load(&readings.values[here..here + n], &at.standard, &mut u);
+        load(values.at(chunk), &at.standard, &mut u);
         if chunk == 0 || !is_common {
             load_noise(readings, here, n, &mut noise);
         }
@@ -94,8 +96,8 @@ fn write_predictions_lanes<const FUSED: bool>(
             found_sigma[l] = if along > floor { along } else { floor }.sqrt();
             found_excess[l] = across / (2.0 * g);
         }
-        sigma.copy_from_slice(&found_sigma[..n]);
-        excess.copy_from_slice(&found_excess[..n]);
+        store(&found_sigma, sigma);
+        store(&found_excess, excess);
     }
 }
 
@@ -150,12 +152,16 @@ fn add_noise_lanes<const FUSED: bool>(
     let (s, g) = (&at.model.s, at.settings.gravity);
     let per_square = 1.0 / (at.standard.size * at.standard.size);
     let mirrored = mirrored(at.settings.frame);
-    let (mut u, mut noise, mut charge) = ([ZERO; 3], [ZERO; 9], ZERO);
+    let (mut u, mut noise) = ([ZERO; 3], [ZERO; 9]);
     let is_common = readings.noise.len() == 1;
-    for (chunk, sigmas) in sigma.chunks(LANES).enumerate() {
-        let (here, n) = (first + chunk * LANES, sigmas.len());
-        load(&readings.values[here..here + n], &at.standard, &mut u);
-        pad(sigmas, f64::INFINITY, &mut charge);
+    let values = &readings.values[first..first + sigma.len()];
+    let values = Eights::of(values, filler(values));
+    let sigmas = Eights::of(sigma, f64::INFINITY);
+    for chunk in 0..sigma.len().div_ceil(LANES) {
+        let here = first + chunk * LANES;
+        let n = LANES.min(first + sigma.len() - here);
+        load(values.at(chunk), &at.standard, &mut u);
+        let charge = sigmas.at(chunk);
         if chunk == 0 || !is_common {
             load_noise(readings, here, n, &mut noise);
         }

@@ -11,7 +11,9 @@
 use nalgebra::{SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 
-use super::lanes::{LANES, Row, ZERO, columns, dot, force, load, mirrored, misfit, pad};
+use super::lanes::{
+    Eights, LANES, Row, ZERO, columns, dot, filler, force, load, mirrored, misfit, store,
+};
 use super::{Model, N_PARAMETERS, Settings};
 use crate::ellipsoid::Standardisation;
 use crate::gauss_newton::Loss;
@@ -204,17 +206,14 @@ for_each_instruction_set! {
 fn add_rows_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, sums: &mut Lanes) {
     let settings = &at.settings;
     let mirrored = mirrored(settings.frame);
-    let (mut u, mut sigma, mut excess) = ([ZERO; 3], ZERO, ZERO);
+    let mut u = [ZERO; 3];
     let (mut rows, mut residual, mut weight) = ([ZERO; N_PARAMETERS], ZERO, [1.0; LANES]);
-    let parts = charged
-        .values
-        .chunks(LANES)
-        .zip(charged.sigma.chunks(LANES))
-        .zip(charged.excess.chunks(LANES));
-    for ((values, sigmas), excesses) in parts {
-        load(values, &at.standard, &mut u);
-        pad(sigmas, f64::INFINITY, &mut sigma);
-        pad(excesses, 0.0, &mut excess);
+    let values = Eights::of(charged.values, filler(charged.values));
+    let sigmas = Eights::of(charged.sigma, f64::INFINITY);
+    let excesses = Eights::of(charged.excess, 0.0);
+    for i in 0..charged.values.len().div_ceil(LANES) {
+        load(values.at(i), &at.standard, &mut u);
+        let (sigma, excess) = (sigmas.at(i), excesses.at(i));
         for l in 0..LANES {
             let f = force::<FUSED>(&at.model, &u, l);
             let (value, length) = misfit::<FUSED>(f, excess[l], settings);
@@ -273,15 +272,13 @@ for_each_instruction_set! {
 
 #[inline(always)]
 fn add_directions_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, sums: &mut Lanes) {
-    let (mut u, mut sigma) = ([ZERO; 3], ZERO);
+    let mut u = [ZERO; 3];
     let mut rows = [ZERO; N_PARAMETERS];
-    let parts = charged
-        .values
-        .chunks(LANES)
-        .zip(charged.sigma.chunks(LANES));
-    for (values, sigmas) in parts {
-        load(values, &at.standard, &mut u);
-        pad(sigmas, f64::INFINITY, &mut sigma);
+    let values = Eights::of(charged.values, filler(charged.values));
+    let sigmas = Eights::of(charged.sigma, f64::INFINITY);
+    for i in 0..charged.values.len().div_ceil(LANES) {
+        load(values.at(i), &at.standard, &mut u);
+        let sigma = sigmas.at(i);
         for l in 0..LANES {
             let f = force::<FUSED>(&at.model, &u, l);
             let scale = 1.0 / dot::<FUSED>(f, f).sqrt();
@@ -301,16 +298,13 @@ for_each_instruction_set! {
 
 #[inline(always)]
 fn add_costs_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, sum: &mut Row) {
-    let (mut u, mut sigma, mut excess, mut square) = ([ZERO; 3], ZERO, ZERO, ZERO);
-    let parts = charged
-        .values
-        .chunks(LANES)
-        .zip(charged.sigma.chunks(LANES))
-        .zip(charged.excess.chunks(LANES));
-    for ((values, sigmas), excesses) in parts {
-        load(values, &at.standard, &mut u);
-        pad(sigmas, f64::INFINITY, &mut sigma);
-        pad(excesses, 0.0, &mut excess);
+    let (mut u, mut square) = ([ZERO; 3], ZERO);
+    let values = Eights::of(charged.values, filler(charged.values));
+    let sigmas = Eights::of(charged.sigma, f64::INFINITY);
+    let excesses = Eights::of(charged.excess, 0.0);
+    for i in 0..charged.values.len().div_ceil(LANES) {
+        load(values.at(i), &at.standard, &mut u);
+        let (sigma, excess) = (sigmas.at(i), excesses.at(i));
         for l in 0..LANES {
             let f = force::<FUSED>(&at.model, &u, l);
             let residual =
@@ -335,19 +329,16 @@ for_each_instruction_set! {
 
 #[inline(always)]
 fn write_misfits_lanes<const FUSED: bool>(charged: &Charged<'_>, at: &At, out: &mut [f64]) {
-    let (mut u, mut excess, mut found) = ([ZERO; 3], ZERO, ZERO);
-    let parts = charged
-        .values
-        .chunks(LANES)
-        .zip(charged.excess.chunks(LANES))
-        .zip(out.chunks_mut(LANES));
-    for ((values, excesses), out) in parts {
-        load(values, &at.standard, &mut u);
-        pad(excesses, 0.0, &mut excess);
+    let (mut u, mut found) = ([ZERO; 3], ZERO);
+    let values = Eights::of(charged.values, filler(charged.values));
+    let excesses = Eights::of(charged.excess, 0.0);
+    for (i, out) in out.chunks_mut(LANES).enumerate() {
+        load(values.at(i), &at.standard, &mut u);
+        let excess = excesses.at(i);
         for l in 0..LANES {
             let f = force::<FUSED>(&at.model, &u, l);
             found[l] = misfit::<FUSED>(f, excess[l], &at.settings).0;
         }
-        out.copy_from_slice(&found[..out.len()]);
+        store(&found, out);
     }
 }

@@ -263,6 +263,42 @@ pub fn prepare_all(
         .collect()
 }
 
+/// Prepares and integrates every move, in parallel; for an integration that is not repeated: nothing is kept in between.
+///
+/// # Errors
+/// As [`prepare`], for the first move that fails, and when there are not as many biases as moves.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "what is prepared and what is integrated"
+)]
+pub fn integrate_once(
+    time_s: &[f64],
+    raw: &[Vector3<f64>],
+    ranges: &[MoveRange],
+    model: RateModel,
+    scale: &Matrix3<f64>,
+    bias_before: &[Vector3<f64>],
+    bias_after: &[Vector3<f64>],
+    noise: &RateNoise,
+) -> Result<Vec<Turn>> {
+    if bias_before.len() != ranges.len() || bias_after.len() != ranges.len() {
+        return Err(Error::bad_input(format!(
+            "there are {} moves but {} biases before and {} after them",
+            ranges.len(),
+            bias_before.len(),
+            bias_after.len()
+        )));
+    }
+    ranges
+        .par_iter()
+        .zip(bias_before.par_iter().zip(bias_after))
+        .map(|(range, (before, after))| {
+            let prepared = prepare(time_s, raw, None, range, model)?;
+            Ok(prepared.integrate(scale, before, after, noise))
+        })
+        .collect()
+}
+
 /// Integrates every move, in parallel; biases are per move.
 #[must_use]
 pub fn integrate_all(

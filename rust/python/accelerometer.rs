@@ -8,7 +8,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{as_vectors, flat3};
+use super::lent::{as_vectors, flat3};
 use super::rotation::rows3;
 use crate::ellipsoid;
 use crate::gauss_newton::Loss;

@@ -192,7 +192,7 @@ fn allan_variance<'py>(
     let workspace = PyArray1::<f64>::zeros(py, rows(&x) + 1, false);
     let mut workspace = workspace.try_readwrite()?;
     let workspace = workspace.as_slice_mut()?;
-    let found = with_view!(&x, v => super::run(py, || {
+    let found = with_view!(&x, v => super::run_long(py, || {
         (0..v.channels)
             .map(|c| allan::variances_in(&v.channel(c), &clusters, kind.into(), workspace))
             .collect::<crate::Result<Vec<Curve>>>()
@@ -229,7 +229,7 @@ impl AllanStream {
                     "the stream has {} channels, this chunk {}", channels.len(), v.channels
                 )));
             }
-            super::run(py, || {
+            super::run_long(py, || {
                 channels.iter_mut().enumerate().try_for_each(|(c, stream)| stream.extend(&v.channel(c)))
             })
         })

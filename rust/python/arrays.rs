@@ -1,47 +1,36 @@
-//! NumPy arrays as the kernels want them: lent where they lie in one piece, copied where they do not.
+//! Matrices of the kernels as arrays, and back.
 
-use std::borrow::Cow;
-
-use nalgebra::Vector3;
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray};
 use pyo3::prelude::*;
 
-/// The numbers of an `(n, 3)` array, row by row.
-pub(super) fn flat3<'a>(
-    name: &str,
-    array: &'a PyReadonlyArray2<'_, f64>,
-) -> PyResult<Cow<'a, [f64]>> {
-    if array.shape()[1] != 3 {
-        return Err(PyValueError::new_err(format!(
-            "{name} must have shape (n, 3), got ({}, {})",
-            array.shape()[0],
-            array.shape()[1]
-        )));
-    }
-    // `as_slice` also succeeds on a Fortran-ordered array, whose memory runs down the columns.
-    Ok(match array.as_slice() {
-        Ok(flat) if array.is_c_contiguous() => Cow::Borrowed(flat),
-        _ => Cow::Owned(array.as_array().iter().copied().collect()),
-    })
+pub(super) fn matrix<'py>(
+    py: Python<'py>,
+    value: &DMatrix<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    value
+        .transpose()
+        .as_slice()
+        .to_pyarray(py)
+        .reshape([value.nrows(), value.ncols()])
 }
 
-/// The same numbers as rows.
-pub(super) fn as_rows(flat: &[f64]) -> &[[f64; 3]] {
-    flat.as_chunks::<3>().0
+pub(super) fn vectors<'py>(
+    py: Python<'py>,
+    values: &[Vector3<f64>],
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let flat: Vec<f64> = values.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
+    flat.to_pyarray(py).reshape([values.len(), 3])
 }
 
-/// The same numbers as vectors.
-pub(super) fn as_vectors(flat: &[f64]) -> &[Vector3<f64>] {
-    bytemuck::cast_slice(flat)
+pub(super) fn of3<'py>(
+    py: Python<'py>,
+    value: &Matrix3<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    value.transpose().as_slice().to_pyarray(py).reshape([3, 3])
 }
 
-/// The numbers of an `(n,)` array.
-pub(super) fn flat1<'a, T: numpy::Element + Copy>(
-    array: &'a PyReadonlyArray1<'_, T>,
-) -> Cow<'a, [T]> {
-    match array.as_slice() {
-        Ok(flat) => Cow::Borrowed(flat),
-        Err(_) => Cow::Owned(array.as_array().iter().copied().collect()),
-    }
+pub(super) fn dmatrix(array: &PyReadonlyArray2<'_, f64>) -> DMatrix<f64> {
+    let view = array.as_array();
+    DMatrix::from_fn(array.shape()[0], array.shape()[1], |i, j| view[[i, j]])
 }

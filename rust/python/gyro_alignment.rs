@@ -230,7 +230,7 @@ impl Moves {
             is_near,
             ..Settings::default()
         };
-        let found = super::run(py, || fit(&problem, &starts, &zero_weights, &settings))?;
+        let found = super::run_long(py, || fit(&problem, &starts, &zero_weights, &settings))?;
         export(py, &found)
     }
 }

@@ -294,7 +294,7 @@ fn kalman_track(
     let poses = poses(&readings, &references, &start_s, &hold_s, &extra_variance)?;
     let prior = prior(&prior_mean, &prior_sigma, &walk)?;
     let model = &model.inner;
-    let out = super::run(py, || axis::track(model, &prior, &poses))?;
+    let out = super::run_long(py, || axis::track(model, &prior, &poses))?;
     let column = |values: Vec<f64>| values.to_pyarray(py).unbind();
     Ok((
         rows4(py, &out.constants)?,
@@ -332,7 +332,7 @@ fn kalman_smooth(
     let poses = poses(&readings, &references, &start_s, &hold_s, &extra_variance)?;
     let prior = prior(&prior_mean, &prior_sigma, &walk)?;
     let model = &model.inner;
-    let out = super::run(py, || smoother::smooth(model, &prior, &poses))?;
+    let out = super::run_long(py, || smoother::smooth(model, &prior, &poses))?;
     let column = |values: Vec<f64>| values.to_pyarray(py).unbind();
     Ok((
         rows4(py, &out.constants)?,
@@ -371,7 +371,7 @@ fn kalman_noise_covariance<'py>(
         })
         .collect();
     let model = &model.inner;
-    let c = super::run(py, || least_squares::noise_covariance(model, &poses))?;
+    let c = super::run_long(py, || least_squares::noise_covariance(model, &poses))?;
     matrix(py, &c)
 }
 

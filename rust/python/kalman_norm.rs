@@ -113,13 +113,13 @@ impl NormKalman {
             .map(|i| pose(rows[i].into(), t[i], hold[i], extra[i].into()))
             .collect();
         let filter = &mut self.inner;
-        super::run(py, || filter.load(&poses))
+        super::run_long(py, || filter.load(&poses))
     }
 
     /// Run over all poses again at the latest constants until they stay; the number of runs, or None.
     fn relinearise(&mut self, py: Python<'_>, most: usize) -> PyResult<Option<usize>> {
         let filter = &mut self.inner;
-        super::run(py, || filter.relinearise(most))
+        super::run_long(py, || filter.relinearise(most))
     }
 
     /// Pass a reading that has not been made: the covariance changes, the estimate does not.

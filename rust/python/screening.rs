@@ -38,7 +38,7 @@ fn find_jumps(
     let workspace = PyArray1::<f64>::zeros(py, x.len() + 1, false);
     let mut workspace = workspace.try_readwrite()?;
     let workspace = workspace.as_slice_mut()?;
-    let found = super::run(py, || {
+    let found = super::run_long(py, || {
         screening::jumps_in(
             &Column {
                 data: x,
@@ -63,6 +63,6 @@ fn block_scatter<'py>(
     size: usize,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let x = slice(&x)?;
-    let found = super::run(py, || Ok(screening::scatter(x.len(), |i| x[i], size)))?;
+    let found = super::run_long(py, || Ok(screening::scatter(x.len(), |i| x[i], size)))?;
     Ok(found.to_pyarray(py))
 }

@@ -81,7 +81,7 @@ fn stage<'py>(
     act: impl FnOnce(&mut Vec<Sample>) -> KernelResult<()> + Send,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let mut samples = channels("signal", signal)?;
-    let samples = super::run(py, move || {
+    let samples = super::run_long(py, move || {
         act(&mut samples)?;
         Ok(samples)
     })?;
@@ -175,7 +175,7 @@ fn simulate_motion<'py>(
         earth_rate: Vector3::from(earth_rate_rad_s),
     };
     let n = times.len();
-    let track = super::run(py, || motion::evaluate(&parts, &place, &times))?;
+    let track = super::run_long(py, || motion::evaluate(&parts, &place, &times))?;
     Ok((
         track.attitude.into_pyarray(py).reshape([n, 4])?,
         track.rate.into_pyarray(py).reshape([n, 3])?,
@@ -205,7 +205,7 @@ fn simulate_noise(
         flicker: k[2],
         walk: k[3],
     });
-    let out = super::run(py, || Ok(noise::three_axes(n, dt_s, &terms, &keys)))?;
+    let out = super::run_long(py, || noise::three_axes(n, dt_s, &terms, &keys))?;
     out.into_pyarray(py).reshape([n, 3])
 }
 
@@ -216,7 +216,7 @@ fn simulate_project<'py>(
     directions: [Sample; 3],
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let signal = channels("signal", &signal)?;
-    let out = super::run(py, || Ok(mechanism::project(&signal, &directions)))?;
+    let out = super::run_long(py, || Ok(mechanism::project(&signal, &directions)))?;
     to_array(py, out)
 }
 
@@ -234,7 +234,7 @@ fn simulate_force_at_places<'py>(
         channels("rate", &rate)?,
         channels("rate_change", &rate_change)?,
     );
-    let out = super::run(py, || {
+    let out = super::run_long(py, || {
         Ok(mechanism::force_at_places(
             &force,
             &rate,
@@ -320,7 +320,7 @@ fn simulate_resample<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let signal = channels("signal", &signal)?;
     let times: Vec<f64> = time_s.as_array().iter().copied().collect();
-    let out = super::run(py, || sampling::resample(&signal, start_s, dt_s, &times))?;
+    let out = super::run_long(py, || sampling::resample(&signal, start_s, dt_s, &times))?;
     to_array(py, out)
 }
 

@@ -77,7 +77,7 @@ impl SpectralBins {
     fn fit(&self, py: Python<'_>, active: Vec<usize>, has_line: bool) -> PyResult<SpectralFit> {
         self.know(&active)?;
         let question = Question { active, has_line };
-        let fit = super::run(py, || likelihood::fit(&self.bins, &question))?;
+        let fit = super::run_long(py, || likelihood::fit(&self.bins, &question))?;
         Ok(SpectralFit {
             strength: fit.strength,
             slope: fit.slope,

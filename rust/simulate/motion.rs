@@ -7,6 +7,7 @@
 
 use super::jet::{Jet, QuaternionJet, progress, window};
 use crate::error::{Error, Result};
+use crate::interrupt;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -316,6 +317,9 @@ pub fn evaluate(segments: &[Segment], place: &Place, times: &[f64]) -> Result<Tr
         .zip(track.rate_change.par_chunks_mut(3 * CHUNK))
         .zip(track.specific_force.par_chunks_mut(3 * CHUNK))
         .for_each(|((((times, q), w), a), f)| {
+            if interrupt::is_requested() {
+                return;
+            }
             let mut k = segments
                 .partition_point(|s| s.start <= times[0])
                 .saturating_sub(1);

@@ -5,6 +5,8 @@
 //! logarithm of frequency from far below one over the record to the sampling frequency.
 
 use super::random::Stream;
+use crate::error::{Error, Result};
+use crate::interrupt;
 use rayon::prelude::*;
 
 /// Coefficients of one axis \[unit·s, unit·√s, unit, unit/√s, unit/s\].
@@ -127,27 +129,33 @@ pub fn add(out: &mut [f64], dt: f64, terms: &Terms, keys: &Keys) {
     if terms.white > 0.0 {
         let mut stream = Stream::new(keys.white);
         let size = terms.white / dt.sqrt();
-        for x in out.iter_mut() {
-            *x += size * stream.normal();
+        for block in blocks(out) {
+            for x in block {
+                *x += size * stream.normal();
+            }
         }
     }
     if terms.quantisation > 0.0 {
         let mut stream = Stream::new(keys.quantisation);
         let size = terms.quantisation / dt;
         let mut last = stream.normal();
-        for x in out.iter_mut() {
-            let next = stream.normal();
-            *x += size * (next - last);
-            last = next;
+        for block in blocks(out) {
+            for x in block {
+                let next = stream.normal();
+                *x += size * (next - last);
+                last = next;
+            }
         }
     }
     if terms.walk > 0.0 {
         let mut stream = Stream::new(keys.walk);
         let size = terms.walk * dt.sqrt();
         let mut sum = 0.0;
-        for x in out.iter_mut() {
-            *x += sum;
-            sum += size * stream.normal();
+        for block in blocks(out) {
+            for x in block {
+                *x += sum;
+                sum += size * stream.normal();
+            }
         }
     }
     if terms.flicker > 0.0 {
@@ -160,6 +168,9 @@ pub fn add(out: &mut [f64], dt: f64, terms: &Terms, keys: &Keys) {
             .collect();
         // A chunk stays in the nearest cache while every process passes over it.
         for chunk in out.chunks_mut(2048) {
+            if interrupt::is_requested() {
+                return;
+            }
             for process in &mut processes {
                 process.add(chunk);
             }
@@ -172,9 +183,33 @@ pub fn add(out: &mut [f64], dt: f64, terms: &Terms, keys: &Keys) {
     }
 }
 
+/// Blocks of work, until somebody asks for an end.
+fn blocks(out: &mut [f64]) -> impl Iterator<Item = &mut [f64]> {
+    out.chunks_mut(1 << 16)
+        .take_while(|_| !interrupt::is_requested())
+}
+
+/// Steps of time that a recording can have [s]: outside, the processes of flicker noise would have no end.
+const STEPS_S: std::ops::RangeInclusive<f64> = 1e-9..=1e9;
+
 /// Noise of three axes, `n` samples, interleaved.
-#[must_use]
-pub fn three_axes(n: usize, dt: f64, terms: &[Terms; 3], keys: &[Keys; 3]) -> Vec<f64> {
+///
+/// # Errors
+/// `BadInput` for a step that no recording has, or a term that is no finite number.
+pub fn three_axes(n: usize, dt: f64, terms: &[Terms; 3], keys: &[Keys; 3]) -> Result<Vec<f64>> {
+    if !STEPS_S.contains(&dt) {
+        return Err(Error::bad_input(format!(
+            "the step of time must lie between 1e-9 s and 1e9 s, got {dt} s"
+        )));
+    }
+    for t in terms {
+        let sizes = [t.white, t.quantisation, t.walk, t.flicker, t.ramp];
+        if let Some(bad) = sizes.iter().find(|v| !v.is_finite()) {
+            return Err(Error::bad_input(format!(
+                "the size of a noise term must be a finite number, got {bad}"
+            )));
+        }
+    }
     let axes: Vec<Vec<f64>> = (0..3usize)
         .into_par_iter()
         .map(|k| {
@@ -192,5 +227,5 @@ pub fn three_axes(n: usize, dt: f64, terms: &[Terms; 3], keys: &[Keys; 3]) -> Ve
                 row[k] = axes[k][i];
             }
         });
-    out
+    Ok(out)
 }

@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+from trihedron.capture.account import Count, clock_sentence
 from trihedron.capture.clock import ClockFit, ClockLine, Timeline
 from trihedron.capture.detection import Found, find_protocol
 from trihedron.capture.errors import CaptureError, DiskError, SourceEndedError, SourceLostError
@@ -27,7 +28,7 @@ from trihedron.capture.protocols import (
     decoder_factory,
     name_by_position,
 )
-from trihedron.capture.recorder import Block, Count, Recorder, clock_sentence
+from trihedron.capture.recorder import Block, Recorder
 from trihedron.capture.sequence import Sequence, Tally
 from trihedron.capture.sources import Source, open_source
 

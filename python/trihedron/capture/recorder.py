@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import queue
-import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from datetime import datetime, timezone
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.capture.account import Count, clock_sentence
 from trihedron.capture.clock import ClockLine, Timeline
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
 from trihedron.capture.log import GrowingLog
 from trihedron.capture.protocols import Decoder
+from trihedron.capture.reading import ReadingThread, SourceReturned, Stopped
+from trihedron.capture.rows import Rows
 from trihedron.capture.sequence import Placed, Sequence, Tally
 from trihedron.capture.sources import Source
 
@@ -28,13 +29,12 @@ SETTLE_S = 0.6
 FILL_S = 2.0
 """How often the header's lines on frames and clocks are said anew."""
 
-MOST_PPM = 20_000.0
-"""Beyond two per cent it is no clock's error: a replay at another speed, or a unit of time that was misread."""
+AWAY_MARGIN, AWAY_FRAMES = 2.0, 64
+"""A counter that went on while the device was away cannot be further on than twice what the host's clock allows, and
+the frames that waited in buffers; beyond that it began anew."""
 
-RETRY_S = 0.25
 WAIT_FOR_RETURN_S = 60.0
 SILENCE_S = 5.0
-MOST_QUEUED_BYTES = 512 * 1024 * 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,42 +47,6 @@ class Block:
     values: FloatArray
     columns: tuple[str, ...]
     remarks: tuple[str, ...] = ()
-
-
-@dataclass
-class Count:
-    """What became of everything that was sent."""
-
-    tally: Tally = field(default_factory=Tally)
-    corrupt: int = 0
-    skipped_bytes: int = 0
-    n_bytes: int = 0
-    disconnections: int = 0
-    counted_by: str = "nothing"
-
-    @property
-    def lost(self) -> int:
-        """Frames that were sent and are not in the log: by counter or clock, else as far as remains were seen."""
-        return self.corrupt if self.counted_by == "nothing" else self.tally.lost
-
-    def sentence(self) -> str:
-        """For people and for the header."""
-        how = {
-            "counter": "by the device's counter",
-            "clock": "by the device's clock",
-            "nothing": "as far as remains were seen: there is no counter and no clock",
-        }[self.counted_by]
-        parts = [f"{self.tally.saved} saved", f"{self.lost} lost {how}"]
-        for n, words in (
-            (self.corrupt if self.counted_by != "nothing" else 0, "corrupt pieces seen"),
-            (self.tally.garbled, "with a garbled count"),
-            (self.tally.repeated, "repeated"),
-            (self.disconnections, "disconnections"),
-            (self.tally.restarts, "restarts of the device"),
-        ):
-            if n:
-                parts.append(f"{n} {words}")
-        return " / ".join(parts)
 
 
 class Recorder:
@@ -126,93 +90,51 @@ class Recorder:
         self.ended_because = ""
         self._make = make_decoder
         self._decoder = make_decoder()
-        self._log = log if log is not None else None if path is None else GrowingLog(path, overwrite=overwrite)
+        if log is None and path is not None:
+            log = GrowingLog(path, overwrite=overwrite)
+        self._rows = Rows(log, source, rate_hz)
         self._rate_hz = rate_hz
         self._wait_s, self._silence_s = wait_for_return_s, silence_s
-        self._first = first_bytes
         self._sequence: Sequence | None = None
         self._timeline: Timeline | None = None
-        self._is_begun = False
+        self._new_connection = True
+        self._past = (0, 0, Tally())  # what earlier connections counted
+        self._before: Sequence | None = None  # of the connection before
+        self._first_host_s = self._last_host_s = 0.0
         self._held: list[Placed] = []
         self._held_since_s: float | None = None
-        self._offset = 0
-        self._next_index = 0
-        self._remarks: list[str] = []
         self._start_s = time.monotonic()
-        self._started = datetime.now(timezone.utc)
         self._filled_s = 0.0
-        self._queue: queue.SimpleQueue[tuple[float, bytes | Exception]] = queue.SimpleQueue()
-        self._queued = 0
-        self._stop = threading.Event()
-        self._time_s = 0.0
+        self._reading = ReadingThread(
+            source, first_bytes=first_bytes, wait_for_return_s=wait_for_return_s, now_s=self._now_s
+        )
 
     def stop(self) -> None:
         """Take no more bytes; what came is still written."""
-        self._stop.set()
+        self._reading.stop()
+
+    def _now_s(self) -> float:
+        return time.monotonic() - self._start_s
 
     def write_now(self) -> None:
         """Put everything that has come into the log, so that it can be read while it grows."""
-        if self._log is not None:
-            self._log.flush(force=True)
+        self._rows.flush(force=True)
 
     def clock_text(self) -> str:
         """How the host's clock and the device's go together."""
         return clock_sentence(self.clock, self._timeline)
 
     def __iter__(self) -> Iterator[Block]:
-        reader = threading.Thread(target=self._read, name="capture reader", daemon=True)
-        reader.start()
+        self._reading.start()
         try:
             yield from self._run()
         except BaseException:
-            self._stop.set()
-            if self._log is not None:
-                self._log.abandon()
+            self._reading.stop()
+            self._rows.abandon()
             raise
         finally:
-            self._stop.set()
-            reader.join(timeout=2.0)
+            self._reading.join(2.0)
             self.source.close()
-
-    # The reading thread: nothing here may wait for a disk or a decoder.
-
-    def _read(self) -> None:
-        put = self._queue.put
-        if self._first:
-            put((time.monotonic() - self._start_s, self._first))
-        while not self._stop.is_set():
-            try:
-                data = self.source.read()
-            except SourceLostError as error:
-                put((time.monotonic() - self._start_s, error))
-                if not self._wait_for_return():
-                    put((time.monotonic() - self._start_s, SourceEndedError(str(error))))
-                    return
-                put((time.monotonic() - self._start_s, SourceReturned(self.source.name)))
-                continue
-            except Exception as error:  # handed to the loop, which raises it
-                put((time.monotonic() - self._start_s, error))
-                return
-            now = time.monotonic() - self._start_s
-            if data:
-                self._queued += len(data)
-                put((now, data))
-                if not self.source.is_live:
-                    # A file can be read faster than it is decoded; a device cannot be asked to wait.
-                    while self._queued > 1 << 20 and not self._stop.is_set():
-                        time.sleep(0.002)
-            if self._queued > MOST_QUEUED_BYTES:
-                put((now, CaptureError("the disk is slower than the device and memory is full; use a faster disk.")))
-                return
-        put((time.monotonic() - self._start_s, Stopped()))
-
-    def _wait_for_return(self) -> bool:
-        until = time.monotonic() + self._wait_s
-        while not self._stop.is_set() and time.monotonic() < until:
-            if self.source.reopen():
-                return True
-            self._stop.wait(RETRY_S)
-        return False
 
     # The loop.
 
@@ -221,11 +143,10 @@ class Recorder:
         is_away = False
         while True:
             try:
-                host_s, item = self._queue.get(timeout=0.1)
+                host_s, item = self._reading.get(0.1)
             except queue.Empty:
-                if self._log is not None:
-                    self._log.flush()
-                quiet = time.monotonic() - self._start_s - (heard_s or 0.0)
+                self._rows.flush()
+                quiet = self._now_s() - (heard_s or 0.0)
                 if heard_s is None and quiet > self._silence_s:
                     raise CaptureError(
                         f"{self.source.name}: not one byte came in {self._silence_s:g} s; is the board powered and "
@@ -233,7 +154,6 @@ class Recorder:
                     ) from None
                 continue
             if isinstance(item, bytes):
-                self._queued -= len(item)
                 heard_s = host_s
                 self.count.n_bytes += len(item)
                 yield from self._emit(self._place(self._decoder.feed(item), host_s), host_s)
@@ -243,13 +163,12 @@ class Recorder:
                 is_away = True
                 yield from self._part(host_s)
                 self.count.disconnections += 1
-                self._say(f"{str(item).rstrip('.')} at {host_s:.3f} s of the host's clock")
-                if self._log is not None:
-                    self._log.flush(force=True)
+                self._rows.say(f"{str(item).rstrip('.')} at {host_s:.3f} s of the host's clock")
+                self._rows.flush(force=True)
                 continue
             if isinstance(item, SourceReturned):
                 is_away = False
-                self._say(f"{item} is back at {host_s:.3f} s; the time it was away is a gap in the log")
+                self._rows.say(f"{item} is back at {host_s:.3f} s; the time it was away is a gap in the log")
                 continue
             yield from self._part(host_s)
             if not isinstance(item, (Stopped, SourceEndedError)):
@@ -284,26 +203,24 @@ class Recorder:
             placed, self._held = [*self._held, *placed], []
         if not placed:
             return
-        self._begin()
+        self._rows.begin(self._decoder, timeline)
         times = np.empty(len(placed))
         for i, one in enumerate(placed):
-            times[i] = self._row(one, is_first=self._new_connection)
+            away = self._lost_while_away(one) if self._new_connection else 0
+            times[i] = self._rows.add(one, timeline, is_first=self._new_connection, lost_while_away=away)
             self._new_connection = False
+        self._last_host_s = placed[-1].host_s
         timeline.arrived(host_s)
         self._fill(host_s)
-        if self._log is not None:
-            self._log.flush()
-        remarks, self._remarks = tuple(self._remarks), []
+        self._rows.flush()
         yield Block(
             times,
             np.array([one.host_s for one in placed]),
-            np.array([one.place + self._offset for one in placed], dtype=np.int64),
+            np.array([self._rows.index(one) for one in placed], dtype=np.int64),
             np.array([one.frame.values for one in placed], dtype=np.float64),
             self._decoder.columns,
-            remarks,
+            self._rows.take_remarks(),
         )
-
-    _new_connection = True
 
     def _is_settled(self, placed: list[Placed], host_s: float, is_last: bool) -> bool:
         if not self._new_connection:
@@ -321,57 +238,21 @@ class Recorder:
         placed.clear()
         return True
 
-    def _row(self, one: Placed, *, is_first: bool) -> float:
-        timeline, log = self._timeline, self._log
-        assert timeline is not None
-        if is_first and self._next_index:
-            self._offset = self._next_index - one.place
-        index = one.place + self._offset
-        fresh = one.restarted or is_first
-        self._time_s = timeline.place(index, one.frame.ticks, one.host_s, restarted=fresh)
-        if one.lost:
-            self._say(f"lost {one.lost} before frame {index} at {self._time_s:.6f} s")
-        if one.restarted:
-            self._say(f"the device began to count anew before frame {index} at {self._time_s:.6f} s")
-        self._next_index = index + 1
-        if log is not None:
-            parts = [f"{self._time_s:.6f}"] if self._has_time else []
-            if self.source.is_live:
-                parts.append(f"{one.host_s:.6f}")
-            parts.append(str(index))
-            if timeline.has_device_clock:
-                parts.append(str(one.frame.ticks))
-            log.row(",".join(parts) + "," + one.frame.text, self._time_s)
-        return self._time_s
-
-    @property
-    def _has_time(self) -> bool:
-        assert self._timeline is not None
-        return self._timeline.has_device_clock or self.source.is_live or self._rate_hz is not None
-
-    def _begin(self) -> None:
-        if self._is_begun:
-            return
-        self._is_begun = True
-        if self._log is None:
-            return
-        assert self._timeline is not None
-        names = ["time [s]"] if self._has_time else []
-        names += ["host_s"] if self.source.is_live else []
-        names += ["frame", *(["device_ticks"] if self._timeline.has_device_clock else [])]
-        tick = f"{self._timeline.tick_s:g} s per tick" if self._timeline.has_device_clock else "none"
-        facts = {
-            "protocol": self._decoder.name,
-            "source": self.source.name,
-            "started": self._started.isoformat(timespec="milliseconds"),
-            "device clock": tick,
-        }
-        self._log.begin(facts, [*names, *self._decoder.columns])
-
-    def _say(self, text: str) -> None:
-        self._remarks.append(text)
-        if self._log is not None and self._is_begun:
-            self._log.remark(text)
+    def _lost_while_away(self, first: Placed) -> int:
+        """What the device's counter says of the time between two connections, and of pieces cut at either end."""
+        before, start_s, self._before = self._before, self._first_host_s, None
+        self._first_host_s = first.host_s
+        if before is None:
+            return 0
+        rate_hz = (before.tally.saved + before.tally.lost) / max(self._last_host_s - start_s, SETTLE_S)
+        most = int(AWAY_MARGIN * rate_hz * (first.host_s - self._last_host_s)) + AWAY_FRAMES
+        missing = before.missing_until(first.frame, most)
+        if missing is None:
+            self._rows.say("how many frames were lost while it was away cannot be told from what the device sends")
+            return 0
+        earlier = self._past[2]
+        self._past = (*self._past[:2], replace(earlier, lost=earlier.lost + missing))
+        return missing
 
     def _part(self, host_s: float) -> Iterator[Block]:
         """A connection ends: whole frames in what remains count, then decoder and sequence start anew."""
@@ -382,12 +263,12 @@ class Recorder:
         yield from self._emit(placed, host_s, is_last=True)
         self._count_now()
         self._past = (self.count.corrupt, self.count.skipped_bytes, self.count.tally)
+        if self._sequence is not None:
+            self._before = self._sequence
         self._decoder, self._sequence = self._make(), None
         if decoder.columns:
             _keep_layout(self._decoder, decoder)
         self._new_connection, self._held_since_s = True, None
-
-    _past: tuple[int, int, Tally] = (0, 0, Tally())
 
     def _count_now(self) -> None:
         corrupt, skipped, past = self._past
@@ -406,14 +287,11 @@ class Recorder:
         self._count_now()
         if self._timeline is not None and self.source.is_live:
             self.clock = self._timeline.fit.line() or self.clock
-        if self._log is None or not self._is_begun:
-            return
-        self._log.fill("frames", self.count.sentence())
-        self._log.fill("clock", clock_sentence(self.clock, self._timeline))
+        self._rows.say_facts(self.count, self.clock, self._timeline)
 
     def _give_up_if_wrong(self, host_s: float) -> None:
         """Bytes for ten seconds and not one frame: another protocol or another baud."""
-        if self._is_begun or self._held or host_s < 10.0 or self._sequence is not None:
+        if self._rows.is_begun or self._held or host_s < 10.0 or self._sequence is not None:
             return
         raise CaptureError(
             f"{self.source.name}: {self.count.n_bytes} bytes came and not one {self._decoder.name} frame was among "
@@ -422,39 +300,12 @@ class Recorder:
 
     def _finish(self) -> None:
         self._say_facts()
-        if self._log is not None:
-            self._log.close()
-        if not self._is_begun:
-            if self._log is not None:
-                self._log.path.unlink(missing_ok=True)
+        self._rows.close()
+        if not self._rows.is_begun:
             heard = f"{self.count.n_bytes} bytes came" if self.count.n_bytes else "nothing came"
             raise CaptureError(
                 f"{self.source.name}: {heard} and not one whole {self._decoder.name} frame; no log was written."
             )
-
-
-class SourceReturned(Exception):
-    """The device is back."""
-
-
-class Stopped(Exception):
-    """The user said stop."""
-
-
-def clock_sentence(line: ClockLine | None, timeline: Timeline | None) -> str:
-    """Offset, rate and arrival jitter, for people and for the header."""
-    if line is None or timeline is None:
-        return "not fitted: too short or not live"
-    late = f"bytes arrive {1e3 * line.jitter_rms_s:.3g} ms rms and {1e3 * line.jitter_95_s:.3g} ms (95 %) late"
-    if timeline.has_device_clock:
-        if abs(line.rate_ppm) > MOST_PPM:
-            return f"the device's clock runs {1.0 / line.slope:.4g} times as fast as the host's / {late}"
-        return (
-            f"device second = host second {line.rate_ppm:+.2f} ppm +- {line.sigma_ppm:.2f} / device zero at host "
-            f"{line.offset_s:.6f} s / {late}"
-        )
-    sigma = 100.0 * line.sigma_slope / line.slope
-    return f"{1.0 / line.slope:.6f} frames per second of the host +- {sigma:.2g} % / {late}"
 
 
 def _keep_layout(new: Decoder, old: Decoder) -> None:

@@ -122,6 +122,20 @@ class Sequence:
             self._longest(out)
         return out
 
+    def missing_until(self, frame: Frame, most: int) -> int | None:
+        """Frames that the device counted between the last one placed here and ``frame`` of a later connection.
+
+        None where that cannot be known: nothing is counted by, the device began anew, more than ``most`` frames would
+        have had to pass, or a counter is so short that it may have wrapped meanwhile.
+        """
+        if self._last is None or not (self._by_counter or (self._by_clock and self._period > 0.0)) or self.is_coarse:
+            return None
+        in_keys = most if self._by_counter else most * self._period
+        if self._modulus and in_keys >= self._modulus // 2:
+            return None
+        steps = self._ahead(self._key(frame))
+        return steps - 1 if 0 < steps <= most else None
+
     @property
     def period_s(self) -> float:
         """Step of the device's clock, 0 while unknown."""

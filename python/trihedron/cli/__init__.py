@@ -1,15 +1,19 @@
 """COMMAND LINE: arguments to one stage of the pipeline, nothing else.
 
 Results go to stdout, progress to stderr. Exit status: 0 fine; 1 could not run (one sentence says what, where and what
-to do); 2 ran, but the answer is not to be trusted. One file per command; options that several commands share are in
-``options.py``.
+to do); 2 ran, but the answer is not to be trusted; 130 and 143 interrupted by Ctrl-C and SIGTERM. One
+file per command; options that several commands share are in ``options.py``.
 """
 
 from __future__ import annotations
 
+import contextlib
+import errno
+import io
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import typer
 
@@ -29,6 +33,8 @@ from trihedron.cli.ports import ports
 from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
 from trihedron.cli.verify import verify
+from trihedron.interruption import SENTENCE, Interrupted, status_of
+from trihedron.printable import printable
 
 # In the order in which they are used.
 COMMANDS = (
@@ -51,6 +57,7 @@ COMMANDS = (
 )
 
 COULD_NOT_RUN = 1
+_INTERRUPTED = 130
 
 # Typer has its own copy of click's exceptions in some versions; both hang below the one it makes public.
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
@@ -92,24 +99,85 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status; never a traceback for a question that cannot be answered."""
     words = _with_stdout_as_default(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
     try:
+        _make_writable()
         status = typer.main.get_command(build_app()).main(words, prog_name="trihedron", standalone_mode=False)
+        # Here and not when the interpreter ends: a full disk must be the command's failure.
+        sys.stdout.flush()
+        if status == _INTERRUPTED:
+            # Where typer took a Ctrl-C for its own.
+            _refuse(SENTENCE)
         return int(status or 0)
     except _UsageError as error:
         return _refuse(_usage_sentence(error, words))
-    except typer.Abort:
-        return _refuse("interrupted; nothing was written.")
-    except KeyboardInterrupt:
-        return _refuse("interrupted; nothing was written.")
-    except BrokenPipeError:
-        # Whoever read the output has left (`| head`); nothing is wrong, and nothing more can be said.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (typer.Abort, Interrupted, KeyboardInterrupt) as error:
+        _refuse(SENTENCE)
+        return status_of(error)
+    except (BrokenPipeError, SystemExit) as error:
+        # Whoever read the output has left (`| head`); nothing is wrong, and nothing more can be said. Where the pipe
+        # broke inside a command, typer has made an exit of it.
+        if isinstance(error, SystemExit):
+            sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__
+        _silence_stdout()
         return 0
     except MemoryError:
         return _refuse("this log does not fit into memory; cut it into parts, or use a machine with more memory.")
-    except (ValueError, OSError) as error:
+    except OSError as error:
+        if os.environ.get("TRIHEDRON_TRACEBACK"):
+            raise
+        if error.filename is None and error.errno in _OF_STDOUT:
+            _silence_stdout()
+            return _refuse(f"standard output could not be written ({error.strerror}).")
+        return _refuse(str(error))
+    except ValueError as error:
         if os.environ.get("TRIHEDRON_TRACEBACK"):
             raise
         return _refuse(str(error))
+    except Exception as error:
+        # The last net: a defect is said to be one, in one line, and never looks like an answer.
+        if os.environ.get("TRIHEDRON_TRACEBACK"):
+            raise
+        return _refuse(_defect_sentence(error))
+    except BaseException as error:
+        # Libraries in Rust panic with exceptions that are no Exception.
+        if type(error).__name__ != "PanicException" or os.environ.get("TRIHEDRON_TRACEBACK"):
+            raise
+        return _refuse(_defect_sentence(error))
+
+
+_OF_STDOUT = (errno.ENOSPC, errno.EIO, errno.EBADF, errno.EDQUOT, errno.EFBIG)
+
+
+class _Closed(io.TextIOBase):
+    """Standard output of a process that was started without one."""
+
+    def write(self, _text: str) -> int:
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+
+
+def _make_writable() -> None:
+    """Output that any result can be written to: names of files may hold what the terminal's encoding does not."""
+    if sys.stdout is None:
+        sys.stdout = _Closed()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _silence_stdout() -> None:
+    """Let nothing of what could not be written be tried again when the interpreter ends."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _defect_sentence(error: BaseException) -> str:
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    where = f" at {Path(place.tb_frame.f_code.co_filename).name}:{place.tb_lineno}" if place is not None else ""
+    return (
+        f"internal error ({type(error).__name__}{where}); this is a defect of trihedron: please report it with the "
+        "command and the log. TRIHEDRON_TRACEBACK=1 shows where it happened."
+    )
 
 
 def _with_stdout_as_default(words: list[str]) -> list[str]:
@@ -133,5 +201,5 @@ def _usage_sentence(error: Exception, words: Sequence[str]) -> str:
 
 
 def _refuse(sentence: str) -> int:
-    typer.echo(f"trihedron: {sentence}", err=True)
+    typer.echo(f"trihedron: {printable(sentence)}", err=True)
     return COULD_NOT_RUN

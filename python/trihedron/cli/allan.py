@@ -80,7 +80,7 @@ def allan(
     stretches = [_stretch(text) for text in exclude or []]
     if not 0.0 < accuracy < 1000.0:
         raise typer.BadParameter(f"--accuracy is a positive number of per cent, not {accuracy:g}")
-    check_outputs(json, csv, plot, force=force, report=report)
+    check_outputs(json, csv, plot, force=force, report=report, inputs=source.files)
     if curve:
         if exclude or stream or keep_events:
             raise typer.BadParameter("--curve has no log: --exclude, --keep-events and --stream do not go with it")
@@ -103,9 +103,10 @@ def allan(
         write_whole(csv, curve_csv(found), overwrite=force)
         say(f"curve: {csv}")
     if plot is not None:
-        from trihedron.report.noise import draw_noise
+        from trihedron.report.noise import noise_picture
+        from trihedron.report.page import png_of
 
-        write_whole(plot, draw_noise(found), overwrite=force)
+        write_whole(plot, png_of(noise_picture(found)), overwrite=force)
         say(f"plot: {plot}")
     write_json(machine, json, force=force)
     write_report(document, machine, report, force=force)

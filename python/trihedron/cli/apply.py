@@ -25,7 +25,7 @@ def apply(
     force: Force = False,
 ) -> None:
     """Apply a calibration to a log: time [s], specific force [m/s^2], angular rate [rad/s]."""
-    check_outputs(output, json, force=force)
+    check_outputs(output, json, force=force, inputs=(*source.files, calibration))
     from trihedron.files.calibration import read_calibration
     from trihedron.files.recording import check_format, write_recording
 

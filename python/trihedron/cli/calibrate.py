@@ -7,15 +7,16 @@ from typing import Annotated, Any, Optional
 
 import typer
 
-from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
+from trihedron.cli.calibrate_sessions import By, Labels, calibrate_many
+from trihedron.cli.options import Force, GravitySource, Json, LogsSource, Report, progress, with_options
 from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
 
 FIRST_SCREEN = 2
 
 
-@with_options(source=LogSource, place=GravitySource)
+@with_options(sources=LogsSource, place=GravitySource)
 def calibrate(
-    source: LogSource,
+    sources: LogsSource,
     place: GravitySource,
     method: Annotated[
         str,
@@ -49,9 +50,21 @@ def calibrate(
         Optional[float],  # noqa: UP045
         typer.Option(metavar="X", help="Nominal rad/s per gyro unit, where counts and few moves cannot tell it."),
     ] = None,
+    reference: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."
+        ),
+    ] = None,
+    reference_columns: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz', 't,wx [deg/s],...'."),
+    ] = None,
     extended: Annotated[
         bool, typer.Option("--extended", help="Diagnose the log too, and store the effects it demands; for apply.")
     ] = False,
+    by: By = None,
+    labels: Labels = None,
     output: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON)."),
@@ -61,10 +74,24 @@ def calibrate(
     full: Annotated[bool, typer.Option("--full", help="Print the whole report, with every pose and move.")] = False,
     force: Force = False,
 ) -> None:
-    """Calibrate both sensors from a log of still poses and moves."""
-    check_outputs(output, json, force=force, report=report)
+    """Calibrate both sensors from a log of still poses and moves.
+
+    With several logs of one unit: one model, and how far every parameter repeats.
+    """
+    check_outputs(output, json, force=force, report=report, inputs=sources.files)
     choices = _choices(method, frame, faces, turns, axis_signs, loss)
-    recording = source.read()
+    if sources.are_many(by):
+        if extended or gyro_nominal is not None or {k for k, v in choices.items() if v} - {"method", "loss", "frame"}:
+            raise typer.BadParameter(
+                "several logs are calibrated with the options of method 2 only, without --extended"
+            )
+        if method != "joint" or loss != "linear":
+            raise typer.BadParameter("several logs are calibrated with --method joint and --loss linear")
+        calibrate_many(sources, place, by, labels, choices["frame"], output, json, report, full=full, force=force)
+        return
+    if labels is not None:
+        raise typer.BadParameter("--labels belong to several logs")
+    recording = sources.one().read()
     from trihedron import pipeline
     from trihedron.files.calibration import write_calibration
     from trihedron.report import calibration_report
@@ -77,6 +104,8 @@ def calibrate(
             latitude_deg=place.latitude,
             height_m=place.height,
             gyroscope_nominal=gyro_nominal,
+            reference=reference,
+            reference_columns=reference_columns,
             progress=tell,
             **choices,
         )

@@ -90,7 +90,7 @@ def capture(
     from trihedron.files.output import check_free
     from trihedron.pipeline.capturing import open_device
 
-    check_free([output, calibration], overwrite=force)
+    check_free([output, calibration], overwrite=force, inputs=[Path(port)])
     source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
     _say(f"{source.name}: {found.protocol}. Recording to {output}; Ctrl-C stops.")
     recorder = Recorder(

@@ -21,7 +21,7 @@ def convert(
     force: Force = False,
 ) -> None:
     """Write any log that is read as a plain table: time [s] and readings in their own unit, units in the names."""
-    check_outputs(output, json, force=force)
+    check_outputs(output, json, force=force, inputs=source.files)
     from trihedron.files.log import LOG_SUFFIXES
     from trihedron.files.output import OutputError
 

@@ -29,6 +29,16 @@ def diagnose(
             help="Your simulation as model: a log or a scenario (.toml).",
         ),
     ] = None,
+    reference: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option(
+            "--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."
+        ),
+    ] = None,
+    reference_columns: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz', 't,wx [deg/s],...'."),
+    ] = None,
     improved: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says."),
@@ -56,7 +66,7 @@ def diagnose(
         raise typer.BadParameter("--improved goes with --against SCENARIO.toml: that file is what is improved")
     if improved is not None and against is not None and improved.resolve() == against.resolve():
         raise typer.BadParameter("--improved would overwrite the scenario that it improves; give it another name")
-    check_outputs(json, updated, improved, force=force, report=report)
+    check_outputs(json, updated, improved, force=force, report=report, inputs=(*source.files, calibration, against))
     from trihedron.files.calibration import read_calibration, write_calibration
 
     known = None if calibration is None else read_calibration(calibration)
@@ -74,6 +84,8 @@ def diagnose(
             height_m=place.height,
             calibration=known,
             against=against,
+            reference=reference,
+            reference_columns=reference_columns,
             alpha=alpha,
             progress=tell,
         )

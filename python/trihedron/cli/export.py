@@ -44,7 +44,7 @@ def export(
     """Write a calibration in another program's convention, with its equation stated."""
     if rate is not None and not rate > 0.0:
         raise typer.BadParameter(f"--rate is the number of samples per second, not {rate:g}")
-    check_outputs(output, force=force)
+    check_outputs(output, force=force, inputs=(calibration, noise))
     from trihedron.files.calibration import read_calibration
     from trihedron.files.export import ExportOptions, export_files
     from trihedron.files.noise import read_noise
@@ -60,7 +60,7 @@ def export(
         typer.echo("\n".join(made.values()), nl=False)
     else:
         targets = {output.with_name(output.stem + ending) if ending else output: text for ending, text in made.items()}
-        check_outputs(*targets, force=force)
+        check_outputs(*targets, force=force, inputs=(calibration, noise))
         for target, text in targets.items():
             write_whole(target, text, overwrite=force)
             say(f"{to}: {target}")

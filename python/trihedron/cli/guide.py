@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Optional
 
@@ -16,10 +17,10 @@ from trihedron.cli.options import Force, LogSource, with_options
 if TYPE_CHECKING:
     from trihedron.capture import Block, Recorder
     from trihedron.records import Recording
-    from trihedron.records.guiding import FloatArray, GuideView
+    from trihedron.records.guiding import GuideView
 
-STEP_S = 0.25
-"""Of a replayed log: as the blocks of a live one."""
+MOST_COLUMNS = 120
+"""A wider screen only draws the eye apart."""
 
 DEFAULT_ACCURACY = "accel 0.1 %, gyro 0.2 %"
 Show = Callable[["GuideView"], None]
@@ -47,59 +48,32 @@ def guide(
     """Replay a log through the guide: what it would have said pose by pose, then calibrate and verify."""
     from trihedron.cli.output import check_outputs
     from trihedron.cli.screen import as_text
-    from trihedron.pipeline.guiding import examine, part_of
+    from trihedron.pipeline.replaying import replay
     from trihedron.records.guiding import Accuracy
-    from trihedron.units import STANDARD_GRAVITY_M_S2
 
     wanted = Accuracy.parse(accuracy)
-    check_outputs(output, force=force)
-    recording = source.read()
-    now = {"s": 0.0}
-    made = _guide(
-        wanted,
-        lambda: examine(
-            part_of(recording, -math.inf, now["s"] + 1e-9), wanted, gravity_m_s2=gravity or STANDARD_GRAVITY_M_S2
-        ),
-    )
-    readings = readings_of(recording)
-    n_events = 0
-    for first, last in steps(recording.time_s):
-        now["s"] = float(recording.time_s[last - 1])
-        view = made.advance(recording.time_s[first:last], readings[first:last])
-        if view.n_events > n_events:
-            n_events = view.n_events
-            typer.echo(_line(view))
-            if every:
-                typer.echo(as_text(view))
-        if made.is_done:
-            break
-    typer.echo(as_text(made.view()))
-    finish(part_of(recording, -math.inf, now["s"] + 1e-9), made.cut_s, gravity, output, force=force)
+    check_outputs(output, force=force, inputs=source.files)
+
+    def tell(view: GuideView) -> None:
+        typer.echo(_line(view))
+        if every:
+            typer.echo(as_text(view, *_size()))
+
+    done = replay(source.read(), wanted, gravity_m_s2=gravity, on_pose=tell)
+    typer.echo(as_text(done.view, *_size()))
+    finish(done.recording, done.cut_s, gravity, output, force=force)
+
+
+def _size() -> tuple[int, int]:
+    """Columns and lines of the terminal; what COLUMNS and LINES say, or 80 x 24, elsewhere."""
+    size = shutil.get_terminal_size((80, 24))
+    return max(60, min(size.columns, MOST_COLUMNS)), max(size.lines, 24)
 
 
 def _guide(wanted: Any, examine: Callable[[], Any]) -> Any:
     from trihedron.capture.guide import Guide
 
     return Guide(wanted, examine)
-
-
-def steps(time_s: FloatArray) -> Iterable[tuple[int, int]]:
-    """Ranges of samples of about ``STEP_S``."""
-    import numpy as np
-
-    edges = np.searchsorted(time_s, np.arange(time_s[0], time_s[-1] + STEP_S, STEP_S))
-    edges = np.unique([*edges, len(time_s)])
-    return zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
-
-
-def readings_of(recording: Recording) -> FloatArray:
-    """(n, 3) or (n, 6), the accelerometer first."""
-    import numpy as np
-
-    parts = [part for part in (recording.accelerometer, recording.gyroscope) if part is not None]
-    if recording.accelerometer is None:
-        raise ValueError(f"{recording.source}: a guide needs the accelerometer; this log has a gyro alone.")
-    return np.hstack(parts)
 
 
 def _line(view: GuideView) -> str:
@@ -229,7 +203,7 @@ class _Shown:
             from trihedron.cli.screen import screen
 
             size = self._live.console.size
-            shown = screen(view, min(size.width, 120), size.height, lost=lost, seconds=now - self._started)
+            shown = screen(view, min(size.width, MOST_COLUMNS), size.height, lost=lost, seconds=now - self._started)
             self._live.update(shown, refresh=True)
         elif rings or (view.instruction.split(":")[0] != self._said and self._page is None):
             self._said = view.instruction.split(":")[0]

@@ -50,7 +50,7 @@ def kalman(
     """Calibrate the accelerometer by Kalman filter, pose by pose, with its noise in the state."""
     if frame not in ("lower", "symmetric"):
         raise typer.BadParameter(f"--frame is one of lower, symmetric, not {frame!r}")
-    check_outputs(output, json, force=force, report=report)
+    check_outputs(output, json, force=force, report=report, inputs=(*source.files, reference, noise))
     recording = source.read()
     from trihedron import pipeline
     from trihedron.files.calibration import write_calibration

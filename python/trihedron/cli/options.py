@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -28,23 +29,9 @@ Report = Annotated[
 
 
 @dataclass(frozen=True)
-class LogSource:
-    """Where the readings come from, as said on the command line."""
+class ReadingOptions:
+    """How a log is to be understood, where it does not say so itself."""
 
-    log: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Argument(
-            metavar="[LOG]", help="Log: text of any layout, .npz, .npy, Parquet, zip; bags and others with extras."
-        ),
-    ] = None
-    accel: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--accel", metavar="F", help="Log of the accelerometer, where each sensor has its own."),
-    ] = None
-    gyro: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own."),
-    ] = None
     columns: Annotated[
         Optional[str],  # noqa: UP045
         typer.Option("--columns", metavar="LIST", help="'t,ax,ay,az,-,gx,gy,gz' in file order, or 'ax=3,ay=4,az=5'."),
@@ -69,7 +56,6 @@ class LogSource:
         Optional[int],  # noqa: UP045
         typer.Option("--device", metavar="N", help="Which device (from 1) of an archive of several."),
     ] = None
-
     topic: Annotated[
         Optional[str],  # noqa: UP045
         typer.Option("--topic", metavar="NAME", help="Which topic, dataset or member of a file that holds several."),
@@ -78,6 +64,31 @@ class LogSource:
         Optional[str],  # noqa: UP045
         typer.Option("--instance", metavar="N", help="Which of several IMUs whose readings one file holds."),
     ] = None
+
+
+@dataclass(frozen=True)
+class LogSource(ReadingOptions):
+    """Where the readings come from, as said on the command line."""
+
+    log: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Argument(
+            metavar="[LOG]", help="Log: text of any layout, .npz, .npy, Parquet, zip; bags and others with extras."
+        ),
+    ] = None
+    accel: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--accel", metavar="F", help="Log of the accelerometer, where each sensor has its own."),
+    ] = None
+    gyro: Annotated[
+        Optional[Path],  # noqa: UP045
+        typer.Option("--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own."),
+    ] = None
+
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """What is read: no output may lie there."""
+        return self.log, self.accel, self.gyro
 
     def read(self) -> Recording:
         """The audited recording, with progress shown when it takes long."""
@@ -101,6 +112,64 @@ class LogSource:
                 instance=self.instance,
                 progress=report,
             )
+
+
+@dataclass(frozen=True)
+class LogsSource(ReadingOptions):
+    """One log or several, as said on the command line."""
+
+    log: Annotated[
+        Optional[list[Path]],  # noqa: UP045
+        typer.Argument(metavar="[LOG]...", help="Log, or several of one unit; files and archives as for `read`."),
+    ] = None
+    accel: Annotated[
+        Optional[list[Path]],  # noqa: UP045
+        typer.Option(
+            "--accel", metavar="F", help="Log of the accelerometer, where each sensor has its own; once for each log."
+        ),
+    ] = None
+    gyro: Annotated[
+        Optional[list[Path]],  # noqa: UP045
+        typer.Option(
+            "--gyro", metavar="F", help="Log of the gyroscope, where each sensor has its own; once for each log."
+        ),
+    ] = None
+
+    @property
+    def files(self) -> tuple[Path | None, ...]:
+        """What is read: no output may lie there."""
+        return tuple(path for paths in (self.log, self.accel, self.gyro) for path in paths or ())
+
+    def are_many(self, by: str | None) -> bool:
+        """Whether several logs were named, or grouping was asked for."""
+        return by is not None or any(len(files or []) > 1 for files in (self.log, self.accel, self.gyro))
+
+    def one(self) -> LogSource:
+        """The only log."""
+        return self.each()[0]
+
+    def each(self) -> list[LogSource]:
+        """One source a log.
+
+        Raises
+        ------
+        typer.BadParameter
+            When accelerometer and gyro logs do not pair.
+        """
+        log, accel, gyro = (list(files or []) for files in (self.log, self.accel, self.gyro))
+        rest: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(ReadingOptions)}
+        if accel and gyro and len(accel) != len(gyro):
+            raise typer.BadParameter(
+                f"--accel was given {len(accel)} times and --gyro {len(gyro)} times: they go in pairs"
+            )
+        if len(log) <= 1 and max(len(accel), len(gyro)) <= 1:
+            only = {name: next(iter(files), None) for name, files in (("log", log), ("accel", accel), ("gyro", gyro))}
+            return [LogSource(**rest | only)]
+        pairs = [
+            LogSource(**rest, accel=accel[k] if accel else None, gyro=gyro[k] if gyro else None)
+            for k in range(max(len(accel), len(gyro)))
+        ]
+        return [*(LogSource(**rest, log=path) for path in log), *pairs]
 
 
 @dataclass(frozen=True)
@@ -132,7 +201,9 @@ def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[...
         parameters: list[inspect.Parameter] = []
         for name, parameter in own.parameters.items():
             if name in groups:
-                hints = inspect.get_annotations(groups[name], eval_str=True)
+                hints: dict[str, Any] = {}
+                for base in reversed(groups[name].__mro__[:-1]):
+                    hints |= inspect.get_annotations(base, eval_str=True)
                 parameters += [
                     inspect.Parameter(
                         f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default, annotation=hints[f.name]
@@ -166,7 +237,8 @@ def progress(task: str, after_s: float = 1.0) -> Iterator[Callable[[float, str],
     def report(done: float, text: str) -> None:
         nonlocal bar, handle
         if bar is None:
-            if time.monotonic() - began < after_s:
+            # A bar in a file or a pipe would be garbage.
+            if time.monotonic() - began < after_s or not sys.stderr.isatty():
                 return
             from rich.console import Console
             from rich.progress import Progress

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 from collections.abc import Iterable
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from trihedron.files.output import OutputError, check_free, write_whole
+from trihedron.printable import printable
 
 if TYPE_CHECKING:
     from trihedron.records import Finding
@@ -21,8 +21,10 @@ NOT_TO_BE_TRUSTED = 2
 REPORT_KINDS = (".html", ".txt", ".json")
 
 
-def check_outputs(*paths: Path | None, force: bool, report: Path | None = None) -> None:
-    """Refuse outputs that would be refused later, before minutes of work.
+def check_outputs(
+    *paths: Path | None, force: bool, report: Path | None = None, inputs: Iterable[Path | None] = ()
+) -> None:
+    """Refuse outputs that would be refused later, before minutes of work; ``inputs`` are what they are made from.
 
     Raises
     ------
@@ -31,7 +33,7 @@ def check_outputs(*paths: Path | None, force: bool, report: Path | None = None) 
     """
     if report is not None and report.suffix.lower() not in REPORT_KINDS:
         raise OutputError(f"{report}: the ending tells the format of a report; give .html, .txt or .json.")
-    check_free([*paths, report], overwrite=force)
+    check_free([*paths, report], overwrite=force, inputs=inputs)
 
 
 def write_report(document: Document, machine: dict[str, Any], report: Path | None, *, force: bool) -> None:
@@ -48,6 +50,8 @@ def write_report(document: Document, machine: dict[str, Any], report: Path | Non
 
         content = to_text(document)
     else:
+        from trihedron.report.machine import json_text
+
         content = json_text(machine)
     write_whole(report, content, overwrite=force)
     say(f"report: {report}")
@@ -57,6 +61,8 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool) -> 
     """The result for machines, to a file or ('-') to stdout."""
     if target is None:
         return
+    from trihedron.report.machine import json_text
+
     if str(target) == "-":
         typer.echo(json_text(machine), nl=False)
         return
@@ -64,19 +70,12 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool) -> 
     say(f"JSON: {target}")
 
 
-def json_text(machine: dict[str, Any]) -> str:
-    """Strict JSON: what is not a finite number is ``null``."""
-    from trihedron.files.calibration import plain
-
-    return json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
 def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:
     """The report on stdout, unless stdout carries JSON."""
     if json_target is None or str(json_target) != "-":
         from trihedron.report import to_text
 
-        typer.echo(to_text(document, sections=sections, width=columns()), nl=False)
+        typer.echo(printable(to_text(document, sections=sections, width=columns())), nl=False)
 
 
 def columns() -> int:
@@ -88,10 +87,13 @@ def columns() -> int:
 
 def say(sentence: str) -> None:
     """To stderr: what was done, not what was found."""
-    typer.echo(sentence, err=True)
+    typer.echo(printable(sentence), err=True)
 
 
 def leave(findings: Iterable[Finding]) -> None:
-    """End with status 2 when a serious finding says that the answer is not to be trusted."""
-    if any(finding.severity.value == "serious" for finding in findings):
+    """End with status 2, and the reason on stderr, when a serious finding says that the answer is not to be trusted."""
+    reasons = [finding.seen for finding in findings if finding.severity.value == "serious"]
+    if reasons:
+        more = f" ({len(reasons) - 1} more)" if len(reasons) > 1 else ""
+        say(f"trihedron: not to be trusted: {reasons[0]}{more}")
         raise typer.Exit(NOT_TO_BE_TRUSTED)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from textwrap import shorten
 
 from rich.console import Group
 from rich.panel import Panel
@@ -87,7 +88,10 @@ def screen(view: GuideView, width: int = 80, height: int = 24, *, lost: int = 0,
     if seconds is not None:
         facts.append(f"{seconds:.0f} s")
     room = max(height - 21, 1)
-    warned = [Text(f"! {text}"[: inner - 1], style=BAD, no_wrap=True) for text in view.warnings[:room]]
+    warned = [
+        Text(shorten(f"! {text}", inner - 1, placeholder=" ..."), style=BAD, no_wrap=True)
+        for text in view.warnings[:room]
+    ]
     foot = Text(" | ".join(facts)[:inner], style=DIM, no_wrap=True)
     title = f"trihedron guide: {view.accuracy.sentence()}"
     return Group(Panel(Group(*lines, Text(""), body, Text(""), *warned, foot), title=title, width=width))

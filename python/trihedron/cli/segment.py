@@ -9,7 +9,7 @@ from trihedron.cli.output import check_outputs, leave, show, write_json, write_r
 @with_options(source=LogSource)
 def segment(source: LogSource, report: Report = None, json: Json = None, force: Force = False) -> None:
     """Find the still poses and the moves between them."""
-    check_outputs(json, force=force, report=report)
+    check_outputs(json, force=force, report=report, inputs=source.files)
     recording = source.read()
     from trihedron import pipeline
     from trihedron.report import segments_report

@@ -84,7 +84,8 @@ def simulate(
         raise OutputError(f"{output}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
     if truth is not None and truth.suffix.lower() not in (".npz", ".json"):
         raise OutputError(f"{truth}: truth is written as .npz (everything) or .json (no samples).")
-    check_free([output, truth], overwrite=force)
+    read_from = (None if scenario is None else Path(scenario), like, calibration, with_effects)
+    check_free([output, truth], overwrite=force, inputs=read_from)
     if like is not None and calibration is not None:
         from trihedron.files.calibration import read_calibration
 

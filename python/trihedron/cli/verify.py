@@ -37,7 +37,7 @@ def verify(
 
     Exit status 2 when a limit is exceeded, or, without one, when the miss is more than ten times what was expected.
     """
-    check_outputs(json, force=force, report=report)
+    check_outputs(json, force=force, report=report, inputs=(*source.files, calibration))
     from trihedron.files.calibration import read_calibration
 
     known = read_calibration(calibration)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -11,12 +11,13 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.laws.find import laws_of_rest
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
-from trihedron.diagnose.residuals.goodness_of_fit import test_rows
+from trihedron.diagnose.residuals.goodness_of_fit import hidden_zeros, test_rows
 from trihedron.diagnose.residuals.timing import test_timing
 from trihedron.diagnose.residuals.within_holds import test_within_static
 from trihedron.diagnose.selection.accepted import accepted_effects
 from trihedron.diagnose.selection.evidence import with_evidence
 from trihedron.diagnose.selection.model import StepwiseModel, begin
+from trihedron.diagnose.selection.numbers import final_numbers
 from trihedron.diagnose.selection.prune import judged_again
 from trihedron.diagnose.selection.score import Scored
 from trihedron.diagnose.selection.stages import held_out_stages
@@ -75,24 +76,28 @@ def diagnose_recording(
     laws = laws_of_rest(run.model.context, run.remaining)
     model, base = run.model, run.bare.fitted
     twin = model.fitted.twin
+    final = final_numbers(model, run.remaining)
+    accel_hidden, gyro_hidden = hidden_zeros(model.fitted)
     result = Diagnosis(
-        verdict=verdict_of(model, run.domains, has_laws=bool(laws)),
+        verdict=verdict_of(model, run.domains, run.remaining, has_laws=bool(laws)),
         domains=run.domains,
-        effects=accepted_effects(model),
+        effects=accepted_effects(model, final),
         remaining=run.remaining,
         candidates=tuple(run.candidates[key] for key in sorted(run.candidates)),
         baseline=with_covariance(linear_model(base), base),
-        extended=with_covariance(linear_model(model.fitted), model.fitted),
+        extended=with_covariance(linear_model(final), final),
         noise=MappingProxyType(
             {
                 "accelerometer_density": (np.sqrt((twin.accel_S**2) @ obs.force_density**2)).tolist(),
                 "accelerometer_unit": "m/s^2/sqrt(Hz)",
                 "accelerometer_corner_s": twin.accel_corner_s,
+                "accelerometer_zero": asdict(accel_hidden),
                 "gyroscope_density": None
                 if obs.rate_density is None
                 else (np.sqrt((twin.gyro_S**2) @ obs.rate_density**2)).tolist(),
                 "gyroscope_unit": "rad/s/sqrt(Hz)",
                 "gyroscope_corner_s": twin.gyro_corner_s,
+                "gyroscope_zero": None if gyro_hidden is None else asdict(gyro_hidden),
             }
         ),
         gravity_m_s2=calibration.gravity_m_s2,

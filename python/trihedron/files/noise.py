@@ -34,6 +34,17 @@ def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], fl
         raise NoiseFileError(f"{path}: there is no such file; check the name and the folder.") from None
     except (OSError, ValueError, RecursionError):
         raise NoiseFileError(f"{path}: this is not JSON; name a file written by `trihedron allan --json`.") from None
+    return noise_figures(document, str(path))
+
+
+def noise_figures(document: dict[str, Any], source: str = "noise") -> tuple[dict[str, SensorNoise], float]:
+    """The same of the document itself; ``source`` names it in complaints.
+
+    Raises
+    ------
+    NoiseFileError
+        When it holds no noise terms, or its readings are not in SI.
+    """
     try:
         axes = document["axes"]
         out = {
@@ -44,11 +55,11 @@ def read_noise(path: str | os.PathLike[str]) -> tuple[dict[str, SensorNoise], fl
         rate = float(document["rate_hz"])
     except (KeyError, TypeError, ValueError):
         raise NoiseFileError(
-            f"{path}: this JSON holds no noise terms; name a file written by `trihedron allan --json`."
+            f"{source}: this JSON holds no noise terms; name a file written by `trihedron allan --json`."
         ) from None
     if not out:
         raise NoiseFileError(
-            f"{path}: its noise is in raw units; run `trihedron allan` with the units or on SI readings."
+            f"{source}: its noise is in raw units; run `trihedron allan` with the units or on SI readings."
         )
     return out, rate
 

@@ -1,45 +1,102 @@
-"""Files written: whole or not at all, and never over another one unless told to."""
+"""Files written: whole or not at all, never over another one unless told to, and never over what they were made from.
+
+A plain file is written beside its place under a name of its own and moved there in one step. What is no plain file (a
+device, a pipe, a socket) is written to as it is, and never replaced.
+"""
 
 from __future__ import annotations
 
 import os
-import tempfile
+import stat
 from collections.abc import Iterable
 from pathlib import Path
+
+from trihedron.files.special import is_stream, write_stream
+from trihedron.files.temporary import Temporary, clear_leftovers
 
 
 class OutputError(ValueError):
     """A file that cannot be written. One sentence: which file, why, what to do."""
 
 
-def check_free(paths: Iterable[Path | None], *, overwrite: bool) -> None:
+def check_free(
+    paths: Iterable[Path | None], *, overwrite: bool, inputs: Iterable[str | os.PathLike[str] | None] = ()
+) -> None:
     """Refuse before the work is done what would be refused after it.
+
+    ``inputs`` are the files that the outputs are made from: none of them may be written over, whatever ``overwrite``.
 
     Raises
     ------
     OutputError
-        When a file exists and may not be replaced, its folder is missing or not writable, or one name is given twice.
+        When a file exists and may not be replaced, is an input or read-only, its folder is missing or not writable, or
+        one name is given twice.
     """
-    seen: set[Path] = set()
+    read = {identity: Path(path) for path in inputs if path is not None and (identity := _identity(path))}
+    seen: set[str] = set()
     for path in paths:
         if path is None or str(path) == "-":
             continue
-        if path.resolve() in seen:
+        found = _status(path)
+        if is_stream(path, found):
+            if found is not None and stat.S_ISBLK(found.st_mode) and not overwrite:
+                raise OutputError(f"{path}: this is a disk, all of which would be lost; add --force to write on it.")
+            continue
+        place = os.path.realpath(path)
+        if place in seen:
             raise OutputError(f"{path}: two outputs were given this one name; give each its own.")
-        seen.add(path.resolve())
-        if path.is_dir():
-            raise OutputError(f"{path}: this is a directory; name a file inside it.")
-        if path.exists() and not overwrite:
-            raise OutputError(f"{path}: the file exists and was left alone; choose another name or add --force.")
-        folder = path.absolute().parent
-        if not folder.is_dir():
-            raise OutputError(f"{path}: there is no folder {folder}; make it first.")
-        if not os.access(folder, os.W_OK):
-            raise OutputError(f"{path}: no permission to write into {folder}; choose another folder.")
+        seen.add(place)
+        if found is not None:
+            if (source := read.get((found.st_dev, found.st_ino))) is not None:
+                raise OutputError(f"{path}: this is the input {source.name} itself; give the output another name.")
+            _check_replaceable(path, found, overwrite=overwrite)
+        _check_folder(path, os.path.dirname(place))
+
+
+def _identity(path: str | os.PathLike[str]) -> tuple[int, int] | None:
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return None
+    # Reading from a terminal or a pipe and writing to it harms nothing.
+    return (found.st_dev, found.st_ino) if stat.S_ISREG(found.st_mode) else None
+
+
+def _status(path: Path) -> os.stat_result | None:
+    """What stands at a place, behind every link; None where there is nothing."""
+    try:
+        return os.stat(path)
+    except FileNotFoundError:
+        return None
+    except NotADirectoryError:
+        raise OutputError(f"{path}: a part of this name is a file and not a folder; choose another name.") from None
+    except (OSError, ValueError) as error:
+        # A loop of links, a name too long, a folder that may not be looked into.
+        why = getattr(error, "strerror", None) or error
+        raise OutputError(f"{str(path)!r}: this cannot be the name of an output ({why}); choose another.") from None
+
+
+def _check_replaceable(path: Path, found: os.stat_result, *, overwrite: bool) -> None:
+    if stat.S_ISDIR(found.st_mode):
+        raise OutputError(f"{path}: this is a directory; name a file inside it.")
+    if not overwrite:
+        raise OutputError(f"{path}: the file exists and was left alone; choose another name or add --force.")
+    # By its mode too: for the superuser everything is writable, and what was protected was protected on purpose.
+    if not found.st_mode & 0o222 or not os.access(path, os.W_OK):
+        raise OutputError(f"{path}: the file is read-only and was left alone; choose another name or `chmod u+w` it.")
+
+
+def _check_folder(path: Path, folder: str) -> None:
+    if not os.path.isdir(folder):
+        raise OutputError(f"{path}: there is no folder {folder}; make it first.")
+    if not os.access(folder, os.W_OK):
+        raise OutputError(f"{path}: no permission to write into {folder}; choose another folder.")
 
 
 def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite: bool = False) -> None:
     """Write a file in one step: a reader sees the old one or the new one, never half of it.
+
+    Through a link, the file that it names is written. What killed runs left in the folder is cleared away.
 
     Raises
     ------
@@ -48,28 +105,17 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite
     """
     target = Path(path)
     check_free([target], overwrite=overwrite)
-    data = content.encode() if isinstance(content, str) else content
+    data = content.encode(errors="backslashreplace") if isinstance(content, str) else content
+    found = _status(target)
     try:
-        handle, temporary = tempfile.mkstemp(dir=target.absolute().parent, prefix=f".{target.name}.")
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(data)
-                stream.flush()
-                os.fsync(stream.fileno())
-            # mkstemp makes files private; a result is as readable as any file the user makes.
-            mask = os.umask(0)
-            os.umask(mask)
-            os.chmod(temporary, 0o666 & ~mask)
-            if overwrite:
-                os.replace(temporary, target)
-            else:
-                # A link fails where a file appeared in the meantime; a rename would replace it.
-                os.link(temporary, target)
-                os.unlink(temporary)
-        except BaseException:
-            if os.path.exists(temporary):
-                os.unlink(temporary)
-            raise
+        if is_stream(target, found):
+            write_stream(target, found, data)
+            return
+        place = Path(os.path.realpath(target))
+        clear_leftovers(place.parent)
+        with Temporary(place) as temporary:
+            temporary.write(data)
+            temporary.put_in_place(None if found is None else stat.S_IMODE(found.st_mode))
     except FileExistsError:
         raise OutputError(f"{target}: the file appeared meanwhile and was left alone; choose another name.") from None
     except OSError as error:

@@ -6,18 +6,25 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from trihedron.pipeline.applying import apply
+    from trihedron.pipeline.applying import apply, write_calibration
     from trihedron.pipeline.calibrating import METHODS, calibrate
+    from trihedron.pipeline.capturing import capture, ports
     from trihedron.pipeline.checking import check
     from trihedron.pipeline.choices import settle_gravity
     from trihedron.pipeline.converting import convert
+    from trihedron.pipeline.curves import allan_deviation
+    from trihedron.pipeline.demonstrating import demo
     from trihedron.pipeline.diagnosing import diagnose, extend
     from trihedron.pipeline.exporting import export
     from trihedron.pipeline.filtering import KalmanResult, kalman
     from trihedron.pipeline.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
     from trihedron.pipeline.improving import driven, improve
+    from trihedron.pipeline.planning import plan
+    from trihedron.pipeline.presenting import plot, report
     from trihedron.pipeline.reading import read, segment
+    from trihedron.pipeline.replaying import guide
     from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
+    from trihedron.pipeline.sessions import SessionsResult, calibrate_sessions
     from trihedron.pipeline.simulating import simulate, twin, with_effects
     from trihedron.pipeline.verifying import verify
 
@@ -27,33 +34,53 @@ __all__ = [
     "CheckResult",
     "DiagnosisResult",
     "KalmanResult",
+    "SessionsResult",
     "VerificationResult",
+    "allan_deviation",
     "apply",
     "calibrate",
+    "calibrate_sessions",
+    "capture",
     "check",
     "convert",
+    "demo",
     "diagnose",
     "driven",
     "export",
     "extend",
+    "guide",
     "improve",
     "kalman",
     "noise",
     "noise_of_curve",
     "noise_of_file",
+    "plan",
+    "plot",
+    "ports",
     "read",
     "recording_lengths",
+    "report",
     "segment",
     "settle_gravity",
     "simulate",
     "twin",
     "verify",
     "with_effects",
+    "write_calibration",
 ]
 
 # Fetched when first asked for: a command must not wait for the stages of the others.
 _HOME = {
     "apply": "trihedron.pipeline.applying",
+    "write_calibration": "trihedron.pipeline.applying",
+    "guide": "trihedron.pipeline.replaying",
+    "report": "trihedron.pipeline.presenting",
+    "plot": "trihedron.pipeline.presenting",
+    "plan": "trihedron.pipeline.planning",
+    "demo": "trihedron.pipeline.demonstrating",
+    "allan_deviation": "trihedron.pipeline.curves",
+    "ports": "trihedron.pipeline.capturing",
+    "capture": "trihedron.pipeline.capturing",
     "METHODS": "trihedron.pipeline.calibrating",
     "calibrate": "trihedron.pipeline.calibrating",
     "check": "trihedron.pipeline.checking",
@@ -76,6 +103,8 @@ _HOME = {
     "CheckResult": "trihedron.pipeline.results",
     "DiagnosisResult": "trihedron.pipeline.results",
     "VerificationResult": "trihedron.pipeline.results",
+    "SessionsResult": "trihedron.pipeline.sessions",
+    "calibrate_sessions": "trihedron.pipeline.sessions",
     "simulate": "trihedron.pipeline.simulating",
     "twin": "trihedron.pipeline.simulating",
     "with_effects": "trihedron.pipeline.simulating",

@@ -5,51 +5,101 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.files.calibration import read_calibration
-from trihedron.pipeline.results import CalibrationResult
+from trihedron.files.calibration import write_calibration as write_file
+from trihedron.files.plausible import require_plausible
+from trihedron.pipeline.asking import WrongTypeError
+from trihedron.pipeline.reading import AnyRecording, recording_of
+from trihedron.pipeline.results import CheckResult
+from trihedron.pipeline.temperature import check_range, thermally_corrected
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit
 
 FloatArray = npt.NDArray[np.float64]
-AnyCalibration = CalibrationResult | Calibration | str | os.PathLike[str]
+
+
+class HasCalibration(Protocol):
+    """A result that holds a calibration."""
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """The calibration."""
+
+
+AnyCalibration = HasCalibration | Calibration | str | os.PathLike[str]
+"""A calibration, a result that holds one (of calibrate, kalman, verify), or a calibration file."""
 
 
 def calibration_of(given: AnyCalibration) -> Calibration:
-    """A calibration as a record, whether it comes from a fit, a file or is one already."""
-    if isinstance(given, CalibrationResult):
-        return given.calibration
-    return given if isinstance(given, Calibration) else read_calibration(given)
+    """A calibration as a record, whether it comes from a result, a file or is one already.
+
+    Raises
+    ------
+    WrongTypeError
+        (a ``ValueError`` and a ``TypeError``) when it is none of these.
+    """
+    if isinstance(given, Calibration):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return read_calibration(given)
+    # A check's is made with a standard gravity, for its error bars alone.
+    inside = None if isinstance(given, CheckResult) else getattr(given, "calibration", None)
+    if isinstance(inside, Calibration):
+        return inside
+    raise WrongTypeError(
+        "a calibration is what trihedron.calibrate gives, one that was read from a file, or the name of its file, not "
+        f"{type(given).__name__}."
+    )
 
 
-def apply(calibration: AnyCalibration, recording: Recording) -> Recording:
+def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a calibration file in one step, never over another file unless told to.
+
+    Raises
+    ------
+    OutputError
+        (a ``ValueError``) when the file exists or cannot be written.
+    """
+    write_file(calibration_of(calibration), path, overwrite=overwrite)
+
+
+def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     """The recording in SI, in the calibration's instrument trihedron: ``S raw + b`` for every row.
 
-    Where the calibration is extended, its effects are taken off first; a finding names those that cannot be.
+    Where the calibration is extended, its effects are taken off first; a finding names those that cannot be. Where it
+    follows temperature, S and b are those of each sample's temperature; outside the range for which it was made the
+    ends are held and a serious finding says so.
 
     Raises
     ------
     ValueError
-        When the recording is in other units than the calibration was made for, or has no sensor that was calibrated.
+        When the recording is in other units than the calibration was made for, or has no sensor that was calibrated;
+        when the calibration is no sensor's (S singular, a negative variance).
     """
-    known = calibration_of(calibration)
+    known = require_plausible(calibration_of(calibration))
+    recording = recording_of(recording)
     check_units(known, recording)
     recording, more = without_effects(known, recording)
     accelerometer, gyroscope = recording.accelerometer, recording.gyroscope
-    findings = (*recording.findings, *more)
+    findings = (*recording.findings, *more, *doubted(known), *check_range(known, recording))
     if gyroscope is not None and known.gyroscope is None:
         gyroscope = None
         findings = (*findings, _left_out())
     if accelerometer is None and gyroscope is None:
         raise ValueError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
+    followed = thermally_corrected(known, recording)
+    if followed is None:
+        followed = _corrected(accelerometer, known.accelerometer), _corrected(gyroscope, known.gyroscope)
     return replace(
         recording,
-        accelerometer=_corrected(accelerometer, known.accelerometer),
-        gyroscope=_corrected(gyroscope, known.gyroscope),
+        accelerometer=followed[0],
+        gyroscope=followed[1],
         accelerometer_unit=AccelerationUnit.M_S2,
         gyroscope_unit=RateUnit.RAD_S,
         source=f"{recording.source}, calibrated",
@@ -117,6 +167,22 @@ def _left_out() -> Finding:
         "The gyro was left out: the calibration holds none.",
         "It was made without gyro readings, or they did not suffice.",
         "Calibrate both sensors in one recording.",
+    )
+
+
+def doubted(calibration: Calibration) -> tuple[Finding, ...]:
+    """What the calibration said of itself goes with everything that it is applied to."""
+    grave = [finding for finding in calibration.findings if finding.severity is Severity.SERIOUS]
+    if not grave:
+        return ()
+    return (
+        Finding(
+            FindingCode.CALIBRATION_DOUBTED,
+            Severity.SERIOUS,
+            f"The calibration itself was not to be trusted: {grave[0].seen}",
+            "What it said when it was made holds for all that it is applied to.",
+            "Calibrate again as its findings say, or apply another calibration.",
+        ),
     )
 
 

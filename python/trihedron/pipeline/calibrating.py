@@ -26,7 +26,8 @@ from trihedron.estimate.gyroscope.missing_samples import missing_samples
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.pipeline.choices import settle_gravity
-from trihedron.pipeline.reading import Progress, segment
+from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segments_of
+from trihedron.pipeline.referring import AnyReference, calibration_by, held_against
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.sensor_model import in_frame
@@ -46,7 +47,7 @@ Found = tuple[Finding, ...]
 
 
 def calibrate(
-    recording: Recording,
+    recording: AnyRecording,
     *,
     segments: Segments | None = None,
     gravity_m_s2: float | None = None,
@@ -59,14 +60,16 @@ def calibrate(
     axis_signs: Sequence[int] | None = None,
     loss: Loss = "linear",
     gyroscope_nominal: float | None = None,
+    reference: AnyReference | None = None,
+    reference_columns: str | None = None,
     progress: Progress | None = None,
 ) -> CalibrationResult:
     """Calibrate both sensors from one recording of still poses and moves.
 
     Parameters
     ----------
-    recording : Recording
-        As :func:`trihedron.read` gives it. Without a gyro the accelerometer is calibrated alone.
+    recording : Recording, or what trihedron.read takes
+        Without a gyro the accelerometer is calibrated alone.
     segments : Segments, optional
         Still poses and moves; found when not given.
     gravity_m_s2 or latitude_deg, height_m : float
@@ -87,6 +90,9 @@ def calibrate(
         Method 2: how far outlying poses count.
     gyroscope_nominal : float
         rad/s per raw unit, where readings are counts and too few moves tell it.
+    reference : path, Recording or ReferenceMotion
+        Known motion beside the log (rate table, optical tracking, another unit): both sensors are held against it, and
+        still poses are not needed. ``reference_columns`` says its columns where their names do not.
 
     Raises
     ------
@@ -96,7 +102,12 @@ def calibrate(
     if method not in METHODS:
         raise ValueError(f"there is no method {method!r}; choose one of {', '.join(METHODS)}.")
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
-    segments = segment(recording, progress=progress) if segments is None else segments
+    recording = recording_of(recording)
+    segments = segments_of(segments, recording, progress)
+    if reference is not None:
+        found = held_against(recording, reference, gravity, columns=reference_columns)
+        by_motion = calibration_by(found, recording, gravity, source, frame)
+        return CalibrationResult(replace(by_motion, findings=(*said, *by_motion.findings)), segments, recording)
     _require_poses(recording, segments)
     if method == "faces":
         calibration = _by_faces(recording, segments, gravity, source, faces, turns_deg, gyroscope_nominal)

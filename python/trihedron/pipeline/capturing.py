@@ -3,16 +3,37 @@
 from __future__ import annotations
 
 import math
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.capture import Found, LineColumns, NameColumns, Source, find_protocol, open_source
+from trihedron.capture import (
+    Block,
+    Found,
+    LineColumns,
+    NameColumns,
+    Port,
+    Recorder,
+    Source,
+    find_protocol,
+    list_ports,
+    open_source,
+)
 from trihedron.files.frame_declaration import read_frame_declaration
+from trihedron.files.output import check_free
+from trihedron.pipeline.reading import read
 from trihedron.read.clock import SECONDS, parse_time_unit
 from trihedron.read.columns import Columns, find_columns
 from trihedron.read.table import Table
+from trihedron.records import Recording
 from trihedron.records.frame_declaration import FrameDeclaration
 
 Cells = npt.NDArray[np.float64]
@@ -55,6 +76,89 @@ def open_device(
     except BaseException:
         source.close()
         raise
+
+
+def capture(
+    port: str,
+    output: str | os.PathLike[str],
+    *,
+    protocol: str | None = None,
+    baud: int | None = None,
+    seconds: float | None = None,
+    rate_hz: float | None = None,
+    columns: str | None = None,
+    time_unit: str | None = None,
+    wait_s: float = 60.0,
+    overwrite: bool = False,
+    on_block: Callable[[Block], bool | None] | None = None,
+) -> Recording:
+    """Record what a board sends into a log, on disk as it comes, then read the log back.
+
+    Parameters
+    ----------
+    port : str
+        A serial port (``trihedron.ports()`` lists them), ``tcp://host:port`` or a file of bytes.
+    output : path
+        The log to write.
+    protocol, baud, columns, time_unit
+        What the board speaks; found when not said.
+    seconds : float, optional
+        When to stop; Ctrl-C, or ``on_block`` that returns False, stops any time, and what came is in the log.
+    rate_hz : float, optional
+        Rate of a board that sends no time.
+    wait_s : float
+        How long to wait for a board that was unplugged.
+    on_block : callable, optional
+        Is given every block of samples as it is written.
+
+    Raises
+    ------
+    CaptureError
+        (a ``ValueError``) when the board is silent or not understood, or the disk is full; it says what was saved.
+    """
+    if seconds is not None and not seconds > 0.0:
+        raise ValueError(f"seconds is how long to record, not {seconds:g}")
+    check_free([Path(output)], overwrite=overwrite)
+    source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
+    recorder = Recorder(
+        source,
+        found.make_decoder,
+        Path(output),
+        overwrite=overwrite,
+        rate_hz=rate_hz,
+        wait_for_return_s=wait_s,
+        first_bytes=found.first_bytes,
+    )
+    began_s = time.monotonic()
+    with stopped_by_interrupt(recorder):
+        for block in recorder:
+            is_wanted = on_block is None or on_block(block) is not False
+            if not is_wanted or (seconds is not None and time.monotonic() - began_s >= seconds):
+                recorder.stop()
+    return read(output)
+
+
+@contextmanager
+def stopped_by_interrupt(recorder: Recorder) -> Iterator[None]:
+    """Ctrl-C ends the recording in order; a second one ends the program. Elsewhere than in the main thread: nothing."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(_number: int, _frame: Any) -> None:
+        recorder.stop()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    before = signal.signal(signal.SIGINT, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def ports() -> list[Port]:
+    """The serial ports that are plugged in."""
+    return list_ports()
 
 
 def column_namer(mapping: str | None = None, time_unit: str | None = None) -> NameColumns:

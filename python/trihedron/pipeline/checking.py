@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from trihedron.pipeline.calibrating import calibrate
-from trihedron.pipeline.reading import Progress, segment
+from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segment
 from trihedron.pipeline.results import CheckResult
-from trihedron.records import Finding, FindingCode, Recording, Severity
+from trihedron.records import Finding, FindingCode, Severity
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
-def check(recording: Recording, *, progress: Progress | None = None) -> CheckResult:
+def check(recording: AnyRecording, *, progress: Progress | None = None) -> CheckResult:
     """Audit of the log, still poses, and the error bars that a calibration from it would have.
 
     The error bars come from the poses, the moves and the sensor's noise; gravity hardly matters for them and is not
     asked for.
     """
+    recording = recording_of(recording)
     segments = segment(recording, progress=progress)
     # A standard value: here only the size of the error bars is wanted, to which an error of 0.4 % means nothing.
     try:

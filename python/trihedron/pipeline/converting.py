@@ -6,7 +6,7 @@ import os
 from typing import Any
 
 from trihedron.files.log import write_recording
-from trihedron.pipeline.reading import read
+from trihedron.pipeline.reading import read, recording_of
 from trihedron.records import Recording
 
 
@@ -21,6 +21,8 @@ def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False
     ValueError
         When the log cannot be read, or the file cannot be written.
     """
-    recording = log if isinstance(log, Recording) else read(log, **options)
+    if options and (isinstance(log, Recording) or hasattr(log, "recording")):
+        raise ValueError(f"{', '.join(options)}: how a log is read cannot be said of one that was read already.")
+    recording = read(log, **options) if options else recording_of(log)
     write_recording(recording, output, overwrite=overwrite)
     return recording

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +27,9 @@ from trihedron.sensor_model import reframing
 from trihedron.simulate import Environment, Scenario, hand_session, scenario_by_name, simulate
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
+if TYPE_CHECKING:
+    from trihedron.pipeline.disagreeing import Disagreement
+
 FloatArray = npt.NDArray[np.float64]
 
 LATITUDE_DEG = 59.94
@@ -43,6 +48,28 @@ class Demonstration:
     uncalibrated_rms_m_s2: float
     files: tuple[tuple[Path, str], ...]
     document: Document
+
+
+def demo(
+    folder: str | os.PathLike[str] = "trihedron-demo", *, seed: int = 0, overwrite: bool = False
+) -> tuple[Demonstration, Disagreement]:
+    """Two acts, simulated: calibrate and compare with the truth; then a simulation that a log contradicts.
+
+    Files go to ``folder``; ``seed`` draws unit and flaw of the second act. ``.document`` of each is its story, which
+    ``print`` shows.
+
+    Raises
+    ------
+    ValueError
+        When the folder exists and may not be written into.
+    """
+    target = Path(folder)
+    if target.exists() and not overwrite:
+        raise ValueError(f"{target}: this exists and was left alone; choose another name or say overwrite=True.")
+    from trihedron.pipeline.disagreeing import disagree
+
+    first = demonstrate(target, overwrite=overwrite)
+    return first, disagree(target, seed, overwrite=overwrite)
 
 
 def demonstrate(folder: Path, *, overwrite: bool = False, say: Callable[[str], None] | None = None) -> Demonstration:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -15,19 +16,24 @@ from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
+from trihedron.pipeline.asking import WrongTypeError
+from trihedron.pipeline.beside import beside
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
+from trihedron.pipeline.diagnosing_rest import at_rest, diagnosed_at_rest
 from trihedron.pipeline.improving import driven
-from trihedron.pipeline.reading import Progress, read, segment
+from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segments_of
+from trihedron.pipeline.referring import AnyReference
 from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
 
-AnyRecording = Recording | str | os.PathLike[str]
+GivenModel = Recording | Scenario | str | os.PathLike[str]
+"""A simulated recording or its file, or a scenario or its .toml."""
 
 
 def diagnose(
@@ -38,7 +44,9 @@ def diagnose(
     height_m: float | None = None,
     segments: Segments | None = None,
     calibration: AnyCalibration | None = None,
-    against: AnyRecording | Scenario | None = None,
+    against: GivenModel | None = None,
+    reference: AnyReference | None = None,
+    reference_columns: str | None = None,
     alpha: float = 0.01,
     progress: Progress | None = None,
 ) -> DiagnosisResult:
@@ -46,7 +54,7 @@ def diagnose(
 
     Parameters
     ----------
-    recording : Recording or path
+    recording : Recording, or what trihedron.read takes
         Still poses and moves of one sensor.
     gravity_m_s2 or latitude_deg, height_m : float
         |g| at the place; with a ``calibration`` that of the calibration unless said.
@@ -57,6 +65,9 @@ def diagnose(
     against : Recording, Scenario or path, optional
         The user's simulation as the model: a simulated recording, with everything that it contains, or a scenario
         (``.toml``), whose instrument is moved as the recording was.
+    reference : path, Recording or ReferenceMotion, optional
+        Known motion beside the log: attitude, rate or pose with a clock of its own, or the log of another unit that
+        moved along (docs/reference.md). ``reference_columns`` says its columns where their names do not.
     alpha : float
         Chance that a healthy recording is called anything but consistent.
 
@@ -70,8 +81,15 @@ def diagnose(
     if not 0.0 < alpha < 0.5:
         raise ValueError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
     tell = progress or (lambda _fraction, _text: None)
-    if not isinstance(recording, Recording):
-        recording = read(recording)
+    recording = recording_of(recording)
+    if reference is not None:
+        ordinary = partial(
+            diagnose, recording, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m,
+            segments=segments, calibration=calibration, against=against, alpha=alpha, progress=progress,
+        )  # fmt: skip
+        given = None if calibration is None else calibration_of(calibration)
+        place = (gravity_m_s2, latitude_deg, height_m)
+        return beside(recording, reference, reference_columns, given, place, alpha, ordinary)
     known = None if calibration is None else calibration_of(calibration)
     said: tuple[Finding, ...] = ()
     if known is not None and gravity_m_s2 is None and latitude_deg is None and height_m is None:
@@ -85,8 +103,12 @@ def diagnose(
         findings += more
         segments = None if known.extensions.get("effects") else segments
     tell(0.02, "finding still poses")
-    segments = segment(recording) if segments is None else segments
+    segments = segments_of(segments, recording)
     findings += segments.findings
+    resting = None if against is not None else at_rest(recording, segments, known, gravity)
+    if resting is not None:
+        tell(0.1, "looking at zeros and lines")
+        return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
     simulated: _Free | None = None
     if against is not None:
         tell(0.05, "diagnosing the simulated recording")
@@ -162,12 +184,13 @@ def _start(
     return (replace(known, gravity_m_s2=gravity), False) if is_poor else (own, True)
 
 
-def _simulated_log(
-    against: AnyRecording | Scenario, recording: Recording, segments: Segments, gravity: float
-) -> Recording:
+def _simulated_log(against: GivenModel, recording: Recording, segments: Segments, gravity: float) -> Recording:
     if isinstance(against, Recording):
         return against
     if not isinstance(against, Scenario):
+        if not isinstance(against, str | os.PathLike):
+            kind = type(against).__name__
+            raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
         if Path(against).suffix.lower() != ".toml":
             return read(against)
         against = read_scenario(Path(against))
@@ -225,6 +248,8 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
     ValueError
         When the calibration is in another frame than ``lower``.
     """
+    if not isinstance(result, CalibrationResult):
+        raise WrongTypeError(f"trihedron.extend takes what trihedron.calibrate gave, not {type(result).__name__}.")
     base = result.calibration
     if base.frame != "lower":
         raise ValueError(

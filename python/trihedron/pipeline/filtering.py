@@ -16,8 +16,9 @@ from trihedron.estimate.kalman import (
 from trihedron.estimate.noise import identify_noise, noise_of_holds
 from trihedron.estimate.noise.holds import SHORTEST as SHORTEST_HOLD
 from trihedron.estimate.noise.resolution import converter_step
+from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.choices import settle_gravity
-from trihedron.pipeline.reading import Progress, segment
+from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segments_of
 from trihedron.read import read_axis_noise, read_pose_table, read_recording
 from trihedron.records import (
     AxisNoise,
@@ -31,12 +32,13 @@ from trihedron.records import (
     Severity,
 )
 from trihedron.records.noise import Noise
+from trihedron.records.presented import Presented
 
 NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class KalmanResult:
+class KalmanResult(Presented):
     """What the filter found, with the segments and the recording that it was made from. ``print`` gives the report."""
 
     outcome: KalmanCalibration | NormKalmanCalibration
@@ -64,7 +66,7 @@ class KalmanResult:
 
 
 def kalman(
-    recording: Recording,
+    recording: AnyRecording,
     reference: PoseTable | str | os.PathLike[str] | None = None,
     *,
     segments: Segments | None = None,
@@ -80,8 +82,8 @@ def kalman(
 
     Parameters
     ----------
-    recording : Recording
-        As :func:`trihedron.read` gives it.
+    recording : Recording, or what trihedron.read takes
+        The log of still poses.
     reference : PoseTable or file, optional
         Attitudes of the still poses: pitch and roll, or directions. Without it the length of gravity must do.
     sigma_angle_deg : float
@@ -98,11 +100,14 @@ def kalman(
         When the question cannot be answered; one sentence says why and what to do.
     """
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+    recording = recording_of(recording)
     table = reference
+    if table is not None and not isinstance(table, PoseTable | str | os.PathLike):
+        raise WrongTypeError(f"a reference is a pose table or the name of its file, not {type(table).__name__}.")
     if isinstance(table, str | os.PathLike):
         table = read_pose_table(table, gravity_m_s2=gravity, sigma_angle_deg=sigma_angle_deg)
     given, noted, identified = _settle_noise(noise, recording)
-    segments = segment(recording, progress=progress) if segments is None else segments
+    segments = segments_of(segments, recording, progress)
     if identified and isinstance(given, Sequence):
         _check_converter(given, recording, segments)
     outcome: KalmanCalibration | NormKalmanCalibration
@@ -139,6 +144,9 @@ def _settle_noise(
         noticed = [*noise.findings, *(finding for axis in noise.axes for finding in axis.findings)]
         weighty = tuple(finding for finding in noticed if finding.severity is not Severity.NOTE)
         return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty, True
+    is_axes = isinstance(noise, Sequence) and all(isinstance(axis, AxisNoise) for axis in noise)
+    if noise is not None and not isinstance(noise, AxisNoise) and not is_axes:
+        raise WrongTypeError(f"noise is what trihedron.noise found, or the name of a file, not {type(noise).__name__}.")
     return noise, (), False
 
 

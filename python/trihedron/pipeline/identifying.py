@@ -15,10 +15,11 @@ from trihedron.estimate.noise.grid import readings_of
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s
 from trihedron.estimate.noise.streamed import stream_noise
+from trihedron.pipeline.reading import AnyRecording, recording_of
 from trihedron.read.allan_table import read_allan_table
 from trihedron.read.chunks import open_chunks
 from trihedron.read.errors import ReadError
-from trihedron.records import Noise, Recording, TermName
+from trihedron.records import Noise, TermName
 from trihedron.units import (
     AccelerationUnit,
     RateUnit,
@@ -33,7 +34,7 @@ IN_MEMORY_BYTES = 1 << 29
 
 
 def noise(
-    recording: Recording,
+    recording: AnyRecording,
     *,
     exclude_s: Sequence[tuple[float, float]] = (),
     automatic: bool = True,
@@ -50,6 +51,7 @@ def noise(
     ValueError
         When the log is too short or has too many gaps; one sentence says why and what to do.
     """
+    recording = recording_of(recording)
     readings, names, units = readings_of(
         recording,
         None if gyroscope_lsb is None else rate_lsb_to_si(gyroscope_lsb),

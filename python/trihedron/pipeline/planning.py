@@ -15,18 +15,18 @@ from trihedron.estimate.gyroscope.turn_design import (
     design_zero_first,
 )
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth, TurnPlan
-from trihedron.units import STANDARD_GRAVITY_M_S2, radians_from_degrees
+from trihedron.units import STANDARD_GRAVITY_M_S2, m_s2_from_micro_g, radians_from_degrees
 
 POSE_SETS = ("6 faces", "9 poses", "12 edges", "18 poses: faces and edges", "26 poses: faces, edges and corners")
 
 
 def plan(
     *,
-    turns_deg: Sequence[float],
-    turn_s: float,
-    hold_s: float,
-    gyroscope_density: float,
-    accelerometer_density: float,
+    turns_deg: Sequence[float] = (90.0, -90.0),
+    turn_s: float = 2.0,
+    hold_s: float = 4.0,
+    gyroscope_density: float = radians_from_degrees(0.005),
+    accelerometer_density: float = m_s2_from_micro_g(150.0),
     sigma_turn_rad: float = 0.0,
     gravity_m_s2: float = STANDARD_GRAVITY_M_S2,
 ) -> ExperimentPlan:
@@ -39,7 +39,7 @@ def plan(
     hold_s : float
         How long every pose, and the one zero turn, is held.
     gyroscope_density, accelerometer_density : float
-        White noise [rad/s/√Hz, m/s²/√Hz].
+        White noise [rad/s/√Hz, m/s²/√Hz]; that of a consumer part unless said.
     sigma_turn_rad : float
         Standard error of a turn's angle (the wall).
 

@@ -15,6 +15,8 @@ from trihedron.records import Recording, Segments
 from trihedron.units import AccelerationUnit, RateUnit
 
 Progress = Callable[[float, str], None]
+AnyRecording = object
+"""A recording, a result that holds one, or what :func:`read` takes: a file, arrays, a dictionary, a data frame."""
 
 
 def read(
@@ -35,8 +37,8 @@ def read(
     """Read and audit a log; the parameters are those of :func:`trihedron.read.read_recording`.
 
     ``path`` is a file name, or readings in memory: an array (n, columns), also structured or masked; a dictionary of
-    arrays (n,) or (n, 3); a data frame of pandas, polars or Arrow. Names of columns are understood as in a file; masked
-    cells are missing readings.
+    arrays (n,) or (n, 3); a list of dictionaries, one per sample; a data frame of pandas, polars or Arrow. Names of
+    columns are understood as in a file; masked cells are missing readings. A recording comes back as it is.
 
     Raises
     ------
@@ -51,6 +53,9 @@ def read(
     >>> trihedron.read({"t": np.arange(500) / 100, "acc": a}).rate_hz
     100.0
     """
+    inside = getattr(path, "recording", path)
+    if isinstance(inside, Recording):
+        return inside
     try:
         recording = read_recording(
             path,
@@ -89,6 +94,8 @@ def of_arrays(
         raise ReadError("from_arrays needs accelerometer (n, 3) or gyroscope (n, 3).")
     import numpy as np
 
+    if time_s is not None and np.ndim(time_s) != 1:
+        raise ReadError(f"time_s must have shape (n,), got {np.shape(time_s)}.")
     columns: dict[str, Any] = {} if time_s is None else {"time [s]": time_s}
     mapping = ["time=time [s]"] if time_s is not None else ["time=none"]
     for name, letter, readings in (("accelerometer", "a", accelerometer), ("gyroscope", "g", gyroscope)):
@@ -112,8 +119,37 @@ def of_arrays(
     )
 
 
-def segment(recording: Recording, *, progress: Progress | None = None) -> Segments:
+def recording_of(given: AnyRecording) -> Recording:
+    """A recording, whether it is one, belongs to a result, or is what :func:`read` takes (a file, arrays, a frame).
+
+    Raises
+    ------
+    ReadError
+        (a ``ValueError``) when it cannot be read, or is nothing of the kind.
+    """
+    if isinstance(given, Recording):
+        return given
+    return read(given)
+
+
+def segments_of(given: Segments | None, recording: Recording, progress: Progress | None = None) -> Segments:
+    """Segments as given, or found in the recording.
+
+    Raises
+    ------
+    ValueError
+        When what was given are no segments.
+    """
+    if given is None:
+        return segment(recording, progress=progress)
+    if not isinstance(given, Segments):
+        raise ValueError(f"segments are what trihedron.segment(recording) gives, not {type(given).__name__}.")
+    return given
+
+
+def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Segments:
     """Still poses and the moves between them, told apart by the sensor's own noise: nothing to set."""
+    recording = recording_of(recording)
     # Loaded when it is needed: half of what a command that only reads would wait for.
     from trihedron.segment import segment_recording
 

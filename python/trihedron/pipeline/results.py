@@ -7,10 +7,12 @@ from typing import Any
 
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
+from trihedron.records.presented import Presented
+from trihedron.records.reference import AgainstReference
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CalibrationResult:
+class CalibrationResult(Presented):
     """A calibration with the segments and the recording that it was made from. ``print`` gives the report."""
 
     calibration: Calibration
@@ -48,7 +50,7 @@ class CalibrationResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class VerificationResult:
+class VerificationResult(Presented):
     """A calibration judged on another recording. ``print`` gives the report."""
 
     verification: Verification
@@ -76,7 +78,7 @@ class VerificationResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CheckResult:
+class CheckResult(Presented):
     """Is a log fit for calibration? ``calibration`` holds the error bars to expect, ``None`` where it cannot be
     made."""
 
@@ -100,18 +102,20 @@ class CheckResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DiagnosisResult(Diagnosis):
+class DiagnosisResult(Diagnosis, Presented):
     """A diagnosis with what it was made from. ``print`` gives a short laboratory report.
 
     ``calibration`` is the linear model at the start: fitted to this recording, or given (``model_is_given``);
     ``updated`` the recording's own calibration where one was given and the recording can carry another;
+    ``reference`` what known motion beside the log says;
     ``own_effects`` every effect that the recording has, those that the given model has too included.
     """
 
     recording: Recording = field(kw_only=True)
     segments: Segments = field(kw_only=True)
-    calibration: Calibration = field(kw_only=True)
+    calibration: Calibration | None = field(kw_only=True)
     updated: Calibration | None = None
+    reference: AgainstReference | None = None
     own_effects: tuple[AcceptedEffect, ...] = ()
     gravity_source: str = ""
     model_is_given: bool = False
@@ -123,6 +127,7 @@ class DiagnosisResult(Diagnosis):
             **super().to_dict(),
             "gravity_source": self.gravity_source,
             "model_is_given": self.model_is_given,
+            "reference": None if self.reference is None else self.reference.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
         }
 

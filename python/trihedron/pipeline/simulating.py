@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from trihedron.records import Calibration, Recording, Truth
+from trihedron.pipeline.applying import AnyCalibration, calibration_of
+from trihedron.pipeline.asking import WrongTypeError
+from trihedron.pipeline.reading import AnyRecording, recording_of
+from trihedron.records import Recording, Truth
 from trihedron.segment import segment_recording
 from trihedron.simulate import Scenario, read_scenario, scenario_by_name, twin_scenario, with_diagnosed_effects
 from trihedron.simulate import simulate as run
@@ -35,6 +38,8 @@ def scenario_of(scenario: str | os.PathLike[str] | Scenario) -> Scenario:
     """
     if isinstance(scenario, Scenario):
         return scenario
+    if not isinstance(scenario, str | os.PathLike):
+        raise WrongTypeError(f"a scenario is its name or its .toml file, not {type(scenario).__name__}.")
     path = Path(scenario)
     return read_scenario(path) if path.suffix.lower() == ".toml" else scenario_by_name(str(scenario))
 
@@ -53,7 +58,7 @@ def with_effects(scenario: str | os.PathLike[str] | Scenario, effects: Sequence[
     return WithEffects(*with_diagnosed_effects(scenario_of(scenario), effects))
 
 
-def twin(recording: Recording, calibration: Calibration, seed: int = 0) -> tuple[Recording, Truth]:
+def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) -> tuple[Recording, Truth]:
     """Repeat a recording as a simulation: its poses, moves, timing, noise and converter.
 
     Raises
@@ -61,5 +66,5 @@ def twin(recording: Recording, calibration: Calibration, seed: int = 0) -> tuple
     ValueError
         When the recording has no still poses, or lacks a sensor.
     """
-    segments = segment_recording(recording)
-    return run(twin_scenario(recording, segments, calibration), seed)
+    recording, known = recording_of(recording), calibration_of(calibration)
+    return run(twin_scenario(recording, segment_recording(recording), known), seed)

@@ -6,17 +6,17 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from trihedron.estimate.verification import verify_calibration
-from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
+from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
 from trihedron.pipeline.choices import settle_gravity
-from trihedron.pipeline.reading import Progress, segment
+from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segments_of
 from trihedron.pipeline.results import VerificationResult
-from trihedron.records import Finding, FindingCode, Recording, Segments, Severity, Verification
+from trihedron.records import Finding, FindingCode, Segments, Severity, Verification
 from trihedron.units import mg_from_m_s2
 
 
 def verify(
     calibration: AnyCalibration,
-    recording: Recording,
+    recording: AnyRecording,
     *,
     segments: Segments | None = None,
     gravity_m_s2: float | None = None,
@@ -38,11 +38,12 @@ def verify(
         When units differ, or the recording has no accelerometer or no still pose.
     """
     known = calibration_of(calibration)
+    recording = recording_of(recording)
     check_units(known, recording)
     recording, more = without_effects(known, recording)
     if known.extensions.get("effects"):
         segments = None
-    segments = segment(recording, progress=progress) if segments is None else segments
+    segments = segments_of(segments, recording, progress)
     if gravity_m_s2 is None and latitude_deg is None and height_m is None:
         gravity, source = known.gravity_m_s2, "that of the calibration"
     else:
@@ -57,6 +58,7 @@ def verify(
         for found in judged.findings
     )
     findings = (*recording.findings, *segments.findings, *missed, *more, *_limits(judged, limit_mg, limit_deg))
+    findings = (*doubted(known), *findings)
     findings += _same_recording(known.recording_sha256, recording.sha256)
     return VerificationResult(replace(judged, findings=findings), known, segments, recording)
 

@@ -3,33 +3,104 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
 
 from trihedron.records import Finding
 
 _PARAMETERS = {
     "--accel-unit": "accelerometer_unit",
     "--gyro-unit": "gyroscope_unit",
+    "--accel-lsb": "accelerometer_lsb",
+    "--gyro-lsb": "gyroscope_lsb",
+    "--gyro-nominal": "gyroscope_nominal",
     "--time-unit": "time_unit",
     "--columns": "columns",
     "--rate": "rate_hz",
+    "--samples": "n_samples",
     "--device": "device",
     "--topic": "topic",
     "--instance": "instance",
     "--accel": "accelerometer_path",
     "--gyro": "gyroscope_path",
+    "--gravity": "gravity_m_s2",
+    "--latitude": "latitude_deg",
+    "--height": "height_m",
+    "--turns": "turns_deg",
+    "--alpha": "alpha",
+    "--accuracy": "accuracy",
+    "--noise": "noise",
+    "--baud": "baud",
+    "--protocol": "protocol",
+    "--force": "overwrite=True",
+    "--extended": "trihedron.extend",
+}
+_COMMANDS = {
+    "trihedron allan --json": "trihedron.report(noise, path)",
+    "trihedron allan": "trihedron.noise",
+    "trihedron apply": "trihedron.apply",
+    "trihedron calibrate -o": "trihedron.write_calibration",
+    "trihedron diagnose --json": "trihedron.report(diagnosis, path)",
+    "trihedron diagnose": "trihedron.diagnose",
+    "trihedron ports": "trihedron.ports()",
+    "trihedron segment LOG": "trihedron.segment(recording)",
+    "trihedron segment": "trihedron.segment(recording)",
 }
 _COLUMNS = re.compile(r"--columns ((?:\w[\w.]*=|[\w-]+,)[\w=,.-]*\w)(\.{3})?")
-_FLAG = re.compile("|".join(sorted(map(re.escape, _PARAMETERS), key=len, reverse=True)) + r"(?![\w-])")
+_TURNS = re.compile(r"--turns (-?\d[\d,.-]*\d),\.\.\.")
+_QUOTED = re.compile(r"(--(?:accel|gyro)-lsb) '([^']*)'")
+_WORD = re.compile(r"--method (\w+)")
+# A place holder behind a flag (`--latitude DEG`) says what the parameter's own name says.
+_FLAG = re.compile(
+    "("
+    + "|".join(sorted(map(re.escape, _PARAMETERS), key=len, reverse=True))
+    + r")(?![\w-])(?: (?:DEG|M_S2|M|HZ|N|NAME|UNIT|LIST|SIZE|ALLAN\.json)\b)?"
+)
+_COMMAND = re.compile("`(" + "|".join(sorted(map(re.escape, _COMMANDS), key=len, reverse=True)) + ")`")
+
+Value = TypeVar("Value")
 
 
 def in_python(text: str) -> str:
     """A sentence with ``--columns ax=1`` as ``columns="ax=1"`` and other flags as the parameters they stand for."""
     text = _COLUMNS.sub(lambda m: f'columns="{m[1]}{m[2] or ""}"', text)
-    return _FLAG.sub(lambda m: _PARAMETERS[m[0]], text)
+    text = _TURNS.sub(lambda m: f"turns_deg=[{m[1].replace(',', ', ')}, ...]", text)
+    text = _QUOTED.sub(lambda m: f'{_PARAMETERS[m[1]]}="{m[2]}"', text)
+    text = _WORD.sub(lambda m: f'method="{m[1]}"', text)
+    text = _COMMAND.sub(lambda m: f"`{_COMMANDS[m[1]]}`", text)
+    return _FLAG.sub(lambda m: _PARAMETERS[m[1]], text)
 
 
 def finding_in_python(finding: Finding) -> Finding:
-    """A finding whose action names parameters instead of flags."""
-    action = in_python(finding.action)
-    return finding if action == finding.action else replace(finding, action=action)
+    """A finding whose sentences name parameters instead of flags."""
+    said = {name: in_python(getattr(finding, name)) for name in ("seen", "cause", "action")}
+    if all(text == getattr(finding, name) for name, text in said.items()):
+        return finding
+    return replace(finding, seen=said["seen"], cause=said["cause"], action=said["action"])
+
+
+def result_in_python(result: Value) -> Value:
+    """A record whose findings, its own and those of its parts, name parameters instead of flags."""
+    changed = _changed(result)
+    return result if changed is None else changed
+
+
+def _changed(record: Any) -> Any:
+    """The record with other findings, or None where there is nothing to change."""
+    if isinstance(record, tuple) and record and all(isinstance(part, Finding) for part in record):
+        said = tuple(finding_in_python(part) for part in record)
+        return None if all(new is old for new, old in zip(said, record, strict=True)) else said
+    if isinstance(record, tuple) and record and all(_holds_findings(part) for part in record):
+        parts = [_changed(part) for part in record]
+        if all(part is None for part in parts):
+            return None
+        return tuple(old if new is None else new for new, old in zip(parts, record, strict=True))
+    if not _holds_findings(record):
+        return None
+    found = {field.name: _changed(getattr(record, field.name)) for field in fields(record) if field.init}
+    found = {name: value for name, value in found.items() if value is not None}
+    return replace(record, **found) if found else None
+
+
+def _holds_findings(record: Any) -> bool:
+    return is_dataclass(record) and not isinstance(record, type) and hasattr(record, "findings")

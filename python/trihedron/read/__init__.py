@@ -4,6 +4,7 @@ The file's first bytes tell its format; names, then readings tell its columns an
 stated as a finding. A file that cannot become a recording raises :class:`ReadError` with one sentence.
 """
 
+from trihedron.read.archived_devices import devices_of
 from trihedron.read.axis_noise import read_axis_noise
 from trihedron.read.chunks import ChunkedLog, open_chunks
 from trihedron.read.errors import ReadError
@@ -11,4 +12,13 @@ from trihedron.read.pose_table import read_pose_table
 from trihedron.read.recording import read_recording
 from trihedron.read.table import Progress
 
-__all__ = ["ChunkedLog", "Progress", "ReadError", "open_chunks", "read_axis_noise", "read_pose_table", "read_recording"]
+__all__ = [
+    "ChunkedLog",
+    "Progress",
+    "ReadError",
+    "devices_of",
+    "open_chunks",
+    "read_axis_noise",
+    "read_pose_table",
+    "read_recording",
+]

@@ -28,9 +28,15 @@ def table_of(data: object) -> Table:
         (a ``ValueError``) when it is none of these, or lengths disagree.
     """
     if isinstance(data, Mapping):
-        return columns_table("dict", list(data.items()))
+        return columns_table("dict", _flat(data))
+    if isinstance(data, list | tuple) and data and all(isinstance(row, Mapping) for row in data):
+        names = list(dict.fromkeys(name for row in data for name in row))
+        return columns_table("list", [(name, [row.get(name) for row in data]) for name in names])
+    if hasattr(data, "collect") and hasattr(data, "collect_schema"):
+        # A lazy frame is a question; its answer has the rows.
+        data = data.collect()
     if _is_frame(data):
-        return columns_table(type(data).__name__, _frame_columns(data))
+        return columns_table(type(data).__name__, frame_columns(data))
     array = _as_array(data)
     if array.dtype.names:
         return columns_table("array", [(name, array[name]) for name in array.dtype.names])
@@ -43,6 +49,19 @@ def table_of(data: object) -> Table:
         raise ReadError(f"an array of readings holds numbers, got dtype {array.dtype}.")
     columns = tuple(_floats("array", f"column {k + 1}", array[:, k]) for k in range(array.shape[1]))
     return _table("array", None, columns)
+
+
+def _flat(data: Mapping[Any, Any], prefix: str = "") -> list[tuple[str, Any]]:
+    """Items of a dictionary, those of dictionaries inside it by both names: ``acc.x``."""
+    items: list[tuple[str, Any]] = []
+    for key, value in data.items():
+        items += _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else [(f"{prefix}{key}", value)]
+    return items
+
+
+def _name(label: object) -> str:
+    """A column's name; of several levels all that say something."""
+    return ".".join(str(part) for part in label if str(part)) if isinstance(label, tuple) else str(label)
 
 
 def _as_array(data: object) -> npt.NDArray[Any]:
@@ -66,7 +85,7 @@ def _is_frame(data: object) -> bool:
     )
 
 
-def _frame_columns(frame: Any) -> list[tuple[str, Any]]:
+def frame_columns(frame: Any) -> list[tuple[str, Any]]:
     """Names and columns; an index of pandas that holds times is a column too."""
     columns: list[tuple[str, Any]] = []
     index = getattr(frame, "index", None)
@@ -75,7 +94,7 @@ def _frame_columns(frame: Any) -> list[tuple[str, Any]]:
         if values.dtype.kind in "Mm" or (index.name is not None and values.dtype.kind in "iuf"):
             columns.append((str(index.name or "time"), values))
     if hasattr(frame, "columns") and hasattr(frame, "__getitem__") and hasattr(frame, "dtypes"):
-        return columns + [(str(name), _series(frame[name])) for name in frame.columns]
+        return columns + [(_name(name), _series(frame[name])) for name in frame.columns]
     import polars
 
     known = polars.DataFrame(frame) if hasattr(frame, "__arrow_c_stream__") else polars.from_dataframe(frame)

@@ -12,7 +12,7 @@ _NOT_A_SENSOR = frozenset(
     | {"status", "heading", "delta", "id", "count", "error", "drift"}
 )
 _SENSOR_WORDS = {
-    "accelerometer": re.compile(r"acc|accel\w*|acceler\w*|specific|specificforce|sf"),
+    "accelerometer": re.compile(r"acc|accl|accel\w*|acceler\w*|specific|specificforce|sf"),
     "gyroscope": re.compile(
         r"gyr|gyro\w*|angular|omega|rotation|rotationrate|angvel|angrate|rotrate|av|angularvelocity|rate"
     ),
@@ -34,8 +34,17 @@ _TIME_WORDS = {
     "epoch",
     "clock",
     "datetime",
+    # The clock of GNSS receivers; time in the languages of loggers that translate their names.
+    "tow",
+    "itow",
+    "zeit",
+    "zeitstempel",
+    "temps",
+    "tiempo",
+    "tempo",
 }
 _TIME_WORDS |= {"millis", "micros", "seconds", "secs", "ticks", "unix"}
+_TIME_ANYWHERE = {"time", "timestamp", "timestamps", "stamp", "datetime", "tow", "itow"}
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
 _TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
 _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
@@ -223,7 +232,9 @@ def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
     ):
         return ColumnName("counter")
     is_time = words[0] in _TIME_WORDS or (len(words) == 1 and words[0] in _TIME_UNIT_OF)
-    is_time = is_time or any(w in {"time", "timestamp", "timestamps", "stamp", "datetime"} for w in words)
+    is_time = is_time or any(
+        w in {"time", "timestamp", "timestamps", "stamp", "datetime", "tow", "itow"} for w in words
+    )
     if is_time and not any(w in {"x", "y", "z", "zone", "offset", "valid"} for w in words):
         units = [_TIME_UNIT_OF[w] for w in [*words, *unit_words] if w in _TIME_UNIT_OF]
         rank = 2 if words[0] in {"t", "time", "timestamp"} else 1

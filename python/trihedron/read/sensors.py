@@ -153,13 +153,18 @@ def _words_left_out(table: Table) -> list[Finding]:
     ]
 
 
+_CLOCK = re.compile(r"\d[:.h]\d\d[:.m]\d\d")
+"""Hours, minutes and seconds in some order of marks."""
+
+
 def _refuse_unread_time(table: Table, options: Options) -> None:
     """A time that cannot be understood must not become 100 Hz."""
     if table.names is None or (options.columns is not None and re.search(r"(?:t|time)\s*=", options.columns)):
         return
+    has_time = any(parse_name(name).role == "time" for i, name in enumerate(table.names) if i not in table.words)
     for i, example in table.words.items():
-        parsed = parse_name(table.names[i])
-        if parsed.role == "time":
+        is_clock = not has_time and _CLOCK.search(example) is not None
+        if is_clock or parse_name(table.names[i]).role == "time":
             raise ReadError(
                 f"{table.path}: column {table.label(i)} holds {example[:40]!r}, which is no time known here; write it "
                 "in seconds or as 2024-03-01 12:00:00.000, or read with --columns time=none --rate HZ."

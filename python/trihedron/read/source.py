@@ -83,12 +83,14 @@ def _ecosystem(path: Path, magic: bytes, choice: Choice, progress: Progress | No
         from trihedron.read.ardupilot import read_dataflash
 
         return read_dataflash(path, choice)
-    if magic.startswith(b"\x89HDF") or magic.startswith(b"MATLAB 7.3"):
+    # A MATLAB file says in its 125th byte that HDF5 follows, whatever words its writer put before.
+    is_hdf5_inside = magic.startswith(b"MATLAB") and magic[124:126] in (b"\x00\x02", b"\x02\x00")
+    if magic.startswith(b"\x89HDF") or is_hdf5_inside or magic.startswith(b"MATLAB 7.3"):
         from trihedron.read.tree import read_hdf5
 
-        return (read_hdf5(path, choice),)
+        return read_hdf5(path, choice)
     if magic.startswith(b"MATLAB"):
         from trihedron.read.tree import read_matlab
 
-        return (read_matlab(path, choice),)
+        return read_matlab(path, choice)
     return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from trihedron.read.columns import find_columns
 from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError
+from trihedron.read.matlab_objects import read_objects
 from trihedron.read.memory import columns_table
 from trihedron.read.table import Table, file_sha256
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
@@ -21,8 +23,8 @@ Groups = dict[str, dict[str, npt.NDArray[Any]]]
 MIN_ROWS = 8
 
 
-def read_hdf5(path: Path, choice: Choice) -> Table:
-    """The log of an HDF5 or MATLAB 7.3 file.
+def read_hdf5(path: Path, choice: Choice) -> tuple[Table, ...]:
+    """The log of an HDF5 or MATLAB 7.3 file; of MATLAB's tables one for each sensor where they are apart.
 
     Raises
     ------
@@ -44,15 +46,18 @@ def read_hdf5(path: Path, choice: Choice) -> Table:
 
     try:
         with h5py.File(path, "r") as file:
+            has_objects = "#subsystem#" in file
             file.visititems(visit)
     # h5py answers damage with errors of several kinds.
     except Exception as error:
         raise ReadError(f"{path}: h5py cannot read this file ({first_line(error)}); copy it again.") from None
-    return _of_groups(path, groups, choice, "this HDF5 file")
+    if has_objects and not _hold_a_log(path, groups):
+        return read_objects(path, choice)
+    return (_of_groups(path, groups, choice, "this HDF5 file"),)
 
 
-def read_matlab(path: Path, choice: Choice) -> Table:
-    """The log of a MATLAB file before version 7.3, read by SciPy.
+def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
+    """The log of a MATLAB file before version 7.3, read by SciPy; tables and timetables are decoded by mat-io.
 
     Raises
     ------
@@ -62,18 +67,20 @@ def read_matlab(path: Path, choice: Choice) -> Table:
     from scipy.io import loadmat
 
     try:
-        content = loadmat(str(path), simplify_cells=True)
+        with warnings.catch_warnings():
+            # Of objects SciPy finds the bookkeeping only, and says so.
+            warnings.simplefilter("ignore")
+            content = loadmat(str(path), simplify_cells=True)
     # SciPy answers damage with errors of several kinds.
     except Exception as error:
         raise ReadError(f"{path}: SciPy cannot read this MATLAB file ({first_line(error)}); save it again.") from None
     groups: Groups = {}
     _walk("", {k: v for k, v in content.items() if not k.startswith("__")}, groups)
+    if "__function_workspace__" in content and not _hold_a_log(path, groups):
+        return read_objects(path, choice)
     if not groups:
-        raise ReadError(
-            f"{path}: no arrays of numbers in this MATLAB file; tables and timetables are objects that only MATLAB "
-            "reads: save their columns as arrays, or write them with writetable or writetimetable as CSV."
-        )
-    return _of_groups(path, groups, choice, "this MATLAB file")
+        raise ReadError(f"{path}: no arrays of numbers in this MATLAB file.")
+    return (_of_groups(path, groups, choice, "this MATLAB file"),)
 
 
 def _walk(name: str, node: Mapping[str, Any], groups: Groups) -> None:
@@ -86,7 +93,13 @@ def _walk(name: str, node: Mapping[str, Any], groups: Groups) -> None:
             groups.setdefault(name, {})[key] = np.array(value)
 
 
-def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
+def _hold_a_log(path: Path, groups: Groups) -> bool:
+    """Whether arrays outside the objects are named as a sensor's."""
+    return bool(_tables(path, groups))
+
+
+def _tables(path: Path, groups: Groups) -> dict[str, Table]:
+    """Groups that hold an accelerometer or a gyro, by name."""
     tables: dict[str, Table] = {}
     for name, arrays in groups.items():
         table = _table(path, arrays)
@@ -97,6 +110,11 @@ def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
         except ReadError:
             continue
         tables[name or "/"] = table
+    return tables
+
+
+def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
+    tables = _tables(path, groups)
     if not tables:
         held = ", ".join(f"{g}/{n}".strip("/") for g, arrays in groups.items() for n in arrays)
         raise ReadError(f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it holds {held[:300]}.")

@@ -15,11 +15,13 @@ from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError
 from trihedron.read.table import StatedClock, Table, file_sha256
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
+from trihedron.read.ulog_fifo import SUFFIX, expanded
 from trihedron.records import Finding, FindingCode, Severity
 
 _RAW = "sensor_accel"
 _COMBINED = "sensor_combined"
-_TOPICS = [_RAW, "sensor_gyro", _COMBINED]
+_GYRO = "sensor_gyro"
+_TOPICS = [_RAW, _GYRO, _RAW + SUFFIX, _GYRO + SUFFIX, _COMBINED]
 _UNITS = {"sensor_accel": "m/s^2", "sensor_gyro": "rad/s"}
 _SKIP = {"timestamp", "timestamp_sample"}
 
@@ -27,7 +29,8 @@ _SKIP = {"timestamp", "timestamp_sample"}
 def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     """The accelerometer's and the gyro's table of one instance, or the one table of ``sensor_combined``.
 
-    Raw topics are taken where they were logged at full rate (at least half as many rows as ``sensor_combined`` has).
+    Raw topics are taken where they were logged at full rate (at least half as many rows as ``sensor_combined`` has),
+    else batches of raw samples (``sensor_accel_fifo``) where there are, unrolled.
 
     Raises
     ------
@@ -47,19 +50,17 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
     # pyulog answers damage with whatever its unpacking met.
     except Exception as error:
         raise ReadError(f"{path}: pyulog cannot read this log ({first_line(error)}); copy it again.") from None
-    data = {(d.name, d.multi_id): d.data for d in log.data_list}
-    counts = {key: len(columns["timestamp"]) for key, columns in data.items()}
+    data = _unrolled(log)
+    counts = {key: len(columns[_stamp(columns)]) for key, columns in data.items()}
     combined = counts.get((_COMBINED, 0), 0)
-    raw = [
-        Stream(_RAW, n, str(i))
-        for (name, i), n in sorted(counts.items())
-        if name == _RAW and counts.get(("sensor_gyro", i), 0)
-    ]
-    streams = raw + ([Stream(_COMBINED, combined)] if (_COMBINED, 0) in counts else [])
+    raw, batches = (_pairs(counts, suffix) for suffix in ("", SUFFIX))
+    streams = raw + batches + ([Stream(_COMBINED, combined)] if (_COMBINED, 0) in counts else [])
     offered = streams
-    if choice.topic is None and choice.instance is None:
+    if choice.topic is None:
         full = [s for s in raw if s.count >= 0.5 * combined]
-        offered = full or [s for s in streams if s.topic == _COMBINED] or raw
+        offered = full or batches or [s for s in streams if s.topic == _COMBINED] or raw
+        if choice.instance is not None and not any(s.instance == choice.instance for s in offered):
+            offered = streams
     taken = pick(path, offered, choice, "this log")
     findings = (*choice_note("This log", taken, streams), *_losses(log))
     sha256 = file_sha256(path)
@@ -67,9 +68,28 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
         return (_table(path, data[(_COMBINED, 0)], "", sha256, findings),)
     i = int(taken.instance)
     return (
-        _table(path, data[(_RAW, i)], "sensor_accel", sha256, findings),
-        _table(path, data[("sensor_gyro", i)], "sensor_gyro", sha256, ()),
+        _table(path, data[(taken.topic, i)], _RAW, sha256, findings),
+        _table(path, data[(taken.topic.replace(_RAW, _GYRO), i)], _GYRO, sha256, ()),
     )
+
+
+def _unrolled(log: Any) -> dict[tuple[str, int], dict[str, Any]]:
+    """Columns of every topic and instance; batches of samples as rows."""
+    data = {(d.name, d.multi_id): d.data for d in log.data_list}
+    for key in [key for key in data if key[0].endswith(SUFFIX)]:
+        rows = expanded(data.pop(key))
+        if rows is not None:
+            data[key] = rows
+    return data
+
+
+def _pairs(counts: dict[tuple[str, int], int], suffix: str) -> list[Stream]:
+    """Accelerometers whose gyro of the same number was logged as well."""
+    return [
+        Stream(_RAW + suffix, n, str(i))
+        for (name, i), n in sorted(counts.items())
+        if name == _RAW + suffix and counts.get((_GYRO + suffix, i), 0)
+    ]
 
 
 def _check_definitions(path: Path) -> None:
@@ -93,7 +113,7 @@ def _check_definitions(path: Path) -> None:
 
 def _table(path: Path, data: dict[str, Any], topic: str, sha256: str, findings: tuple[Finding, ...]) -> Table:
     # The sample's own stamp, where the log has it; `timestamp` is when the message was published.
-    stamp = "timestamp_sample" if "timestamp_sample" in data else "timestamp"
+    stamp = _stamp(data)
     names, columns = ["timestamp [us]"], [np.asarray(data[stamp], dtype=np.float64)]
     for name, values in data.items():
         if name not in _SKIP and np.asarray(values).dtype.kind in "iufb":
@@ -103,6 +123,10 @@ def _table(path: Path, data: dict[str, Any], topic: str, sha256: str, findings: 
     sensors: dict[str, Any] = {"sensor_accel": "accelerometer", "sensor_gyro": "gyroscope"}
     clock = StatedClock(time=0, unit="us")
     return Table(path, tuple(names), tuple(columns), sha256, findings=findings, sensor=sensors.get(topic), clock=clock)
+
+
+def _stamp(data: dict[str, Any]) -> str:
+    return "timestamp_sample" if "timestamp_sample" in data else "timestamp"
 
 
 def _losses(log: Any) -> tuple[Finding, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.records.finding import Finding, Severity
+from trihedron.records.presented import Presented
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -70,7 +71,7 @@ class FitQuality:
     covariance_scale: float = 1.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SensorCalibration:
     """Direct model of one sensor: ``truth = S raw + b``, raw unit → SI.
 
@@ -107,9 +108,12 @@ class SensorCalibration:
         sigma: FloatArray = np.sqrt(np.maximum(np.diag(self.covariance)[9:], 0.0))
         return sigma
 
+    def __repr__(self) -> str:
+        return f"<SensorCalibration {self.raw_unit} to {self.si_unit}, by {self.method}>"
 
-@dataclass(frozen=True, eq=False)
-class Calibration:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Presented):
     """Both sensors in one instrument trihedron, with what they were determined from.
 
     ``covariance`` (24, 24): accelerometer's 12 parameters, then the gyro's, with cross terms; (12, 12) without.
@@ -140,3 +144,9 @@ class Calibration:
     def is_trustworthy(self) -> bool:
         """No finding says that the answer is not to be trusted."""
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
+
+    def __repr__(self) -> str:
+        sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
+        trusted = "" if self.is_trustworthy else ", NOT TO BE TRUSTED"
+        source = self.recording_source or "an unnamed recording"
+        return f"<Calibration of {source}: {sensors}, frame {self.frame}{trusted}>"

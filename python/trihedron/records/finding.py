@@ -84,6 +84,24 @@ class FindingCode(str, Enum):
     EFFECTS_MODELLED = "effects-modelled"
     EFFECT_NOT_APPLIED = "effect-not-applied"
     PROTOCOL_DIFFERS = "protocol-differs"
+    # reference
+    REFERENCE_LAG_AMBIGUOUS = "reference-lag-ambiguous"
+    REFERENCE_MISFIT = "reference-misfit"
+    REFERENCE_OUTLIERS = "reference-outliers"
+    REFERENCE_UPSIDE_DOWN = "reference-upside-down"
+    REFERENCE_TURNED_ROUND = "reference-turned-round"
+    REFERENCE_OF_ITSELF = "reference-of-itself"
+    REFERENCE_ONLY = "reference-only"
+    ACCELEROMETER_NOMINAL = "accelerometer-nominal"
+    SHARED_MOTION = "shared-motion"
+    # many recordings, temperature
+    NUMBERS_CHANGED = "numbers-changed"
+    FEW_SESSIONS = "few-sessions"
+    SESSION_LEFT_OUT = "session-left-out"
+    OUTSIDE_VALID_RANGE = "outside-valid-range"
+    TEMPERATURE_MISSING = "temperature-missing"
+    # apply
+    CALIBRATION_DOUBTED = "calibration-doubted"
     # verify, check
     LIMIT_EXCEEDED = "limit-exceeded"
     SAME_RECORDING = "same-recording"

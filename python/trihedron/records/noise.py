@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from types import MappingProxyType
 from typing import Literal
@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.records.finding import Finding, Severity
+from trihedron.records.presented import Presented
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -28,15 +29,19 @@ class TermName(str, Enum):
     RATE_RAMP = "R"
 
 
-@dataclass(frozen=True, eq=False)
-class AllanCurve:
+_PER_CHANNEL = ("deviation", "n_terms", "weight", "edf", "lower", "upper")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AllanCurve(Presented):
     """Allan deviations of one or more channels against averaging time.
 
     ``clusters`` (k,) readings per cluster, ``tau_s`` (k,) the same in seconds; ``deviation`` (k, channels) in the unit
     of the readings, NaN where missing readings leave no term; ``lower``, ``upper`` (k, channels) a chi-square interval
     of ``confidence`` from ``edf`` (k, channels) equivalent degrees of freedom; ``n_terms`` (k, channels) terms summed,
     ``weight`` (k, channels) the sum of their weights (equal to ``n_terms`` without missing readings). ``stride`` is the
-    distance of the starts of clusters too long for the memory: 1 unless the log was streamed.
+    distance of the starts of clusters too long for the memory: 1 unless the log was streamed. Of a series alone all
+    arrays are (k,).
     """
 
     kind: AllanKind
@@ -55,9 +60,10 @@ class AllanCurve:
     stride: int = 1
 
     def __post_init__(self) -> None:
-        k = len(self.clusters)
-        shape = (k, self.deviation.shape[1])
-        for name in ("deviation", "n_terms", "weight", "edf", "lower", "upper"):
+        shape = (len(self.clusters), *self.deviation.shape[1:])
+        if len(shape) > 2:
+            raise ValueError(f"deviation must have shape (k,) or (k, channels), got {self.deviation.shape}")
+        for name in _PER_CHANNEL:
             if getattr(self, name).shape != shape:
                 raise ValueError(f"{name} must have shape {shape}, got {getattr(self, name).shape}")
 
@@ -74,7 +80,25 @@ class AllanCurve:
     @property
     def n_channels(self) -> int:
         """Number of channels."""
-        return int(self.deviation.shape[1])
+        return int(self.deviation.shape[1]) if self.deviation.ndim == 2 else 1
+
+    def of_one_series(self) -> AllanCurve:
+        """The curve of one channel with arrays (k,) instead of (k, 1).
+
+        Raises
+        ------
+        ValueError
+            When it is of several channels.
+        """
+        if self.n_channels > 1:
+            raise ValueError(f"this curve is of {self.n_channels} channels, not of one series")
+        flat = {name: getattr(self, name).reshape(-1) for name in _PER_CHANNEL}
+        return replace(self, **flat)
+
+    def __repr__(self) -> str:
+        span = f"{self.tau_s[0]:.4g} to {self.tau_s[-1]:.4g} s" if len(self.clusters) else "no averaging time"
+        channels = f"{self.n_channels} channel{'s' if self.n_channels > 1 else ''}"
+        return f"<AllanCurve {self.kind}: {channels}, {len(self.clusters)} averaging times from {span}>"
 
 
 @dataclass(frozen=True)
@@ -258,8 +282,8 @@ def _gauss_markov_allan(process: GaussMarkov, tau: FloatArray) -> FloatArray:
     return np.asarray(process.sigma_process**2 * shape)
 
 
-@dataclass(frozen=True, eq=False)
-class Noise:
+@dataclass(frozen=True, eq=False, repr=False)
+class Noise(Presented):
     """The noise of a log: its axes, the Allan curve as the picture, and what is wrong with the log.
 
     ``excluded_s`` are the stretches left out, ``breaks_s`` the instants where the level jumped and the fit starts anew.
@@ -272,6 +296,9 @@ class Noise:
     breaks_s: tuple[float, ...] = ()
     findings: tuple[Finding, ...] = ()
     extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __repr__(self) -> str:
+        return f"<Noise of {self.source or 'a log'}: {', '.join(axis.name for axis in self.axes)}>"
 
     def axis(self, name: str) -> NoiseAxis:
         """The axis of that name.

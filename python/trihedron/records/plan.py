@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from trihedron.records.presented import Presented
+
 
 @dataclass(frozen=True)
 class TurnPlan:
@@ -55,7 +57,7 @@ class MovePlan:
 
 
 @dataclass(frozen=True)
-class ExperimentPlan:
+class ExperimentPlan(Presented):
     """What known turns, poses and moves would tell; noise densities in rad/s/√Hz and m/s²/√Hz."""
 
     gyroscope_density: float

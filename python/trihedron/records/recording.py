@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.records.finding import Finding
+from trihedron.records.presented import Presented
 from trihedron.records.sampling import UNJUDGED, Sampling
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -56,8 +57,8 @@ def spread_stamps(time_s: FloatArray, step_s: float) -> FloatArray:
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Presented):
     """Raw readings on a common time base.
 
     Parameters

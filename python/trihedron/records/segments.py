@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.records.finding import Finding
+from trihedron.records.presented import Presented
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -58,8 +59,8 @@ class Move:
     stop: int
 
 
-@dataclass(frozen=True, eq=False)
-class Segments:
+@dataclass(frozen=True, eq=False, repr=False)
+class Segments(Presented):
     """Holds and moves of one recording, and the sensor noise that decided them.
 
     ``accelerometer_sigma`` and ``gyroscope_sigma`` (3,) are the white noise of one sample in raw units, measured inside
@@ -98,3 +99,10 @@ class Segments:
     def n_holds(self) -> int:
         """Number of still poses."""
         return len(self.holds)
+
+    def __repr__(self) -> str:
+        poses = f"{self.n_holds} still pose{'' if self.n_holds == 1 else 's'}"
+        moves = f"{len(self.moves)} move{'' if len(self.moves) == 1 else 's'}"
+        held = f" ({self.duration_s.sum():.1f} s still)" if self.n_holds else ""
+        said = f", {len(self.findings)} findings" if self.findings else ""
+        return f"<Segments: {poses}{held}, {moves}{said}>"

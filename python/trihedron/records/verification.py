@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.records.finding import Finding, Severity
+from trihedron.records.presented import Presented
 
 FloatArray = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Verification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Verification(Presented):
     """What a calibration says about another recording, with what it should have said.
 
     ``norm_error`` (n,) is ``|S a' + b| - |g|`` of every still pose [m/s²], ``norm_noise`` (n,) what the noise of the
@@ -50,3 +51,6 @@ class Verification:
     def is_passed(self) -> bool:
         """No finding says that the calibration does not hold here."""
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
+
+    def __repr__(self) -> str:
+        return f"<Verification on {self.source}: {self.norm_rms:.3g} m/s² rms in {len(self.norm_error)} poses>"

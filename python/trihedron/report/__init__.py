@@ -8,6 +8,7 @@ from trihedron.report.disagreement import disagreement_report
 from trihedron.report.document import Document
 from trihedron.report.kalman import kalman_report
 from trihedron.report.segments import segments_report
+from trihedron.report.sessions import sessions_report
 from trihedron.report.text import to_text
 from trihedron.report.verification import verification_report
 
@@ -20,6 +21,7 @@ __all__ = [
     "disagreement_report",
     "kalman_report",
     "segments_report",
+    "sessions_report",
     "to_text",
     "verification_report",
 ]

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from trihedron.report.figures import AXIS_COLOURS, DPI, INK, png
+from trihedron.report.figures import AXIS_COLOURS, DPI, INK
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -20,7 +20,7 @@ FloatArray = npt.NDArray[np.float64]
 HALF_EDGES = np.array([0.75, 0.55, 0.3])
 
 
-def draw_body_poses(up: Sequence[Sequence[float]], columns: int = 6) -> bytes:
+def draw_body_poses(up: Sequence[Sequence[float]], columns: int = 6) -> Figure:
     """A case in every pose: ``up`` holds the body direction that points up. Axes in the colours of all figures."""
     rows = -(-len(up) // columns)
     figure = Figure(figsize=(1.6 * columns, 1.75 * rows), dpi=DPI)
@@ -31,7 +31,7 @@ def draw_body_poses(up: Sequence[Sequence[float]], columns: int = 6) -> bytes:
         _draw_case(axis, rotation_to_up(np.asarray(direction, dtype=np.float64)))
         axis.set_title(str(k + 1), fontsize=9, pad=-4, color=INK)
     figure.subplots_adjust(left=0.0, right=1.0, bottom=0.0, top=0.97, wspace=0.0, hspace=0.05)
-    return png(figure)
+    return figure
 
 
 def rotation_to_up(direction: FloatArray) -> FloatArray:

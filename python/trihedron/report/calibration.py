@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import (
     duration,
@@ -33,8 +32,9 @@ def calibration_report(
         Section("Result", _result(calibration, segments, recording)),
         Section("Findings", (findings_block(calibration.findings),)),
     ]
-    if segments is not None and recording is not None:
-        sections.append(Section("Figures", tuple(_figures(calibration, segments, recording))))
+    figures = tuple(_figures(calibration, segments, recording))
+    if figures:
+        sections.append(Section("Figures", figures))
     sections += [
         Section("Axes", _meaning(calibration)),
         Section("Certainty", tuple(_certainty(calibration))),
@@ -272,17 +272,11 @@ def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
     return Table(head, tuple(rows), "Gyroscope: angle between predicted and measured gravity after every move")
 
 
-def _figures(calibration: Calibration, segments: Segments, recording: Recording) -> list[Block]:
-    # Drawing is imported when something is drawn: text and JSON need none of it.
-    from trihedron.report import figures
-
-    blocks: list[Block] = [
-        Picture(
-            "signals",
-            "The recording; shaded where the sensor stood still.",
-            partial(figures.draw_signals, recording, segments),
-        ),
-    ]
+def _figures(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> list[Block]:
+    blocks: list[Block] = []
+    if segments is not None and recording is not None:
+        draw = later("figures", "draw_signals", recording, segments)
+        blocks.append(Picture("signals", "The recording; shaded where the sensor stood still.", draw))
     quality = calibration.accelerometer.quality
     if quality is not None:
         blocks.append(
@@ -290,16 +284,16 @@ def _figures(calibration: Calibration, segments: Segments, recording: Recording)
                 "residuals",
                 "Norm of gravity minus its true value in every still pose, with the standard "
                 "error that noise alone gives; open circles: predicted by a fit that did not see that pose.",
-                partial(figures.draw_residuals, quality),
+                later("figures", "draw_residuals", quality),
             )
         )
-        if segments.accelerometer_mean is not None:
+        if segments is not None and segments.accelerometer_mean is not None:
             blocks.append(
                 Picture(
                     "poses",
                     "Directions of 'up' in the sensor's trihedron, upper and lower hemisphere. Empty "
                     "regions are poses that were not recorded.",
-                    partial(figures.draw_poses, calibration.accelerometer, segments.accelerometer_mean),
+                    later("figures", "draw_poses", calibration.accelerometer, segments.accelerometer_mean),
                 )
             )
     gyroscope = calibration.gyroscope
@@ -308,7 +302,7 @@ def _figures(calibration: Calibration, segments: Segments, recording: Recording)
             Picture(
                 "moves",
                 "Angle between predicted and measured gravity after every move, in sample and held out.",
-                partial(figures.draw_moves, gyroscope.quality),
+                later("figures", "draw_moves", gyroscope.quality),
             )
         )
     return blocks

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis, DomainResiduals, DomainTest, HeldOut
@@ -16,6 +16,7 @@ from trihedron.report.diagnosis_numbers import (
     stages_blocks,
 )
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
     engineering_exponent,
@@ -26,6 +27,7 @@ from trihedron.report.numbers import (
     unit_in_print,
     with_sigma,
 )
+from trihedron.report.reference import reference_blocks
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 MEANING = {
@@ -77,6 +79,9 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         sections.append(Section("Findings", (findings_block(findings),)))
     if diagnosis.residuals:
         sections.append(Section("Figures", tuple(_picture(diagnosis, r) for r in diagnosis.residuals)))
+    found = getattr(diagnosis, "reference", None)
+    if found is not None:
+        sections.insert(0, Section("Against the reference", reference_blocks(found)))
     return Document(
         title="Diagnosis",
         subtitle=diagnosis.recording_source,
@@ -94,10 +99,19 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "consistent":
         return "CONSISTENT: the model and its noise account for this recording; nothing is missing that it could show."
     if diagnosis.verdict == "unexplained":
+        named = [effect.id for effect in diagnosis.effects if effect.side == "recording"]
+        off = left if named else off
+        beside = f" ({listed(list(dict.fromkeys(named)))} is there too, and explains little)" if named else ""
         return (
             f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
-            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it"
+            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it{beside}"
             + (f"; numbers differ too ({listed(numbers)})." if numbers else ".")
+        )
+    if diagnosis.verdict == "not-testable":
+        tested = listed([d.domain for d in diagnosis.domains]) if diagnosis.domains else "nothing"
+        return (
+            f"NOT TESTABLE: this recording does not carry the question ({tested} looked at, nothing named); hold 18 or "
+            "more poses of 3 to 5 s in different directions."
         )
     if diagnosis.verdict == "parameters-differ":
         return f"PARAMETERS DIFFER: {listed(numbers)}; nothing else, no physics is missing."
@@ -312,13 +326,18 @@ def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
         if density is not None:
             unit = str(diagnosis.noise.get(f"{name}_unit", ""))
             words = ", ".join(plain_number(float(d)) for d in density)
-            corner = plain_number(float(diagnosis.noise[f"{name}_corner_s"]))
-            facts.append(
-                (
-                    f"{name} noise",
-                    f"{words} {unit_in_print(unit).replace('sqrt(Hz)', '√Hz')}; bias walk from {corner} s on",
-                )
-            )
+            words += f" {unit_in_print(unit).replace('sqrt(Hz)', '√Hz')}"
+            corner = diagnosis.noise[f"{name}_corner_s"]
+            if corner is not None:
+                words += f"; bias walk from {plain_number(float(corner))} s on"
+            facts.append((f"{name} noise", words))
+        hidden = diagnosis.noise.get(f"{name}_zero")
+        if hidden:
+            unit = "m/s^2" if name == "accelerometer" else "rad/s"
+            words = f"{_size(hidden['rms'], unit)} rms from pose to pose taken up by its walk"
+            words += f"; a pose's mean is good to {_size(hidden['noise'], unit)}"
+            words += "; the walk is as strong as the model allows" if hidden["is_at_edge"] else ""
+            facts.append((f"{name} zero", words))
     blocks.append(Facts(tuple(facts)))
     return tuple(blocks)
 
@@ -341,13 +360,7 @@ def _number_with_sigma(value: float, sigma: float) -> str:
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     has_effects = bool(diagnosis.effects)
 
-    def draw() -> bytes:
-        # Drawing is imported when something is drawn: text and JSON need none of it.
-        from trihedron.report import diagnosis_figures
-
-        return diagnosis_figures.draw_before_after(residuals, has_effects=has_effects)
-
-    made: Callable[[], bytes] = draw
+    made = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
     n = len(residuals.before)
     caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'hold' else 'move')}; "
     caption += "bars: twice the noise predicted for one number."

@@ -1,13 +1,14 @@
-"""Figures of a diagnosis. Every function returns a PNG file."""
+"""Figures of a diagnosis. Every function returns a figure."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from trihedron.records.diagnosis import DomainResiduals
-from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels, png
+from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 FloatArray = npt.NDArray[np.float64]
@@ -20,7 +21,7 @@ _PRINTED = {
 }
 
 
-def draw_before_after(residuals: DomainResiduals, *, has_effects: bool) -> bytes:
+def draw_before_after(residuals: DomainResiduals, *, has_effects: bool) -> Figure:
     """One domain, before beside after on one scale; without effects only the linear model."""
     factor, unit = _PRINTED[residuals.unit]
     n = 2 if has_effects else 1
@@ -41,7 +42,7 @@ def draw_before_after(residuals: DomainResiduals, *, has_effects: bool) -> bytes
     for axis in axes:
         axis.set_ylim(0.0 if residuals.domain == "moves" else low, high)
     axes[0].set_ylabel(f"{residuals.quantity} [{unit}]", fontsize=9)
-    return png(figure)
+    return figure
 
 
 def _draw(axis: Axes, time_s: FloatArray, value: FloatArray, sigma: FloatArray, channels: tuple[str, ...]) -> None:

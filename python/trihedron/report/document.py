@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from trihedron.records import Finding
+
+if TYPE_CHECKING:
+    from trihedron.report.figures import ShownFigure
 
 
 @dataclass(frozen=True)
@@ -40,11 +44,11 @@ class FindingList:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure that is drawn when a writer can show it: ``draw`` returns a PNG file."""
+    """A figure that is drawn when a writer can show it: ``draw`` raises ``NoFiguresError`` without matplotlib."""
 
     name: str
     caption: str
-    draw: Callable[[], bytes]
+    draw: Callable[[], ShownFigure]
 
 
 Block = Paragraph | Facts | Table | FindingList | Picture

@@ -1,4 +1,4 @@
-"""Figures: the only place that draws. Every function returns a PNG file."""
+"""Figures: the only place that draws. Every function returns a figure; :func:`png` makes a file of it."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ DPI = 110
 MOST_POINTS = 4000
 
 
-def draw_signals(recording: Recording, segments: Segments) -> bytes:
-    """Both sensors over time, holds shaded."""
+def draw_signals(recording: Recording, segments: Segments | None = None) -> Figure:
+    """Both sensors over time, holds shaded where segments are given."""
     sensors = [
         (recording.accelerometer, f"accelerometer\n[{unit_in_print(recording.accelerometer_unit.value)}]"),
         (recording.gyroscope, f"gyroscope\n[{unit_in_print(recording.gyroscope_unit.value)}]"),
@@ -35,19 +35,35 @@ def draw_signals(recording: Recording, segments: Segments) -> bytes:
     present = [(readings, label) for readings, label in sensors if readings is not None]
     figure, axes = panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
     for axis, (readings, label) in zip(axes, present, strict=True):
-        _shade_holds(axis, recording, segments)
+        if segments is not None:
+            _shade_holds(axis, recording, segments)
         for k in range(3):
             time, values = _envelope(recording.time_s, readings[:, k])
             axis.plot(time, values, color=AXIS_COLOURS[k], linewidth=0.7, label=f"axis {k + 1}")
         axis.set_ylabel(label)
         axis.margins(x=0.0)
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
-    _mark_disturbances(axes, recording, segments)
+    if segments is not None:
+        _mark_disturbances(axes, recording, segments)
     axes[-1].set_xlabel("time [s]")
-    return png(figure)
+    return figure
 
 
-def draw_residuals(quality: FitQuality) -> bytes:
+def draw_holds(segments: Segments) -> Figure:
+    """Mean readings of every still pose over time, in the unit of the log."""
+    pairs = [("accelerometer", segments.accelerometer_mean), ("gyroscope", segments.gyroscope_mean)]
+    present = [(name, means) for name, means in pairs if means is not None]
+    figure, axes = panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
+    for axis, (name, means) in zip(axes, present, strict=True):
+        for k in range(3):
+            axis.plot(segments.time_mid_s, means[:, k], "o", color=AXIS_COLOURS[k], markersize=4, label=f"axis {k + 1}")
+        axis.set_ylabel(name)
+    axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
+    axes[-1].set_xlabel("time [s]")
+    return figure
+
+
+def draw_residuals(quality: FitQuality) -> Figure:
     """Residual of every pose with its standard error, and the held-out prediction."""
     figure, (axis,) = panels(1, 1, (9.5, 3.2))
     pose = np.arange(len(quality.residual))
@@ -78,7 +94,7 @@ def draw_residuals(quality: FitQuality) -> bytes:
     axis.set_ylabel("|f| − |g|  [mm/s²]")
     axis.set_xlim(-0.8, len(pose) - 0.2)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    return png(figure)
+    return figure
 
 
 def mm_s2(values: FloatArray) -> FloatArray:
@@ -86,7 +102,7 @@ def mm_s2(values: FloatArray) -> FloatArray:
     return values * mm_s2_from_m_s2(1.0)
 
 
-def draw_poses(sensor: SensorCalibration, means: FloatArray) -> bytes:
+def draw_poses(sensor: SensorCalibration, means: FloatArray) -> Figure:
     """Directions of "up" on two hemispheres, by Lambert's equal-area projection."""
     force = means @ sensor.S.T + sensor.b
     up = force / np.linalg.norm(force, axis=1)[:, None]
@@ -100,10 +116,10 @@ def draw_poses(sensor: SensorCalibration, means: FloatArray) -> bytes:
             x, y = _equal_area(direction * np.array([1.0, 1.0, sign]))
             axis.plot(x, y, "o", markersize=8, color=AXIS_COLOURS[0], alpha=0.85)
             axis.annotate(str(k), (x, y), ha="center", va="center", fontsize=5.5, color="white")
-    return png(figure)
+    return figure
 
 
-def draw_moves(quality: FitQuality) -> bytes:
+def draw_moves(quality: FitQuality) -> Figure:
     """Angle between predicted and measured gravity after every move."""
     assert quality.angle_deg is not None
     figure, (axis,) = panels(1, 1, (9.5, 3.0))
@@ -115,12 +131,19 @@ def draw_moves(quality: FitQuality) -> bytes:
     axis.set_ylabel("gravity missed by [°]")
     axis.set_xlim(-0.8, len(move) - 0.2)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    return png(figure)
+    return figure
+
+
+class ShownFigure(Figure):
+    """A figure that a notebook shows by itself, whatever its back end."""
+
+    def _repr_png_(self) -> bytes:
+        return png(self)
 
 
 def panels(rows: int, columns: int, size: tuple[float, float], *, share_x: bool = False) -> tuple[Figure, list[Axes]]:
     """A figure of the house and its panels, row by row."""
-    figure = Figure(figsize=size, dpi=DPI, layout="constrained")
+    figure = ShownFigure(figsize=size, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.subplots(rows, columns, sharex=share_x, squeeze=False)
     axes: list[Axes] = list(grid.ravel())
@@ -185,7 +208,7 @@ def _hemisphere(axis: Axes, title: str) -> None:
     axis.set_title(title, fontsize=10)
 
 
-def draw_verification(verification: Verification) -> bytes:
+def draw_verification(verification: Verification) -> Figure:
     """Norm error per pose with its standard error, and angle per move with the expected one."""
     has_moves = len(verification.angle_deg) > 0
     figure, axes = panels(2 if has_moves else 1, 1, (9.5, 5.2 if has_moves else 3.0))
@@ -209,4 +232,4 @@ def draw_verification(verification: Verification) -> bytes:
         axes[1].set_xlabel("move")
         axes[1].set_ylabel("gravity missed by [°]")
         axes[1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
-    return png(figure)
+    return figure

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from trihedron.records import (
 )
 from trihedron.report.calibration import parameter_table
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
 from trihedron.units import mm_s2_from_m_s2
@@ -61,7 +61,7 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
             f"convergence-{AXES[axis.axis]}",
             f"Constants of axis {AXES[axis.axis]} after every pose by every method, with the filter's 3σ band around "
             "its last value.",
-            partial(_draw, "draw_convergence", axis),
+            later("kalman_figures", "draw_convergence", axis),
         )
         for axis in outcome.axes
     ]
@@ -70,17 +70,17 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
             "innovations",
             "Normalised innovations squared, running mean over 15 poses, with the interval in which 99 % of such means "
             "lie when the noise model is right.",
-            partial(_draw, "draw_innovations", outcome.axes),
+            later("kalman_figures", "draw_innovations", outcome.axes),
         ),
         Picture(
             "drift",
             "Slow noise that the filter saw: while it ran, and smoothed with all readings, with 1σ bands.",
-            partial(_draw, "draw_drift", outcome.axes),
+            later("kalman_figures", "draw_drift", outcome.axes),
         ),
         Picture(
             "residual",
             "Corrected minus reference specific force of every pose.",
-            partial(_draw, "draw_residual", outcome.residual_m_s2),
+            later("kalman_figures", "draw_residual", outcome.residual_m_s2),
         ),
     ]
     return [
@@ -105,18 +105,18 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
         Picture(
             "convergence",
             "S and b after every pose, with the 3σ band around their last values.",
-            partial(_draw, "draw_norm_convergence", outcome),
+            later("kalman_figures", "draw_norm_convergence", outcome),
         ),
         Picture(
             "innovations",
             "Normalised innovations squared, running mean over 15 poses, with the interval in which 99 % of such means "
             "lie when the noise model is right.",
-            partial(_draw, "draw_innovations", (outcome,)),
+            later("kalman_figures", "draw_innovations", (outcome,)),
         ),
         Picture(
             "residual",
             "Length of the corrected reading minus |g| in every pose.",
-            partial(_draw, "draw_residual", outcome.residual_m_s2[:, None]),
+            later("kalman_figures", "draw_residual", outcome.residual_m_s2[:, None]),
         ),
     )
     return [
@@ -125,13 +125,6 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
         Section("Innovations", (_consistency_table([("norm", outcome.consistency)]),)),
         Section("Figures", pictures),
     ]
-
-
-def _draw(name: str, *what: object) -> bytes:
-    # Drawing is imported when something is drawn: text and JSON need none of it.
-    from trihedron.report import kalman_figures
-
-    return bytes(getattr(kalman_figures, name)(*what))
 
 
 def _residual_words(residual: FloatArray) -> str:

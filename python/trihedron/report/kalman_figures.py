@@ -1,4 +1,4 @@
-"""Figures of a calibration by Kalman filter. Every function returns a PNG file."""
+"""Figures of a calibration by Kalman filter. Every function returns a figure."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from scipy import stats
 
 from trihedron.records import CONSTANT_NAMES, AxisKalmanResult, NormKalmanCalibration
-from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, mm_s2, panels, png
+from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, mm_s2, panels
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -23,7 +24,7 @@ STYLES = (
 NAMES = {"kalman": "Kalman filter"}
 
 
-def draw_convergence(axis: AxisKalmanResult) -> bytes:
+def draw_convergence(axis: AxisKalmanResult) -> Figure:
     """Every constant of one axis by every method."""
     figure, axes = panels(4, 1, (9.5, 9.0), share_x=True)
     for k, panel in enumerate(axes):
@@ -44,7 +45,7 @@ def draw_convergence(axis: AxisKalmanResult) -> bytes:
         _frame(panel, [t.constants[:, k] for t in axis.tracks], track.sigma[:, k], last)
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
     axes[-1].set_xlabel("poses")
-    return png(figure)
+    return figure
 
 
 def _frame(panel: Axes, tracks: Sequence[FloatArray], sigma: FloatArray, last: float) -> None:
@@ -59,7 +60,7 @@ def _frame(panel: Axes, tracks: Sequence[FloatArray], sigma: FloatArray, last: f
     panel.set_xlim(1, n)
 
 
-def draw_innovations(results: Sequence[AxisKalmanResult | NormKalmanCalibration]) -> bytes:
+def draw_innovations(results: Sequence[AxisKalmanResult | NormKalmanCalibration]) -> Figure:
     """Running mean of the normalised innovation squared."""
     figure, (panel,) = panels(1, 1, (9.5, 3.2))
     window = WINDOW
@@ -77,10 +78,10 @@ def draw_innovations(results: Sequence[AxisKalmanResult | NormKalmanCalibration]
     panel.set_xlabel("poses")
     panel.set_ylabel(f"NIS, mean of {window}")
     panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
-    return png(figure)
+    return figure
 
 
-def draw_drift(results: Sequence[AxisKalmanResult]) -> bytes:
+def draw_drift(results: Sequence[AxisKalmanResult]) -> Figure:
     """Slow noise, filtered and smoothed."""
     figure, axes = panels(3, 1, (9.5, 6.0), share_x=True)
     for panel, result in zip(axes, results, strict=True):
@@ -97,10 +98,10 @@ def draw_drift(results: Sequence[AxisKalmanResult]) -> bytes:
         panel.set_xlim(1, max(2, len(pose)))
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     axes[-1].set_xlabel("poses")
-    return png(figure)
+    return figure
 
 
-def draw_residual(residual: FloatArray) -> bytes:
+def draw_residual(residual: FloatArray) -> Figure:
     """Residual (n, 3) of the components or (n, 1) of the length, m/s²."""
     figure, (panel,) = panels(1, 1, (9.5, 3.2))
     pose = np.arange(1, len(residual) + 1)
@@ -111,10 +112,10 @@ def draw_residual(residual: FloatArray) -> bytes:
     panel.set_xlabel("poses")
     panel.set_ylabel("residual [mm/s²]")
     panel.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
-    return png(figure)
+    return figure
 
 
-def draw_norm_convergence(outcome: NormKalmanCalibration) -> bytes:
+def draw_norm_convergence(outcome: NormKalmanCalibration) -> Figure:
     """S and b after every pose, each against its last value in its last standard errors."""
     figure, axes = panels(3, 4, (11.0, 7.0), share_x=True)
     n = len(outcome.parameters)
@@ -135,4 +136,4 @@ def draw_norm_convergence(outcome: NormKalmanCalibration) -> bytes:
             _frame(panel, [value], sigma, float(value[-1]))
     for panel in axes[8:]:
         panel.set_xlabel("poses")
-    return png(figure)
+    return figure

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
-from trihedron.files.calibration import calibration_document
-from trihedron.records import Calibration, Finding, Recording, Segments, Verification
+from trihedron.files.calibration import calibration_document, plain
+from trihedron.printable import printable_json
+from trihedron.records import AllanCurve, Calibration, Finding, Recording, Segments, Verification
 
 
 def recording_record(recording: Recording) -> dict[str, Any]:
@@ -19,6 +21,45 @@ def recording_record(recording: Recording) -> dict[str, Any]:
         "accelerometer_unit": None if recording.accelerometer is None else recording.accelerometer_unit.value,
         "gyroscope_unit": None if recording.gyroscope is None else recording.gyroscope_unit.value,
         "findings": [finding.to_dict() for finding in recording.findings],
+    }
+
+
+def json_text(machine: dict[str, Any]) -> str:
+    """Strict JSON: what is not a finite number is ``null``."""
+    return printable_json(json.dumps(plain(machine), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
+
+
+def curve_record(curve: AllanCurve) -> dict[str, Any]:
+    """An Allan curve: channels in the order of ``names``, arrays as they are."""
+    names = ("kind", "rate_hz", "n_samples", "confidence", "stride", "names", "units", "tau_s", "clusters")
+    arrays = ("deviation", "lower", "upper", "edf", "n_terms")
+    return {name: getattr(curve, name) for name in (*names, *arrays)}
+
+
+def holds_record(segments: Segments) -> dict[str, Any]:
+    """Still poses, moves and noise without the recording that they were found in."""
+    holds = [
+        {
+            "start": hold.start,
+            "stop": hold.stop,
+            "disturbed": [list(part) for part in hold.disturbed],
+            "is_unsteady": hold.is_unsteady,
+            "time_mid_s": float(segments.time_mid_s[k]),
+            "duration_s": float(segments.duration_s[k]),
+            "n_averaged": int(segments.n_averaged[k]),
+            "accelerometer_mean": _row(segments.accelerometer_mean, k),
+            "accelerometer_sigma_mean": _row(segments.accelerometer_sigma_mean, k),
+            "gyroscope_mean": _row(segments.gyroscope_mean, k),
+            "gyroscope_sigma_mean": _row(segments.gyroscope_sigma_mean, k),
+        }
+        for k, hold in enumerate(segments.holds)
+    ]
+    return {
+        "accelerometer_sigma": _row(segments.accelerometer_sigma),
+        "gyroscope_sigma": _row(segments.gyroscope_sigma),
+        "holds": holds,
+        "moves": [dict(vars(move)) for move in segments.moves],
+        "findings": [finding.to_dict() for finding in segments.findings],
     }
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import partial
 
 import numpy as np
 
 from trihedron.records import Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.noise_units import TERM_WORDS, customary, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
@@ -274,16 +274,11 @@ def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
         "Allan deviation with its 95 % interval, fitted terms (thin) and their sum (dashed); "
         "the cross marks the least deviation of the sum."
     )
-    return Picture(f"allan-{axes[0].name.split()[0]}", caption, partial(_draw, noise, [(unit, axes)]))
+    draw = later("noise_figures", "draw_allan", noise.curve, [(unit, axes)])
+    return Picture(f"allan-{axes[0].name.split()[0]}", caption, draw)
 
 
-def draw_noise(noise: Noise) -> bytes:
-    """All curves of a log in one PNG file, a row for each sensor."""
-    return _draw(noise, _groups(noise))
-
-
-def _draw(noise: Noise, sensors: list[tuple[str, list[NoiseAxis]]]) -> bytes:
-    # Drawing is imported when something is drawn: text and JSON need none of it.
-    from trihedron.report.noise_figures import draw_allan
-
-    return draw_allan(noise.curve, sensors)
+def noise_picture(noise: Noise) -> Picture:
+    """All curves of a log in one figure, a row for each sensor."""
+    draw = later("noise_figures", "draw_allan", noise.curve, _groups(noise))
+    return Picture("allan", "Allan deviation of every axis.", draw)

@@ -1,4 +1,4 @@
-"""Figures of noise. Every function returns a PNG file."""
+"""Figures of noise. Every function returns a figure."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from trihedron.records import AllanCurve, NoiseAxis, TermName
-from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels, png
+from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels
 from trihedron.report.numbers import plain_number, unit_in_print
 
 _SLOPES = {
@@ -21,7 +22,7 @@ _SLOPES = {
 }
 
 
-def draw_allan(curve: AllanCurve, sensors: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> bytes:
+def draw_allan(curve: AllanCurve, sensors: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Figure:
     """Curves of each sensor in a row on the same scales: interval, fitted terms, their sum, its minimum."""
     columns = max(len(axes) for _, axes in sensors)
     figure, places = panels(len(sensors), columns, (3.6 * columns + 0.8, 4.2 * len(sensors)))
@@ -31,7 +32,28 @@ def draw_allan(curve: AllanCurve, sensors: Sequence[tuple[str, Sequence[NoiseAxi
             place.set_axis_off()
         _row(mine, curve, axes)
         mine[0].set_ylabel(f"Allan deviation [{unit_in_print(unit)}]")
-    return png(figure)
+    return figure
+
+
+def draw_curve(curve: AllanCurve) -> Figure:
+    """Every channel of a curve with its interval, on one pair of axes."""
+    figure, (place,) = panels(1, 1, (7.0, 4.4))
+    k = len(curve.clusters)
+    deviation, lower, upper = (values.reshape(k, -1) for values in (curve.deviation, curve.lower, curve.upper))
+    for c, name in enumerate(curve.names):
+        colour = AXIS_COLOURS[c % 3]
+        place.fill_between(curve.tau_s, lower[:, c], upper[:, c], color=colour, alpha=0.18, linewidth=0)
+        place.plot(curve.tau_s, deviation[:, c], color=colour, linewidth=1.6, label=name)
+    place.set_xscale("log")
+    place.set_yscale("log")
+    place.set_xlabel("averaging time τ [s]")
+    units = {unit_in_print(unit) for unit in curve.units if unit}
+    place.set_ylabel("Allan deviation" + (f" [{units.pop()}]" if len(units) == 1 else ""))
+    place.grid(which="major", color="#E3E7EA", linewidth=0.6)
+    place.set_axisbelow(True)
+    if len(curve.names) > 1:
+        place.legend(frameon=False)
+    return figure
 
 
 def _row(places: Sequence[Axes], curve: AllanCurve, axes: Sequence[NoiseAxis]) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.records import Recording, Segments
 from trihedron.report.document import Document, Facts, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
 
@@ -86,13 +87,8 @@ def hold_table(recording: Recording, segments: Segments) -> Table:
 
 def signals_picture(recording: Recording, segments: Segments) -> Picture:
     """The signals with the holds shaded."""
-
-    def draw() -> bytes:
-        # Drawing is imported when something is drawn: text and JSON need none of it.
-        from trihedron.report import figures
-
-        return figures.draw_signals(recording, segments)
-
     return Picture(
-        "signals", "The recording; shaded where the sensor stood still, red where a still pose was bumped.", draw
+        "signals",
+        "The recording; shaded where the sensor stood still, red where a still pose was bumped.",
+        later("figures", "draw_signals", recording, segments),
     )

@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.records import Recording, Segments, Verification
 from trihedron.report.document import Block, Document, Facts, Picture, Section, Table
+from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import plain_number, with_sigma
 from trihedron.report.segments import signals_picture
@@ -21,8 +22,10 @@ def verification_report(
         Section("Findings", (findings_block(verification.findings),)),
         Section("Poses and moves", tuple(_tables(verification, segments))),
     ]
+    figures: list[Block] = [_errors_picture(verification)]
     if segments is not None and recording is not None:
-        sections.append(Section("Figures", (_errors_picture(verification), signals_picture(recording, segments))))
+        figures.append(signals_picture(recording, segments))
+    sections.append(Section("Figures", tuple(figures)))
     return Document(
         title="Verification",
         subtitle=verification.source,
@@ -107,10 +110,8 @@ def _tables(verification: Verification, segments: Segments | None) -> list[Block
 
 
 def _errors_picture(verification: Verification) -> Picture:
-    def draw() -> bytes:
-        # Drawing is imported when something is drawn: text and JSON need none of it.
-        from trihedron.report import figures
-
-        return figures.draw_verification(verification)
-
-    return Picture("errors", "Error in every still pose and after every move, with what was to be expected.", draw)
+    return Picture(
+        "errors",
+        "Error in every still pose and after every move, with what was to be expected.",
+        later("figures", "draw_verification", verification),
+    )

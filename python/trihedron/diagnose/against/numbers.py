@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy.stats import f as f_distribution
 
 from trihedron.diagnose.against.fitted import FittedModel
-from trihedron.diagnose.against.invariants import (
+from trihedron.invariants import (
     PAIRS,
     Invariants,
     invariants,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.laws.find import MOST_FOLLOWS, accel_zero_laws
+from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
 from trihedron.diagnose.zeros.of_session import (
     FEWEST_NORM_POSES,
     accel_evidence,
@@ -34,6 +35,8 @@ class AccelZeroScatter(DirectEffect):
         found = accel_evidence(context)
         if found is None or not exceeds_noise(found) or accel_zero_laws(context).share > MOST_FOLLOWS:
             return None  # what follows something is a law, not scatter
+        if jumps_in_poses(context.obs).p_value[0] < JUMPS:
+            return None  # a zero that changes inside poses is not drawn anew in each
         sigma, si = float(found.evidence.scatter[0]), context.si_per_raw("accelerometer")
         return Evidence(
             found.evidence.p_scatter_spared,

@@ -11,7 +11,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
-from trihedron.diagnose.residuals.within_holds import hold_scatter
+from trihedron.diagnose.residuals.within_holds import LOUD, hold_scatter
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, folds_of, leverage, predict_held_out
 from trihedron.diagnose.session.twin import NO_DISTORTION, STATIC_ACCEL
@@ -21,8 +21,6 @@ MOST = 0.25
 """If more than a quarter of the poses are restless it is not a pose that was disturbed but the place that shakes."""
 
 
-LOUD = 4.0
-"""A restless pose has this many times the variance of the others: twice their noise."""
 MIN_GAIN = 15.0
 """Chi-square that cutting poses at their bumps must win in held-out data of one domain; the share that may stay."""
 MUST_FALL = 0.9

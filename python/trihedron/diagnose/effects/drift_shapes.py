@@ -11,6 +11,11 @@ from trihedron.diagnose.effects.contract import Variant, per_axis
 from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.twin import Distortion
 
+MOST_M_S2, MOST_RAD_S = 0.6, 0.09
+"""Zeros of parts drift by less while they warm up (0.06 g, 5 °/s; chambers of 90 K show as much); more is a wrong
+pose."""
+STILL_THERE, FEWEST_POSES_OF_A_DRIFT = 0.1, 3
+"""A drift that has fallen to a tenth by the third pose is a matter of one or two poses, not of the session."""
 WARM_UP_FRACTIONS = (0.04, 0.1, 0.25, 0.6)
 """Time constants tried, as fractions of the recording: faster is over before the first moves, slower is a line."""
 
@@ -26,7 +31,9 @@ def drift_variants(
     three = np.ones(3)
     out = [Variant(only(on_axes((x - 0.5)[:, None] * three)), per_axis("drift"), (unit,) * 3, label="line")]
     duration = float(context.obs.time_s[-1] - context.obs.time_s[0])
-    out += [warm_up_variant(context, on_axes, only, unit, fraction * duration) for fraction in WARM_UP_FRACTIONS]
+    shortest = shortest_time_constant(context)
+    taus = [fraction * duration for fraction in WARM_UP_FRACTIONS]
+    out += [warm_up_variant(context, on_axes, only, unit, tau) for tau in taus if tau >= shortest]
     waves = np.concatenate([on_axes(np.cos(np.pi * k * x)[:, None] * three) for k in (1, 2, 3, 4)], axis=2)
     names = tuple(name for k in (1, 2, 3, 4) for name in per_axis(f"cosine{k}"))
     out.append(Variant(only(waves), names, (unit,) * 12, label="curve"))
@@ -41,6 +48,23 @@ def warm_up_variant(
     tau_s: float,
 ) -> Variant:
     """An exponential of one time constant; its parameter is the bias at the first sample."""
+    tau_s = max(tau_s, shortest_time_constant(context))
     elapsed_s = context.time_s - context.obs.time_s[0]
     columns = on_axes(np.exp(-elapsed_s / tau_s)[:, None] * np.ones(3))
     return Variant(only(columns), per_axis("warm_up"), (unit,) * 3, {"time_constant": (tau_s, "s")}, "warm-up")
+
+
+def shortest_time_constant(context: Context) -> float:
+    """s; a faster exponential is over before the third pose."""
+    middles = context.obs.hold_time_s
+    if len(middles) < FEWEST_POSES_OF_A_DRIFT:
+        return 0.0
+    return float(middles[FEWEST_POSES_OF_A_DRIFT - 1] - middles[0]) / float(-np.log(STILL_THERE))
+
+
+def is_possible_drift(variant: Variant, value: FloatArray) -> bool:
+    """Whether the curve stays inside what zeros of parts drift by."""
+    for side, most in ((variant.distortion.force, MOST_M_S2), (variant.distortion.rate, MOST_RAD_S)):
+        if side is not None and float(np.ptp(side @ value, axis=0).max(initial=0.0)) > most:
+            return False
+    return True

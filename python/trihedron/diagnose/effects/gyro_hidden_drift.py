@@ -7,7 +7,8 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, per_axis, rate_only
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.drift_shapes import drift_variants, warm_up_variant
+from trihedron.diagnose.effects.drift_shapes import drift_variants, is_possible_drift, warm_up_variant
+from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
 from trihedron.diagnose.zeros.of_session import SessionEvidence, gyro_evidence, share_of_curve, walk_of_noise
 from trihedron.records.diagnosis import EffectParameter
@@ -41,6 +42,9 @@ class GyroHiddenDrift(DirectEffect):
         if variant.label != "warm-up":
             return None
         return warm_up_variant(context, context.on_gyros, rate_only, "rad/s", value)
+
+    def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
+        return is_possible_drift(variant, value)
 
     def made_again(self, context: Context, variant: Variant) -> Variant | None:
         if variant.label != "smooth":

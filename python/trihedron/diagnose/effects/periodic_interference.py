@@ -6,11 +6,8 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.residuals.within_holds import find_lines
+from trihedron.diagnose.residuals.within_holds import MIN_LINE_SHARE, find_lines
 from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
-
-MIN_SHARE = 0.03
-"""Share of the variance at rest that the line must predict in the half of each hold it was not fitted to."""
 
 
 class PeriodicInterference(DirectEffect):
@@ -25,7 +22,7 @@ class PeriodicInterference(DirectEffect):
         if not lines:
             return None
         # Long holds resolve lines a hundredth of the noise high. What counts is what it adds to readings not yet seen.
-        lines = [line for line in lines if line.power_after < (1.0 - MIN_SHARE) * line.power_before]
+        lines = [line for line in lines if line.power_after < (1.0 - MIN_LINE_SHARE) * line.power_before]
         if not lines:
             return None
         strongest = min(lines, key=lambda line: line.p_value)

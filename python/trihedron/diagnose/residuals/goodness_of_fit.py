@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.special import fdtrc
 
+from trihedron.diagnose.residuals.jumps import jumps_in_poses
 from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import Fit, leverage
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
@@ -49,13 +52,78 @@ def test_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
         # A widened domain is judged by the noise it was predicted to have.
         widened = {MOVES: fitted.line.obs.moves_inflation, DYNAMICS: fitted.line.obs.dynamics_inflation}.get(label, 1.0)
         chi2 = float((fitted.system.residual[rows] ** 2).sum()) * widened**2
-        p = float(fdtrc(dof, NOISE_DOF, chi2 / dof))
+        per_dof = chi2 / dof
+        p = float(fdtrc(dof, NOISE_DOF, per_dof))
         disagrees = p < alpha / N_DOMAINS_TESTED
         where = locate(fitted, label) if disagrees else Where()
+        if not disagrees and label in (STATIC_ACCEL, STATIC_GYRO):
+            inside, changing = _inside_poses(fitted, label), _strayed(fitted, label)
+            other = min((inside, changing), key=lambda look: look[0])
+            # Two more looks at the same domain.
+            if 2.0 * other[0] < alpha / N_DOMAINS_TESTED:
+                p, disagrees, where = 2.0 * other[0], True, other[2]
+                per_dof = max(per_dof, other[1])
         tests.append(
-            DomainTest(name, chi2 / dof, dof, p, disagrees, where, physical.get(label, 0.0), rms_unit.get(label, ""))
+            DomainTest(name, per_dof, dof, p, disagrees, where, physical.get(label, 0.0), rms_unit.get(label, ""))
         )
     return tuple(tests)
+
+
+def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:
+    """p, ratio of variances and place of zeros that change inside some poses: their means' error bars swallow it."""
+    side = fitted.line.distortion.force if label == STATIC_ACCEL else fitted.line.distortion.rate
+    if side is not None:
+        return 1.0, 1.0, Where()  # what an effect changes inside a pose is not known here
+    k = 0 if label == STATIC_ACCEL else 1
+    found = jumps_in_poses(fitted.line.obs)
+    holds, t = found.holds[k], fitted.line.obs.time_s
+    parts = [fitted.line.obs.segments.holds[i] for i in holds]
+    spans = tuple((float(t[hold.start]), float(t[hold.stop - 1])) for hold in parts)
+    return found.p_value[k], found.ratio[k], Where((), tuple(f"hold {i}" for i in holds), spans)
+
+
+AT_EDGE = 2.0
+"""Rms of the walk over the error of a pose's mean, its strength at the end of its range: of healthy sessions with
+consumer 1/f noise none of 18 passes 1.3 (0.7 typically), a zero that jumps between poses does."""
+
+
+def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
+    """p (0 or 1), ratio of variances: a walk as strong as the model allows stands in for something else."""
+    k = 0 if label == STATIC_ACCEL else 1
+    stray = hidden_zeros(fitted)[k]
+    if stray is None or not stray.is_at_edge or stray.rms < AT_EDGE * stray.noise:
+        return 1.0, 1.0, Where()
+    return 0.0, (stray.rms / stray.noise) ** 2, Where(_CHANNELS[label])
+
+
+@dataclass(frozen=True)
+class HiddenZero:
+    """What the model's walk of a sensor's zero absorbed, SI: ``rms`` about its mean, the median error of a pose's mean
+    ``noise``, and whether the walk is as strong as the model allows."""
+
+    rms: float
+    noise: float
+    is_at_edge: bool
+
+
+def hidden_zeros(fitted: Fit) -> tuple[HiddenZero, HiddenZero | None]:
+    """Accelerometer, gyro: zeros of the holds about their session mean, absorbed by hidden states."""
+    twin, obs = fitted.twin, fitted.line.obs
+    edge = fitted.line.core.is_walk_at_edge
+    out: list[HiddenZero | None] = []
+    sides = (
+        (twin.accel_bias, twin.accel_S, obs.hold_force_sigma, edge[0]),
+        (twin.gyro_bias, twin.gyro_S, obs.hold_rate_sigma, edge[1]),
+    )
+    for zero, S, sigma, is_at_edge in sides:
+        if sigma is None:
+            out.append(None)
+            continue
+        size = 1.0 / np.linalg.norm(np.linalg.inv(S), axis=1)
+        rms = float(np.sqrt(np.mean((zero - zero.mean(axis=0)) ** 2)))
+        out.append(HiddenZero(rms, float(np.median(sigma * size)), bool(is_at_edge)))
+    assert out[0] is not None
+    return out[0], out[1]
 
 
 def locate(fitted: Fit, label: int, n_most: int = 5) -> Where:

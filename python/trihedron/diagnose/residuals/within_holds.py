@@ -17,8 +17,12 @@ from trihedron.records.diagnosis import DomainTest, Where
 CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 
 
-MIN_LINE_SHARE = 0.01
-"""Long holds resolve lines far below the noise; a hundredth of its variance changes nothing that the model says."""
+MIN_LINE_SHARE = 0.03
+"""Long holds resolve lines far below the noise: below this share of its variance a line changes nothing that the model
+says, and a line that is no disagreement needs no name."""
+LOUD = 3.0
+"""Variance of a pose over that of the others from which it disagrees, and is named: real noise is not exactly Gaussian
+or white, and a pose on another support has half as much again."""
 
 
 @dataclass(frozen=True)
@@ -210,8 +214,7 @@ def test_within_static(obs: Observations, alpha: float) -> DomainTest:
     """Lines and noisy poses, as one domain; the p-value is the smallest, paid for by the number of looks."""
     scatter = hold_scatter(obs)
     n_looks = scatter.p_value.size
-    # Real noise is not exactly Gaussian or white: a pose must be half as noisy again before its variance counts.
-    loud = np.where(scatter.ratio > 1.5, scatter.p_value, 1.0)
+    loud = np.where(scatter.ratio > LOUD, scatter.p_value, 1.0)
     p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0
     lines = [line for line in find_lines(obs) if line.share > MIN_LINE_SHARE]
     p_line = min((line.p_value for line in lines), default=1.0)

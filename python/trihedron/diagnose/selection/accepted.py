@@ -10,13 +10,18 @@ import numpy as np
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.compare import excess
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel
+from trihedron.diagnose.session.solve import Fit
 from trihedron.records.diagnosis import AcceptedEffect, EffectParameter
 
 
-def accepted_effects(model: StepwiseModel) -> tuple[AcceptedEffect, ...]:
-    """Every accepted effect with its parameters, the one that explains most of the misfit first."""
-    covariance = model.fitted.covariance()
-    n = model.fitted.n_effect
+def accepted_effects(model: StepwiseModel, numbers: Fit | None = None) -> tuple[AcceptedEffect, ...]:
+    """Every accepted effect with its parameters, the one that explains most of the misfit first.
+
+    ``numbers`` is the fit that parameters and their errors are taken from, where it is another than the model's.
+    """
+    final = model.fitted if numbers is None else numbers
+    covariance = final.covariance()
+    n = final.n_effect
     effect_cov = covariance[len(covariance) - n :, len(covariance) - n :]
     first = 0
     out = []
@@ -24,16 +29,16 @@ def accepted_effects(model: StepwiseModel) -> tuple[AcceptedEffect, ...]:
         k = 0 if found.variant is None else found.variant.distortion.n_parameters
         span = slice(first, first + k)
         first += k
-        values, cov = model.fitted.twin.effect[span], effect_cov[span, span]
+        values, cov = final.twin.effect[span], effect_cov[span, span]
         if found.evidence is not None:
             parameters, statement = found.evidence.parameters, found.evidence.statement
         else:
             assert found.variant is not None
             parameters = found.effect.parameters(found.variant, values, cov)
             statement = found.effect.statement(parameters)
-        is_footnote = found.effect.is_spread or (_stated(found) is not None and share < HEADLINE)
+        is_behind = found.effect.is_spread or (_stated(found) is not None and share < HEADLINE)
         record = replace(_accepted(found, values, parameters, statement), share=share)
-        out.append(((is_footnote, -share), record))
+        out.append(((is_behind, -share), record))
     return tuple(one for _, one in sorted(out, key=lambda pair: pair[0]))
 
 
@@ -51,6 +56,14 @@ def shares(model: StepwiseModel) -> tuple[float, ...]:
     whole = max(sum(gains) + excess(model.fitted), 1e-9)
     return tuple(
         gain / whole if (own := _stated(one)) is None else own for one, gain in zip(model.accepted, gains, strict=True)
+    )
+
+
+def are_footnotes(model: StepwiseModel) -> bool:
+    """Whether nothing accepted is an answer: single poses, a faint line, scatter that is little of what zeros do."""
+    return all(
+        share < HEADLINE and (_stated(one) is not None or one.effect.is_spread or one.effect.is_local)
+        for one, share in zip(model.accepted, shares(model), strict=True)
     )
 
 

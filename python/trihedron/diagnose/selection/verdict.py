@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from trihedron.diagnose.selection.accepted import are_footnotes
 from trihedron.diagnose.selection.model import StepwiseModel
 from trihedron.records.diagnosis import DomainTest, Verdict
 
@@ -24,10 +25,20 @@ def accounted_for(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> tu
     )
 
 
-def verdict_of(model: StepwiseModel, domains: tuple[DomainTest, ...], *, has_laws: bool = False) -> Verdict:
-    """One word; ``not-testable`` where neither gravity nor rest had a say and the samples show nothing either."""
+def verdict_of(
+    model: StepwiseModel,
+    domains: tuple[DomainTest, ...],
+    remaining: tuple[DomainTest, ...] = (),
+    *,
+    has_laws: bool = False,
+) -> Verdict:
+    """One word; ``not-testable`` where neither gravity nor rest had a say and the samples show nothing either.
+
+    Footnotes (one pushed pose, a faint line) are no answer while something else disagrees.
+    """
     if model.accepted:
-        return "missing-physics"
+        is_left = any(d.disagrees for d in remaining)
+        return "unexplained" if is_left and are_footnotes(model) else "missing-physics"
     if has_laws or any(d.disagrees for d in domains):
         return "unexplained"
     # A weak prior fills what the poses leave open; rows that it alone decides test nothing.

@@ -42,7 +42,7 @@ def covariance_of(process: ZeroProcess, axis: int, sigma: FloatArray) -> tuple[F
 def smooth_curve(process: ZeroProcess, keep: list[int], sigma: FloatArray, time_s: FloatArray) -> DriftCurve:
     """Mean and standard error of walk plus drift at ``time_s`` (m,), its mean over those times taken off.
 
-    Only for zeros seen one axis at a time (``direction`` of one column).
+    Of readings of a length, which see three walks along the vertical (``direction`` of three columns), three curves.
     """
     r = process.readings
     X = r.design[:, keep]
@@ -61,10 +61,13 @@ def smooth_curve(process: ZeroProcess, keep: list[int], sigma: FloatArray, time_
 
     centre = np.eye(len(at)) - 1.0 / len(at)
     values, errors = [], []
-    for axis, y in enumerate(r.values):
+    is_length = r.direction.shape[1] > 1
+    seen = [(0, k) for k in range(r.direction.shape[1])] if is_length else [(k, 0) for k in range(len(r.values))]
+    for axis, along in seen:
+        y = r.values[axis]
         V, _ = covariance_of(process, axis, sigma)
         _, w, d = (process.axis_factor[axis] * sigma) ** 2
-        cross = centre @ kernel(at, t, w, d, r.length_s / span)
+        cross = centre @ (kernel(at, t, w, d, r.length_s / span) * r.direction[:, along])
         inverse = np.linalg.inv(V)
         side = inverse @ X
         A = np.linalg.pinv(X.T @ side)

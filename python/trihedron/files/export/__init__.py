@@ -11,10 +11,11 @@ from collections.abc import Callable
 
 from trihedron.files.export.autopilot import to_ardupilot, to_px4
 from trihedron.files.export.code import to_c, to_python, to_rust
-from trihedron.files.export.contract import ExportOptions, NoiseFigure, SensorNoise, checked
+from trihedron.files.export.contract import ExportOptions, NoiseFigure, SensorNoise
 from trihedron.files.export.matrices import lower_orthogonal, upper_frame
 from trihedron.files.export.others import to_imu_tk, to_pyins, to_xio
 from trihedron.files.export.vio import to_basalt, to_kalibr, to_openvins, to_ros, to_vins_fusion
+from trihedron.files.plausible import require_plausible
 from trihedron.records import Calibration
 
 __all__ = [
@@ -56,7 +57,7 @@ def export_files(calibration: Calibration, target: str, options: ExportOptions |
     """
     if target not in TARGETS:
         raise ValueError(f"there is no export to {target!r}; there are {', '.join(TARGETS)}.")
-    made = TARGETS[target](checked(calibration), options or ExportOptions())
+    made = TARGETS[target](require_plausible(calibration), options or ExportOptions())
     return {"": made} if isinstance(made, str) else made
 
 

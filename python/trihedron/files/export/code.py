@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.files.export.contract import ExportOptions, heading, named_sensors, row
+from trihedron.files.export.contract import ExportOptions, heading, row
+from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 
 EQUATION = "true = S * raw + b, raw to true, row by row."

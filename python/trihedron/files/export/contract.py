@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.files.plausible import has_one_handedness, named_sensors
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.units import (
     AccelerationUnit,
@@ -22,8 +23,6 @@ from trihedron.units import (
 FloatArray = npt.NDArray[np.float64]
 
 NO_GYRO = "no gyroscope in this calibration"
-LARGEST_CONDITION = 100.0
-"""Of S with its columns at one length: two axes 0.6 degrees apart. Beyond it the matrix is a mistake, not a sensor."""
 
 
 @dataclass(frozen=True)
@@ -56,32 +55,6 @@ class ExportOptions:
     topic: str = "/imu0"
     accel_lsb: str = ""
     gyro_lsb: str = ""
-
-
-def checked(calibration: Calibration) -> Calibration:
-    """A calibration that can be a sensor's.
-
-    Raises
-    ------
-    ValueError
-        When S is singular or nearly so, or a variance is negative.
-    """
-    for name, sensor in named_sensors(calibration):
-        lengths = np.linalg.norm(sensor.S, axis=0)
-        if not np.all(lengths > 0.0) or np.linalg.cond(sensor.S / lengths) > LARGEST_CONDITION:
-            raise ValueError(
-                f"the {name}'s S is singular or nearly so (two of its axes are parallel): this is no sensor's "
-                "calibration; calibrate again with more poses."
-            )
-        if np.any(np.diag(sensor.covariance) < 0.0):
-            raise ValueError(f"the {name}'s covariance has a negative variance: the file is damaged; calibrate again.")
-    return calibration
-
-
-def named_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
-    """The sensors there are, with their names."""
-    pairs = (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope))
-    return [(name, sensor) for name, sensor in pairs if sensor is not None]
 
 
 def of_si_readings(calibration: Calibration, target: str, options: ExportOptions) -> Calibration:
@@ -132,6 +105,8 @@ def heading(calibration: Calibration, equation: str) -> list[str]:
     ]
     if not calibration.is_trustworthy:
         rows.append("NOT TO BE TRUSTED: see the findings of the calibration.")
+    if not has_one_handedness(calibration):
+        rows.append("One of the triads is mirrored against the other: check the signs of the axes before use.")
     effects = effect_ids(calibration)
     if effects:
         rows.append(f"Left out, since this file cannot hold it: {', '.join(effects)}.")

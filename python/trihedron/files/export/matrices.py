@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.files.export.contract import named_sensors
+from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration, SensorCalibration
 
 FloatArray = npt.NDArray[np.float64]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.files.export.contract import ExportOptions, heading, named_sensors, row
+from trihedron.files.export.contract import ExportOptions, heading, row
 from trihedron.files.export.matrices import upper_frame
+from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration
 from trihedron.sensor_model import other_form
 from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians

@@ -6,6 +6,7 @@ import bz2
 import gzip
 import io
 import lzma
+import re
 import zlib
 from collections.abc import Generator
 from dataclasses import dataclass
@@ -85,6 +86,22 @@ def blocks(
         if compression is not None and error.errno is None:
             raise ReadError(f"{path}: the {compression} data is damaged ({error}); copy the file again.") from None
         raise from_os_error(path, error) from None
+
+
+_SEMICOLON = re.compile(rb"(?m)^;")
+
+
+def has_semicolon_remarks(data: bytes) -> bool:
+    """Whether lines that begin with ``;`` are remarks: the first one does, and no other line has a semicolon in it."""
+    if not data.startswith(b";"):
+        return False
+    rows = [line for line in data[: 1 << 16].split(b"\n")[:-1] if line.strip() and not line.startswith(b";")]
+    return bool(rows) and not any(b";" in line for line in rows)
+
+
+def with_hash_remarks(data: bytes) -> bytes:
+    """Remarks of ``;`` as those of ``#``."""
+    return _SEMICOLON.sub(b"#", data)
 
 
 def as_utf8(path: Path, data: bytes, first_line: int) -> bytes:

@@ -32,6 +32,7 @@ _FORMS = (
     _Form(rf"^\d\d?-\d\d?-\d{{4}} {_CLOCK}$", _MONTH_FIRST),
 )
 _TIME_OF_DAY = re.compile(rf"^{_CLOCK}$")
+_POINTS = re.compile(r"^[ \"]*\d\d?\.\d\d?\.\d{4}[ T]")
 _DATE_ALONE = re.compile(r"^(\d{4}[-/.]\d\d?[-/.]\d\d?|\d\d?[-/.]\d\d?[-/.]\d{4})$")
 
 
@@ -39,6 +40,8 @@ def _plain(cells: pl.Series) -> pl.Series:
     """Cells with ``-`` in dates, one blank before the clock, ``:`` inside it and a point before its fraction."""
     text = cells.str.strip_chars(' "').str.replace_all("/", "-", literal=True)
     text = text.str.replace(r"^(\d{4}-\d\d-\d\d)[T_]", "${1} ")
+    # Day, month and year with points between, as in Central Europe: the day comes first.
+    text = text.str.replace(r"^(\d\d?)\.(\d\d?)\.(\d{4})[ T]", "${1}-${2}-${3} ")
     # MetaBase writes 12.34.56.789, AndroSensor 12:34:56:789.
     text = text.str.replace(r"(\d\d?)\.(\d\d)\.(\d\d)([.,]\d+)", "${1}:${2}:${3}${4}")
     return text.str.replace(r"(:\d\d:\d\d)[,:](\d+)", "${1}.${2}")
@@ -49,6 +52,8 @@ def form_of(cells: pl.Series) -> str | None:
     text = _plain(cells.drop_nulls())
     if not len(text):
         return None
+    if all(_POINTS.match(cell) for cell in cells.drop_nulls()):
+        return _DAY_FIRST if text.str.contains(_FORMS[-1].pattern).all() else None
     for form in _FORMS:
         if text.str.contains(form.pattern).all():
             is_day_first = form.format == _MONTH_FIRST and bool(np.isnan(seconds(cells, form.format)).any())

@@ -180,6 +180,8 @@ def _header(lines: list[str], separator: str, n_fields: int) -> _Header:
         if not line or line.strip('"').lower().startswith("sep="):
             continue
         plain = re.sub(r"^(#+|%+|//+)\s*", "", line) if is_comment(line) else line
+        # GCDC's loggers say so before the names.
+        plain = re.sub(r"^headers\s*,\s*", "", plain, flags=re.IGNORECASE)
         fields = _header_fields(plain, separator, n_fields)
         if fields is not None and any(fields) and not any(is_number(f, False) for f in fields):
             matching.append((i, fields))

@@ -26,9 +26,7 @@ class Lines:
 
 
 def regular(data: bytes, layout: Layout) -> bytes:
-    """One separator between fields, none around lines, line ends as ``\\n``."""
-    if b"\r" in data:
-        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    """One separator between fields, none around lines."""
     separator = layout.separator.encode()
     if layout.separator == " ":
         data = data.replace(b"\t", b" ")

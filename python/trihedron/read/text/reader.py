@@ -13,8 +13,9 @@ import polars as pl
 
 from trihedron import _core
 from trihedron.read.errors import ReadError
+from trihedron.read.names import parse_name
 from trihedron.read.table import FloatArray, Progress, Table, check_memory, file_sha256
-from trihedron.read.text.blocks import Cursor, as_utf8, blocks
+from trihedron.read.text.blocks import Cursor, as_utf8, blocks, has_semicolon_remarks, with_hash_remarks
 from trihedron.read.text.cells import MAX_WORDS, TextColumn, find_text_columns, numbers, parse, refuse_words
 from trihedron.read.text.dates import past_midnight
 from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect, is_comment, split
@@ -53,6 +54,7 @@ class TextReader:
         self.comments: list[npt.NDArray[np.int64]] = []
         self.n_left_out = 0
         self.may_be_plain, self.n_odd_blocks = True, 0
+        self.semicolons = False
 
     def read(self) -> Table:
         """The whole file as a table."""
@@ -64,8 +66,13 @@ class TextReader:
         layout: Layout | None = None
         for raw in parts:
             data = as_utf8(self.path, raw, self.cursor.lines + 1)
-            if b"\n" not in data and b"\r" in data:
-                data = data.replace(b"\r", b"\n")
+            if b"\r" in data:
+                # Before the layout is judged: a lone carriage return ends a row for whoever counts rows afterwards.
+                data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+            if layout is None:
+                self.semicolons = has_semicolon_remarks(data)
+            if self.semicolons:
+                data = with_hash_remarks(data)
             if layout is None:
                 layout = self._layout(data)
                 start = offset_of_line(data, layout.first_line)
@@ -259,6 +266,7 @@ class TextReader:
         names: list[str] = []
         words: dict[int, str] = {}
         labels: dict[int, tuple[tuple[str, ...], npt.NDArray[np.int64]]] = {}
+        has_time = any(parse_name(name).role == "time" for name in layout.names or ())
         dated = {i for i, column in self.text_columns.items() if column.form and column.form != "date"}
         for i in range(layout.n_fields):
             parts, self.parts[i] = self.parts[i], []
@@ -270,7 +278,9 @@ class TextReader:
                 if text.codes and len(text.words) <= MAX_WORDS:
                     labels[i] = (tuple(text.words), np.concatenate(text.codes))
             elif text is not None:
-                name = f"{name} [s]" if name else "time [s]"
+                # A date is a time whatever its column is called, unless another one is called so.
+                is_time = has_time or not name or parse_name(name).role == "time"
+                name = (f"{name} [s]" if is_time else f"{name} time [s]") if name else "time [s]"
                 values = past_midnight(values) if text.form == "time-of-day" else values
             columns.append(values)
             names.append(name)

@@ -1,0 +1,73 @@
+"""Error bars of `--reference` on simulated rigs: how many truths lie within one and two of them.
+
+    python benches/reference_coverage.py --each 40 --seed 1000 --kinds tracked,path,table,commands
+
+The rig is tests/reference_rig.py: attitudes as products of turns, rates as their finite differences, an instrument of
+its own. commands: rates of a table that lags and wobbles; table: rates that it measured; tracked: attitude with 0.05°
+of white error on a clock up to 100 ppm off; path: the same with position (0.3 mm) and a lever arm.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from reference_rig import G, commanded_table, measured_table, tracked
+from trihedron.estimate.reference import fit_reference
+
+KINDS = {
+    "tracked": tracked,
+    "path": lambda seed: tracked(seed, has_path=True),
+    "table": measured_table,
+    "commands": commanded_table,
+}
+
+
+def one(trial):
+    """z of every number of one trial, by group."""
+    found = fit_reference(trial.log, trial.motion, G)
+    A = np.linalg.inv(trial.unit.M)
+    sigma = np.sqrt(np.diag(found.gyroscope.covariance))
+    z = {
+        "gyro S": (found.gyroscope.S - A).ravel() / sigma[:9],
+        "gyro b": (found.gyroscope.b + A @ trial.unit.c) / sigma[9:],
+    }
+    if found.clock_rate_ppm is not None:
+        lead = trial.lead_s + 1e-6 * trial.ppm * found.clock_middle_s
+        z["clock offset"] = np.array([(found.clock_offset_s[0] - lead) / found.clock_offset_s[1]])
+        z["clock rate"] = np.array([(found.clock_rate_ppm[0] - trial.ppm) / found.clock_rate_ppm[1]])
+    if found.accelerometer is not None:
+        S = np.linalg.inv(trial.unit.N)
+        sigma = np.sqrt(np.diag(found.accelerometer.covariance))
+        z["accelerometer S"] = (found.accelerometer.S - S).ravel() / sigma[:9]
+        z["accelerometer b"] = (found.accelerometer.b + S @ trial.unit.d) / sigma[9:]
+    if found.lever_arm is not None:
+        z["lever arm"] = (found.lever_arm.value - trial.arm) / found.lever_arm.std
+    return z, {name: e.p_value for name, e in found.effects.items()}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--each", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=1000)
+    parser.add_argument("--kinds", default="tracked,path,table,commands")
+    given = parser.parse_args()
+    for kind in given.kinds.split(","):
+        start = time.process_time()
+        runs = [one(KINDS[kind](given.seed + k)) for k in range(given.each)]
+        print(f"{kind}: {given.each} runs, {time.process_time() - start:.0f} s CPU")
+        for name in runs[0][0]:
+            z = np.concatenate([r[0][name] for r in runs])
+            one, two = (100 * np.mean(np.abs(z) < k) for k in (1, 2))
+            rms = np.sqrt(np.mean(z**2))
+            print(f"  {name:16} within 1 sigma {one:5.1f} %, 2 sigma {two:5.1f} %, rms z {rms:.2f}, n {len(z)}")
+        for name in runs[0][1]:
+            p = np.array([r[1].get(name, 1.0) for r in runs])
+            print(f"  {name:26} p < 0.01 in {np.sum(p < 0.01)} of {len(p)} without it")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""What became of everything that was sent, and how the clocks went together: the account of a capture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from trihedron.capture.clock import ClockLine, Timeline
+from trihedron.capture.sequence import Tally
+
+MOST_PPM = 20_000.0
+"""Beyond two per cent it is no clock's error: a replay at another speed, or a unit of time that was misread."""
+
+
+@dataclass
+class Count:
+    """What became of everything that was sent."""
+
+    tally: Tally = field(default_factory=Tally)
+    corrupt: int = 0
+    skipped_bytes: int = 0
+    n_bytes: int = 0
+    disconnections: int = 0
+    counted_by: str = "nothing"
+
+    @property
+    def lost(self) -> int:
+        """Frames that were sent and are not in the log: by counter or clock, else as far as remains were seen."""
+        return self.corrupt if self.counted_by == "nothing" else self.tally.lost
+
+    def sentence(self) -> str:
+        """For people and for the header."""
+        how = {
+            "counter": "by the device's counter",
+            "clock": "by the device's clock",
+            "nothing": "as far as remains were seen: there is no counter and no clock",
+        }[self.counted_by]
+        parts = [f"{self.tally.saved} saved", f"{self.lost} lost {how}"]
+        for n, words in (
+            (self.corrupt if self.counted_by != "nothing" else 0, "corrupt pieces seen"),
+            (self.tally.garbled, "with a garbled count"),
+            (self.tally.repeated, "repeated"),
+            (self.disconnections, "disconnections"),
+            (self.tally.restarts, "restarts of the device"),
+        ):
+            if n:
+                parts.append(f"{n} {words}")
+        return " / ".join(parts)
+
+
+def clock_sentence(line: ClockLine | None, timeline: Timeline | None) -> str:
+    """Offset, rate and arrival jitter, for people and for the header."""
+    if line is None or timeline is None:
+        return "not fitted: too short or not live"
+    late = f"bytes arrive {1e3 * line.jitter_rms_s:.3g} ms rms and {1e3 * line.jitter_95_s:.3g} ms (95 %) late"
+    if timeline.has_device_clock:
+        if abs(line.rate_ppm) > MOST_PPM:
+            return f"the device's clock runs {1.0 / line.slope:.4g} times as fast as the host's / {late}"
+        return (
+            f"device second = host second {line.rate_ppm:+.2f} ppm +- {line.sigma_ppm:.2f} / device zero at host "
+            f"{line.offset_s:.6f} s / {late}"
+        )
+    sigma = 100.0 * line.sigma_slope / line.slope
+    return f"{1.0 / line.slope:.6f} frames per second of the host +- {sigma:.2g} % / {late}"

@@ -1,0 +1,117 @@
+"""The thread that only reads: nothing in it waits for a disk or a decoder."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable
+
+from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
+from trihedron.capture.sources import Source
+
+RETRY_S = 0.25
+MOST_QUEUED_BYTES = 512 * 1024 * 1024
+
+READ_AHEAD_BYTES = 1 << 20
+"""A file can be read faster than it is decoded; a device cannot be asked to wait."""
+
+
+class SourceReturned(Exception):
+    """The device is back."""
+
+
+class Stopped(Exception):
+    """The user said stop."""
+
+
+class ReadingThread:
+    """Reads a source into a queue, waits for a device that went away, and says what happened in order.
+
+    Parameters
+    ----------
+    source : Source
+    first_bytes : bytes
+        What was read already; it is the first item.
+    wait_for_return_s : float
+        How long to wait for a device that went away.
+    now_s : callable
+        The host's clock in seconds.
+
+    Notes
+    -----
+    Items are ``(host_s, bytes)`` or ``(host_s, exception)``: `SourceLostError`, `SourceReturned`, `SourceEndedError`,
+    `Stopped`, or what the source raised; after one of the last three nothing follows.
+    """
+
+    def __init__(
+        self, source: Source, *, first_bytes: bytes, wait_for_return_s: float, now_s: Callable[[], float]
+    ) -> None:
+        self._source, self._first, self._wait_s, self._now_s = source, first_bytes, wait_for_return_s, now_s
+        self._queue: queue.SimpleQueue[tuple[float, bytes | Exception]] = queue.SimpleQueue()
+        self._put_bytes = self._taken_bytes = 0  # each written by one thread only
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._read, name="capture reader", daemon=True)
+
+    def start(self) -> None:
+        """Begin to read."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Take no more bytes; what came stays in the queue."""
+        self._stop.set()
+
+    def join(self, timeout_s: float) -> None:
+        """Stop and wait until the thread has ended; one that never began has."""
+        self._stop.set()
+        if self._thread.ident is not None:
+            self._thread.join(timeout=timeout_s)
+
+    def get(self, timeout_s: float) -> tuple[float, bytes | Exception]:
+        """The next item; raises ``queue.Empty`` where none came in time."""
+        host_s, item = self._queue.get(timeout=timeout_s)
+        if isinstance(item, bytes):
+            self._taken_bytes += len(item)
+        return host_s, item
+
+    @property
+    def _waiting_bytes(self) -> int:
+        return self._put_bytes - self._taken_bytes
+
+    def _put(self, item: bytes | Exception) -> None:
+        if isinstance(item, bytes):
+            self._put_bytes += len(item)
+        self._queue.put((self._now_s(), item))
+
+    def _read(self) -> None:
+        if self._first:
+            self._put(self._first)
+        while not self._stop.is_set():
+            try:
+                data = self._source.read()
+            except SourceLostError as error:
+                self._put(error)
+                if not self._wait_for_return():
+                    self._put(SourceEndedError(str(error)))
+                    return
+                self._put(SourceReturned(self._source.name))
+                continue
+            except Exception as error:  # handed to the loop, which raises it
+                self._put(error)
+                return
+            if data:
+                self._put(data)
+                while not self._source.is_live and self._waiting_bytes > READ_AHEAD_BYTES and not self._stop.is_set():
+                    time.sleep(0.002)
+            if self._waiting_bytes > MOST_QUEUED_BYTES:
+                self._put(CaptureError("the disk is slower than the device and memory is full; use a faster disk."))
+                return
+        self._put(Stopped())
+
+    def _wait_for_return(self) -> bool:
+        until = time.monotonic() + self._wait_s
+        while not self._stop.is_set() and time.monotonic() < until:
+            if self._source.reopen():
+                return True
+            self._stop.wait(RETRY_S)
+        return False

@@ -1,0 +1,99 @@
+"""``trihedron calibrate LOG LOG ...``: many recordings of one unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Optional
+
+import typer
+
+from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress
+from trihedron.cli.output import leave, say, show, write_json, write_report
+
+if TYPE_CHECKING:
+    from trihedron.records import Recording
+
+By = Annotated[
+    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+    typer.Option(
+        "--by",
+        metavar="HOW",
+        help="Several logs: by session (each for itself), date, device (every device of an archive), or temperature.",
+    ),
+]
+Labels = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--labels", metavar="LIST", help="Several logs: day or device of each, with commas between."),
+]
+FIRST_SCREEN = 2
+
+
+def calibrate_many(
+    sources: LogsSource,
+    place: GravitySource,
+    by: str | None,
+    labels: str | None,
+    frame: Any,
+    output: Path | None,
+    json: Path | None,
+    report: Path | None,
+    *,
+    full: bool,
+    force: bool,
+) -> None:
+    """Calibrate every log and print what is common and what repeats how far."""
+    how = by or "session"
+    if how not in ("session", "date", "device", "temperature"):
+        raise typer.BadParameter(f"--by is one of session, date, device, temperature, not {how!r}")
+    from trihedron import pipeline
+    from trihedron.files.calibration import write_calibration
+    from trihedron.report import sessions_report
+    from trihedron.report.sessions import sessions_record
+
+    words = None if labels is None else [word.strip() for word in labels.split(",")]
+    place_said: dict[str, Any] = {
+        "gravity_m_s2": place.gravity,
+        "latitude_deg": place.latitude,
+        "height_m": place.height,
+    }
+    given = sources.each()
+    with progress("calibrating") as tell:
+        # A log that cannot be read stops at once: a wrong name is not a bad recording.
+        recordings = list(_recordings(given, how))
+        if words is not None and len(words) == len(given) < len(recordings):
+            raise typer.BadParameter("--labels name logs; the devices of an archive have their own names")
+        result = pipeline.calibrate_sessions(
+            recordings,
+            by=how,  # type: ignore[arg-type]
+            labels=words,
+            frame=frame or "lower",
+            progress=tell,
+            **place_said,
+        )
+    document = sessions_report(result.model)
+    machine = sessions_record(result.model)
+    show(document, json, sections=None if full else FIRST_SCREEN)
+    if output is not None:
+        write_calibration(result.calibration, output, overwrite=force)
+        say(f"calibration: {output}")
+    write_json(machine, json, force=force)
+    write_report(document, machine, report, force=force)
+    if not full and report is None:
+        say("What changed and every recording: --full, or --report FILE.html with figures.")
+    leave(result.model.findings)
+
+
+def _recordings(sources: list[LogSource], by: str) -> Iterator[Recording]:
+    """Every log; by device, every device of an archive of several."""
+    from trihedron.read import devices_of
+
+    for source in sources:
+        n = devices_of(source.log) if by == "device" and source.device is None and source.log is not None else 1
+        if n == 1:
+            yield source.read()
+            continue
+        for device in range(1, n + 1):
+            recording = replace(source, device=device).read()
+            yield replace(recording, source=f"{recording.source}, device {device}")

@@ -1,0 +1,347 @@
+"""The diagnosis of a log that holds one or two orientations (docs/rest.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType, SimpleNamespace
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
+from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
+from trihedron.diagnose.residuals.within_holds import test_within_static
+from trihedron.diagnose.rest.heat import Curve, branch_gap, thermal_curve
+from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
+from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.solve import CORNER_GRID_S, Fit
+from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
+from trihedron.diagnose.zeros.evidence import KIND_LIMIT, examine
+from trihedron.diagnose.zeros.process import ZeroReadings
+from trihedron.records import Hold, Recording
+from trihedron.records.diagnosis import (
+    AcceptedEffect,
+    Candidate,
+    Diagnosis,
+    Domain,
+    DomainTest,
+    EffectParameter,
+    HeldOut,
+    LinearModel,
+    Where,
+)
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, rate_to_si
+
+Sensor = Literal["accelerometer", "gyroscope"]
+AXES = ("x", "y", "z")
+DOMAIN: dict[Sensor, Domain] = {"accelerometer": "static-accel", "gyroscope": "static-gyro"}
+NOT_HERE = "the log holds too few orientations"
+BEYOND_NOISE = 3.0
+"""Rms of a drift over the error of one mean; of a walk, over what noise that turns into one after 20 s (K = √3 N/τ)
+could walk: as among poses."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Samples:
+    """What the spectrum of a log at rest needs of observations: readings with their slow part taken off."""
+
+    recording: Recording
+    time_s: FloatArray
+    raw_force: FloatArray
+    raw_rate: FloatArray | None
+    segments: Any
+
+
+def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float, alpha: float) -> Diagnosis:
+    """Zeros against temperature and time, and lines, of a log whose orientations carry no calibration.
+
+    Parameters
+    ----------
+    recording : Recording
+        A static log, a chamber log, two orientations: with an accelerometer.
+    model : LinearModel
+        Nominal or given S, b of both sensors: only sizes in physical units come from it.
+    """
+    pieces = rest_pieces(recording)
+    domains: list[DomainTest] = []
+    remaining: list[DomainTest] = []
+    effects: list[AcceptedEffect] = []
+    tried = {effect.id: Candidate(effect.id, None, False, NOT_HERE) for effect in catalogue()}
+    if pieces is not None:
+        sensors: list[Sensor] = ["gyroscope", "accelerometer"] if pieces.rate is not None else ["accelerometer"]
+        for sensor in sensors:
+            unit = _unit(recording, model, sensor)
+            before, after, found, candidates = _zeros(pieces, sensor, _sizes(model, sensor), unit, alpha)
+            domains.append(before)
+            remaining.append(after)
+            effects += found
+            tried |= {c.id: c for c in candidates}
+        within, line = _lines(recording, pieces, model, alpha)
+        domains.append(within)
+        remaining.append(within if line is None else _agreeing(within))
+        effects += [] if line is None else [line]
+        tried["periodic-interference"] = Candidate("periodic-interference", within.p_value, True)
+    effects.sort(key=lambda e: -(e.share or 0.0))
+    return Diagnosis(
+        verdict="missing-physics" if effects else "not-testable",
+        domains=tuple(domains),
+        effects=tuple(effects),
+        remaining=tuple(remaining),
+        candidates=tuple(tried[key] for key in sorted(tried)),
+        baseline=model,
+        extended=model,
+        noise=MappingProxyType(_noise(recording, pieces, model)),
+        gravity_m_s2=gravity_m_s2,
+        alpha=alpha,
+        recording_source=recording.source,
+        recording_sha256=recording.sha256,
+        references=MappingProxyType(
+            {} if pieces is None or pieces.temperature is None
+            else {"temperature_degc": float(pieces.temperature.mean())}
+        ),
+    )  # fmt: skip
+
+
+def _sizes(model: LinearModel, sensor: Sensor) -> FloatArray:
+    """(3,) size of a raw unit along every axis, in the model's unit."""
+    side = model.accelerometer if sensor == "accelerometer" else model.gyroscope
+    return np.ones(3) if side is None else 1.0 / np.linalg.norm(np.linalg.inv(np.array(side["S"])), axis=1)
+
+
+def _unit(recording: Recording, model: LinearModel, sensor: Sensor) -> str:
+    """SI, or ``raw`` where neither the log nor a given calibration says what a count of the gyro is."""
+    if sensor == "accelerometer":
+        return "m/s^2"
+    side = model.gyroscope
+    is_unknown = rate_to_si(recording.gyroscope_unit) is None and side is not None and side["S"][0][0] == 1.0
+    return "raw" if is_unknown else "rad/s"
+
+
+def _noise(recording: Recording, pieces: RestPieces | None, model: LinearModel) -> dict[str, Any]:
+    step = np.sqrt(1.0 / recording.rate_hz)
+    out: dict[str, Any] = {"accelerometer_density": [0.0] * 3, "accelerometer_unit": "m/s^2/sqrt(Hz)",
+                           "accelerometer_corner_s": None, "gyroscope_density": None,
+                           "gyroscope_unit": "rad/s/sqrt(Hz)", "gyroscope_corner_s": None}  # fmt: skip
+    if pieces is not None:
+        out["accelerometer_density"] = (pieces.force_sigma * _sizes(model, "accelerometer") * step).tolist()
+        if pieces.rate_sigma is not None:
+            out["gyroscope_density"] = (pieces.rate_sigma * _sizes(model, "gyroscope") * step).tolist()
+    return out
+
+
+def _zeros(
+    pieces: RestPieces, sensor: Sensor, size: FloatArray, unit: str, alpha: float
+) -> tuple[DomainTest, DomainTest, list[AcceptedEffect], list[Candidate]]:
+    """One sensor's zeros: as they run, what temperature or a smooth drift takes of them, what stays."""
+    prefix = "accel" if sensor == "accelerometer" else "gyro"
+    sigma = pieces.force_sigma if sensor == "accelerometer" else pieces.rate_sigma
+    assert sigma is not None
+    n_effects = len(catalogue())
+    own = size * sigma / np.sqrt(float(np.median(pieces.count)))
+    candidates = []
+    curve = thermal_curve(pieces, sensor)
+    effect: AcceptedEffect | None = None
+    if pieces.temperature is None:
+        candidates.append(Candidate(f"{prefix}-thermal-bias", None, False, "the log has no temperature"))
+    else:
+        candidates.append(Candidate(f"{prefix}-thermal-bias", 1.0 if curve is None else curve.p_value, True))
+    raw = _about_poses(pieces, sensor) * size
+    left = raw
+    if curve is not None and curve.p_value * n_effects < alpha:
+        effect = _thermal(pieces, sensor, curve, size, unit, n_effects)
+        left = curve.rest * size
+    else:
+        drift, p, is_smooth = _drift(pieces, sensor)
+        candidates.append(Candidate(f"{prefix}-hidden-drift", p, True))
+        span = float(pieces.time_s[-1] - pieces.time_s[0])
+        walk = np.sqrt(3.0) * size * sigma * np.sqrt(float(np.median(pieces.length_s / pieces.count)))
+        walk = walk / CORNER_GRID_S[0] * np.sqrt(span / 6.0)
+        least = BEYOND_NOISE * (own if is_smooth else np.hypot(walk, own))
+        if drift is not None and p * n_effects < alpha and (drift.rms * size > least).any():
+            effect = _drifting(sensor, drift, raw, size, unit, p, n_effects)
+            at = np.stack([np.interp(pieces.time_s, drift.time_s, v) for v in drift.values], axis=1) * size
+            left = raw - (at - at.mean(axis=0))
+    tests = [_domain(DOMAIN[sensor], x, own, unit, is_named=effect is not None, alpha=alpha) for x in (raw, left)]
+    return tests[0], tests[1], [] if effect is None else [effect], candidates
+
+
+def _about_poses(pieces: RestPieces, sensor: Sensor) -> FloatArray:
+    values = pieces.force if sensor == "accelerometer" else pieces.rate
+    assert values is not None
+    level = np.array([values[pieces.pose == p].mean(axis=0) for p in range(pieces.n_poses)])
+    return np.asarray(values - level[pieces.pose])
+
+
+def _domain(domain: Domain, x: FloatArray, own: FloatArray, unit: str, *, is_named: bool, alpha: float) -> DomainTest:
+    """Zeros about the mean of their orientation, in their own unit; they disagree where an effect was named.
+
+    A zero that walks is no disagreement by itself: without an effect nothing contradicts the model.
+    """
+    chi2 = float(np.mean((x / own) ** 2))
+    dof = float(x.size)
+    p = 1.0 if not is_named else float(min(1.0, np.exp(-0.5 * max(chi2 - 1.0, 0.0) * 3.0)))
+    worst = AXES[int(np.argmax((x / own).std(axis=0)))]
+    where = Where((("a" if domain == "static-accel" else "g") + worst,)) if is_named else Where()
+    return DomainTest(domain, chi2, dof, p, p < alpha / N_DOMAINS_TESTED, where, float(np.sqrt(np.mean(x**2))), unit)
+
+
+def _words(unit: str, values: FloatArray) -> str:
+    """Sizes in the unit that people use; counts of an unknown scale stay counts."""
+    if unit == "rad/s":
+        return ", ".join(f"{degrees_from_radians(v):.2g}" for v in values) + " °/s"
+    if unit == "m/s^2":
+        return ", ".join(f"{mm_s2_from_m_s2(v):.3g}" for v in values) + " mm/s²"
+    return ", ".join(f"{v:.3g}" for v in values) + " counts"
+
+
+def _thermal(
+    pieces: RestPieces, sensor: Sensor, curve: Curve, size: FloatArray, unit: str, n_effects: int
+) -> AcceptedEffect:
+    units = {"bias_per_kelvin": f"{unit}/K", "bias_per_kelvin2": f"{unit}/K^2", "bias_per_kelvin3": f"{unit}/K^3",
+             "bias_per_kelvin_per_s": f"{unit}/(K/s)", "half_gap": unit}  # fmt: skip
+    parameters = [
+        EffectParameter(
+            f"{name}_{axis}", float(curve.value[k, j] * size[k]), float(curve.std[k, j] * size[k]), units[name]
+        )
+        for j, name in enumerate(curve.names)
+        for k, axis in enumerate(AXES)
+    ]  # fmt: skip
+    raw, rest = curve.raw * size, curve.rest * size
+    low, high = curve.range_degc
+    name = "gyro" if sensor == "gyroscope" else "accelerometer"
+    order = sum("kelvin_per_s" not in n and n != "half_gap" for n in curve.names)
+    shape = {1: "a straight line", 2: "a parabola", 3: "a curve of third order"}[order]
+    statement = (
+        f"The {name}'s zero follows the temperature from {low:.0f} to {high:.0f} °C by {shape}"
+        + (", and its rate of change" if "bias_per_kelvin_per_s" in curve.names else "")
+        + (", on two branches" if "half_gap" in curve.names else "")
+        + f": it runs through {_words(unit, curve.swing * size)} (x, y, z); "
+        f"{_words(unit, rest.std(axis=0))} rms stay of {_words(unit, raw.std(axis=0))}."
+    )
+    gap = branch_gap(pieces, rest)
+    if gap is not None:
+        statement += (
+            f" At one temperature heating and cooling differ by {_words(unit, gap[0])}: hysteresis, or a drift in "
+            "time, which one cycle does not tell."
+        )
+        parameters += [
+            EffectParameter(f"branch_difference_{axis}", float(g), float(s), unit)
+            for axis, g, s in zip(AXES, *gap, strict=True)
+        ]
+    confounded = ("accel-thermal-scale",) if sensor == "accelerometer" else ()
+    if confounded and pieces.n_poses == 1:
+        statement += " One orientation does not tell zero from scale, nor the fixture's own tilt across gravity."
+    share = float(np.clip(1.0 - (rest**2).sum() / (raw**2).sum(), 0.0, 1.0))
+    mean_size = float(np.sqrt(np.mean(size**2)))
+    held = HeldOut(DOMAIN[sensor], 1.0, (curve.held_after / curve.held_before) ** 2, curve.held_before * mean_size,
+                   curve.held_after * mean_size, unit)  # fmt: skip
+    return AcceptedEffect(
+        id=f"{'gyro' if sensor == 'gyroscope' else 'accel'}-thermal-bias",
+        statement=statement,
+        parameters=tuple(parameters),
+        p_adjusted=float(min(1.0, max(curve.p_value, 1e-300) * n_effects)),
+        delta_bic=curve.gain - curve.cost,
+        held_out=(held,),
+        confounded_with=confounded,
+        separating_experiment="repeat the cycle with the sensor turned over" if confounded else "",
+        model=_model("rest-curve", _series(pieces, sensor, size, unit)),
+        share=share,
+    )
+
+
+def _series(pieces: RestPieces, sensor: Sensor, size: FloatArray, unit: str) -> Mapping[str, Any]:
+    out: dict[str, Any] = {"time_s": pieces.time_s.tolist(), "value": (_about_poses(pieces, sensor) * size).T.tolist(),
+                           "unit": unit}  # fmt: skip
+    if pieces.temperature is not None:
+        out["temperature_degc"] = pieces.temperature.tolist()
+    return out
+
+
+def _model(variant: str, series: Mapping[str, Any]) -> MappingProxyType[str, Any]:
+    return MappingProxyType(
+        {"variant": variant, "shape": {}, "values": [], "applies_to_other_recordings": False, "curve": dict(series)}
+    )
+
+
+def _drift(pieces: RestPieces, sensor: Sensor) -> tuple[DriftCurve | None, float, bool]:
+    """The curve of zeros that change slowly, p of any slow change, and whether a walk alone does not make it.
+
+    ``None`` where they do not change slowly. A walk is what every sensor's noise becomes; a smooth drift is not.
+    """
+    parts = [pieces.readings(sensor, axis, []) for axis in range(3)]
+    together = ZeroReadings(
+        np.vstack([r.values for r in parts]), np.vstack([r.sigma for r in parts]), parts[0].time_s,
+        parts[0].length_s, parts[0].pose, parts[0].design, parts[0].direction,
+    )  # fmt: skip
+    found = examine(together)
+    if not found.kind:
+        return None, float(found.p_slow), False
+    columns = list(range(together.design.shape[1]))
+    curve = smooth_curve(found.process, columns, found.sigma, together.time_s[::2])
+    return curve, max(found.p_slow, 1e-300), found.drift_ratio > KIND_LIMIT
+
+
+def _drifting(
+    sensor: Sensor, curve: DriftCurve, raw: FloatArray, size: FloatArray, unit: str, p: float, n_effects: int
+) -> AcceptedEffect:
+    spans = curve.range * size
+    errors = [float(np.hypot(s[v.argmax()], s[v.argmin()])) for v, s in zip(curve.values, curve.sigma, strict=True)]
+    name = "gyro" if sensor == "gyroscope" else "accelerometer"
+    statement = (
+        f"The {name}'s zero drifts smoothly through {_words(unit, spans)} (x, y, z); no logged channel explains it."
+    )
+    if sensor == "accelerometer":
+        statement += " A support that settles does the same across gravity."
+    share = float(np.clip(((curve.rms * size) ** 2).sum() / max(float(raw.var(axis=0).sum()), 1e-300), 0.0, 1.0))
+    series = {"time_s": curve.time_s.tolist(), "value": (curve.values * size[:, None]).tolist(),
+              "sigma": (curve.sigma * size[:, None]).tolist(), "unit": unit}  # fmt: skip
+    return AcceptedEffect(
+        id=f"{'gyro' if sensor == 'gyroscope' else 'accel'}-hidden-drift",
+        statement=statement,
+        parameters=tuple(
+            EffectParameter(f"range_{axis}", float(r), e * float(s), unit)
+            for axis, r, e, s in zip(AXES, spans, errors, size, strict=True)
+        ),
+        p_adjusted=float(min(1.0, p * n_effects)),
+        delta_bic=float(max(-2.0 * np.log(p), 0.0)),
+        held_out=(),
+        separating_experiment="",
+        model=_model("rest-drift", series),
+        share=share,
+    )
+
+
+def _lines(
+    recording: Recording, pieces: RestPieces, model: LinearModel, alpha: float
+) -> tuple[DomainTest, AcceptedEffect | None]:
+    """Spectral lines of the pieces, their slow part taken off, and whether pieces are unlike in noise."""
+    assert recording.accelerometer is not None
+    t = recording.time_s
+
+    def quick(values: FloatArray, means: FloatArray) -> FloatArray:
+        slow = np.stack([np.interp(t, pieces.time_s, m) for m in means.T], axis=1)
+        return np.asarray(values - slow)
+
+    holds = tuple(Hold(k, a, b, a, b) for k, (a, b) in enumerate(pieces.spans))
+    force = quick(recording.accelerometer, pieces.force)
+    rate = None if recording.gyroscope is None or pieces.rate is None else quick(recording.gyroscope, pieces.rate)
+    samples = cast(Observations, _Samples(recording, t, force, rate, SimpleNamespace(holds=holds)))
+    test = test_within_static(samples, alpha)
+    S = [np.eye(3) if side is None else np.array(side["S"]) for side in (model.accelerometer, model.gyroscope)]
+    fitted = cast(Fit, SimpleNamespace(twin=SimpleNamespace(accel_S=S[0], gyro_S=S[1])))
+    effect = PeriodicInterference()
+    found = effect.find(Context(samples, fitted))
+    if found is None or found.p_value * len(catalogue()) >= alpha / 2.0:
+        return test, None
+    return test, AcceptedEffect(
+        id=effect.id, statement=found.statement, parameters=found.parameters,
+        p_adjusted=float(min(1.0, max(found.p_value, 1e-300) * len(catalogue()))), delta_bic=found.strength,
+        held_out=found.held_out, model=_model("", {}), share=found.share,
+    )  # fmt: skip
+
+
+def _agreeing(test: DomainTest) -> DomainTest:
+    return DomainTest(test.domain, test.chi2_per_dof, test.dof, test.p_value, False, Where(), test.rms, test.unit)

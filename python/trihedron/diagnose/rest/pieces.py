@@ -1,0 +1,154 @@
+"""A long log cut into still pieces, whatever its segmentation makes of a zero that drifts (docs/rest.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import gaussian_filter1d
+
+from trihedron.diagnose.zeros.process import FloatArray, ZeroReadings
+from trihedron.records import Recording
+
+N_PIECES = 80
+"""Pieces of a log: enough for a curve of third order on both branches of a temperature cycle, and quick."""
+FEWEST_PIECES = 24
+FEWEST_SAMPLES = 8
+"""Samples of half a piece below which its mean has no error of its own."""
+QUIET_QUANTILE, LOUD = 0.2, 4.0
+"""Variance of first differences over that of the quietest fifth from which a piece is taken as moving: noise of a part
+changes by a factor of two over a hundred kelvin."""
+TURNS_RAD = 0.02
+"""A piece whose halves point this far apart moves: a zero of 0.1 g that drifts through a log turns it by a tenth."""
+SAME_POSE_RAD = 0.12
+"""Pieces whose force points less than 7° apart hold one orientation: a drifting zero of 0.1 g turns it by less."""
+MOSTLY_STILL = 0.6
+"""Share of a log that must be still: in one that moves, what is slow is taken for still."""
+LEAST_SHARE, FEWEST_OF_POSE = 0.04, 4
+"""An orientation that fewer pieces hold is handling."""
+TEMPERATURE_WINDOW_S = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class RestPieces:
+    """Means over the halves of still pieces of a log, raw units: n = 2 per piece, in the order of time.
+
+    ``pose`` (n,) number of the orientation, ``piece`` (n,) of the piece, ``spans`` their sample ranges; ``force``,
+    ``rate`` (n, 3) means, ``force_sigma``, ``rate_sigma`` (3,) white noise of one sample, ``count`` (n,) samples of
+    every mean; ``temperature`` (n,) °C and ``temperature_rate`` (n,) K/s, where logged.
+    """
+
+    time_s: FloatArray
+    length_s: FloatArray
+    count: npt.NDArray[np.int64]
+    pose: npt.NDArray[np.int64]
+    piece: npt.NDArray[np.int64]
+    spans: tuple[tuple[int, int], ...]
+    force: FloatArray
+    force_sigma: FloatArray
+    rate: FloatArray | None
+    rate_sigma: FloatArray | None
+    temperature: FloatArray | None
+    temperature_rate: FloatArray | None
+
+    @property
+    def n_poses(self) -> int:
+        """Number of orientations."""
+        return int(self.pose.max()) + 1
+
+    def readings(self, sensor: str, axis: int, columns: list[FloatArray]) -> ZeroReadings:
+        """One axis as the process of zeros takes it: a zero for every orientation, then ``columns`` (n,) each."""
+        values, sigma = (self.force, self.force_sigma) if sensor == "accelerometer" else (self.rate, self.rate_sigma)
+        assert values is not None
+        assert sigma is not None
+        levels = [np.ones(len(self.time_s))]
+        levels += [(self.pose == k).astype(np.float64) for k in range(1, self.n_poses)]
+        return ZeroReadings(
+            values[None, :, axis], (sigma[axis] / np.sqrt(self.count))[None], self.time_s, self.length_s, self.piece,
+            np.column_stack([*levels, *columns]), np.ones((len(self.time_s), 1)),
+        )  # fmt: skip
+
+
+def rest_pieces(recording: Recording) -> RestPieces | None:
+    """The still pieces of a log, orientations that are hardly held left out; ``None`` where too little is still."""
+    assert recording.accelerometer is not None
+    n = recording.n_samples
+    half = max(n // (2 * N_PIECES), FEWEST_SAMPLES)
+    starts = np.arange(0, n - 2 * half + 1, 2 * half)
+    if len(starts) < FEWEST_PIECES:
+        return None
+    sides = [recording.accelerometer] + ([] if recording.gyroscope is None else [recording.gyroscope])
+    loud = np.zeros(len(starts), dtype=bool)
+    noise = []
+    for values in sides:
+        rough = np.array([np.nanvar(np.diff(values[a : a + 2 * half], axis=0), axis=0) / 2.0 for a in starts])
+        step = _at_least(np.zeros(3), values) ** 2
+        quiet = np.maximum(np.nanquantile(rough, QUIET_QUANTILE, axis=0), step)
+        limit = LOUD * np.maximum(quiet, 1e-300)
+        loud |= ~(rough <= limit).all(axis=1)
+        noise.append(np.sqrt(np.maximum(np.nanmedian(rough[~loud], axis=0), quiet) if (~loud).any() else quiet))
+    means = [np.array([[np.nanmean(v[a + k * half : a + (k + 1) * half], axis=0) for k in (0, 1)] for a in starts])
+             for v in sides]  # fmt: skip
+    up = means[0] / np.linalg.norm(means[0], axis=2, keepdims=True)
+    calm = ~loud & (np.linalg.norm(up[:, 1] - up[:, 0], axis=1) < TURNS_RAD)
+    still, means = starts[calm], [m[calm] for m in means]
+    if len(still) < max(FEWEST_PIECES, MOSTLY_STILL * len(starts)):
+        return None
+    pose = _orientations(means[0].mean(axis=1))
+    keep = pose >= 0
+    if keep.sum() < FEWEST_PIECES:
+        return None
+    still, pose = still[keep], pose[keep]
+    means = [m[keep].reshape(-1, 3) for m in means]
+    t = recording.time_s
+    middles = np.array([[t[a + k * half] + t[min(a + (k + 1) * half, n) - 1] for k in (0, 1)] for a in still]) / 2.0
+    heat = _logged(recording, still, half)
+    count = np.full(2 * len(still), half, dtype=np.int64)
+    return RestPieces(
+        middles.ravel(), count / recording.rate_hz, count, np.repeat(pose, 2),
+        np.repeat(np.arange(len(still)), 2), tuple((int(a), int(a) + 2 * half) for a in still),
+        means[0], _at_least(noise[0], recording.accelerometer), means[1] if len(means) > 1 else None,
+        _at_least(noise[1], recording.gyroscope) if len(means) > 1 else None,
+        None if heat is None else heat[0], None if heat is None else heat[1],
+    )  # fmt: skip
+
+
+def _at_least(sigma: FloatArray, values: FloatArray | None) -> FloatArray:
+    """Noise of a sample, not below that of a converter's step: a log that repeats one code is not free of noise."""
+    assert values is not None
+    step = np.array([np.diff(np.unique(np.round(c[np.isfinite(c)], 9))).min(initial=np.inf) for c in values.T])
+    return np.asarray(np.maximum(sigma, np.where(np.isfinite(step), step, 0.0) / np.sqrt(12.0)))
+
+
+def _logged(recording: Recording, starts: npt.NDArray[np.int64], half: int) -> tuple[FloatArray, FloatArray] | None:
+    logged = recording.temperature_degc
+    if logged is None or not np.isfinite(logged).any():
+        return None
+    t = recording.time_s
+    good = np.isfinite(logged)
+    filled = np.interp(t, t[good], logged[good])
+    # Its rate over a piece: steps of a tenth of a kelvin are gone, the branches are not.
+    width = max(TEMPERATURE_WINDOW_S * recording.rate_hz, float(half))
+    speed = np.gradient(gaussian_filter1d(filled, width, mode="nearest"), t)
+    spans = [(a + k * half, a + (k + 1) * half) for a in starts for k in (0, 1)]
+    return np.array([filled[a:b].mean() for a, b in spans]), np.array([speed[a:b].mean() for a, b in spans])
+
+
+def _orientations(force: FloatArray) -> npt.NDArray[np.int64]:
+    """(n,) number of the orientation of every piece, the most held first; -1 where it is handling."""
+    up = force / np.linalg.norm(force, axis=1, keepdims=True)
+    out = np.full(len(up), -1, dtype=np.int64)
+    found = 0
+    while (out < 0).any():
+        free = np.flatnonzero(out < 0)
+        near = np.arccos(np.clip(up[free] @ up[free].T, -1.0, 1.0)) < SAME_POSE_RAD
+        members = free[near[near.sum(axis=1).argmax()]]
+        # A zero that drifts smears an orientation: once more about the mean of those found.
+        centre = up[members].mean(axis=0)
+        members = free[np.arccos(np.clip(up[free] @ (centre / np.linalg.norm(centre)), -1.0, 1.0)) < SAME_POSE_RAD]
+        if len(members) < max(LEAST_SHARE * len(up), FEWEST_OF_POSE):
+            break
+        out[members] = found
+        found += 1
+    return out

@@ -1,0 +1,64 @@
+"""The numbers of the final model with error bars for what remains: scatter of the poses, misfit of the moves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from trihedron.diagnose.selection.model import StepwiseModel
+from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.solve import Fit, tune_noise
+from trihedron.diagnose.session.twin import stacked
+from trihedron.diagnose.zeros.of_session import (
+    SessionEvidence,
+    accel_evidence,
+    gyro_evidence,
+    with_accel_scatter,
+    with_gyro_scatter,
+)
+from trihedron.records.diagnosis import DomainTest
+
+SCATTERS = 0.01
+"""p-value from which poses scatter enough for their error bars, though too little for a name."""
+
+
+def final_numbers(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> Fit:
+    """The model fitted once more, poses as uncertain as their zeros scatter, moves as they miss (eq. 8.19).
+
+    What nothing explains counts with the size it shows: else the fit bends S and b to it and says small errors of both.
+    A healthy recording keeps its fit.
+    """
+    obs = model.obs
+    context = model.context
+    named = {one.effect.id for one in model.accepted}
+    left = {d.domain: d.chi2_per_dof for d in remaining if d.disagrees}
+    accel = None if "accel-zero-scatter" in named else accel_evidence(context)
+    if _scatters(accel):
+        assert accel is not None
+        obs = with_accel_scatter(obs, float(accel.evidence.scatter[0]), context.si_per_raw("accelerometer"))
+    elif "static-accel" in left:
+        obs = replace(obs, hold_force_sigma=obs.hold_force_sigma * np.sqrt(max(left["static-accel"], 1.0)))
+    gyro = None if "gyro-zero-scatter" in named else gyro_evidence(context)
+    if _scatters(gyro):
+        assert gyro is not None
+        obs = with_gyro_scatter(obs, gyro.evidence.scatter, context.si_per_raw("gyroscope"))
+    elif "static-gyro" in left and obs.hold_rate_sigma is not None:
+        wider: FloatArray = obs.hold_rate_sigma * np.sqrt(max(left["static-gyro"], 1.0))
+        obs = replace(obs, hold_rate_sigma=wider)
+    obs = replace(
+        obs,
+        moves_inflation=max(obs.moves_inflation, float(np.sqrt(max(left.get("moves", 1.0), 1.0)))),
+        dynamics_inflation=max(obs.dynamics_inflation, float(np.sqrt(max(left.get("dynamics", 1.0), 1.0)))),
+    )
+    same = obs.hold_force_sigma is model.obs.hold_force_sigma and obs.hold_rate_sigma is model.obs.hold_rate_sigma
+    if same and (obs.moves_inflation, obs.dynamics_inflation) == (
+        model.obs.moves_inflation,
+        model.obs.dynamics_inflation,
+    ):
+        return model.fitted
+    return tune_noise(obs, model.fitted.twin, stacked(model.distortions), model.prior)
+
+
+def _scatters(found: SessionEvidence | None) -> bool:
+    return found is not None and found.evidence.p_scatter_spared < SCATTERS

@@ -1,0 +1,208 @@
+"""An accelerometer held against known motion: its 12 numbers, where it sits (lever arm), and which way is up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.estimate.reference.coloured import Solution, solve
+from trihedron.estimate.reference.together import Grid, Reference
+from trihedron.estimate.reference.windows import Windows
+from trihedron.sensor_model import other_form, other_form_jacobian
+
+FloatArray = npt.NDArray[np.float64]
+TURNS = 4
+"""Steps of the direction of gravity: it starts within a degree or two, and each squares the error."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForceFit:
+    """``f_reference = S a' + b`` with ``covariance`` (12, 12).
+
+    ``up`` (3,): unit vector of the specific force at rest in the reference's world, with its covariance (3, 3); ``arm``
+    (3,) [m] from the reference's origin to the accelerometer, in the reference's body.
+    """
+
+    S: FloatArray
+    b: FloatArray
+    covariance: FloatArray
+    up: FloatArray | None
+    up_covariance: FloatArray | None
+    arm: FloatArray | None
+    arm_covariance: FloatArray | None
+    solution: Solution
+
+
+def fit_accelerometer(
+    grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, gravity: float, handedness: float
+) -> ForceFit | None:
+    """Fit by windows; ``None`` where the reference knows no force. ``handedness`` is the sign of the gyro's det A.
+
+    With attitude alone the acceleration of the body is unknown: the second derivative of a path that stays in the room
+    has little power where gravity turns slowly, and the colour of what is left says how little.
+
+    Raises
+    ------
+    ValueError
+        When too few windows are left, or the reference's frames are mirrored.
+    """
+    if grid.accelerometer is None:
+        return None
+    time = grid.time_s * (1.0 + rate) + offset_s
+    motion = reference.motion
+    if motion.attitude is not None and motion.position is not None:
+        return _along_path(grid, reference, windows, time, gravity, handedness)
+    if motion.attitude is not None:
+        return _under_gravity(grid, reference, windows, time, gravity, handedness)
+    if motion.specific_force is not None:
+        return _in_body(grid, reference, windows, time, handedness)
+    return None
+
+
+def _in_body(grid: Grid, reference: Reference, windows: Windows, time: FloatArray, handedness: float) -> ForceFit:
+    """Beside another unit: ``S a' + b = f + dω/dt x ℓ + ω x (ω x ℓ)``, all in the other's body."""
+    assert grid.accelerometer is not None
+    signals = windows.of(windows.weight, np.column_stack([grid.accelerometer, np.ones(len(time))]))
+    k = len(windows.start)
+    design = np.zeros((k, 3, 15))
+    for i in range(3):
+        design[:, i, 3 * i : 3 * i + 3] = signals[:, :3]
+        design[:, i, 9 + i] = signals[:, 3]
+    omega = _cross(reference.rate(time))
+    design[:, :, 12:] = -(windows.of(windows.weight, omega @ omega) - windows.of(windows.slope, omega))
+    target = windows.of(windows.weight, reference.specific_force(time))
+    size = _turning(windows, reference, time)
+    solution = solve(design, target, windows.start // windows.spacing, size)
+    S, b = solution.theta[:9].reshape(3, 3), solution.theta[9:12]
+    _refuse_mirror(reference, float(np.linalg.det(S)), handedness)
+    return ForceFit(
+        S, b, solution.covariance[:12, :12], None, None, solution.theta[12:], solution.covariance[12:, 12:], solution
+    )
+
+
+def _along_path(
+    grid: Grid, reference: Reference, windows: Windows, time: FloatArray, gravity: float, handedness: float
+) -> ForceFit:
+    """``C (S a' + b) = d²(p + C ℓ)/dt² + g u`` in the reference's world."""
+    assert grid.accelerometer is not None
+    C = reference.attitude(time)
+    signals = np.column_stack([grid.accelerometer, np.ones(len(time))])
+    moments = windows.of(windows.weight, C[:, :, :, None] * signals[:, None, None, :])
+    k = len(windows.start)
+    base = np.concatenate([moments[:, :, :, :3].reshape(k, 3, 9), moments[:, :, :, 3]], axis=2)
+    base = np.concatenate([base, -windows.of(windows.curvature, C)], axis=2)
+    path = windows.of(windows.curvature, reference.position(time))
+    up = _first_up(base, path, gravity)
+    size, noise = _turning(windows, reference, time), None
+    for _ in range(TURNS):
+        across = _across(up)
+        design = np.concatenate([base, np.broadcast_to(-gravity * across, (k, 3, 2))], axis=2)
+        solution = solve(design, path + gravity * up, windows.start // windows.spacing, size, noise)
+        noise = solution.model
+        up = up + across @ solution.theta[15:]
+        up /= np.linalg.norm(up)
+    S, b = solution.theta[:9].reshape(3, 3), solution.theta[9:12]
+    _refuse_mirror(reference, float(np.linalg.det(S)), handedness)
+    up_covariance = across @ solution.covariance[15:, 15:] @ across.T
+    arm, arm_covariance = solution.theta[12:15], solution.covariance[12:15, 12:15]
+    return ForceFit(S, b, solution.covariance[:12, :12], up, up_covariance, arm, arm_covariance, solution)
+
+
+def _turning(windows: Windows, reference: Reference, time: FloatArray) -> FloatArray:
+    """(k,) mean rate in each window: a hand that turns also pushes."""
+    return np.asarray(np.linalg.norm(windows.of(windows.weight, reference.rate(time)), axis=1), dtype=np.float64)
+
+
+def _first_up(base: FloatArray, path: FloatArray, gravity: float) -> FloatArray:
+    """The direction that is left of readings turned into the world when the path's acceleration is taken off."""
+    k, _, n = base.shape
+    scale = np.sqrt(np.mean(base**2, axis=(0, 1))) + 1e-300
+    X = np.column_stack([(base / scale).reshape(3 * k, n), np.tile(-gravity * np.eye(3), (k, 1))])
+    u = np.linalg.lstsq(X, path.ravel(), rcond=None)[0][n:]
+    return np.asarray(u / max(float(np.linalg.norm(u)), 1e-300))
+
+
+def _under_gravity(
+    grid: Grid, reference: Reference, windows: Windows, time: FloatArray, gravity: float, handedness: float
+) -> ForceFit:
+    """``a' = M Cᵀ g u + c``: the acceleration of the body is unknown, and is noise.
+
+    The readings are what is predicted: with the noise among the regressors M would be too small.
+    """
+    assert grid.accelerometer is not None
+    readings = windows.of(windows.weight, grid.accelerometer)
+    back = gravity * np.swapaxes(windows.of(windows.weight, reference.attitude(time)), 1, 2)
+    k = len(windows.start)
+    up, M = _gravity_seen(readings, back, handedness)
+    design = np.zeros((k, 3, 14))
+    size, noise = _turning(windows, reference, time), None
+    for _ in range(TURNS):
+        across = _across(up)
+        seen = back @ up
+        for i in range(3):
+            design[:, i, 3 * i : 3 * i + 3] = seen
+            design[:, i, 9 + i] = 1.0
+        design[:, :, 12:] = M @ back @ across
+        solution = solve(design, readings, windows.start // windows.spacing, size, noise)
+        noise = solution.model
+        M = solution.theta[:9].reshape(3, 3)
+        up = up + across @ solution.theta[12:]
+        up /= np.linalg.norm(up)
+        # The change of u was taken with M: it is in u now, and no longer wanted in the prediction.
+    S, b = other_form(M, solution.theta[9:12])
+    jacobian = other_form_jacobian(M, solution.theta[9:12])
+    covariance = jacobian @ solution.covariance[:12, :12] @ jacobian.T
+    scale = float(np.mean(np.linalg.svd(S, compute_uv=False)))
+    in_si = replace(solution, residual=solution.residual * scale, rms_held_out=solution.rms_held_out * scale)
+    return ForceFit(S, b, covariance, up, across @ solution.covariance[12:, 12:] @ across.T, None, None, in_si)
+
+
+def _gravity_seen(readings: FloatArray, back: FloatArray, handedness: float) -> tuple[FloatArray, FloatArray]:
+    """u and M to begin with: the best of an axis of the world and of what the readings alone say.
+
+    Each reading is a linear form of Cᵀ of rank one in (M, u), which tells both only where the motion tilts enough.
+    """
+    k = len(readings)
+    X = np.column_stack([back.reshape(k, 9), np.ones(k)])
+    K = np.linalg.lstsq(X, readings, rcond=None)[0][:9].T.reshape(9, 3)
+    best: tuple[float, FloatArray, FloatArray] | None = None
+    for start in (np.linalg.svd(K, full_matrices=False)[2][0], *np.eye(3)[::-1]):
+        u = np.asarray(start, dtype=np.float64)
+        for _ in range(TURNS):
+            seen = np.column_stack([back @ u, np.ones(k)])
+            M = np.asarray(np.linalg.lstsq(seen, readings, rcond=None)[0][:3].T, dtype=np.float64)
+            across = _across(u)
+            slope = (M @ back @ across).reshape(3 * k, 2)
+            rest = readings - seen @ np.vstack([M.T, np.mean(readings - back @ u @ M.T, axis=0)])
+            u = u + across @ np.linalg.lstsq(slope, rest.ravel(), rcond=None)[0]
+            u /= np.linalg.norm(u)
+        misfit = float(np.median(np.linalg.norm(rest, axis=1)))
+        if best is None or misfit < 0.98 * best[0]:
+            best = misfit, u, M
+    assert best is not None
+    _, u, M = best
+    # The norm of gravity does not tell up from down: the handedness of the gyro's axes does.
+    sign = 1.0 if np.linalg.det(M) * handedness > 0.0 else -1.0
+    return sign * u, sign * M
+
+
+def _refuse_mirror(reference: Reference, determinant: float, handedness: float) -> None:
+    if determinant * handedness < 0.0:
+        raise ValueError(
+            f"{reference.motion.source}: the reference is mirrored against the log: its turns and its forces are those "
+            "of frames of opposite handedness. Turn the sign of one axis of the reference (position and attitude), or "
+            "of one sensor's axis in the log."
+        )
+
+
+def _across(up: FloatArray) -> FloatArray:
+    """(3, 2) unit vectors across a direction."""
+    return np.asarray(np.linalg.svd(up[None, :])[2][1:].T, dtype=np.float64)
+
+
+def _cross(v: FloatArray) -> FloatArray:
+    out = np.zeros((len(v), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -v[:, 2], v[:, 1], -v[:, 0]
+    return out - np.swapaxes(out, 1, 2)

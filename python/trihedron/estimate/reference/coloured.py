@@ -1,0 +1,211 @@
+"""Least squares under coloured residuals: several noise models, the one whose answers repeat best from block to block.
+
+A tracker's noise is blue, a table's wobble has lines, a zero wanders, and all of it grows with motion. A model that is
+wrong about one of these can make an answer worse than none; blocks of time left out in turn show which one does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
+
+ORDERS = (0, 2, 12)
+"""Orders of the autoregression tried: none, one slope or line, wobble of some lines (two poles each)."""
+ROWS_PER_POLE = 15
+"""An autoregression of order p is fitted to 15 p rows of an axis or more: p lags cost 1/15 of its variance."""
+OUTLIER = 7.0
+"""Residuals beyond 7 robust sigmas, and their neighbours, are left out: a normal one is that far once in 4e11."""
+BLOCKS = 16
+"""Blocks of time that are left out in turn. With 16 the pooled ratio of 12 parameters scatters by a tenth."""
+MOST_OUT = 0.2
+"""Where more than this share would be left out the scale is wrong, not the rows."""
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Whether the noise grows with the size of what is predicted, and the order of its autoregression."""
+
+    grows: bool
+    order: int
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """θ (p,), covariance (p, p), residuals (k, 3) as they are, rows used (k,), and rms of rows left out in turn."""
+
+    theta: FloatArray
+    covariance: FloatArray
+    residual: FloatArray
+    is_used: Mask
+    widened: float
+    rms_held_out: float
+    model: NoiseModel
+
+
+def solve(
+    design: FloatArray, target: FloatArray, index: IntArray, size: FloatArray, model: NoiseModel | None = None
+) -> Solution:
+    """θ of ``target (k, 3) = design (k, 3, p) θ``.
+
+    ``index`` (k,) counts windows, gaps included; ``size`` (k,) is the motion with which noise may grow; ``model`` the
+    noise where it was settled before.
+
+    Raises
+    ------
+    ValueError
+        When there are fewer rows than parameters need.
+    """
+    k, _, p = design.shape
+    if 3 * k < 2 * p + 30:
+        raise ValueError("too little motion is known beside the log: fewer windows than the parameters need.")
+    scale = np.sqrt(np.mean(design**2, axis=(0, 1)))
+    scale[scale == 0.0] = 1.0
+    X = design / scale
+    tried = [NoiseModel(grows, order) for grows in (False, True) for order in ORDERS] if model is None else [model]
+    best: tuple[float, Solution] | None = None
+    for one in tried:
+        if one.order * ROWS_PER_POLE > k:
+            continue
+        spread, solution = _solve(X, target, index, size, one)
+        if best is None or spread < best[0]:
+            best = spread, solution
+    assert best is not None
+    found = best[1]
+    return Solution(
+        found.theta / scale, found.covariance / np.outer(scale, scale), found.residual, found.is_used, found.widened,
+        found.rms_held_out, found.model,
+    )  # fmt: skip
+
+
+def _solve(
+    X: FloatArray, target: FloatArray, index: IntArray, size: FloatArray, model: NoiseModel
+) -> tuple[float, Solution]:
+    """The answer under one noise model, and how far it scatters from block to block (mean log variance)."""
+    k, _, p = X.shape
+    used = np.ones(k, dtype=bool)
+    weight = np.ones(k)
+    theta = _least_squares(X.reshape(-1, p), target.ravel())
+    for _ in range(2):
+        r = target - X @ theta
+        weight = _weights(r, size, used) if model.grows else np.ones(k)
+        length = np.linalg.norm(r * weight[:, None], axis=1)
+        used = _without_outliers(length)
+        rows = np.repeat(used, 3)
+        w = np.repeat(weight, 3)[rows]
+        theta = _least_squares(X.reshape(-1, p)[rows] * w[:, None], target.ravel()[rows] * w)
+    Xw, yw = X * weight[:, None, None], target * weight[:, None]
+    for _ in range(2 if model.order else 1):
+        r = yw - Xw @ theta
+        filters = [_autoregression(r[:, axis], index, used, model.order) for axis in range(3)]
+        Z, y, at = _whitened(Xw, yw, index, used, filters)
+        theta = _least_squares(Z, y)
+    left = y - Z @ theta
+    variance = float(left @ left) / max(len(left) - p - 3 * model.order, 1)
+    inverse = np.linalg.pinv(Z.T @ Z, hermitian=True)
+    jackknife, held_out = _by_blocks(X, target, used, Z, y, at, theta)
+    predicted = variance * np.diag(inverse)
+    is_known = (predicted > 0.0) & (jackknife > 0.0)
+    # Each number by its own blocks and by those of all: sixteen blocks tell a variance to a third.
+    ratio = np.ones(p)
+    ratio[is_known] = jackknife[is_known] / predicted[is_known]
+    wide = np.sqrt(np.maximum(0.5 * (ratio + np.median(ratio)), 1.0))
+    widened = float(np.median(wide))
+    spread = float(np.mean(np.log(np.maximum(jackknife, predicted)[is_known]))) if np.any(is_known) else np.inf
+    residual = target - X @ theta
+    return spread, Solution(theta, variance * inverse * np.outer(wide, wide), residual, used, widened, held_out, model)
+
+
+def _least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
+    normal = X.T @ X
+    theta: FloatArray = np.linalg.pinv(normal, rcond=1e-14, hermitian=True) @ (X.T @ y)
+    return theta
+
+
+def _weights(r: FloatArray, size: FloatArray, used: Mask) -> FloatArray:
+    """One over the scale of the noise at each row: its square grows with the square of the motion."""
+    square = np.sum(r**2, axis=1)
+    order = np.argsort(size[used])
+    parts = np.array_split(np.flatnonzero(used)[order], 8)
+    # Medians of squares stand a third below their mean alike in every part.
+    level = np.array([np.median(square[part]) for part in parts])
+    at = np.array([np.mean(size[part] ** 2) for part in parts])
+    slope = max(float(np.polyfit(at, level, 1)[0]), 0.0) if np.ptp(at) > 0.0 else 0.0
+    floor = max(float(np.median(np.maximum(level - slope * at, 0.0))), 0.05 * float(level.mean()), 1e-300)
+    scale = np.sqrt(floor + slope * size**2)
+    return np.asarray(np.median(scale) / scale, dtype=np.float64)
+
+
+def _without_outliers(length: FloatArray) -> Mask:
+    limit = OUTLIER * float(np.median(length)) / 1.538  # the median length of three standard normals
+    odd = length > limit
+    if odd.mean() > MOST_OUT:
+        return np.ones(len(length), dtype=bool)
+    near = odd.copy()
+    near[1:] |= odd[:-1]
+    near[:-1] |= odd[1:]
+    return ~near
+
+
+def _autoregression(r: FloatArray, index: IntArray, used: Mask, order: int) -> FloatArray:
+    """Coefficients (order + 1,): one first, then minus the lags', and all over the innovation's sigma."""
+    rows = _with_past(index, used, order)
+    if order == 0 or len(rows) < 3 * order:
+        return np.array([1.0 / max(float(np.sqrt(np.mean(r[used] ** 2))), 1e-300)])
+    past = np.column_stack([r[rows - lag] for lag in range(1, order + 1)])
+    phi = _least_squares(past, r[rows])
+    sigma = float(np.sqrt(np.sum((r[rows] - past @ phi) ** 2) / max(len(rows) - order, 1)))
+    return np.concatenate([[1.0], -phi]) / max(sigma, 1e-300)
+
+
+def _with_past(index: IntArray, used: Mask, order: int) -> IntArray:
+    """Rows whose ``order`` predecessors are all there, without a gap between."""
+    rows = np.arange(order, len(index))
+    near = index[rows] - index[rows - order] == order
+    bad = np.concatenate([[0], np.cumsum(~used)])
+    return np.asarray(rows[near & (bad[rows + 1] == bad[rows - order])], dtype=np.int64)
+
+
+def _whitened(
+    X: FloatArray, y: FloatArray, index: IntArray, used: Mask, filters: list[FloatArray]
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    Z, z, rows_of = [], [], []
+    for axis, f in enumerate(filters):
+        rows = _with_past(index, used, len(f) - 1)
+        Z.append(sum(c * X[rows - lag, axis] for lag, c in enumerate(f)))
+        z.append(sum(c * y[rows - lag, axis] for lag, c in enumerate(f)))
+        rows_of.append(rows)
+    return np.concatenate(Z), np.concatenate(z), np.concatenate(rows_of)
+
+
+def _by_blocks(
+    X: FloatArray, target: FloatArray, used: Mask, Z: FloatArray, y: FloatArray, rows: IntArray, theta: FloatArray
+) -> tuple[FloatArray, float]:
+    """Jackknife variances (p,) of the answers without each block of time; rms of what is left out, as it was."""
+    k = len(X)
+    block = np.minimum(np.arange(k) * BLOCKS // k, BLOCKS - 1)
+    normal, moment = Z.T @ Z, Z.T @ y
+    moved, error, n = [], 0.0, 0
+    for one in range(BLOCKS):
+        out = block[rows] == one
+        if not np.any(out):
+            continue
+        without = normal - Z[out].T @ Z[out]
+        if np.linalg.cond(without) > 1e12:
+            continue
+        other = np.linalg.solve(without, moment - Z[out].T @ y[out])
+        moved.append(other - theta)
+        seen = used & (block == one)
+        error += float(np.sum((target[seen] - X[seen] @ other) ** 2))
+        n += 3 * int(seen.sum())
+    if len(moved) < 4:
+        return np.zeros(X.shape[2]), float("nan")
+    d = np.array(moved)
+    d -= d.mean(axis=0)
+    m = len(d)
+    return np.asarray((m - 1) / m * np.sum(d**2, axis=0)), float(np.sqrt(error / max(n, 1)))

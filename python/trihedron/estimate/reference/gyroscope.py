@@ -1,0 +1,130 @@
+"""A gyro held against known attitude or rate: its 12 numbers, the clock, and the effects that a reference shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.estimate.reference.coloured import NoiseModel, Solution, solve
+from trihedron.estimate.reference.together import Grid, Reference
+from trihedron.estimate.reference.windows import Windows
+
+FloatArray = npt.NDArray[np.float64]
+TURNS = 6
+"""Gauss-Newton steps of the clock: from a sample off, three reach a microsecond."""
+
+
+@dataclass(frozen=True, eq=False)
+class GyroFit:
+    """θ = A (3, 3) row by row, a (3), clock offset at ``middle_s`` and rate, then effects; ``offset_s`` is that at
+    zero; ``size`` (k,) the reference's rate in each window."""
+
+    A: FloatArray
+    a: FloatArray
+    offset_s: float
+    rate: float
+    solution: Solution
+    is_clock_free: bool
+    has_rate: bool
+    middle_s: float
+    size: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Columns beside the linear ones: signals (n, q) on the grid and the directions (q, 3) in which they act."""
+
+    values: FloatArray
+    directions: FloatArray
+
+
+def fit_gyroscope(
+    grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, *,
+    clock: int = 2, extra: Signals | None = None, settled_noise: NoiseModel | None = None,
+) -> GyroFit:  # fmt: skip
+    """``ω_reference(t (1 + ε) + τ) = A w' + a`` by windows; ``clock`` 0 holds τ and ε, 1 frees τ, 2 both."""
+    middle = float(np.mean(grid.time_s[windows.middle]))
+    n_clock = clock
+    noise = settled_noise
+    solution: Solution | None = None
+    for _ in range(TURNS if clock else 1):
+        target, design = _rows(grid, reference, windows, offset_s, rate, extra)
+        if n_clock:
+            theta = _quick(target, design) if solution is None else solution.theta[: design.shape[2]]
+            half = 0.25 * grid.step_s
+            slope = [
+                t - d @ theta
+                for t, d in (
+                    _rows(grid, reference, windows, offset_s + side * half, rate, extra) for side in (1.0, -1.0)
+                )
+            ]
+            by_offset = -(slope[0] - slope[1]) / (2.0 * half)
+            columns = [by_offset]
+            if n_clock == 2:
+                columns.append(by_offset * (grid.time_s[windows.middle] - middle)[:, None])
+            design = np.concatenate([design, np.stack(columns, axis=2)], axis=2)
+        size = np.linalg.norm(target, axis=1)
+        solution = solve(design, target, windows.start // windows.spacing, size, noise)
+        noise = solution.model
+        if not n_clock:
+            break
+        moved = solution.theta[-n_clock:]
+        rate_change = float(moved[1]) if n_clock == 2 else 0.0
+        # Never further than a correlation leaves open.
+        change = float(np.clip(moved[0], -0.1, 0.1))
+        offset_s += change - rate_change * middle
+        rate += rate_change
+        if abs(change) < 1e-7 and abs(rate_change) * (grid.time_s[-1] - grid.time_s[0]) < 1e-7:
+            break
+    assert solution is not None
+    A, a = solution.theta[:9].reshape(3, 3), solution.theta[9:12]
+    return GyroFit(A, a, offset_s, rate, solution, clock > 0, clock > 1, middle, size)
+
+
+def _quick(target: FloatArray, design: FloatArray) -> FloatArray:
+    p = design.shape[2]
+    scale = np.sqrt(np.mean(design**2, axis=(0, 1))) + 1e-300
+    theta: FloatArray = np.linalg.lstsq((design / scale).reshape(-1, p), target.ravel(), rcond=None)[0]
+    return np.asarray(theta / scale)
+
+
+def _rows(
+    grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, extra: Signals | None
+) -> tuple[FloatArray, FloatArray]:
+    """Target (k, 3) and design (k, 3, 12 + q): A row by row, a, then the extra columns."""
+    time = grid.time_s * (1.0 + rate) + offset_s
+    signals = np.column_stack([grid.gyroscope, np.ones(len(time))])
+    if extra is not None:
+        signals = np.column_stack([signals, extra.values])
+    k, q = len(windows.start), signals.shape[1]
+    if reference.motion.attitude is None:
+        # The area of a window is one: averages of both.
+        target = windows.of(windows.weight, reference.rate(time)) * (1.0 + rate)
+        mean = windows.of(windows.weight, signals)
+        per = np.zeros((k, 3, 3, q))
+        for i in range(3):
+            per[:, i, i, :] = mean
+    else:
+        C = reference.attitude(time)
+        back = np.swapaxes(C[windows.middle], 1, 2)
+        target = _vector(-back @ windows.of(windows.slope, C))
+        moments = windows.of(windows.weight, C[:, :, :, None] * signals[:, None, None, :])
+        turned = np.einsum("kab,kbcq->kacq", back, moments)
+        # vee of the skew part of R [e]x is ½ (tr R - Rᵀ) e.
+        trace = np.einsum("kaaq->kq", turned)
+        per = 0.5 * (np.eye(3)[None, :, :, None] * trace[:, None, None, :] - np.swapaxes(turned, 1, 2))
+    design = np.zeros((k, 3, 12 + max(q - 4, 0)))
+    # A row i, column j: component i of the rate by signal j.
+    design[:, :, :9] = per[:, :, :, :3].reshape(k, 3, 9)
+    design[:, :, 9:12] = per[:, :, :, 3]
+    if extra is not None:
+        design[:, :, 12:] = np.einsum("kriq,qi->krq", per[:, :, :, 4:], extra.directions)
+    return target, design
+
+
+def _vector(D: FloatArray) -> FloatArray:
+    """(k, 3) axial vector of the skew part of (k, 3, 3)."""
+    out = 0.5 * np.stack([D[:, 2, 1] - D[:, 1, 2], D[:, 0, 2] - D[:, 2, 0], D[:, 1, 0] - D[:, 0, 1]], axis=1)
+    return np.asarray(out, dtype=np.float64)

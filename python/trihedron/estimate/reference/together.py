@@ -1,0 +1,120 @@
+"""Log and reference on one even grid: the log's own clock, the reference read at ``(1 + ε) t + τ``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from trihedron.records import Recording
+from trihedron.records.reference import ReferenceMotion
+
+FloatArray = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+LONGEST_GAP = 3.5
+"""Rows further apart than this many usual steps are a gap: a cubic over three steps still follows a hand (0.03 s)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The log on even times: ``time_s`` (n,), raw ``gyroscope`` and ``accelerometer`` (n, 3), where ``is_valid``."""
+
+    time_s: FloatArray
+    step_s: float
+    gyroscope: FloatArray
+    accelerometer: FloatArray | None
+    is_valid: Mask
+
+
+def grid_of(recording: Recording) -> Grid:
+    """The log at even times of its own rate, by cubic interpolation; within gaps it is not valid.
+
+    Raises
+    ------
+    ValueError
+        When there is no gyro.
+    """
+    if recording.gyroscope is None:
+        raise ValueError(f"{recording.source}: a reference is held against the gyro, and this log has none.")
+    recording = recording.with_distinct_stamps()
+    gyroscope = recording.gyroscope
+    assert gyroscope is not None
+    readings = gyroscope if recording.accelerometer is None else np.hstack([gyroscope, recording.accelerometer])
+    is_there = np.all(np.isfinite(readings), axis=1)
+    stamps = recording.time_s[is_there]
+    step = 1.0 / recording.rate_hz
+    n = int((stamps[-1] - stamps[0]) / step) + 1
+    time = stamps[0] + step * np.arange(n)
+    values = CubicSpline(stamps, readings[is_there])(time)
+    accelerometer = None if recording.accelerometer is None else values[:, 3:]
+    return Grid(time, step, values[:, :3], accelerometer, within(stamps, time, step))
+
+
+def within(stamps: FloatArray, time: FloatArray, step: float) -> Mask:
+    """Whether times (n,) lie among stamps (m,) that are no more than ``LONGEST_GAP`` steps apart there."""
+    after = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
+    is_close = stamps[after] - stamps[after - 1] <= LONGEST_GAP * step
+    return np.asarray(is_close & (time >= stamps[0]) & (time <= stamps[-1]), dtype=bool)
+
+
+class Reference:
+    """A reference as functions of its own time: splines of what it knows."""
+
+    def __init__(self, motion: ReferenceMotion) -> None:
+        self.motion = motion
+        t = motion.time_s
+        self.step_s = float(np.median(np.diff(t)))
+        self._attitude: CubicSpline | None = None
+        if motion.attitude is not None:
+            q = Rotation.from_matrix(motion.attitude).as_quat()
+            flips = np.cumprod(np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0))
+            q[1:] *= flips[:, None]
+            self._attitude = CubicSpline(t, q)
+        self._rate = None if motion.rate is None or motion.is_stepwise else CubicSpline(t, motion.rate)
+        self._position = None if motion.position is None else CubicSpline(t, motion.position)
+        self._force = None if motion.specific_force is None else CubicSpline(t, motion.specific_force)
+
+    def covers(self, time: FloatArray) -> Mask:
+        """Whether the reference has rows about these of its own times (n,)."""
+        if self.motion.is_stepwise:
+            return np.asarray((time >= self.motion.time_s[0]) & (time <= self.motion.time_s[-1]), dtype=bool)
+        return within(self.motion.time_s, time, self.step_s)
+
+    def attitude(self, time: FloatArray) -> FloatArray:
+        """(n, 3, 3) body → world."""
+        assert self._attitude is not None
+        return np.asarray(Rotation.from_quat(self._attitude(self._clip(time))).as_matrix())
+
+    def rate(self, time: FloatArray) -> FloatArray:
+        """(n, 3) [rad/s] in the body; of an attitude its derivative, noisy as it is."""
+        time = self._clip(time)
+        if self.motion.is_stepwise:
+            assert self.motion.rate is not None
+            row = np.clip(np.searchsorted(self.motion.time_s, time, side="right") - 1, 0, len(self.motion.time_s) - 1)
+            return self.motion.rate[row]
+        if self._rate is not None:
+            return np.asarray(self._rate(time))
+        assert self._attitude is not None
+        q, dq = self._attitude(time), self._attitude(time, 1)
+        norm = np.linalg.norm(q, axis=1, keepdims=True)
+        q, dq = q / norm, dq / norm
+        v, w, dv, dw = q[:, :3], q[:, 3:], dq[:, :3], dq[:, 3:]
+        # ω = 2 vec(q* q̇) in the body.
+        return np.asarray(2.0 * (w * dv - dw * v - np.cross(v, dv)))
+
+    def position(self, time: FloatArray) -> FloatArray:
+        """(n, 3) [m] in the world."""
+        assert self._position is not None
+        return np.asarray(self._position(self._clip(time)))
+
+    def specific_force(self, time: FloatArray) -> FloatArray:
+        """(n, 3) [m/s²] in the body."""
+        assert self._force is not None
+        return np.asarray(self._force(self._clip(time)))
+
+    def _clip(self, time: FloatArray) -> FloatArray:
+        return np.clip(time, self.motion.time_s[0], self.motion.time_s[-1])

@@ -1,0 +1,173 @@
+r"""Standard deviations between sessions with intervals that hold for few of them (docs/many-recordings.md).
+
+The model of one parameter: ``y_ij = μ + d_i + u_ij + e_ij``, ``d`` of the group (day, device) with variance σ_d²,
+``u`` of the session with σ_u², ``e`` the session's own error with known variance. The point is the restricted maximum
+of likelihood. The interval inverts the weighted sum of squares
+
+    Q(σ²) = Σ w_ij (y_ij - ȳ_i)²,   w = 1/(σ² + v_ij),   Q(σ_u²) ~ χ²_ν                                        (1)
+
+which is exact for any number of sessions (Hartung and Knapp 2005; Viechtbauer 2007). Between groups the variance of a
+group's mean depends on σ_u, which is not known: (1) is averaged over what (1) says of σ_u (a generalised interval).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize_scalar
+from scipy.stats import chi2
+from scipy.stats import t as student
+
+from trihedron.records.sessions import Spread
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+LEVEL = 0.95
+QUANTILES = 60
+"""Points of the distribution of σ_u over which an interval of σ_d is averaged: twice as many move its ends by less
+than 1 %."""
+BISECTIONS = 60
+"""Halvings of an interval of seven decades: the result is exact to rounding."""
+
+
+@dataclass(frozen=True)
+class Mean:
+    """``value`` with its standard error, and half the width of its interval at :data:`LEVEL`."""
+
+    value: float
+    std: float
+    half_width: float
+
+
+def spread_within(values: FloatArray, variances: FloatArray, groups: Sequence[object]) -> Spread | None:
+    """σ_u of sessions (n,) about the mean of their group; ``None`` where no group holds two.
+
+    ``variances`` (n,) are those of the sessions' own errors.
+    """
+    members = _members(groups)
+    dof = sum(len(group) - 1 for group in members)
+    if dof < 1:
+        return None
+    return _spread(values, variances, members, dof)
+
+
+def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[object]) -> Spread | None:
+    """σ_d of groups about their mean; ``None`` for a single group or where no group holds two sessions.
+
+    With one session a group, what differs from group to group and from session to session is one number: that of
+    :func:`spread_within` with all sessions in one group.
+    """
+    members = _members(groups)
+    dof_within = sum(len(group) - 1 for group in members)
+    if len(members) < 2 or dof_within < 1:
+        return None
+    within = _spread(values, variances, members, dof_within)
+    dof = len(members) - 1
+    one_group = [np.arange(len(members))]
+    points = (np.arange(QUANTILES) + 0.5) / QUANTILES
+    inner = _solved(values, variances, members, np.asarray(chi2.isf(points, dof_within)))
+    targets = np.asarray(chi2.isf(points, dof))
+    draws = [_solved(*_group_means(values, variances, members, s2), one_group, targets) for s2 in inner]
+    ends = np.sqrt(np.quantile(np.concatenate(draws), [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0]))
+    means, variance = _group_means(values, variances, members, within.sd**2)
+    point = _restricted(means, variance, one_group)
+    return Spread(float(np.clip(point, ends[0], ends[1])), float(ends[0]), float(ends[1]), dof)
+
+
+def common_mean(
+    values: FloatArray, variances: FloatArray, groups: Sequence[object], within: Spread | None, between: Spread | None
+) -> Mean:
+    """μ with an interval that counts how few groups there are (Hartung and Knapp 2001).
+
+    The weighted mean of group means; its variance is that of their scatter about it, never less than stated.
+    """
+    if within is None:
+        value = float(np.average(values, weights=1.0 / variances))
+        std = float(np.sqrt(1.0 / np.sum(1.0 / variances)))
+        return Mean(value, std, float(student.isf(0.5 - LEVEL / 2.0, max(len(values), 2))) * std)
+    members = _members(groups)
+    if between is None:
+        level, variance = values, variances + within.sd**2
+    else:
+        level, variance = _group_means(values, variances, members, within.sd**2)
+        variance = variance + between.sd**2
+    weights = 1.0 / variance
+    value = float(np.average(level, weights=weights))
+    dof = len(level) - 1
+    scatter = float(np.sum(weights * (level - value) ** 2)) / dof
+    std = float(np.sqrt(max(scatter, 1.0) / np.sum(weights)))
+    return Mean(value, std, float(student.isf(0.5 - LEVEL / 2.0, dof)) * std)
+
+
+def _members(groups: Sequence[object]) -> list[IntArray]:
+    names = list(dict.fromkeys(groups))
+    return [np.array([k for k, group in enumerate(groups) if group == name], dtype=np.int64) for name in names]
+
+
+def _spread(values: FloatArray, variances: FloatArray, members: list[IntArray], dof: int) -> Spread:
+    tail = 0.5 - LEVEL / 2.0
+    targets = np.asarray(chi2.isf([tail, 1.0 - tail], dof))
+    low, high = np.sqrt(_solved(values, variances, members, targets))
+    if high == 0.0:
+        # Sessions agree better than their error bars allow: those are too wide, and "no spread at all" is not shown.
+        q = float(_q(values, variances, members, np.zeros(1))[0])
+        high = float(np.sqrt(_solved(values, variances * max(q / dof, 1e-6), members, targets[1:])[0]))
+    point = _restricted(values, variances, members)
+    return Spread(float(np.clip(point, low, high)), float(low), float(high), dof)
+
+
+def _q(values: FloatArray, variances: FloatArray, members: list[IntArray], s2: FloatArray) -> FloatArray:
+    """Equation (1) at every σ² (m,)."""
+    out = np.zeros(len(s2))
+    for group in members:
+        weights = 1.0 / (variances[group] + s2[:, None])
+        mean = (weights * values[group]).sum(axis=1) / weights.sum(axis=1)
+        out += (weights * (values[group] - mean[:, None]) ** 2).sum(axis=1)
+    return out
+
+
+def _solved(values: FloatArray, variances: FloatArray, members: list[IntArray], targets: FloatArray) -> FloatArray:
+    """σ² (m,) at which Q falls to each target (m,); 0 where it is less from the start: Q falls with σ²."""
+    scale = max(
+        sum(float(np.sum((values[g] - values[g].mean()) ** 2)) for g in members), float(variances.max()), 1e-300
+    )
+    low, high = np.full(len(targets), np.log(1e-12 * scale)), np.full(len(targets), np.log(1e6 * scale))
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        above = _q(values, variances, members, np.exp(middle)) > targets
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    is_zero = _q(values, variances, members, np.zeros(len(targets)) + 1e-12 * scale) <= targets
+    return np.where(is_zero, 0.0, np.exp(0.5 * (low + high)))
+
+
+def _restricted(values: FloatArray, variances: FloatArray, members: list[IntArray]) -> float:
+    """σ that maximises the restricted likelihood, group means free."""
+    largest = max(float(np.sqrt(max(np.ptp(values[group]) for group in members) ** 2 + variances.max())), 1e-300)
+
+    def negative(sigma: float) -> float:
+        total = 0.0
+        for group in members:
+            weights = 1.0 / (variances[group] + sigma**2)
+            mean = np.sum(weights * values[group]) / np.sum(weights)
+            total += float(np.sum(weights * (values[group] - mean) ** 2) - np.sum(np.log(weights)))
+            total += float(np.log(np.sum(weights)))
+        return total
+
+    best = minimize_scalar(negative, bounds=(0.0, 3.0 * largest), method="bounded", options={"xatol": 1e-5 * largest})
+    return 0.0 if negative(0.0) <= best.fun else float(best.x)
+
+
+def _group_means(
+    values: FloatArray, variances: FloatArray, members: list[IntArray], s2: float
+) -> tuple[FloatArray, FloatArray]:
+    """Weighted mean of every group and its variance, at a given σ_u²."""
+    means, variance = [], []
+    for group in members:
+        weights = 1.0 / (variances[group] + s2)
+        means.append(float(np.sum(weights * values[group]) / np.sum(weights)))
+        variance.append(1.0 / float(np.sum(weights)))
+    return np.array(means), np.array(variance)

@@ -1,0 +1,71 @@
+"""What cannot be a sensor's calibration, whoever wrote the file: refused before a number of it is used."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.records import Calibration, SensorCalibration
+
+LARGEST_CONDITION = 100.0
+"""Of S with its columns at one length: two axes 0.6 degrees apart. Beyond it the matrix is a mistake, not a sensor."""
+
+LARGEST_SI_FACTOR = 5.0
+"""Of a scale where readings and result are in one unit: degrees for radians are a factor of 57, g for m/s^2 of 10."""
+
+ROUNDING = 1e-9
+"""Of the largest eigenvalue of a covariance scaled to unit diagonal: below zero by less is rounding of 24 columns."""
+
+
+def require_plausible(calibration: Calibration) -> Calibration:
+    """A calibration that can be a sensor's.
+
+    Raises
+    ------
+    ValueError
+        When S is singular or nearly so, a scale is off its unit by a factor, a zero is no number, or a covariance is
+        none (a negative variance, correlations beyond one).
+    """
+    for name, sensor in named_sensors(calibration):
+        lengths = np.linalg.norm(sensor.S, axis=0)
+        if not np.all(lengths > 0.0) or np.linalg.cond(sensor.S / lengths) > LARGEST_CONDITION:
+            raise ValueError(
+                f"the {name}'s S is singular or nearly so (two of its axes are parallel): this is no sensor's "
+                "calibration; calibrate again with more poses."
+            )
+        if sensor.raw_unit == sensor.si_unit:
+            sizes = np.linalg.svd(sensor.S, compute_uv=False)
+            if sizes[0] > LARGEST_SI_FACTOR or sizes[-1] < 1.0 / LARGEST_SI_FACTOR:
+                raise ValueError(
+                    f"the {name}'s S turns {sensor.raw_unit} into {sensor.si_unit} by a factor of "
+                    f"{sizes[0] if sizes[0] > LARGEST_SI_FACTOR else sizes[-1]:.3g}: the unit of the readings was "
+                    "mistaken; calibrate again with their unit said."
+                )
+        _require_covariance(name, sensor.covariance)
+    _require_covariance("whole", calibration.covariance)
+    return calibration
+
+
+def has_one_handedness(calibration: Calibration) -> bool:
+    """Whether both triads are right-handed or both left-handed: one part rarely mixes them."""
+    signs = {bool(np.linalg.det(sensor.S) > 0.0) for _, sensor in named_sensors(calibration)}
+    return len(signs) < 2
+
+
+def named_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration]]:
+    """The sensors there are, with their names."""
+    pairs = (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope))
+    return [(name, sensor) for name, sensor in pairs if sensor is not None]
+
+
+def _require_covariance(name: str, covariance: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
+    variance = np.diag(covariance)
+    if np.any(variance < 0.0):
+        raise ValueError(f"the {name} covariance has a negative variance: the file is damaged; calibrate again.")
+    known = variance > 0.0
+    sigma = np.sqrt(variance[known])
+    correlation = covariance[np.ix_(known, known)] / np.outer(sigma, sigma)
+    if known.any() and np.linalg.eigvalsh(correlation)[0] < -ROUNDING * len(sigma):
+        raise ValueError(
+            f"the {name} covariance is none (its correlations contradict one another): the file is damaged; "
+            "calibrate again."
+        )

@@ -1,0 +1,75 @@
+"""Ctrl-C and SIGTERM: a command ends within a second, whatever it was doing, and leaves nothing half-written.
+
+The handlers raise :class:`Interrupted` where Python runs. Where it does not (a library is busy for minutes), a thread
+that the system wakes ends the process after a short grace. This module imports nothing large: it stands before
+everything else.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from types import FrameType
+
+GRACE_S = 0.5
+"""Given to a command to end in order: with the rest of what is done here, less than a second."""
+SENTENCE = "interrupted; what was not finished was not written."
+_NUMBERS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Interrupted(BaseException):
+    """Somebody asked the command to end; ``status`` is what it ends with: 130 for Ctrl-C, 143 for SIGTERM.
+
+    No ``KeyboardInterrupt``, which libraries take for their own and turn into an end without a word.
+    """
+
+    def __init__(self, number: int = signal.SIGINT) -> None:
+        super().__init__(SENTENCE)
+        self.status = 128 + number
+
+
+def status_of(error: BaseException) -> int:
+    """Exit status for an interruption; a plain ``KeyboardInterrupt`` is a Ctrl-C."""
+    return error.status if isinstance(error, Interrupted) else 128 + signal.SIGINT
+
+
+def install() -> None:
+    """Let SIGINT and SIGTERM end this process; for commands, not for programs that import the package."""
+    for number in _NUMBERS:
+        # What the caller told us to ignore (nohup, a shell's background job) stays ignored.
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _raise)
+    if os.name != "posix":
+        return
+    heard, told = os.pipe()
+    os.set_blocking(told, False)
+    signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+    threading.Thread(target=_end_in_time, args=(heard,), daemon=True, name="interruption").start()
+
+
+def _raise(number: int, _frame: FrameType | None) -> None:
+    raise Interrupted(number)
+
+
+def _end_in_time(heard: int) -> None:
+    while True:
+        for number in os.read(heard, 1):
+            # A recording that ends in order has handlers of its own.
+            if number in _NUMBERS and signal.getsignal(number) is _raise:
+                time.sleep(GRACE_S)
+                end_now(128 + number)
+
+
+def end_now(status: int) -> None:
+    """End the process here: its unfinished files removed, its terminal as it was, its reason said."""
+    temporary = sys.modules.get("trihedron.files.temporary")
+    if temporary is not None:
+        temporary.remove_unfinished()
+    shown = "\x1b[?25h\r\x1b[K" if os.isatty(2) else ""
+    try:
+        os.write(2, f"{shown}trihedron: {SENTENCE}\n".encode())
+    finally:
+        os._exit(status)

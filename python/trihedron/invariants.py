@@ -1,0 +1,223 @@
+"""Numbers of a calibration that do not depend on the choice of its frame (docs/diagnosis-method.md, section 9).
+
+Two sessions have each their own lower frame, and ``S_r S_m⁻¹`` leaks from one number into another: a pure change in
+scale lights up the off-diagonals. In the distort direction ``M = S⁻¹`` rows are ``k_i n_i``: sensitivity k of axis i
+and its unit vector n. Scales, zeros along the own axis and angles between axes are then the same in every frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+PAIRS = ((0, 1), (0, 2), (1, 2))
+STEP = 1e-6
+"""Relative step of the central differences: their error is its square, 1e-12, and rounding 1e-10 of the value."""
+
+
+@dataclass(frozen=True, eq=False)
+class Invariants:
+    """``zero`` (3,) [SI] along each axis, ``log_scale`` (3,) ln of raw units per SI, ``angle`` (3,) [rad] between axes
+    (1,2), (1,3), (2,3), ``axes`` (3, 3) rows n_i in the model's own frame."""
+
+    zero: FloatArray
+    log_scale: FloatArray
+    angle: FloatArray
+    axes: FloatArray
+
+    def vector(self) -> FloatArray:
+        """(9,) zero, log_scale, angle."""
+        return np.concatenate([self.zero, self.log_scale, self.angle])
+
+
+def invariants(S: FloatArray, b: FloatArray) -> Invariants:
+    """Equation 9.1: ``M = S⁻¹``, ``k_i = |M_i|``, ``n_i = M_i/k_i``, ``zero_i = -(M b)_i/k_i``."""
+    M = np.linalg.inv(S)
+    k = np.linalg.norm(M, axis=1)
+    n = M / k[:, None]
+    angle = np.array([np.arccos(np.clip(n[i] @ n[j], -1.0, 1.0)) for i, j in PAIRS])
+    return Invariants(-(M @ b) / k, np.log(k), angle, n)
+
+
+def polar_rotation(axes: FloatArray) -> FloatArray:
+    """(3, 3) the orthogonal matrix nearest to a triad of unit rows."""
+    u, _, vt = np.linalg.svd(axes)
+    out: FloatArray = u @ vt
+    return out
+
+
+def triad_rotation(accel: Invariants, gyro: Invariants) -> FloatArray:
+    """(3, 3) ``U_g U_aᵀ``: the gyro triad as seen from the accelerometer triad, the same in every frame."""
+    out: FloatArray = polar_rotation(gyro.axes) @ polar_rotation(accel.axes).T
+    return out
+
+
+def rotation_vector(R: FloatArray) -> FloatArray:
+    """(3,) logarithm of a rotation, |angle| < π; of a reflection that of its negative, so that it stays finite."""
+    R = R * np.sign(np.linalg.det(R))
+    cosine = np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0)
+    angle = float(np.arccos(cosine))
+    skew = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    if angle < 1e-6:
+        return skew
+    sine = float(np.sin(angle))
+    out: FloatArray = skew * (angle / sine if sine > 1e-9 else 1.0)
+    return out
+
+
+def jacobian(S: FloatArray, b: FloatArray) -> FloatArray:
+    """(9, 12) derivative of :meth:`Invariants.vector` by S (row by row) and b, by central differences."""
+    out = np.zeros((9, 12))
+    theta = np.concatenate([S.ravel(), b])
+    size = np.concatenate([np.full(9, np.abs(S).max()), np.full(3, max(float(np.abs(b).max()), 1e-3))])
+    for k in range(12):
+        step = np.zeros(12)
+        step[k] = STEP * size[k]
+        high, low = theta + step, theta - step
+        difference = invariants(high[:9].reshape(3, 3), high[9:]).vector()
+        difference = difference - invariants(low[:9].reshape(3, 3), low[9:]).vector()
+        out[:, k] = difference / (2.0 * step[k])
+    return out
+
+
+def triad_jacobian(S_a: FloatArray, S_g: FloatArray) -> FloatArray:
+    """(3, 24) change of the triad rotation, as a rotation vector on its left, by both sensors' S and b."""
+    out = np.zeros((3, 24))
+    zero = np.zeros(3)
+    here = triad_rotation(invariants(S_a, zero), invariants(S_g, zero))
+    for sensor, (S, first) in enumerate(((S_a, 0), (S_g, 12))):
+        for k in range(9):
+            step = np.zeros(9)
+            step[k] = STEP * np.abs(S).max()
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = S + sign * step.reshape(3, 3)
+                pair = (moved, S_g) if sensor == 0 else (S_a, moved)
+                there = triad_rotation(invariants(pair[0], zero), invariants(pair[1], zero))
+                ends.append(rotation_vector(there @ here.T))
+            out[:, first + k] = (ends[0] - ends[1]) / (2.0 * step[k])
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """What the numbers leave open: ``signs`` (3,) of the accelerometer's axes in frame lower, and ``triad`` (3, 3), the
+    signed permutation of axes nearest to the gyro triad against the accelerometer's: its rotation is counted from it.
+    """
+
+    signs: FloatArray
+    triad: FloatArray | None
+
+
+def anchor_of(S_a: FloatArray, S_g: FloatArray | None) -> Anchor:
+    """The anchor of a session whose accelerometer is in frame ``lower``."""
+    zero = np.zeros(3)
+    accel = invariants(S_a, zero)
+    signs = np.sign(np.diag(accel.axes))
+    if S_g is None:
+        return Anchor(signs, None)
+    triad = triad_rotation(accel, invariants(S_g, zero))
+    chosen = max(permutations(range(3)), key=lambda order: sum(abs(triad[i, k]) for i, k in enumerate(order)))
+    nearest = np.zeros((3, 3))
+    for i, k in enumerate(chosen):
+        nearest[i, k] = np.sign(triad[i, k])
+    return Anchor(signs, nearest)
+
+
+def numbers_of(
+    S_a: FloatArray, b_a: FloatArray, S_g: FloatArray | None, b_g: FloatArray | None, anchor: Anchor
+) -> FloatArray:
+    """(9,) or (21,) numbers of both sensors: zero, log_scale, angle of the accelerometer, of the gyro, and the rotation
+    vector of its triad from the anchor's (eq. 9.1)."""
+    accel = invariants(S_a, b_a)
+    if S_g is None or b_g is None or anchor.triad is None:
+        return accel.vector()
+    gyro = invariants(S_g, b_g)
+    turned = rotation_vector(triad_rotation(accel, gyro) @ anchor.triad.T)
+    return np.concatenate([accel.vector(), gyro.vector(), turned])
+
+
+def numbers_jacobian(S_a: FloatArray, b_a: FloatArray, S_g: FloatArray | None, b_g: FloatArray | None) -> FloatArray:
+    """(9, 12) or (21, 24) derivative of :func:`numbers_of` near its anchor."""
+    if S_g is None or b_g is None:
+        return jacobian(S_a, b_a)
+    out = np.zeros((21, 24))
+    out[:9, :12], out[9:18, 12:] = jacobian(S_a, b_a), jacobian(S_g, b_g)
+    out[18:] = triad_jacobian(S_a, S_g)
+    return out
+
+
+def model_of_numbers(
+    numbers: FloatArray, anchor: Anchor
+) -> tuple[FloatArray, FloatArray, FloatArray | None, FloatArray | None]:
+    """``(S_a, b_a, S_g, b_g)`` in frame ``lower``: the inverse of :func:`numbers_of`.
+
+    ``S = (K N)⁻¹``, ``b = -S (k ∘ zero)``. Rows of N_a follow from the angles, n_1 along axis 1 and n_2 in the plane of
+    axes 1 and 2; ``N_g = √(Gram of its angles) · R · U_a``.
+    """
+    N_a = _lower_axes(numbers[6:9], anchor.signs)
+    S_a, b_a = _direct(numbers[:3], numbers[3:6], N_a)
+    if len(numbers) < 21 or anchor.triad is None:
+        return np.tril(S_a), b_a, None, None
+    R = _rotation(numbers[18:21]) @ anchor.triad
+    values, vectors = np.linalg.eigh(_gram(numbers[15:18]))
+    N_g = vectors @ np.diag(np.sqrt(values)) @ vectors.T @ R @ polar_rotation(N_a)
+    return np.tril(S_a), b_a, *_direct(numbers[9:12], numbers[12:15], N_g)
+
+
+def model_vector(numbers: FloatArray, anchor: Anchor) -> FloatArray:
+    """(12,) or (24,) parameters in the order of a calibration file: S row by row, then b, accelerometer first."""
+    S_a, b_a, S_g, b_g = model_of_numbers(numbers, anchor)
+    parts = [S_a.ravel(), b_a]
+    if S_g is not None and b_g is not None:
+        parts += [S_g.ravel(), b_g]
+    return np.concatenate(parts)
+
+
+def model_jacobian(numbers: FloatArray, anchor: Anchor) -> FloatArray:
+    """(12, 9) or (24, 21) derivative of :func:`model_vector`, by central differences."""
+    columns = []
+    for k in range(len(numbers)):
+        step = np.zeros(len(numbers))
+        step[k] = STEP * max(abs(float(numbers[k])), 1.0)
+        ends = model_vector(numbers + step, anchor) - model_vector(numbers - step, anchor)
+        columns.append(ends / (2.0 * step[k]))
+    return np.column_stack(columns)
+
+
+def _direct(zero: FloatArray, log_scale: FloatArray, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    k = np.exp(log_scale)
+    S = np.asarray(np.linalg.inv(k[:, None] * axes), dtype=np.float64)
+    b: FloatArray = -S @ (k * zero)
+    return S, b
+
+
+def _gram(angle: FloatArray) -> FloatArray:
+    gram = np.eye(3)
+    for (i, j), value in zip(PAIRS, np.cos(angle), strict=True):
+        gram[i, j] = gram[j, i] = value
+    return gram
+
+
+def _lower_axes(angle: FloatArray, signs: FloatArray) -> FloatArray:
+    """(3, 3) unit rows, lower triangular with the given signs on the diagonal, at the given angles."""
+    factor = np.linalg.cholesky(_gram(angle))
+    # Cholesky's diagonal is positive: a column of the other sign is turned round.
+    out: FloatArray = factor * signs
+    return out
+
+
+def _rotation(vector: FloatArray) -> FloatArray:
+    """(3, 3) exp([v]×), Rodrigues."""
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < 1e-8:
+        return np.asarray(np.eye(3) + cross + 0.5 * cross @ cross, dtype=np.float64)
+    out: FloatArray = np.eye(3) + np.sin(angle) / angle * cross + (1.0 - np.cos(angle)) / angle**2 * cross @ cross
+    return out

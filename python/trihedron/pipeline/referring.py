@@ -1,0 +1,313 @@
+"""Known motion beside a log: what it says of both sensors, as a calibration and as a diagnosis."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.diagnose.against import FittedModel, compare_numbers, model_of_calibration
+from trihedron.estimate.reference import fit_reference
+from trihedron.pipeline.reading import read
+from trihedron.read import ReadError
+from trihedron.read.reference import of_recording, read_reference
+from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, SensorCalibration, Severity
+from trihedron.records.diagnosis import (
+    AcceptedEffect,
+    Candidate,
+    Diagnosis,
+    DomainTest,
+    EffectParameter,
+    HeldOut,
+    LinearModel,
+    ParameterDifference,
+    Stage,
+    StageDomain,
+    Verdict,
+)
+from trihedron.records.reference import AgainstReference, Estimate, ReferenceMotion
+from trihedron.sensor_model import in_frame
+from trihedron.units import acceleration_to_si
+
+FloatArray = npt.NDArray[np.float64]
+AnyReference = ReferenceMotion | Recording | str | os.PathLike[str]
+
+LEAST_SIGMAS = 3.0
+"""An effect's largest coefficient must stand this far from zero, as in the catalogue."""
+NOMINAL_SCALE, NOMINAL_ZERO_M_S2 = 0.1, 0.5
+"""How wrong an accelerometer is that nobody calibrated: 10 % where only its reading at rest tells the scale."""
+
+
+def motion_of(reference: AnyReference, columns: str | None = None) -> ReferenceMotion:
+    """A reference from a file of attitude, rate or pose, or from the log of another unit that moved along.
+
+    Raises
+    ------
+    ReadError
+        (a ``ValueError``) one sentence: which file, what to do.
+    """
+    if isinstance(reference, ReferenceMotion):
+        return reference
+    if isinstance(reference, Recording):
+        return of_recording(reference)
+    if columns is None:
+        try:
+            log = read(reference)
+        except ReadError:
+            return read_reference(reference)
+        is_named = not any(f.code is FindingCode.COLUMNS_ASSUMED for f in log.findings)
+        if is_named and log.accelerometer is not None and log.gyroscope is not None:
+            return replace(of_recording(log), findings=())
+    return read_reference(reference, columns)
+
+
+def held_against(
+    recording: Recording,
+    reference: AnyReference,
+    gravity: float,
+    *,
+    columns: str | None = None,
+    given: Calibration | None = None,
+) -> AgainstReference:
+    """Hold a log against a reference; ``given`` is a calibration whose replay is shown beside the reference's.
+
+    Raises
+    ------
+    ValueError
+        One sentence: what the two do not share, or what the reference cannot tell.
+    """
+    is_own = not isinstance(reference, ReferenceMotion | Recording) and os.path.abspath(reference) == os.path.abspath(
+        recording.source
+    )
+    motion = read_reference(reference, columns) if is_own else motion_of(reference, columns)  # type: ignore[arg-type]
+    known = None if given is None or given.gyroscope is None else (given.gyroscope.S, given.gyroscope.b)
+    found = fit_reference(recording, motion, gravity, given=known)
+    if is_own or (motion.sha256 and motion.sha256 == recording.sha256):
+        found = replace(found, findings=(*found.findings, _own_file()))
+    return found
+
+
+def _own_file() -> Finding:
+    return Finding(
+        FindingCode.REFERENCE_OF_ITSELF,
+        Severity.WARNING,
+        "The reference stands in the log's own file.",
+        "An attitude that the unit computed from its own gyro agrees with that gyro by construction.",
+        "Believe it only if another instrument measured it.",
+    )
+
+
+def calibration_by(
+    found: AgainstReference, recording: Recording, gravity: float, source: str, frame: Frame | None
+) -> Calibration:
+    """Both sensors as the reference says, in the lower frame, or (``case``) in the reference's body.
+
+    Raises
+    ------
+    ValueError
+        When the log has no accelerometer: a calibration file holds both.
+    """
+    if recording.accelerometer is None:
+        raise ValueError(
+            f"{recording.source}: a calibration holds an accelerometer too, and this log has none; "
+            "`trihedron diagnose LOG --reference MOTION --json FILE` writes the gyro's numbers."
+        )
+    gyro = found.gyroscope
+    method = f"reference ({found.kind})"
+    gyroscope = SensorCalibration(gyro.S, gyro.b, gyro.covariance, recording.gyroscope_unit.value, "rad/s", method)
+    findings: tuple[Finding, ...] = (*recording.findings, *found.findings)
+    wanted: Frame = frame or "lower"
+    if found.accelerometer is not None:
+        force = found.accelerometer
+        accelerometer = SensorCalibration(
+            force.S, force.b, force.covariance, recording.accelerometer_unit.value, "m/s^2", method
+        )
+    else:
+        accelerometer, finding = _nominal(recording, gravity)
+        findings, wanted = (*findings, finding), "case"
+    covariance = np.zeros((24, 24))
+    covariance[:12, :12], covariance[12:, 12:] = accelerometer.covariance, gyroscope.covariance
+    calibration = Calibration(
+        accelerometer, gyroscope, covariance, "case", gravity, source, recording.source, recording.sha256, findings
+    )
+    return calibration if wanted == "case" else _without_rounding(in_frame(calibration, wanted))
+
+
+def _without_rounding(calibration: Calibration) -> Calibration:
+    """Entries of S that the lower frame makes zero have no error bar: what is left of one is rounding."""
+    if calibration.frame != "lower" or calibration.gyroscope is None:
+        return calibration
+    covariance = np.array(calibration.covariance)
+    fixed = [1, 2, 5]
+    covariance[fixed], covariance[:, fixed] = 0.0, 0.0
+    return replace(
+        calibration,
+        covariance=covariance,
+        accelerometer=replace(calibration.accelerometer, covariance=covariance[:12, :12]),
+    )
+
+
+def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, Finding]:
+    """The accelerometer as nobody calibrated it, with error bars that say so."""
+    raw = recording.accelerometer
+    assert raw is not None
+    scale = acceleration_to_si(recording.accelerometer_unit)
+    if scale is None:
+        scale = gravity / float(np.nanmedian(np.linalg.norm(raw, axis=1)))
+    covariance = np.diag([*np.full(9, (NOMINAL_SCALE * scale) ** 2), *np.full(3, NOMINAL_ZERO_M_S2**2)])
+    finding = Finding(
+        FindingCode.ACCELEROMETER_NOMINAL,
+        Severity.WARNING,
+        "The accelerometer was not calibrated: the reference knows no force. Its numbers in the file are nominal.",
+        "A rate alone says nothing of gravity.",
+        "Calibrate it from still poses (`trihedron calibrate LOG`); the frame is the reference's body.",
+        MappingProxyType({"scale": scale}),
+    )
+    unit = recording.accelerometer_unit.value
+    return SensorCalibration(scale * np.eye(3), np.zeros(3), covariance, unit, "m/s^2", "nominal"), finding
+
+
+def effects_of(found: AgainstReference, alpha: float) -> tuple[AcceptedEffect, ...]:
+    """Effects that the reference demands: far from zero, and better on rows left out in turn."""
+    out = []
+    for ident, one in found.effects.items():
+        if one.p_value is None or one.held_out is None:
+            continue
+        before, after = one.held_out
+        is_far = float(np.max(np.abs(one.value / one.std))) > LEAST_SIGMAS
+        p = min(1.0, len(found.effects) * one.p_value)
+        if p < alpha and after < before and is_far:
+            out.append((1.0 - (after / before) ** 2, _accepted(ident, one, p, found)))
+    return tuple(effect for _, effect in sorted(out, key=lambda pair: -pair[0]))
+
+
+def _accepted(ident: str, one: Estimate, p: float, found: AgainstReference) -> AcceptedEffect:
+    assert one.held_out is not None
+    before, after = one.held_out
+    units = one.unit.split(", ")
+    per = len(one.names) // len(units)
+    parameters = tuple(
+        EffectParameter(_written(ident, name), float(v), float(s), units[min(k // per, len(units) - 1)])
+        for k, (name, v, s) in enumerate(zip(one.names, one.value, one.std, strict=True))
+    )
+    floor = found.gyroscope.rms
+    held = HeldOut("dynamics", (before / floor) ** 2, (after / floor) ** 2, before, after, "rad/s")
+    n = 3 * (found.gyroscope.n_rows - found.gyroscope.n_left_out)
+    largest = int(np.argmax(np.abs(one.value / one.std)))
+    what = (
+        "reads a rate that follows specific force"
+        if ident == "gyro-g-sensitivity"
+        else "has a scale that depends on rate"
+    )
+    return AcceptedEffect(
+        ident,
+        f"The gyro {what} ({parameters[largest].name} stands out most).",
+        parameters,
+        p,
+        float(n * np.log((after / before) ** 2) + len(one.names) * np.log(n)),
+        (held,),
+        share=float(1.0 - (after / before) ** 2),
+        # Stated in the reference's body: another recording of the unit may lie in it otherwise.
+        model=MappingProxyType(
+            {
+                "variant": "both" if ident == "gyro-scale-nonlinearity" else "",
+                "shape": {},
+                "values": [float(v) for v in one.value],
+                "applies_to_other_recordings": False,
+            }
+        ),
+    )  # fmt: skip
+
+
+def _written(ident: str, name: str) -> str:
+    return f"G_{name}" if ident == "gyro-g-sensitivity" else name.replace(" ", "_")
+
+
+def parameters_of(found: AgainstReference, given: Calibration, alpha: float) -> tuple[ParameterDifference, ...]:
+    """Numbers of a given calibration against those that the reference shows."""
+    model = model_of_calibration(given)
+    fit, force = found.gyroscope, found.accelerometer
+    covariance = np.zeros((24, 24))
+    covariance[12:, 12:] = fit.covariance
+    covariance[:12, :12] = model.covariance[:12, :12] if force is None else force.covariance
+    S, b = (model.accel_S, model.accel_b) if force is None else (force.S, force.b)
+    # Zeros wander from one day to the next by what nobody measured here: only the fit's own error is known.
+    seen = FittedModel(
+        S, b, model.accel_unit, fit.S, fit.b, model.gyro_unit or "counts", covariance, np.zeros(3), np.zeros(3)
+    )
+    numbers = compare_numbers(model, seen, alpha=alpha).parameters
+    return tuple(p for p in numbers if force is not None or p.sensor == "gyroscope")
+
+
+def diagnosis_by(
+    found: AgainstReference, recording: Recording, gravity: float, given: Calibration | None, alpha: float
+) -> dict[str, Any]:
+    """A diagnosis of a log that holds no poses to speak of: what its reference alone says, as fields."""
+    effects = effects_of(found, alpha)
+    parameters = () if given is None or given.gyroscope is None else parameters_of(found, given, alpha)
+    test = _dynamics(found, alpha)
+    left = replace(test, disagrees=False) if effects else test
+    verdict: Verdict = "consistent"
+    if any(p.significant for p in parameters):
+        verdict = "parameters-differ"
+    if effects:
+        verdict = "missing-physics"
+    rows = [
+        Stage("numbers", (StageDomain("dynamics", found.gyroscope.rms_held_out, None, "rad/s"),)),
+    ]
+    rows += [Stage("effects", (StageDomain("dynamics", e.held_out[0].rms_after, None, "rad/s"),)) for e in effects[:1]]
+    linear = _linear(found, recording)
+    base = Diagnosis(
+        verdict=verdict,
+        domains=(test,),
+        effects=effects,
+        remaining=(left,),
+        candidates=tuple(Candidate(name, one.p_value, True) for name, one in found.effects.items()),
+        baseline=linear,
+        extended=linear,
+        noise=MappingProxyType({}),
+        gravity_m_s2=gravity,
+        alpha=alpha,
+        recording_source=recording.source,
+        recording_sha256=recording.sha256,
+        parameters=parameters,
+        stages=tuple(rows) if given is not None else (),
+    )
+    return dict(vars(base))
+
+
+def _dynamics(found: AgainstReference, alpha: float) -> DomainTest:
+    """Rate sample by sample inside the motion: p is that of the effects tried on it, the search paid for."""
+    p = [one.p_value for one in found.effects.values() if one.p_value is not None]
+    least = min([1.0, *(len(p) * v for v in p)])
+    accepted = effects_of(found, alpha)
+    chi2 = found.gyroscope.rms_held_out / max(found.gyroscope.rms, 1e-300)
+    return DomainTest(
+        "dynamics", chi2**2, float(3 * found.gyroscope.n_rows), least, bool(accepted),
+        rms=found.gyroscope.rms, unit="rad/s",
+    )  # fmt: skip
+
+
+def _linear(found: AgainstReference, recording: Recording) -> LinearModel:
+    def sensor(fit: Any, raw: str, si: str) -> MappingProxyType[str, Any]:
+        sigma = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+        return MappingProxyType(
+            {
+                "S": fit.S.tolist(),
+                "b": fit.b.tolist(),
+                "sigma_S": sigma[:9].reshape(3, 3).tolist(),
+                "sigma_b": sigma[9:].tolist(),
+                "raw_unit": raw,
+                "si_unit": si,
+            }
+        )
+
+    gyro = sensor(found.gyroscope, recording.gyroscope_unit.value, "rad/s")
+    if found.accelerometer is None:
+        nothing = {"S": np.zeros((3, 3)).tolist(), "b": [0.0] * 3, "sigma_S": None, "sigma_b": None}
+        return LinearModel(MappingProxyType({**nothing, "raw_unit": "none", "si_unit": "m/s^2"}), gyro)
+    return LinearModel(sensor(found.accelerometer, recording.accelerometer_unit.value, "m/s^2"), gyro)

@@ -1,0 +1,143 @@
+"""Temperature when a calibration is applied: polynomials followed inside their range, and the range enforced."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.invariants import Anchor, model_vector, numbers_of
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Severity
+from trihedron.records.sessions import PARAMETERS
+from trihedron.sensor_model import in_frame, reframing
+
+FloatArray = npt.NDArray[np.float64]
+
+KNOTS = 257
+"""S and b are exact at so many temperatures of the range and linear between: a cubic over the whole range is followed
+to 1e-5 of its swing."""
+TOLERANCE_DEGC = 1.0
+"""Beyond the range by less is the thermometer's resolution, not another temperature."""
+ROWS = 1 << 17
+
+
+def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding, ...]:
+    """A serious finding where a log was recorded outside the temperatures that a calibration was made for.
+
+    Raises
+    ------
+    ValueError
+        When the calibration's range is not two numbers.
+    """
+    stated = calibration.extensions.get("valid_range")
+    if not isinstance(stated, Mapping) or "temperature_degc" not in stated:
+        return ()
+    try:
+        low, high = (float(value) for value in stated["temperature_degc"])
+    except (TypeError, ValueError):
+        raise ValueError("the calibration's valid_range is not two temperatures: calibrate again.") from None
+    T = recording.temperature_degc
+    if T is None or not np.isfinite(T).any():
+        return (_missing(low, high),) if "thermal" in calibration.extensions else ()
+    known = T[np.isfinite(T)]
+    outside = int(np.sum((known < low - TOLERANCE_DEGC) | (known > high + TOLERANCE_DEGC)))
+    if outside == 0:
+        return ()
+    least, largest = float(known.min()), float(known.max())
+    held = "S and b of the nearer end were used there." if "thermal" in calibration.extensions else ""
+    return (
+        Finding(
+            FindingCode.OUTSIDE_VALID_RANGE,
+            Severity.SERIOUS,
+            f"{outside} of {len(known)} samples were recorded outside {low:.1f} to {high:.1f} °C, for which the "
+            f"calibration was made (the log: {least:.1f} to {largest:.1f} °C). {held}".rstrip(),
+            "The calibration saw no such temperature: a polynomial beyond its ends is no measurement.",
+            "Calibrate at these temperatures too, or leave those samples out.",
+            MappingProxyType(
+                {
+                    "n_outside": float(outside),
+                    "low_degc": low,
+                    "high_degc": high,
+                    "log_low_degc": least,
+                    "log_high_degc": largest,
+                }
+            ),
+        ),
+    )
+
+
+def _missing(low: float, high: float) -> Finding:
+    return Finding(
+        FindingCode.TEMPERATURE_MISSING,
+        Severity.SERIOUS,
+        f"The calibration follows temperature ({low:.1f} to {high:.1f} °C) and the log has none: S and b of its "
+        "reference temperature were used.",
+        "No temperature column was logged, or it was not recognised.",
+        "Log the sensor's temperature; name its column with --columns temperature=N.",
+        MappingProxyType({"low_degc": low, "high_degc": high}),
+    )
+
+
+def thermally_corrected(
+    calibration: Calibration, recording: Recording
+) -> tuple[FloatArray | None, FloatArray | None] | None:
+    """Specific force and rate (n, 3) by S(T), b(T) of every sample; ``None`` where the calibration does not follow
+    temperature or the log has none.
+
+    Outside the range the ends are held. Samples without a temperature take that between their neighbours.
+    """
+    thermal = calibration.extensions.get("thermal")
+    T = recording.temperature_degc
+    if not isinstance(thermal, Mapping) or T is None or not np.isfinite(T).any():
+        return None
+    low, high = (float(v) for v in calibration.extensions["valid_range"]["temperature_degc"])  # type: ignore[index]
+    known = np.isfinite(T)
+    whole = T if known.all() else np.interp(np.arange(len(T)), np.flatnonzero(known), T[known])
+    knots = np.linspace(low, max(high, low + 1e-9), KNOTS)
+    table = np.array([_at(calibration, thermal, float(t)) for t in knots])
+    place = (np.clip(whole, low, high) - low) / (knots[1] - knots[0])
+    return (
+        _followed(recording.accelerometer, table[:, :12], place),
+        _followed(recording.gyroscope, table[:, 12:], place) if table.shape[1] == 24 else None,
+    )
+
+
+def _at(calibration: Calibration, thermal: Mapping[str, Any], degc: float) -> FloatArray:
+    """(12,) or (24,) parameters at one temperature, in the calibration's frame."""
+    signs = np.array(thermal["axis_signs"], dtype=np.float64)
+    triad = None if thermal.get("triad") is None else np.array(thermal["triad"], dtype=np.float64)
+    anchor = Anchor(signs, triad)
+    base = in_frame(calibration, "lower")
+    accel, gyro = base.accelerometer, base.gyroscope
+    numbers = numbers_of(accel.S, accel.b, None if gyro is None else gyro.S, None if gyro is None else gyro.b, anchor)
+    t = degc - float(thermal["reference_degc"])
+    for term in thermal["terms"]:
+        picked = [k for k, parameter in enumerate(PARAMETERS[: len(numbers)]) if parameter.id == term["id"]]
+        if picked:
+            coefficients = np.array(term["coefficients"], dtype=np.float64)
+            numbers[picked] += (t ** np.arange(1, len(coefficients))) @ coefficients[1:]
+    parameters = model_vector(numbers, anchor)
+    if calibration.frame != "lower":
+        # The frame follows the axes as they are at this temperature, as it does at the reference.
+        turn = reframing(parameters[:9].reshape(3, 3), parameters[9:12], calibration.frame).rotation
+        for first in range(0, len(parameters), 12):
+            parameters[first : first + 9] = (turn @ parameters[first : first + 9].reshape(3, 3)).ravel()
+            parameters[first + 9 : first + 12] = turn @ parameters[first + 9 : first + 12]
+    return parameters
+
+
+def _followed(readings: FloatArray | None, table: FloatArray, place: FloatArray) -> FloatArray | None:
+    if readings is None:
+        return None
+    out = np.empty_like(readings)
+    for start in range(0, len(readings), ROWS):
+        rows = slice(start, start + ROWS)
+        below = np.minimum(np.floor(place[rows]).astype(np.int64), len(table) - 2)
+        share = (place[rows] - below)[:, None]
+        parameters = (1.0 - share) * table[below] + share * table[below + 1]
+        S = parameters[:, :9].reshape(-1, 3, 3)
+        out[rows] = np.einsum("nij,nj->ni", S, readings[rows]) + parameters[:, 9:]
+    return out

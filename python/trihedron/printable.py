@@ -1,0 +1,28 @@
+"""Text from elsewhere (names of columns, files, topics) made harmless for a terminal."""
+
+from __future__ import annotations
+
+import re
+
+# C0 but for tab and line end, DEL and C1 (of which terminals take 0x9b for an escape), and what turns the direction of
+# writing: a name could hide or forge what stands beside it.
+_UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
+
+
+def printable(text: str) -> str:
+    r"""The text with every control character spelled out as ``\x1b`` or ``\u202e``, lines and tabs as they are.
+
+    >>> printable("a\x1b[2Jx")
+    'a\\x1b[2Jx'
+    """
+    return _UNSEEN.sub(lambda found: _spelled(found[0], "\\x{:02x}"), text)
+
+
+def printable_json(text: str) -> str:
+    """JSON text with the same characters as the escapes of JSON: the document stays the same."""
+    return _UNSEEN.sub(lambda found: _spelled(found[0], "\\u{:04x}"), text)
+
+
+def _spelled(character: str, short: str) -> str:
+    number = ord(character)
+    return (short if number < 0x100 else "\\u{:04x}").format(number)

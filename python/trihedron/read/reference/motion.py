@@ -1,0 +1,145 @@
+"""A reference from a file, or from the log of another unit."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.clock import build_clock, settle_clock
+from trihedron.read.devices import Choice
+from trihedron.read.errors import ReadError
+from trihedron.read.reference.attitude import attitude_of
+from trihedron.read.reference.roles import WAYS, Role, roles_of
+from trihedron.read.source import read_tables
+from trihedron.read.table import Table
+from trihedron.records import Finding, FindingCode, Recording, Severity
+from trihedron.records.reference import ReferenceMotion
+from trihedron.units import acceleration_to_si, rate_to_si
+
+FloatArray = npt.NDArray[np.float64]
+
+LONG_ROW_S = 0.5
+"""Rows of rate further apart than this are commands that hold until the next: no logger of a table is so slow."""
+SHORTEST_STEP = 0.1
+"""Rows nearer than a tenth of the usual step share an arrival: one of them is left out."""
+
+
+def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> ReferenceMotion:
+    """Read a reference: text, npz, npy or Parquet of time and attitude, rate or pose (docs/reference.md).
+
+    ``columns`` says what the columns are in file order where their names do not.
+
+    Raises
+    ------
+    ReadError
+        (a ``ValueError``) one sentence: which file, which row, what to do.
+    """
+    table = read_tables(Path(path), Choice())[0]
+    roles = roles_of(table, columns)
+    times = [role for role in roles if role.what == "time"]
+    if not times:
+        raise ReadError(f"{table.path}: no column of this reference is its time; name it t, or say {WAYS}.")
+    clock = build_clock(table, times[0].column, times[0].unit, None)
+    rows = np.arange(len(table.columns[times[0].column])) if clock.rows is None else clock.rows
+    used = [role for role in roles if role.what != "time"]
+    whole = np.all([np.isfinite(table.columns[role.column][rows]) for role in used], axis=0) if used else None
+    if whole is None or whole.sum() < 2:
+        raise ReadError(f"{table.path}: this reference tells neither attitude nor rate: its columns are {WAYS}.")
+    if not np.all(whole):
+        rows = rows[whole]
+    time_s = clock.time_s[whole]
+    attitude = attitude_of(table, used, rows)
+    rate = None if attitude is not None else _triad(table, used, "w", rows, "rate")
+    position = None if attitude is None else _triad(table, used, "p", rows, "position")
+    if attitude is None and rate is None:
+        raise ReadError(f"{table.path}: this reference tells neither attitude nor rate: its columns are {WAYS}.")
+    return _settled(table, time_s, clock.start_s, attitude, rate, position, (*table.findings, *clock.findings))
+
+
+def of_recording(recording: Recording) -> ReferenceMotion:
+    """The log of another unit that moved with this one, as a reference: its rate and specific force.
+
+    Raises
+    ------
+    ReadError
+        When its gyro reads counts, or it has none.
+    """
+    recording = recording.with_distinct_stamps()
+    to_rate = rate_to_si(recording.gyroscope_unit)
+    if recording.gyroscope is None or to_rate is None:
+        raise ReadError(
+            f"{recording.source}: the gyro of a unit that serves as reference must read rad/s or deg/s; "
+            "correct it first with `trihedron apply`."
+        )
+    whole = np.all(np.isfinite(recording.gyroscope), axis=1)
+    force = None
+    to_force = acceleration_to_si(recording.accelerometer_unit)
+    if recording.accelerometer is not None and to_force is not None:
+        whole &= np.all(np.isfinite(recording.accelerometer), axis=1)
+        force = to_force * recording.accelerometer[whole]
+    return ReferenceMotion(
+        np.asarray(recording.time_s[whole]),
+        rate=to_rate * recording.gyroscope[whole],
+        specific_force=force,
+        start_epoch_s=recording.start_epoch_s,
+        source=recording.source,
+        sha256=recording.sha256,
+    )
+
+
+def _triad(table: Table, roles: list[Role], what: str, rows: npt.NDArray[np.int64], name: str) -> FloatArray | None:
+    part = {role.index: role for role in roles if role.what == what}
+    if not part:
+        return None
+    if set(part) != set("xyz"):
+        raise ReadError(f"{table.path}: the reference's {name} needs columns of x, y and z; found {', '.join(part)}.")
+    if what == "w" and any(not role.unit for role in part.values()):
+        raise ReadError(
+            f"{table.path}: the unit of the reference's rate is not said; name its columns 'wx [deg/s]' or "
+            "'wx [rad/s]', in the file or with --reference-columns."
+        )
+    return np.column_stack([part[axis].to_si * table.columns[part[axis].column][rows] for axis in "xyz"])
+
+
+def _settled(
+    table: Table, time_s: FloatArray, start_s: float, attitude: FloatArray | None, rate: FloatArray | None,
+    position: FloatArray | None, findings: tuple[Finding, ...],
+) -> ReferenceMotion:  # fmt: skip
+    """With the even clock behind its stamps, where there is one."""
+    stepwise = rate is not None and float(np.median(np.diff(time_s))) > LONG_ROW_S
+    if not stepwise:
+        # Rows of a matrix move as vectors do: two of them are witnesses of when a row was taken.
+        triads = [rate] if rate is not None else [attitude[:, 0], attitude[:, 1]]  # type: ignore[index]
+        settled = settle_clock(time_s, start_s, [np.ascontiguousarray(t) for t in triads if t is not None])
+        time_s, start_s = settled.time_s, settled.start_s
+        findings = (*findings, *settled.findings)
+    keep = np.concatenate([[True], np.diff(time_s) > SHORTEST_STEP * float(np.median(np.diff(time_s)))])
+    if stepwise:
+        findings = (*findings, _commands(len(time_s)))
+    motion = ReferenceMotion(
+        time_s[keep],
+        attitude=None if attitude is None else attitude[keep],
+        rate=None if rate is None else rate[keep],
+        position=None if position is None else position[keep],
+        is_stepwise=stepwise,
+        start_epoch_s=start_s,
+        source=str(table.path),
+        sha256=table.sha256,
+    )
+    said = tuple(replace(f, seen=f"Reference: {f.seen[0].lower()}{f.seen[1:]}") for f in findings)
+    return replace(motion, findings=said)
+
+
+def _commands(n: int) -> Finding:
+    return Finding(
+        FindingCode.COLUMNS_ASSUMED,
+        Severity.NOTE,
+        f"Its {n} rows are seconds apart, so each rate was taken to hold until the next row.",
+        "Commands of a rate table.",
+        numbers=MappingProxyType({"n_rows": float(n)}),
+    )

@@ -1,0 +1,61 @@
+"""What every result can be asked for: plain types, a data frame, a figure, a report; and how it crosses processes."""
+
+from __future__ import annotations
+
+import copyreg
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Literal
+
+Library = Literal["polars", "pandas"]
+
+
+class Presented:
+    """A record that can be shown. Words, tables and figures are made where they live, when they are asked for."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types, as ``--json`` of the command gives it; what is not a finite number is None."""
+        from trihedron.pipeline.presenting import as_dict
+
+        return as_dict(self)
+
+    def to_dataframe(self, library: Library = "polars") -> Any:
+        """One row per parameter, pose, axis and term, or sample; units in the names.
+
+        Raises
+        ------
+        ValueError
+            When the library is neither polars nor pandas, or is not installed.
+        """
+        from trihedron.pipeline.presenting import as_frame
+
+        return as_frame(self, library)
+
+    def plot(self, name: str | None = None) -> Any:
+        """A matplotlib figure of the report: the first, or the one of that name. A notebook shows it.
+
+        Raises
+        ------
+        ValueError
+            When there is no figure of that name (the sentence lists them), or matplotlib is not installed.
+        """
+        from trihedron.pipeline.presenting import plot
+
+        return plot(self, name)
+
+    def _repr_html_(self) -> str:
+        from trihedron.pipeline.presenting import as_html
+
+        return as_html(self)
+
+
+def _read_only(mapping: Mapping[Any, Any]) -> MappingProxyType[Any, Any]:
+    return MappingProxyType(dict(mapping))
+
+
+def _reduced(mapping: MappingProxyType[Any, Any]) -> tuple[Any, tuple[dict[Any, Any]]]:
+    return _read_only, (dict(mapping),)
+
+
+# Records are frozen, and so are their dictionaries; pickle and deepcopy do not know read-only views by themselves.
+copyreg.pickle(MappingProxyType, _reduced)

@@ -1,0 +1,189 @@
+"""Motion known beside a log (rate table, tracking, robot, another unit) and what it says of the log's sensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records.finding import Finding
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceMotion:
+    """Known motion of a rigid body on a clock of its own.
+
+    ``time_s`` (n,) from the first row on, ``start_epoch_s`` its origin; ``attitude`` (n, 3, 3) reference body → its
+    world; ``rate`` (n, 3) [rad/s] and ``specific_force`` (n, 3) [m/s²] in the reference's body; ``position`` (n, 3) [m]
+    in its world. ``is_stepwise``: the rate of a row holds until the next one (commands of a rate table).
+    """
+
+    time_s: FloatArray
+    attitude: FloatArray | None = None
+    rate: FloatArray | None = None
+    position: FloatArray | None = None
+    specific_force: FloatArray | None = None
+    is_stepwise: bool = False
+    start_epoch_s: float = 0.0
+    source: str = "memory"
+    sha256: str = ""
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.time_s)
+        if n < 2 or not np.all(np.isfinite(self.time_s)) or np.any(np.diff(self.time_s) <= 0.0):
+            raise ValueError("a reference needs at least two rows with times that increase")
+        if self.attitude is None and self.rate is None:
+            raise ValueError("a reference needs attitude or rate")
+        for name, shape in (
+            ("attitude", (n, 3, 3)),
+            ("rate", (n, 3)),
+            ("position", (n, 3)),
+            ("specific_force", (n, 3)),
+        ):
+            value = getattr(self, name)
+            if value is not None and value.shape != shape:
+                raise ValueError(f"{name} must have shape {shape}, got {value.shape}")
+
+    @property
+    def kind(self) -> str:
+        """What it is, for people."""
+        if self.specific_force is not None:
+            return "the log of another unit"
+        if self.attitude is None:
+            return "commanded rate, in steps" if self.is_stepwise else "rate"
+        return "attitude" if self.position is None else "attitude and position"
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Named numbers (n,) with their covariance (n, n) in one SI unit.
+
+    ``p_value`` that all of them are zero; ``held_out`` rms [SI] of rows left out in turn, without and with them.
+    """
+
+    names: tuple[str, ...]
+    value: FloatArray
+    covariance: FloatArray
+    unit: str
+    p_value: float | None = None
+    held_out: tuple[float, float] | None = None
+
+    @property
+    def std(self) -> FloatArray:
+        """(n,) standard errors."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)), dtype=np.float64)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        return {
+            "names": list(self.names),
+            "value": self.value.tolist(),
+            "std": self.std.tolist(),
+            "unit": self.unit,
+            "p_value": self.p_value,
+            "rms_held_out": None if self.held_out is None else list(self.held_out),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class FitToReference:
+    """One sensor held against a reference: ``truth in the reference's body = S raw + b``.
+
+    ``covariance`` (12, 12) as a calibration's; ``rms`` [SI] of what is left sample by sample in the band that is
+    compared (up to ``band_hz``), ``rms_held_out`` of rows the fit did not see; ``n_rows`` windows of three components,
+    ``n_left_out`` of them as outliers; ``widened`` by how much blocks of time disagree more than the noise model says.
+    """
+
+    S: FloatArray
+    b: FloatArray
+    covariance: FloatArray
+    rms: float
+    rms_held_out: float
+    band_hz: float
+    n_rows: int
+    n_left_out: int
+    widened: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        sigma = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return {
+            "S": self.S.tolist(),
+            "b": self.b.tolist(),
+            "sigma_S": sigma[:9].reshape(3, 3).tolist(),
+            "sigma_b": sigma[9:].tolist(),
+            "rms": self.rms,
+            "rms_held_out": self.rms_held_out,
+            "band_hz": self.band_hz,
+            "rows": self.n_rows,
+            "left_out": self.n_left_out,
+            "widened": self.widened,
+        }
+
+
+@dataclass(frozen=True)
+class ReplayStage:
+    """Attitude carried by the gyro over ``horizon_s`` against the reference's, on a part no fit saw: rms [rad]."""
+
+    stage: str
+    horizon_s: float
+    error_rad: float
+    n: int
+
+
+@dataclass(frozen=True, eq=False)
+class AgainstReference:
+    """Everything that a reference says of a log: clocks, mounting, lever arm, both sensors, effects, replay.
+
+    ``clock_offset_s``: by how much the reference's clock is ahead at ``clock_middle_s`` of the log, and its σ.
+    """
+
+    kind: str
+    source: str
+    clock_offset_s: tuple[float, float]
+    clock_middle_s: float
+    clock_rate_ppm: tuple[float, float] | None
+    overlap_s: float
+    correlation: float
+    gyroscope: FitToReference
+    accelerometer: FitToReference | None
+    mounting: Estimate
+    lever_arm: Estimate | None
+    vertical: Estimate | None
+    effects: MappingProxyType[str, Estimate]
+    replay: tuple[ReplayStage, ...]
+    findings: tuple[Finding, ...] = ()
+    residual_time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
+    residual_rate: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types (the ``reference`` entry of the diagnosis schema)."""
+        rate = self.clock_rate_ppm
+        return {
+            "source": self.source,
+            "kind": self.kind,
+            "overlap_s": self.overlap_s,
+            "correlation": self.correlation,
+            "clock": {
+                "offset_s": self.clock_offset_s[0],
+                "offset_std_s": self.clock_offset_s[1],
+                "at_s": self.clock_middle_s,
+                "rate_ppm": None if rate is None else rate[0],
+                "rate_std_ppm": None if rate is None else rate[1],
+            },
+            "mounting": self.mounting.to_dict(),
+            "lever_arm": None if self.lever_arm is None else self.lever_arm.to_dict(),
+            "vertical": None if self.vertical is None else self.vertical.to_dict(),
+            "gyroscope": self.gyroscope.to_dict(),
+            "accelerometer": None if self.accelerometer is None else self.accelerometer.to_dict(),
+            "effects": {name: one.to_dict() for name, one in self.effects.items()},
+            "replay": [
+                {"stage": r.stage, "horizon_s": r.horizon_s, "error_rad": r.error_rad, "n": r.n} for r in self.replay
+            ],
+        }

@@ -1,0 +1,172 @@
+"""Many recordings of one unit: what is common, how far each parameter repeats, and what changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records.calibration import Calibration
+from trihedron.records.finding import Finding, Severity
+
+FloatArray = npt.NDArray[np.float64]
+
+By = Literal["session", "date", "device", "temperature"]
+"""How sessions are grouped: not at all, by the day they began, by the device, or along their temperature."""
+
+ChangeKind = Literal["differs", "apart", "step", "trend", "scatter"]
+"""``differs``: two sessions differ. ``apart``: one session differs from all others, which agree. ``step``: sessions
+before differ from sessions after. ``trend``: the number moves evenly from session to session. ``scatter``: every
+session has its own."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One of the numbers that do not depend on a frame: ``id`` of the contract (``gyro-zero``), axis or pair ``name``,
+    ``unit`` of its value, ``sensor``."""
+
+    id: str
+    name: str
+    unit: str
+    sensor: Literal["accelerometer", "gyroscope", "both"]
+
+
+_AXES, _PAIRS = ("x", "y", "z"), ("xy", "xz", "yz")
+
+
+def _of(prefix: Literal["accel", "gyro"], unit: str) -> tuple[Parameter, ...]:
+    sensor: Literal["accelerometer", "gyroscope"] = "accelerometer" if prefix == "accel" else "gyroscope"
+    return (
+        *(Parameter(f"{prefix}-zero", axis, unit, sensor) for axis in _AXES),
+        *(Parameter(f"{prefix}-scale", axis, "1", sensor) for axis in _AXES),
+        *(Parameter(f"{prefix}-misalignment", pair, "rad", sensor) for pair in _PAIRS),
+    )
+
+
+PARAMETERS: tuple[Parameter, ...] = (
+    *_of("accel", "m/s^2"),
+    *_of("gyro", "rad/s"),
+    *(Parameter("triad-alignment", axis, "rad", "both") for axis in _AXES),
+)
+"""Order of every vector of numbers: 9 of the accelerometer, 9 of the gyro, 3 of the rotation between them. A scale is
+the natural logarithm of raw units per SI unit: differences of it are relative."""
+
+
+@dataclass(frozen=True, eq=False)
+class Session:
+    """One calibrated recording as the comparison needs it.
+
+    ``numbers`` (9,) or (21,) in the order of :data:`PARAMETERS`, ``covariance`` of the same size: the error of the
+    session's own estimate; ``wander`` (same size) variance by which a zero moves within a session like this one.
+    ``group`` is the day or the device. Temperatures are those of the holds, NaN where the log has none; ``branch`` is
+    +1 while it was heating, -1 while cooling, 0 where neither is told.
+    """
+
+    name: str
+    group: str
+    numbers: FloatArray
+    covariance: FloatArray
+    wander: FloatArray
+    start_epoch_s: float = 0.0
+    temperature_degc: float = float("nan")
+    temperature_range_degc: tuple[float, float] = (float("nan"), float("nan"))
+    branch: int = 0
+    sha256: str = ""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A standard deviation with its 95 % interval, from ``dof`` degrees of freedom."""
+
+    sd: float
+    low: float
+    high: float
+    dof: int
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """One parameter over all sessions.
+
+    ``value`` what is common, ``std`` its standard error with ``half_width`` that of its 95 % interval; ``within``
+    spread from one session to the next of a group (turn-on to turn-on), ``between`` from group to group (day to day,
+    device to device), ``None`` without groups; ``own_std`` the typical error bar of one session.
+    """
+
+    parameter: Parameter
+    value: float
+    std: float
+    half_width: float
+    within: Spread | None
+    between: Spread | None
+    own_std: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """Whether one group of numbers (an ``id`` of the contract) is the same in all sessions of a unit.
+
+    ``p_adjusted`` after Holm's procedure over the ids; ``where`` names the session (``apart``) or the first session
+    after the step; ``size`` and ``std`` (3,) of that change. ``group`` is the device where several were compared.
+    """
+
+    id: str
+    group: str
+    kind: ChangeKind
+    where: str
+    names: tuple[str, ...]
+    size: tuple[float, ...]
+    std: tuple[float, ...]
+    unit: str
+    p_value: float
+    p_adjusted: float
+    significant: bool
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalTerm:
+    """How one group of numbers follows temperature: polynomial ``coefficients`` (order + 1, 3) in T - reference, lowest
+    first; ``held_out_gain`` of its score against none; ``hysteresis`` (3,) half the difference between heating and
+    cooling, ``None`` where it was not tested or is not there; ``remaining`` (3,) spread of sessions about it."""
+
+    id: str
+    order: int
+    coefficients: FloatArray
+    covariance: FloatArray
+    held_out_gain: float
+    remaining: tuple[Spread, ...]
+    hysteresis: FloatArray | None = None
+    hysteresis_p: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalModel:
+    """Numbers as polynomials of temperature, valid from ``low_degc`` to ``high_degc``."""
+
+    reference_degc: float
+    low_degc: float
+    high_degc: float
+    terms: tuple[ThermalTerm, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SessionsModel:
+    """Many recordings of one unit as one model: ``calibration`` is what is common, its covariance that of the *next*
+    session (error of the common numbers and what a session differs by)."""
+
+    by: By
+    sessions: tuple[Session, ...]
+    repeated: tuple[Repeated, ...]
+    changes: tuple[Change, ...]
+    thermal: ThermalModel | None
+    calibration: Calibration
+    left_out: tuple[tuple[str, str], ...] = ()
+    findings: tuple[Finding, ...] = ()
+    extensions: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_trustworthy(self) -> bool:
+        """No serious finding."""
+        return not any(finding.severity is Severity.SERIOUS for finding in self.findings)

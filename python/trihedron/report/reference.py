@@ -1,0 +1,124 @@
+"""What a reference says of a log, in words and tables."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.records.reference import AgainstReference, Estimate, FitToReference
+from trihedron.report.document import Block, Facts, Picture, Table
+from trihedron.report.drawing import later
+from trihedron.report.numbers import engineering_exponent, plain_number, power_of_ten, with_sigma
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
+
+_EFFECTS = {"gyro-g-sensitivity": "g-sensitivity", "gyro-scale-nonlinearity": "nonlinearity of the scale"}
+
+
+def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
+    """Clocks, mounting, lever arm, both sensors, effects and the replay, as the first thing to read."""
+    facts = [
+        ("reference", f"{found.kind}: {found.source}"),
+        ("shared motion", f"{found.overlap_s:.1f} s, correlation of the turning rates {found.correlation:.3f}"),
+        ("clock", _clock(found)),
+        (
+            "mounting",
+            f"rotation vector {_vector(found.mounting, degrees_from_radians(1.0))}° (log's gyro → reference)",
+        ),
+    ]
+    if found.lever_arm is not None:
+        length = 1000.0 * float(np.linalg.norm(found.lever_arm.value))
+        facts.append(
+            ("lever arm", f"{_vector(found.lever_arm, 1000.0)} mm, {length:.1f} mm long (reference → accelerometer)")
+        )
+    if found.vertical is not None:
+        facts.append(("up", f"{_vector(found.vertical, 1.0)} in the reference's world"))
+    facts.append(("gyro", _left(found.gyroscope, degrees_from_radians(1.0), "°/s")))
+    if found.accelerometer is not None:
+        facts.append(("accelerometer", _left(found.accelerometer, mm_s2_from_m_s2(1.0), "mm/s²")))
+    facts += [(f"attitude, {r.stage}", _replayed(r.error_rad, r.horizon_s, r.n)) for r in found.replay]
+    blocks: list[Block] = [Facts(tuple(facts)), _matrix("Gyro", "ω", "rad/s", found.gyroscope)]
+    if found.accelerometer is not None:
+        blocks.append(_matrix("Accelerometer", "f", "m/s²", found.accelerometer))
+    for ident, one in found.effects.items():
+        blocks.append(_effect(ident, one))
+    blocks.append(
+        Picture(
+            "reference",
+            "What is left of the rate, window by window.",
+            later("reference_figures", "draw_residual", found),
+        )
+    )
+    return tuple(blocks)
+
+
+def _clock(found: AgainstReference) -> str:
+    offset, sigma = found.clock_offset_s
+    where = f"at {found.clock_middle_s:.1f} s of the log"
+    way = "ahead of" if offset >= 0.0 else "behind"
+    size = abs(offset)
+    if not np.isfinite(sigma):
+        return f"the reference's is {size:.2f} s {way} the log's, to about a sample: commands tell no more"
+    far = size > 100.0
+    digits = f"{size:.4f} s" if far else f"{with_sigma(ms_from_s(size), ms_from_s(sigma))} ms"
+    text = f"the reference's is {digits} {way} the log's {where}"
+    text += f" (± {plain_number(ms_from_s(sigma), 2)} ms)" if far else ""
+    if found.clock_rate_ppm is not None:
+        rate, error = found.clock_rate_ppm
+        text += f", and runs {with_sigma(abs(rate), error)} ppm {'fast' if rate >= 0.0 else 'slow'}"
+    return text
+
+
+def _vector(one: Estimate, scale: float) -> str:
+    return "[" + ", ".join(with_sigma(scale * v, scale * s) for v, s in zip(one.value, one.std, strict=True)) + "]"
+
+
+def _left(fit: FitToReference, scale: float, unit: str) -> str:
+    text = f"{plain_number(scale * fit.rms)} {unit} rms left up to {plain_number(fit.band_hz, 2)} Hz"
+    text += f", {plain_number(scale * fit.rms_held_out)} {unit} held out in sixteenths"
+    if fit.n_left_out:
+        text += f"; {fit.n_left_out} of {fit.n_rows} windows left out"
+    return text
+
+
+def _replayed(error_rad: float, horizon_s: float, n: int) -> str:
+    many = "once" if n == 1 else f"{n} times"
+    return (
+        f"{plain_number(degrees_from_radians(error_rad))}° after {horizon_s:g} s by the gyro alone, held out ({many})"
+    )
+
+
+def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:
+    exponent = engineering_exponent(float(np.abs(fit.S).max()))
+    scale = 10.0**-exponent
+    sigma = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    times = f" × {power_of_ten(exponent)}" if exponent else ""
+    raw = "w" if symbol == "ω" else "a"
+    rows = tuple(
+        (
+            f"{symbol}{i + 1} =",
+            *(with_sigma(scale * fit.S[i, j], scale * sigma[3 * i + j]) for j in range(3)),
+            with_sigma(fit.b[i], sigma[9 + i]),
+        )
+        for i in range(3)
+    )
+    return Table(
+        ("", *(f"{raw}′{j}{times}" for j in (1, 2, 3)), f"b [{unit}]"), rows,
+        f"{name} in the reference's body   {symbol} = S {raw}′ + b",
+    )  # fmt: skip
+
+
+def _effect(ident: str, one: Estimate) -> Table:
+    per = 3
+    rows = []
+    for k in range(0, len(one.names), per):
+        exponent = engineering_exponent(float(np.abs(one.value[k : k + per]).max()))
+        scale = 10.0**-exponent
+        units = one.unit.split(", ")
+        unit = units[min(k // per, len(units) - 1)]
+        cells = [
+            with_sigma(scale * v, scale * s) for v, s in zip(one.value[k : k + per], one.std[k : k + per], strict=True)
+        ]
+        rows.append(
+            (", ".join(one.names[k : k + per]), *cells, f"{power_of_ten(exponent)} {unit.replace('^2', '²')}".strip())
+        )
+    p = "–" if one.p_value is None else plain_number(one.p_value, 2)
+    return Table(("", "", "", "", ""), tuple(rows), f"{_EFFECTS.get(ident, ident).capitalize()}   p of all zero: {p}")

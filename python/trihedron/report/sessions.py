@@ -1,0 +1,261 @@
+"""Many recordings of one unit, as a report."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
+from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
+from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.frames import Columns
+from trihedron.report.numbers import how_many, plain_number, with_sigma
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+
+SHOWN: dict[str, tuple[float, str]] = {
+    "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
+    "rad/s": (degrees_from_radians(1.0), "°/s"),
+    "rad": (degrees_from_radians(1.0), "°"),
+    "1": (1e2, "%"),
+}
+"""Factor and unit in which people compare numbers of each kind."""
+
+
+def sessions_report(model: SessionsModel) -> Document:
+    """Lay out what many recordings share, and how far each parameter repeats."""
+    n = len(model.sessions)
+    changed = [change for change in model.changes if change.significant]
+    good = f"{how_many(n, 'recording')} agree: no number of the model changed beyond its error."
+    if model.thermal is not None:
+        good = f"{how_many(n, 'recording')} make one model from {_range(model.thermal)}."
+    sections = [
+        Section("Result", (Facts(_facts(model)), *_repeatability(model))),
+        Section("Findings", (findings_block(model.findings),)),
+    ]
+    if model.changes:
+        sections.append(Section("Did anything change?", tuple(_changes(model))))
+    if model.thermal is not None:
+        sections.append(Section("Temperature", tuple(_thermal(model.thermal))))
+    sections.append(Section("Recordings", (_sessions(model),)))
+    sections.append(Section("Figures", (_picture(model),)))
+    usable = f"{how_many(n, 'recording')} were put into one model"
+    if changed:
+        usable = f"{how_many(n, 'recording')} of which {_and([change.id for change in changed])} changed"
+    return Document(
+        title="Many recordings",
+        subtitle=_named([session.name for session in model.sessions]),
+        verdict=verdict_of(model.findings, good, usable, "NOT TO BE TRUSTED"),
+        is_trustworthy=model.is_trustworthy,
+        sections=tuple(sections),
+    )
+
+
+def _named(names: list[str]) -> str:
+    return ", ".join(names) if len(names) <= 6 else f"{', '.join(names[:3])} ... {names[-1]}"
+
+
+def _and(words: list[str]) -> str:
+    words = list(dict.fromkeys(words))
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
+
+
+def _range(thermal: ThermalModel) -> str:
+    return f"{thermal.low_degc:.1f} to {thermal.high_degc:.1f} °C"
+
+
+def _facts(model: SessionsModel) -> tuple[tuple[str, str], ...]:
+    n_groups = len({session.group for session in model.sessions})
+    how = {
+        "session": "each recording for itself",
+        "date": f"{how_many(n_groups, 'day')}",
+        "device": f"{how_many(n_groups, 'device')}",
+        "temperature": "along temperature",
+    }[model.by]
+    facts = [("recordings", f"{len(model.sessions)}, {how}")]
+    if model.left_out:
+        facts.append(("left out", how_many(len(model.left_out), "recording")))
+    calibration = model.calibration
+    facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
+    if model.thermal is not None:
+        facts.append(("valid", f"{_range(model.thermal)}, counted from {model.thermal.reference_degc:.1f} °C"))
+    facts.append(
+        ("calibration", "the common numbers; its error bars are those of the next recording, repeatability included")
+    )
+    return tuple(facts)
+
+
+def _repeatability(model: SessionsModel) -> list[Block]:
+    if model.thermal is not None:
+        return []
+    grouped = any(one.between is not None for one in model.repeated)
+    between = {"date": "day to day", "device": "device to device"}.get(model.by, "between")
+    head = ["parameter", "common ± σ", "turn-on to turn-on" if grouped else "repeats to", "95 %"]
+    head += [between, "95 %"] if grouped else []
+    head += ["one recording's σ"]
+    rows = [tuple(_row(one, grouped)) for one in model.repeated]
+    return [
+        Table(
+            tuple(head),
+            tuple(rows),
+            "Standard deviation from one recording to the next, beyond each one's own error. Scales are raw counts per "
+            "unit, relative to the common value; misalignments are departures from 90°.",
+        )
+    ]
+
+
+def shown(unit: str) -> tuple[float, str]:
+    """Factor and unit in print."""
+    return SHOWN[unit]
+
+
+def _row(one: Repeated, grouped: bool) -> list[str]:
+    factor, unit = shown(one.parameter.unit)
+    value = one.value
+    if one.parameter.id.endswith("scale"):
+        value = 0.0
+    elif one.parameter.id.endswith("misalignment"):
+        value -= 0.5 * math.pi
+    cells = [f"{one.parameter.id} {one.parameter.name} [{unit}]"]
+    cells.append(
+        f"± {plain_number(one.std * factor, 2)}"
+        if one.parameter.id.endswith("scale")
+        else with_sigma(value * factor, one.std * factor)
+    )
+    cells += _spread_cells(one.within, factor)
+    if grouped:
+        cells += _spread_cells(one.between, factor)
+    return [*cells, plain_number(one.own_std * factor, 2)]
+
+
+def _spread_cells(spread: Spread | None, factor: float) -> list[str]:
+    if spread is None:
+        return ["–", "–"]
+    low, high = (plain_number(value * factor, 2) for value in (spread.low, spread.high))
+    return ["not seen" if spread.sd == 0.0 else plain_number(spread.sd * factor, 2), f"{low} to {high}"]
+
+
+def _changes(model: SessionsModel) -> list[Block]:
+    rows = []
+    with_group = model.by == "device"
+    for change in model.changes:
+        cells = [change.id, *([change.group] if with_group else []), f"{change.p_adjusted:.2g}"]
+        rows.append((*cells, "yes" if change.significant else "no", _said(change) if change.significant else ""))
+    head = ("number", *(["device"] if with_group else []), "p", "changed", "how")
+    return [
+        Paragraph(
+            "Each number of all recordings against one common value, by each recording's own error and the wander of "
+            "its zeros; p after Holm's procedure over all lines."
+        ),
+        Table(head, tuple(rows)),
+    ]
+
+
+def _said(change: Change) -> str:
+    factor, unit = shown(change.unit)
+    pairs = [(size * factor, std * factor) for size, std in zip(change.size, change.std, strict=True)]
+    cells = [plain_number(v, 2) if change.kind == "scatter" else with_sigma(v, s) for v, s in pairs]
+    sizes = ", ".join(f"{name} {cell}" for name, cell in zip(change.names, cells, strict=True))
+    what = {
+        "differs": "second less first",
+        "apart": f"{change.where} apart",
+        "step": f"from {change.where} on",
+        "trend": "each recording by",
+        "scatter": "in every recording, sd",
+    }[change.kind]
+    return f"{what}: {sizes} {unit}"
+
+
+def _thermal(thermal: ThermalModel) -> list[Block]:
+    rows = []
+    powers = ("", "per °C", "per °C²", "per °C³")
+    for term in thermal.terms:
+        factor, unit = shown("1" if term.id.endswith("scale") else _unit(term.id))
+        for k in range(term.order + 1):
+            values = term.coefficients[k] * factor
+            sigma = [math.sqrt(max(float(term.covariance[axis][k, k]), 0.0)) * factor for axis in range(3)]
+            if k == 0 and term.id.endswith(("scale", "misalignment")):
+                continue
+            cells = [with_sigma(float(v), s) for v, s in zip(values, sigma, strict=True)]
+            rows.append((f"{term.id} [{unit} {powers[k]}]".replace(" ]", "]"), *cells))
+        spread = [plain_number(one.sd * factor, 2) for one in term.remaining]
+        rows.append((f"{term.id}, order {term.order}: what remains [{unit}]", *spread))
+        if term.hysteresis is not None:
+            cells = [plain_number(float(v) * factor, 2) for v in term.hysteresis]
+            rows.append((f"{term.id}: half of heating less cooling [{unit}]", *cells))
+    return [
+        Paragraph(
+            f"Polynomials of T − {thermal.reference_degc:.2f} °C; the order is the one that predicts recordings it "
+            f"has not seen. Valid from {_range(thermal)}: `trihedron apply` holds the ends outside it and says so."
+        ),
+        Table(("number", "x or xy", "y or xz", "z or yz"), tuple(rows)),
+    ]
+
+
+def _unit(name: str) -> str:
+    return {"accel-zero": "m/s^2", "gyro-zero": "rad/s"}.get(name, "rad")
+
+
+def _sessions(model: SessionsModel) -> Table:
+    columns = [("recording", [s.name for s in model.sessions])]
+    if model.by in ("date", "device"):
+        columns.append((model.by, [s.group for s in model.sessions]))
+    if any(math.isfinite(s.temperature_degc) for s in model.sessions):
+        shown_degc = ["–" if math.isnan(s.temperature_degc) else f"{s.temperature_degc:.1f}" for s in model.sessions]
+        branch = [{1: "heating", -1: "cooling"}.get(s.branch, "") for s in model.sessions]
+        columns += [("temperature [°C]", shown_degc), ("branch", branch)]
+    return Table(tuple(name for name, _ in columns), tuple(zip(*(cells for _, cells in columns), strict=True)))
+
+
+def _picture(model: SessionsModel) -> Picture:
+    return Picture(
+        "sessions",
+        "Every number in every recording with its own error (bars), about the common value; the band is one standard "
+        "deviation from recording to recording.",
+        later("sessions_figures", "draw_sessions", model),
+    )
+
+
+def sessions_columns(model: SessionsModel) -> Columns:
+    """A row per parameter: common value, error, spreads with their ends (SI)."""
+    columns: dict[str, list[Any]] = {
+        "id": [one.parameter.id for one in model.repeated],
+        "name": [one.parameter.name for one in model.repeated],
+        "unit": [one.parameter.unit for one in model.repeated],
+        "value": [one.value for one in model.repeated],
+        "std": [one.std for one in model.repeated],
+    }
+    for kind in ("within", "between"):
+        spreads: list[Spread | None] = [getattr(one, kind) for one in model.repeated]
+        for part in ("sd", "low", "high"):
+            columns[f"{kind}_{part}"] = [None if s is None else getattr(s, part) for s in spreads]
+    return dict(columns)
+
+
+def session_record(session: Session) -> dict[str, object]:
+    """One recording's numbers for machines."""
+    return {**vars(session), "temperature_range_degc": list(session.temperature_range_degc)}
+
+
+def sessions_record(model: SessionsModel) -> dict[str, object]:
+    """Everything that the report says, as plain types (SI)."""
+    return {
+        "by": model.by,
+        "is_trustworthy": model.is_trustworthy,
+        "sessions": [session_record(session) for session in model.sessions],
+        "parameters": [
+            {
+                **vars(one.parameter),
+                "value": one.value,
+                "std": one.std,
+                "interval": [one.value - one.half_width, one.value + one.half_width],
+                "within": None if one.within is None else vars(one.within),
+                "between": None if one.between is None else vars(one.between),
+                "own_std": one.own_std,
+            }
+            for one in model.repeated
+        ],
+        "changes": [vars(change) for change in model.changes],
+        "left_out": [{"source": source, "reason": why} for source, why in model.left_out],
+        "findings": [finding.to_dict() for finding in model.findings],
+    }

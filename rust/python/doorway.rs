@@ -1,0 +1,183 @@
+//! How a kernel is run: without the interpreter, on threads that exist, stopped by Ctrl-C, its panics kept quiet.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::error::Result as KernelResult;
+use crate::interrupt;
+
+/// How often a long kernel looks whether a signal arrived.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Where the last panic happened; its text is for a bug report, not for the screen.
+static PANIC: Mutex<String> = Mutex::new(String::new());
+
+/// Run a kernel without holding the interpreter; its refusal becomes `ValueError` in the kernel's own words.
+pub(crate) fn run<T: Send>(
+    py: Python<'_>,
+    kernel: impl FnOnce() -> KernelResult<T> + Send,
+) -> PyResult<T> {
+    let before = interrupt::requests();
+    let out = py.detach(|| guarded(kernel));
+    finish(out, before)
+}
+
+/// As [`run`], for kernels that may take seconds: signals are looked for while it works, and end it between blocks.
+pub(crate) fn run_long<T: Send>(
+    py: Python<'_>,
+    kernel: impl FnOnce() -> KernelResult<T> + Send,
+) -> PyResult<T> {
+    let before = interrupt::requests();
+    std::thread::scope(|scope| {
+        let (done, mut waiting) = channel::<()>();
+        let worker = std::thread::Builder::new().spawn_scoped(scope, move || {
+            let out = guarded(kernel);
+            // Nobody waits any more when this fails, which cannot happen before the thread is joined.
+            let _ = done.send(());
+            out
+        });
+        let worker = worker.map_err(|error| no_threads(&error))?;
+        let mut stopped = None;
+        loop {
+            let waiting = &mut waiting;
+            match py.detach(move || waiting.recv_timeout(PATIENCE)) {
+                Err(RecvTimeoutError::Timeout) if stopped.is_none() => {
+                    // Runs the handlers of Python where this is its main thread, and does nothing elsewhere.
+                    if let Err(signal) = py.check_signals() {
+                        stopped = Some((signal, interrupt::request()));
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Ok(()) | Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+        let out = match py.detach(move || worker.join()) {
+            Ok(out) => out,
+            Err(panic) => resume_unwind(panic),
+        };
+        match stopped {
+            Some((signal, _request)) => Err(signal),
+            None => finish(out, before),
+        }
+    })
+}
+
+type Guarded<T> = Result<KernelResult<T>, Failure>;
+
+enum Failure {
+    Threads(String),
+    Panic,
+}
+
+fn guarded<T: Send>(kernel: impl FnOnce() -> KernelResult<T> + Send) -> Guarded<T> {
+    // The kernel owns what it works on, so that nothing half-changed outlives a panic.
+    match catch_unwind(AssertUnwindSafe(|| with_threads(kernel))) {
+        Ok(out) => out.map_err(Failure::Threads),
+        Err(payload) => {
+            forget(payload);
+            Err(Failure::Panic)
+        }
+    }
+}
+
+fn forget(payload: Box<dyn Any + Send>) {
+    // Dropping what was thrown may throw again.
+    std::mem::forget(payload);
+}
+
+fn finish<T>(out: Guarded<T>, requests_before: usize) -> PyResult<T> {
+    if interrupt::requests() != requests_before {
+        return Err(PyKeyboardInterrupt::new_err(
+            "another thread was interrupted",
+        ));
+    }
+    match out {
+        Ok(answer) => answer.map_err(|error| PyValueError::new_err(error.to_string())),
+        Err(Failure::Threads(why)) => Err(no_threads(&why)),
+        Err(Failure::Panic) => Err(PyRuntimeError::new_err(format!(
+            "the numerical core failed on this input ({}); this is a defect of trihedron, please report it",
+            PANIC.lock().unwrap_or_else(PoisonError::into_inner)
+        ))),
+    }
+}
+
+fn no_threads(why: &impl ToString) -> PyErr {
+    PyValueError::new_err(format!(
+        "the system gives this process no threads to compute with ({}); raise its limits of processes or memory",
+        why.to_string()
+    ))
+}
+
+/// The process in which rayon's own threads live; 0 before the first kernel.
+static HOME: AtomicU32 = AtomicU32::new(0);
+/// No process: the system refused rayon's own threads, and every kernel asks again for a pool of its own.
+const NOWHERE: u32 = u32::MAX;
+/// The threads of a forked child, made when its first kernel runs.
+static CHILD: AtomicPtr<Child> = AtomicPtr::new(std::ptr::null_mut());
+
+struct Child {
+    process: u32,
+    pool: ThreadPool,
+}
+
+/// Run on threads of this process: those of its parent did not come along when it was forked.
+fn with_threads<T: Send>(kernel: impl FnOnce() -> T + Send) -> Result<T, String> {
+    let here = std::process::id();
+    match HOME.load(Ordering::Acquire) {
+        home if home == here => Ok(kernel()),
+        0 => {
+            // Made now, where a system without threads can be reported; rayon would panic at its first use.
+            let made = ThreadPoolBuilder::new().build_global();
+            let failed = made.is_err_and(|error| std::error::Error::source(&error).is_some());
+            // Without an error of the system behind it, a failure says that another thread was first.
+            HOME.store(if failed { NOWHERE } else { here }, Ordering::Release);
+            if failed {
+                return Ok(pool_of_child(here)?.install(kernel));
+            }
+            Ok(kernel())
+        }
+        _ => Ok(pool_of_child(here)?.install(kernel)),
+    }
+}
+
+fn pool_of_child(here: u32) -> Result<&'static ThreadPool, String> {
+    // Without a lock: one that was held when the process was forked would be held for ever.
+    let known = CHILD.load(Ordering::Acquire);
+    // SAFETY: what is stored was leaked below and lives as long as the process.
+    if let Some(child) = unsafe { known.as_ref() }
+        && child.process == here
+    {
+        return Ok(&child.pool);
+    }
+    let pool = ThreadPoolBuilder::new()
+        .build()
+        .map_err(|error| error.to_string())?;
+    let made = Box::into_raw(Box::new(Child {
+        process: here,
+        pool,
+    }));
+    let kept = match CHILD.compare_exchange(known, made, Ordering::AcqRel, Ordering::Acquire) {
+        Ok(_) => made,
+        // Another thread of the child was first; its pool serves both.
+        Err(theirs) => theirs,
+    };
+    // SAFETY: as above.
+    Ok(unsafe { &(*kept).pool })
+}
+
+/// Keep panics off the screen: they are reported as an exception, with the place.
+pub(super) fn keep_panics_quiet() {
+    std::panic::set_hook(Box::new(|info| {
+        if let (Some(place), Ok(mut last)) = (info.location(), PANIC.try_lock()) {
+            *last = format!("{}:{}", place.file(), place.line());
+        }
+    }));
+}

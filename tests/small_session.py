@@ -1,0 +1,94 @@
+"""One short session with everything that commands read: made once, copied wherever a test wants to harm it."""
+
+import functools
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+
+from trihedron.cli import main
+from trihedron.simulate import hand_session, scenario_by_name, simulate
+
+G = "9.80665"
+SCENARIO = """name = "small"
+gravity_m_s2 = 9.80665
+
+[motion]
+kind = "hand"
+"""
+
+
+@functools.cache
+def made_once() -> Path:
+    """Folder with log.csv, log.npy, rest.csv, c.json, untrusted.json, noise.json, diagnosis.json and s.toml."""
+    folder = Path(tempfile.mkdtemp(prefix="session-"))
+    motion = hand_session(n_poses=12, hold_s=2.0, move_s=1.0, first_hold_s=4.0)
+    recording = simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
+    rows = np.column_stack([recording.time_s, recording.accelerometer, recording.gyroscope])
+    names = "time_s,ax,ay,az,gx,gy,gz\n"
+    (folder / "log.csv").write_text(names + "\n".join(",".join(f"{v:.10g}" for v in row) for row in rows) + "\n")
+    np.save(folder / "log.npy", rows)
+    rng = np.random.default_rng(5)
+    rest = np.column_stack([np.arange(3000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (3000, 6))])
+    (folder / "rest.csv").write_text(names + "\n".join(",".join(f"{v:.8g}" for v in row) for row in rest) + "\n")
+    (folder / "s.toml").write_text(SCENARIO)
+    log, known = str(folder / "log.csv"), folder / "c.json"
+    quietly("calibrate", log, "--gravity", G, "-o", str(known))
+    quietly("allan", str(folder / "rest.csv"), "--json", str(folder / "noise.json"))
+    quietly("diagnose", log, "--gravity", G, "--json", str(folder / "diagnosis.json"))
+    untrusted = folder / "untrusted.json"
+    text = known.read_text()
+    finding = (
+        '"findings": [{"code": "not-observable", "severity": "serious", "seen": "Scale 3 is not determined.", '
+        '"cause": "", "action": "", "numbers": {}}],\n "was": ['
+    )
+    import json
+
+    document = json.loads(text.replace('"findings": [', finding, 1))
+    del document["was"]
+    document["is_trustworthy"] = False
+    untrusted.write_text(json.dumps(document))
+    return folder
+
+
+def quietly(*arguments: str) -> int:
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+        return main(list(arguments))
+
+
+def copied(tmp_path: Path) -> Path:
+    """A copy of the session's files that may be harmed."""
+    folder = tmp_path / "session"
+    shutil.copytree(made_once(), folder)
+    return folder
+
+
+def started(*arguments: object, **options) -> subprocess.Popen:
+    """The command as a process of its own."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    environment.update(options.pop("env", {}))
+    return subprocess.Popen(
+        [sys.executable, "-m", "trihedron", *map(str, arguments)],
+        stdout=options.pop("stdout", subprocess.PIPE),
+        stderr=subprocess.PIPE,
+        env=environment,
+        **options,
+    )
+
+
+def run(*arguments: object, **options) -> tuple[int, str, str]:
+    """Status, stdout and stderr of the command as a process."""
+    process = started(*arguments, **options)
+    out, err = process.communicate(timeout=120)
+    return process.returncode, (out or b"").decode(), err.decode()
+
+
+def leftovers(folder: Path) -> list[str]:
+    return [p.name for p in folder.rglob(".*trihedron*")]

@@ -1,0 +1,284 @@
+"""The package as people call it from Python: names, arguments, results in notebooks and in other processes."""
+
+import copy
+import inspect
+import json
+import multiprocessing
+import pickle
+import re
+import subprocess
+import sys
+from concurrent.futures import ProcessPoolExecutor
+
+import numpy as np
+import polars as pl
+import pytest
+
+import trihedron
+from trihedron.cli import COMMANDS
+from trihedron.records import Calibration, Severity
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return trihedron.simulate("hand-session", 3)[0]
+
+
+@pytest.fixture(scope="module")
+def result(recording):
+    return trihedron.calibrate(recording, latitude_deg=60.0)
+
+
+@pytest.fixture(scope="module")
+def results(recording, result):
+    rest = {"t": np.arange(6000) / 100, "acc": np.random.default_rng(0).normal([0, 0, 9.8], 0.02, (6000, 3))}
+    return [
+        recording,
+        trihedron.segment(recording),
+        result,
+        result.calibration,
+        trihedron.verify(result, trihedron.simulate("hand-session", 4)[0]),
+        trihedron.check(recording),
+        trihedron.diagnose(recording, gravity_m_s2=9.819),
+        trihedron.kalman(recording, latitude_deg=60.0),
+        trihedron.noise(rest),
+        trihedron.allan_deviation(rest["acc"], 100.0),
+    ]
+
+
+def test_dir_shows_the_public_names_and_nothing_else():
+    assert dir(trihedron) == sorted(trihedron.__all__)
+    assert all(getattr(trihedron, name) is not None for name in trihedron.__all__)
+
+
+def test_there_is_a_version():
+    assert re.match(r"\d+\.\d+", trihedron.__version__)
+
+
+def test_every_command_is_a_verb():
+    names = {command.__name__ for command in COMMANDS}
+    # What the command calls by its method, Python calls by what it finds.
+    verbs = {"noise" if name == "allan" else name for name in names}
+    assert verbs <= set(trihedron.__all__)
+    assert {"report", "plot", "twin"} <= set(trihedron.__all__)
+
+
+def test_verbs_have_signatures_and_words():
+    for name in trihedron.__all__:
+        value = getattr(trihedron, name)
+        if inspect.isfunction(value):
+            assert value.__doc__
+            assert inspect.signature(value).parameters or name == "ports"
+
+
+def test_import_loads_neither_numpy_nor_anything_else_heavy():
+    code = "import sys, trihedron; print([m for m in ('numpy', 'scipy', 'polars', 'typer') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == "[]"
+
+
+def test_results_are_plain_types_frames_figures_and_pieces_of_html(results):
+    for one in results:
+        json.dumps(one.to_dict(), allow_nan=False)
+        assert isinstance(one.to_dataframe(), pl.DataFrame)
+        assert one.plot()._repr_png_().startswith(b"\x89PNG")
+        page = one._repr_html_()
+        # A notebook holds many: small, no picture inside, nothing that runs.
+        assert len(page) < 8000
+        assert "<script" not in page
+        assert "<img" not in page
+        assert len(repr(one)) < 160
+        assert trihedron.report(one)
+
+
+def test_a_frame_of_a_calibration_holds_every_parameter(result):
+    frame = result.to_dataframe()
+    assert frame.columns == ["sensor", "parameter", "value", "sigma", "unit"]
+    S = frame.filter((pl.col("sensor") == "gyroscope") & pl.col("parameter").str.starts_with("S"))["value"]
+    assert np.array_equal(S.to_numpy().reshape(3, 3), result.gyroscope.S)
+
+
+def test_names_from_a_file_are_escaped_in_html(recording):
+    from dataclasses import replace
+
+    page = replace(recording, source="<script>alert(1)</script>.csv")._repr_html_()
+    assert "<script>" not in page
+
+
+def test_results_are_pickled_and_copied_whole(results):
+    for one in results:
+        for twin in (pickle.loads(pickle.dumps(one)), copy.deepcopy(one)):
+            assert type(twin) is type(one)
+            assert twin.to_dict() == one.to_dict()
+
+
+def _worked_on(given):
+    """In another process: a result comes in, the work of another result goes out."""
+    calibration, recording = given
+    done = trihedron.apply(calibration, recording)
+    return calibration, done.accelerometer[0]
+
+
+def test_results_cross_processes_by_spawn(result, recording):
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        back, first = pool.submit(_worked_on, (result, recording)).result(timeout=120)
+    assert np.array_equal(back.calibration.covariance, result.calibration.covariance)
+    here = trihedron.apply(result, recording).accelerometer[0]
+    assert np.array_equal(first, here)
+
+
+def test_a_series_gives_arrays_of_one_dimension_and_channels_of_two():
+    x = np.random.default_rng(1).normal(size=4096)
+    one, two = trihedron.allan_deviation(x, 100.0), trihedron.allan_deviation(np.c_[x, x], 100.0)
+    assert one.deviation.shape == one.lower.shape == one.edf.shape == one.tau_s.shape
+    assert two.deviation.shape == (*one.tau_s.shape, 2)
+    assert np.array_equal(two.deviation[:, 1], one.deviation)
+
+
+WRONG = {
+    "a path of no file": (lambda _: trihedron.calibrate("nofile.csv"), "no such file"),
+    "a number for a log": (lambda _: trihedron.calibrate(3), "trihedron.read takes"),
+    "a text for a number": (lambda r: trihedron.calibrate(r.recording, latitude_deg="60"), "latitude_deg is a number"),
+    "one number for many": (lambda r: trihedron.calibrate(r.recording, turns_deg=90), "turns_deg is a list"),
+    "segments of another kind": (lambda r: trihedron.calibrate(r.recording, segments=[1]), "trihedron.segment"),
+    "a recording for a calibration": (lambda r: trihedron.verify(r.recording, r.recording), "trihedron.calibrate"),
+    "a check for a calibration": (lambda r: trihedron.apply(trihedron.check(r), r), "not CheckResult"),
+    "no calibration": (lambda r: trihedron.apply(None, r.recording), "not NoneType"),
+    "counts without a size": (lambda r: trihedron.export(r, "px4"), 'accelerometer_lsb="0.061 mg"'),
+    "no such target": (lambda r: trihedron.export(r, "x"), "there are c, rust"),
+    "no such figure": (lambda r: trihedron.plot(r, "x"), "'residuals'"),
+    "no such ending": (lambda r: trihedron.report(r, "x.pdf"), ".html, .txt, .json"),
+    "no result": (lambda _: trihedron.report(3), "no result of trihedron"),
+    "no such library": (lambda r: r.to_dataframe("excel"), "polars"),
+    "no such scenario": (lambda _: trihedron.simulate(3), "a scenario is its name"),
+    "a list of columns": (lambda _: trihedron.read("x.csv", columns=["t"]), "columns is a text"),
+    "a rate in words": (lambda _: trihedron.read("x.csv", rate_hz="fast"), "rate_hz is a number"),
+    "gravity twice": (lambda r: trihedron.calibrate(r, gravity_m_s2=9.8, latitude_deg=1.0), "gravity_m_s2 or lat"),
+    "no port": (lambda _: trihedron.capture("/dev/ttyNOPE", "x.csv"), "trihedron.ports()"),
+    "three by n": (lambda _: trihedron.Recording.from_arrays(np.arange(5.0), np.zeros((3, 5))), r"\(n, 3\)"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_argument_is_one_sentence_in_words_of_python(name, result):
+    ask, words = WRONG[name]
+    with pytest.raises((ValueError, TypeError), match=words) as caught:
+        ask(result)
+    assert "\n" not in str(caught.value)
+    assert not re.search(r"(?<!\w)--\w", str(caught.value))
+
+
+def test_findings_name_parameters_not_flags(recording):
+    said = [f"{f.seen} {f.cause} {f.action}" for f in trihedron.calibrate(recording).findings]
+    assert any("latitude_deg" in text for text in said)
+    assert not any(re.search(r"(?<!\w)--\w", text) for text in said)
+
+
+def test_frames_lists_and_nested_dictionaries_are_logs():
+    rng = np.random.default_rng(2)
+    t, acc = np.arange(500) / 100, rng.normal([0, 0, 9.8], 0.02, (500, 3))
+    frame = pl.DataFrame(np.c_[t, acc], schema=["t", "ax", "ay", "az"])
+    rows = [{"t": a, "ax": b[0], "ay": b[1], "az": b[2]} for a, b in zip(t, acc, strict=True)]
+    for given in (frame, frame.lazy(), rows, {"t": t, "acc": {"x": acc[:, 0], "y": acc[:, 1], "z": acc[:, 2]}}):
+        assert np.array_equal(trihedron.read(given).accelerometer, acc)
+
+
+def test_results_take_each_other(result, recording, tmp_path):
+    trihedron.write_calibration(result, tmp_path / "c.json")
+    assert isinstance(trihedron.read_calibration(tmp_path / "c.json"), Calibration)
+    assert trihedron.verify(tmp_path / "c.json", result).recording is recording
+    assert trihedron.read(result) is recording
+    made = trihedron.export(result, "c", output=tmp_path / "c.h")
+    assert (tmp_path / "c.h").read_text() == made[""]
+    assert trihedron.report(result, tmp_path / "r.html")
+    assert "<img" in (tmp_path / "r.html").read_text()
+
+
+def test_noise_that_was_just_found_goes_into_an_export():
+    rng = np.random.default_rng(4)
+    acc = rng.normal([0, 0, 9.8], 0.02, (6000, 3))
+    noise = trihedron.noise({"t": np.arange(6000) / 100, "acc": acc, "gyr": rng.normal(0, 0.001, (6000, 3))})
+    S = np.diag([1.01, 0.99, 1.0])
+    from trihedron.records import SensorCalibration
+
+    sensors = [SensorCalibration(S, np.zeros(3), np.zeros((12, 12)), u, u, "given") for u in ("m/s^2", "rad/s")]
+    known = Calibration(*sensors, np.zeros((24, 24)), "lower", 9.81, "given")
+    text = "\n".join(trihedron.export(known, "kalibr", noise=noise).values())
+    density = float(re.search(r"accelerometer_noise_density: (\S+)", text)[1])
+    assert density == pytest.approx(0.02 / np.sqrt(100.0), rel=0.05)
+
+
+def with_sensor(result, **changes):
+    from dataclasses import replace
+
+    return replace(result.calibration, accelerometer=replace(result.calibration.accelerometer, **changes))
+
+
+def test_apply_and_export_refuse_what_cannot_be_a_calibration(result, recording):
+    S = result.calibration.accelerometer.S
+    singular = with_sensor(result, S=np.stack([S[0], S[1], S[0] + S[1]]))
+    covariance = result.calibration.accelerometer.covariance.copy()
+    covariance[0, 0] = -covariance[0, 0]
+    negative = with_sensor(result, covariance=covariance)
+    contradictory = result.calibration.accelerometer.covariance.copy()
+    contradictory[9, 10] = contradictory[10, 9] = 3.0 * np.sqrt(contradictory[9, 9] * contradictory[10, 10])
+    for wrong, words in (
+        (singular, "singular"),
+        (negative, "negative variance"),
+        (with_sensor(result, covariance=contradictory), "contradict"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            trihedron.apply(wrong, recording)
+        with pytest.raises(ValueError, match=words):
+            trihedron.export(wrong, "c")
+
+
+def test_a_gyro_that_maps_degrees_as_radians_is_refused():
+    from trihedron.records import SensorCalibration
+
+    sensors = [
+        SensorCalibration(S, np.zeros(3), np.zeros((12, 12)), u, u, "given")
+        for S, u in ((np.eye(3), "m/s^2"), (np.eye(3) * np.pi / 180.0, "rad/s"))
+    ]
+    known = Calibration(*sensors, np.zeros((24, 24)), "lower", 9.81, "given")
+    with pytest.raises(ValueError, match="unit of the readings"):
+        trihedron.export(known, "c")
+
+
+def test_what_is_applied_says_that_its_calibration_was_not_to_be_trusted(result, recording):
+    from dataclasses import replace
+
+    from trihedron.records import Finding, FindingCode
+
+    grave = Finding(FindingCode.NOT_CONVERGED, Severity.SERIOUS, "The fit did not converge.")
+    doubted = replace(result.calibration, findings=(grave,))
+    done = trihedron.apply(doubted, recording)
+    said = [f for f in done.findings if f.code is FindingCode.CALIBRATION_DOUBTED]
+    assert [f.severity for f in said] == [Severity.SERIOUS]
+    assert "did not converge" in said[0].seen
+    assert not [f for f in trihedron.apply(result, recording).findings if f.code is FindingCode.CALIBRATION_DOUBTED]
+
+
+def test_a_text_report_needs_no_drawing(tmp_path, recording):
+    trihedron.convert(recording, tmp_path / "log.csv")
+    code = (
+        "import sys; sys.modules['matplotlib'] = None\n"
+        f"import trihedron; r = trihedron.calibrate({str(tmp_path / 'log.csv')!r}, latitude_deg=60.0)\n"
+        f"print(r); trihedron.report(r, {str(tmp_path / 'r.html')!r}); r._repr_html_()\n"
+        "try: r.plot()\nexcept ValueError as error: print(error)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.rstrip().endswith("pip install matplotlib.")
+    assert "Not drawn" in (tmp_path / "r.html").read_text()
+
+
+def test_capture_of_a_file_of_bytes_gives_a_recording(tmp_path):
+    rng = np.random.default_rng(6)
+    rows = "\n".join(
+        f"{k * 10},{a[0]:.4f},{a[1]:.4f},{a[2]:.4f}" for k, a in enumerate(rng.normal([0, 0, 9.8], 0.02, (400, 3)))
+    )
+    (tmp_path / "stream.txt").write_text("t_ms,ax,ay,az\n" + rows + "\n")
+    blocks = []
+    taken = trihedron.capture(str(tmp_path / "stream.txt"), tmp_path / "log.csv", on_block=blocks.append)
+    assert taken.n_samples > 380
+    assert sum(len(block.time_s) for block in blocks) == taken.n_samples

@@ -1,0 +1,97 @@
+"""Logs of one or two orientations: static logs and thermal chambers."""
+
+import numpy as np
+import pytest
+
+import trihedron
+
+DEG = np.pi / 180.0
+
+
+def still(n, rate_hz, seed, force=(0.3, -0.2, 9.79)):
+    rng = np.random.default_rng(seed)
+    t = np.arange(n) / rate_hz
+    accelerometer = np.array(force) + rng.normal(0.0, 0.02, (n, 3))
+    gyroscope = rng.normal(0.0, 0.05 * DEG, (n, 3)) + np.array([0.3, -0.2, 0.1]) * DEG
+    return t, accelerometer, gyroscope
+
+
+def recording(t, accelerometer, gyroscope, **more):
+    return trihedron.Recording.from_arrays(
+        t, accelerometer, gyroscope, accelerometer_unit="m/s^2", gyroscope_unit="rad/s", **more
+    )
+
+
+def chamber(seed, hysteresis=0.0):
+    """Up from -10 to 60 °C and back, at 4 Hz in 80 min: the gyro's zero follows, lagging if there is hysteresis."""
+    n, rate_hz = 19200, 4.0
+    t, accelerometer, gyroscope = still(n, rate_hz, seed)
+    u = t / t[-1]
+    heat = 25.0 - 35.0 * np.cos(2.0 * np.pi * u)
+    own = np.array([0.01, -0.03, 0.004]) * DEG
+    gyroscope += (heat - 25.0)[:, None] * own + hysteresis * np.sign(np.gradient(heat))[:, None] * np.array([1, 0, 0])
+    return recording(t, accelerometer, gyroscope, temperature_degc=np.round(heat, 1)), own
+
+
+@pytest.mark.parametrize("seed", [41, 42])
+def test_a_static_log_of_a_healthy_sensor_is_not_testable_and_nothing_is_named(seed):
+    d = trihedron.diagnose(recording(*still(60000, 100.0, seed)), gravity_m_s2=9.8)
+    assert d.verdict == "not-testable"
+    assert d.effects == ()
+    assert {t.domain for t in d.domains} >= {"static-gyro", "static-accel", "within-static"}
+    assert not any(t.disagrees for t in d.remaining)
+    assert "poses" in str(d)
+
+
+@pytest.mark.parametrize("seed", [43, 44])
+def test_a_chamber_log_of_one_pose_tells_zeros_against_temperature(seed):
+    log, own = chamber(seed)
+    d = trihedron.diagnose(log, gravity_m_s2=9.8)
+    assert [e.id for e in d.effects] == ["gyro-thermal-bias"]
+    said = {p.name: p for p in d.effects[0].parameters}
+    for axis, true in zip("xyz", own, strict=True):
+        p = said[f"bias_per_kelvin_{axis}"]
+        # Four standard errors: three axes, two seeds.
+        assert abs(p.value - true) < 4.0 * p.std
+        assert p.std < 0.1 * np.abs(own).max()
+    static = next(t for t in d.domains if t.domain == "static-gyro")
+    after = next(t for t in d.remaining if t.domain == "static-gyro")
+    assert after.rms < 0.1 * static.rms
+
+
+def test_branches_that_differ_while_heating_and_cooling_are_stated_in_degrees_per_second():
+    log, _ = chamber(45, hysteresis=0.2 * DEG)
+    d = trihedron.diagnose(log, gravity_m_s2=9.8)
+    effect = next(e for e in d.effects if e.id == "gyro-thermal-bias")
+    said = {p.name: p.value for p in effect.parameters}
+    told = abs(said.get("half_gap_x", 0.0)) + 0.5 * abs(said.get("branch_difference_x", 0.0))
+    assert told == pytest.approx(0.2 * DEG, rel=0.25)
+
+
+def test_a_zero_that_swings_without_a_logged_cause_is_hidden_drift():
+    t, accelerometer, gyroscope = still(60000, 50.0, 46)
+    gyroscope[:, 1] += 0.2 * DEG * np.sin(2.0 * np.pi * t / t[-1] * 1.3)
+    d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
+    assert [e.id for e in d.effects] == ["gyro-hidden-drift"]
+    spans = {p.name: p.value for p in d.effects[0].parameters}
+    assert spans["range_y"] == pytest.approx(0.4 * DEG, rel=0.1)
+
+
+def test_a_hum_in_a_static_log_is_named():
+    t, accelerometer, gyroscope = still(30000, 100.0, 47)
+    gyroscope[:, 0] += 0.04 * DEG * np.sin(2.0 * np.pi * 17.3 * t)
+    d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
+    assert [e.id for e in d.effects] == ["periodic-interference"]
+    assert d.effects[0].parameters[0].value == pytest.approx(17.3, abs=1e-3)
+
+
+def test_a_log_in_motion_names_nothing():
+    t, accelerometer, gyroscope = still(6000, 100.0, 48)
+    moving = (t > 5.0) & (t < 55.0)
+    angle = 1.2 * np.sin(0.7 * (t - 5.0)) * moving
+    accelerometer[:, 0] += 9.8 * np.sin(angle)
+    accelerometer[:, 2] += 9.8 * (np.cos(angle) - 1.0)
+    gyroscope[:, 1] += np.gradient(angle, t)
+    d = trihedron.diagnose(recording(t, accelerometer, gyroscope), gravity_m_s2=9.8)
+    assert d.verdict == "not-testable"
+    assert d.effects == ()

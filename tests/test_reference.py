@@ -1,0 +1,148 @@
+"""A log held against known motion: what the reference says, how sure it is, and what it refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trihedron
+from reference_rig import G, commanded_table, measured_table, tracked
+from trihedron.estimate.reference import fit_reference
+from trihedron.files.diagnosis import diagnosis_document
+from trihedron.records import FindingCode
+from trihedron.records.reference import ReferenceMotion
+
+
+@pytest.fixture(scope="module")
+def posed():
+    return tracked(3, seconds=30, has_path=True)
+
+
+@pytest.fixture(scope="module")
+def found(posed):
+    return fit_reference(posed.log, posed.motion, G)
+
+
+def z_of(found, trial):
+    A = np.linalg.inv(trial.unit.M)
+    sigma = np.sqrt(np.diag(found.gyroscope.covariance))
+    return np.r_[(found.gyroscope.S - A).ravel(), found.gyroscope.b + A @ trial.unit.c] / sigma
+
+
+def test_gyro_clock_and_lever_arm_come_out_within_their_error_bars(posed, found):
+    # One fixed trial: 4.5 sigma of some 30 numbers; coverage over many is benches/reference_coverage.py.
+    assert np.abs(z_of(found, posed)).max() < 4.5
+    lead = posed.lead_s + 1e-6 * posed.ppm * found.clock_middle_s
+    assert abs(found.clock_offset_s[0] - lead) < 4.5 * found.clock_offset_s[1]
+    assert found.clock_offset_s[1] < 2e-3  # 100 Hz on both sides: a tenth of a sample is there to be had
+    assert np.all(np.abs(found.lever_arm.value - posed.arm) < 4.5 * found.lever_arm.std)
+    assert np.all(found.lever_arm.std < 5e-3)
+    assert np.degrees(np.arccos(found.vertical.value[2])) < 1.0
+
+
+def test_error_bars_of_a_wobbling_table_cover_the_truth():
+    z = np.array([z_of(fit_reference(t.log, t.motion, G), t) for t in (measured_table(500 + k, 45) for k in range(6))])
+    # 72 numbers, not independent: 68 % within one sigma, less four standard errors of 12 independent ones a run.
+    assert np.mean(np.abs(z) < 1.0) > 0.45
+    assert np.mean(np.abs(z) < 2.0) > 0.83
+
+
+def test_commands_of_a_rate_table_are_enough():
+    trial = commanded_table(11, hold_s=3.0)
+    result = trihedron.calibrate(trial.log, reference=trial.motion, gravity_m_s2=G)
+    A = np.linalg.inv(trial.unit.M)
+    # Plateaus of 2.5 s of a 0.05 °/s wobble and 1.5 °/s of noise a sample: 0.2 % of scale is ten times what noise does.
+    assert np.allclose(np.diag(result.gyroscope.S), np.diag(A), rtol=2e-3)
+    assert any(f.code is FindingCode.ACCELEROMETER_NOMINAL for f in result.findings)
+
+
+def test_g_sensitivity_and_cubic_scale_are_told_from_the_linear_numbers():
+    G_true = np.array([[3e-3, 0, 0], [0, -2e-3, 1e-3], [0, 0, 2e-3]])
+    trial = tracked(21, seconds=40, g_sensitivity=G_true)
+    result = trihedron.diagnose(trial.log, reference=trial.motion, gravity_m_s2=G)
+    assert [e.id for e in result.effects] == ["gyro-g-sensitivity"]
+    one = result.reference.effects["gyro-g-sensitivity"]
+    assert np.abs((one.value - G_true.ravel()) / one.std).max() < 5.0
+    assert result.verdict == "missing-physics"
+    assert diagnosis_document(result)["reference"]["effects"]["gyro-g-sensitivity"]["p_value"] < 1e-4
+
+
+def test_attitude_carried_by_the_gyro_is_better_by_the_reference_on_a_part_it_did_not_see():
+    trial = tracked(31, seconds=50)
+    result = trihedron.diagnose(trial.log, reference=trial.motion, gravity_m_s2=G)
+    before, after = (r.error_rad for r in result.reference.replay)
+    assert after < 0.5 * before
+    assert "carried" not in str(result)  # words of the code stay in the code
+    assert "held out" in str(result)
+
+
+def test_two_rigidly_joined_units_show_how_they_are_joined():
+    """The second unit's log, in SI, is the reference: rotation and lever arm between them."""
+    trial = tracked(41, seconds=40, has_path=True)
+    from reference_rig import FINE_HZ, forces, hand, rates_of, times
+
+    rng = np.random.default_rng(41)
+    from reference_rig import unit
+
+    unit(rng)
+    _, C, path = hand(rng, 40)
+    w, f = rates_of(C), forces(C, path)
+    n = len(w) // 8
+    other = trihedron.Recording.from_arrays(
+        times(n, 8) + 0.0123,
+        f[: n * 8].reshape(n, 8, 3).mean(1) + 0.01 * rng.normal(size=(n, 3)),
+        w[: n * 8].reshape(n, 8, 3).mean(1) + 1e-3 * rng.normal(size=(n, 3)),
+    )
+    assert FINE_HZ == 1000
+    found = trihedron.diagnose(trial.log, reference=other, gravity_m_s2=G).reference
+    assert found.kind == "the log of another unit"
+    assert np.all(np.abs(found.lever_arm.value - trial.arm) < np.maximum(4.5 * found.lever_arm.std, 1e-3))
+    assert abs(np.linalg.norm(z_of(found, trial)[:9])) < 4.5 * 3.0
+
+
+def test_attitudes_from_world_to_body_are_read_so_and_it_is_said(posed):
+    turned = replace(posed.motion, attitude=np.swapaxes(posed.motion.attitude, 1, 2).copy(), position=None)
+    found = fit_reference(posed.log, turned, G)
+    assert any(f.code is FindingCode.REFERENCE_TURNED_ROUND for f in found.findings)
+    assert np.abs(z_of(found, posed)).max() < 4.5
+
+
+# What cannot be answered is refused in one sentence.
+
+
+def test_a_mirrored_reference_is_refused(posed):
+    flip = np.diag([1.0, -1.0, 1.0])
+    mirrored = replace(
+        posed.motion, attitude=flip @ posed.motion.attitude @ flip, position=posed.motion.position @ flip
+    )
+    with pytest.raises(ValueError, match=r"mirrored against the log.*Turn the sign of one axis"):
+        fit_reference(posed.log, mirrored, G)
+
+
+def test_a_reference_clock_that_jumps_is_refused_with_the_place():
+    trial = tracked(51, seconds=80)
+    late = trial.motion.time_s + np.where(trial.motion.time_s > 40.0, 0.5, 0.0)
+    with pytest.raises(ValueError, match=r"clock jumps by \+0\.5\d* s between \d+ and \d+ s of the log"):
+        fit_reference(trial.log, replace(trial.motion, time_s=late), G)
+
+
+def test_a_reference_of_another_motion_is_refused(posed):
+    with pytest.raises(ValueError, match="share no motion"):
+        fit_reference(posed.log, tracked(999, seconds=30).motion, G)
+
+
+def test_a_rate_in_degrees_called_radians_is_refused():
+    trial = measured_table(61, 45)
+    A = np.linalg.inv(trial.unit.M)
+    in_si = trihedron.Recording.from_arrays(trial.log.time_s, None, trial.log.gyroscope @ A.T, gyroscope_unit="rad/s")
+    degrees = replace(trial.motion, rate=np.degrees(trial.motion.rate))
+    with pytest.raises(ValueError, match=r"57\.\d times as fast.*deg"):
+        fit_reference(in_si, degrees, G)
+
+
+def test_an_axis_that_never_turned_is_named():
+    trial = measured_table(71, 45)
+    third = trial.motion.time_s < 30.0
+    short = ReferenceMotion(trial.motion.time_s[third], rate=trial.motion.rate[third], source="two.csv")
+    with pytest.raises(ValueError, match="hardly turns"):
+        fit_reference(trial.log, short, G)

@@ -1,0 +1,320 @@
+"""Outputs: whole or not at all, never over an input, never in the place of a device, and cleared up after a kill."""
+
+import json
+import os
+import shutil
+import signal
+import socket
+import stat
+import threading
+import time
+
+import pytest
+
+from small_session import G, copied, leftovers, made_once, run, started
+from trihedron.cli import COMMANDS, main
+from trihedron.files.output import OutputError, check_free, write_whole
+from trihedron.files.temporary import MARK
+
+
+@pytest.fixture
+def session(tmp_path):
+    return copied(tmp_path)
+
+
+def refused(capsys, *arguments) -> str:
+    status = main([str(a) for a in arguments])
+    out, err = capsys.readouterr()
+    assert status == 1, (status, out, err)
+    assert len(err.strip().splitlines()) == 1
+    assert "defect" not in err
+    return err
+
+
+WHOLE = ["--gravity", G]
+OUTPUTS = {
+    "check": [["check", "log.csv", "--json"], ["check", "log.csv", "--report"]],
+    "segment": [["segment", "log.csv", "--json"], ["segment", "log.csv", "--report"]],
+    "calibrate": [["calibrate", "log.csv", *WHOLE, flag] for flag in ("-o", "--json", "--report")],
+    "allan": [["allan", "rest.csv", flag] for flag in ("--json", "--csv", "--plot", "--report")],
+    "kalman": [["kalman", "log.csv", *WHOLE, flag] for flag in ("-o", "--json", "--report")],
+    "verify": [["verify", "c.json", "log.csv", flag] for flag in ("--json", "--report")],
+    "diagnose": [["diagnose", "log.csv", *WHOLE, flag] for flag in ("--json", "--report")],
+    "apply": [["apply", "c.json", "log.csv", flag] for flag in ("-o", "--json")],
+    "convert": [["convert", "log.csv", "-o"]],
+    "export": [["export", "c.json", "--noise", "noise.json", "--to", "python", "-o"]],
+    "simulate": [
+        ["simulate", "s.toml", "-o"],
+        ["simulate", "--like", "log.csv", "--calibration", "c.json", "-o"],
+        ["simulate", "s.toml", "-o", "x.csv", "--truth"],
+    ],
+    "guide": [["guide", "log.csv", "-o"]],
+}
+NO_INPUT_FILE = {"demo", "plan", "ports", "capture"}
+
+
+def test_every_command_that_reads_a_file_is_attacked_here():
+    assert {c.__name__.replace("_", "-") for c in COMMANDS} - NO_INPUT_FILE <= set(OUTPUTS)
+
+
+@pytest.mark.parametrize("command", OUTPUTS)
+def test_no_output_lies_on_an_input_even_with_force(session, capsys, monkeypatch, command):
+    monkeypatch.chdir(session)
+    for words in OUTPUTS[command]:
+        inputs = [w for w in words if (session / w).is_file()]
+        for name in inputs:
+            before = (session / name).read_bytes()
+            ending = {"--report": ".html", "--plot": ".png", "--truth": ".json"}.get(words[-1])
+            for place in {name, f"./{name}", str(session / name), *_other_names(session, name, ending)}:
+                status = main([*words, place, "--force"])
+                err = capsys.readouterr().err
+                assert status == 1, (words, place, err)
+                assert (session / name).read_bytes() == before
+            assert leftovers(session) == []
+
+
+def _other_names(folder, name, ending):
+    """The same file under a symbolic and a hard link; the ending is one that the option takes."""
+    suffix = ending or os.path.splitext(name)[1]
+    soft, hard = folder / f"soft-{name}{suffix}", folder / f"hard-{name}{suffix}"
+    if not soft.exists():
+        soft.symlink_to(folder / name)
+        os.link(folder / name, hard)
+    return soft.name, hard.name
+
+
+def test_a_device_is_written_to_and_stays_a_device(session, capsys):
+    known = str(session / "c.json")
+    for force in ([], ["--force"]):
+        assert main(["export", known, "--to", "c", "-o", "/dev/null", *force]) == 0
+        capsys.readouterr()
+        assert stat.S_ISCHR(os.stat("/dev/null").st_mode)
+        err = refused(capsys, "export", known, "--to", "rust", "-o", "/dev/full", *force)
+        assert "/dev/full" in err
+        assert "No space left" in err
+        assert stat.S_ISCHR(os.stat("/dev/full").st_mode)
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_a_pipe_is_written_to_however_slowly_it_is_read(tmp_path, force):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    content = os.urandom(300_000)
+    got = []
+
+    def read():
+        with pipe.open("rb", buffering=0) as stream:
+            while part := stream.read(20_000):
+                got.append(part)
+                time.sleep(0.01)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    write_whole(pipe, content, overwrite=force)
+    reader.join()
+    assert b"".join(got) == content
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+
+
+def test_a_pipe_that_nobody_reads_ends_in_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr("trihedron.files.special._READER_WAIT_S", 0.1)
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(OutputError, match="nobody reads"):
+        write_whole(pipe, b"x")
+
+
+def test_a_socket_is_written_to(tmp_path):
+    path = str(tmp_path / "s")
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(path)
+        server.listen()
+        write_whole(path, "hello")
+        with server.accept()[0] as connection:
+            assert connection.recv(100) == b"hello"
+    assert stat.S_ISSOCK(os.stat(path).st_mode)
+
+
+def test_standard_output_by_its_device_name_is_the_pipe_behind_it(session):
+    status, out, err = run("export", session / "c.json", "--to", "python", "-o", "/dev/stdout")
+    assert status == 0, err
+    assert "def " in out
+
+
+def test_through_a_link_the_file_it_names_is_replaced_and_the_link_stays(tmp_path):
+    real, link = tmp_path / "real", tmp_path / "link"
+    real.write_text("old")
+    real.chmod(0o640)
+    link.symlink_to(real)
+    write_whole(link, "new", overwrite=True)
+    assert link.is_symlink()
+    assert real.read_text() == "new"
+    assert stat.S_IMODE(real.stat().st_mode) == 0o640
+    dangling = tmp_path / "dangling"
+    dangling.symlink_to(tmp_path / "made")
+    write_whole(dangling, "new")
+    assert (tmp_path / "made").read_text() == "new"
+
+
+def test_impossible_places_end_in_a_sentence(tmp_path):
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    locked = tmp_path / "locked"
+    locked.write_text("keep")
+    locked.chmod(0o444)
+    plain = tmp_path / "plain"
+    plain.write_text("")
+    for path, words in (
+        (loop, "links"),
+        (locked, "read-only"),
+        (tmp_path, "directory"),
+        (plain / "x", "is a file and not a folder"),
+        (tmp_path / "none" / "x", "no folder"),
+        (tmp_path / ("n" * 300), "too long"),
+        (tmp_path / "a\0b", "name of an output"),
+    ):
+        for overwrite in (False, True):
+            if path == locked and not overwrite:
+                continue
+            with pytest.raises(OutputError, match=words):
+                write_whole(path, "x", overwrite=overwrite)
+    assert locked.read_text() == "keep"
+
+
+def test_the_longest_name_that_a_folder_takes_is_written(tmp_path):
+    for name in ("n" * 255, "ü" * 127):
+        write_whole(tmp_path / name, "x")
+        write_whole(tmp_path / name, "y", overwrite=True)
+        assert (tmp_path / name).read_text() == "y"
+    assert leftovers(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--help"],
+        ["check", "log.csv", "--json"],
+        ["apply", "c.json", "log.csv"],
+        ["export", "c.json", "--to", "c"],
+    ],
+)
+def test_standard_output_on_a_full_disk_is_status_1(session, words):
+    with open("/dev/full", "wb") as full:
+        status, _, err = run(*words, cwd=session, stdout=full)
+    assert status == 1, err
+    assert len(err.strip().splitlines()) == 1, err
+    assert "standard output" in err
+
+
+def test_without_a_standard_output_a_command_that_needs_one_says_so(session):
+    import subprocess
+    import sys
+
+    log = session / "log.csv"
+    for words, expected in ((f"segment {log}", 1), (f"convert {log} -o {session / 'x.csv'}", 0)):
+        done = subprocess.run(
+            f"{sys.executable} -m trihedron {words} >&-", shell=True, stderr=subprocess.PIPE, timeout=60, check=False
+        )
+        assert done.returncode == expected, done.stderr
+        assert b"Traceback" not in done.stderr
+
+
+def test_a_reader_that_leaves_early_is_no_failure(session):
+    with started("apply", session / "c.json", session / "log.csv") as process:
+        process.stdout.read(10)
+        process.stdout.close()
+        err = process.stderr.read()
+        assert process.wait(60) == 0
+        assert err == b""
+
+
+# Killed runs
+
+
+def test_what_a_killed_run_left_is_cleared_by_the_next_and_a_live_one_is_not_harmed(tmp_path):
+    from trihedron.files.temporary import Temporary
+
+    left = tmp_path / f".old.json{MARK}99999-abcdef01"
+    left.write_text("half")
+    other = tmp_path / ".trihedron-notes"
+    with Temporary(tmp_path / "slow.json") as slow:
+        slow.write(b"half")
+        write_whole(tmp_path / "new.json", "whole")
+        assert os.path.exists(slow.path)
+        slow.put_in_place(None)
+    assert not left.exists()
+    assert not other.exists()
+    assert (tmp_path / "slow.json").read_bytes() == b"half"
+    assert leftovers(tmp_path) == []
+
+
+def test_kill_9_at_any_instant_leaves_the_old_output_or_the_new_one(session):
+    target = session / "out.csv"
+    run("convert", session / "log.csv", "-o", target)
+    whole = target.read_bytes()
+    for after_s in (0.1, 0.3, 0.4, 0.5):
+        process = started("convert", session / "log.csv", "-o", target, "--force")
+        time.sleep(after_s)
+        process.kill()
+        process.communicate()
+        assert target.read_bytes() == whole
+    assert run("convert", session / "log.csv", "-o", target, "--force")[0] == 0
+    assert leftovers(session) == []
+
+
+def test_a_small_disk_that_fills_up_leaves_the_old_output(session):
+    # A limit on the size of files stands for the disk: no permission to mount one is needed.
+    target = session / "out.csv"
+    run("convert", session / "log.csv", "-o", target)
+    whole = target.read_bytes()
+    import resource
+
+    status, _, err = run(
+        "convert",
+        session / "log.csv",
+        "-o",
+        target,
+        "--force",
+        preexec_fn=lambda: (
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN),
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
+        ),
+    )
+    assert status == 1
+    assert "File too large" in err
+    assert target.read_bytes() == whole
+    assert leftovers(session) == []
+
+
+# Statuses
+
+
+@pytest.mark.parametrize("words", [["apply"], ["verify"]])
+def test_an_untrusted_calibration_ends_in_status_2_with_its_reason(session, capsys, words, monkeypatch):
+    monkeypatch.chdir(session)
+    more = ["-o", "x.csv"] if words == ["apply"] else []
+    assert main([*words, "untrusted.json", "log.csv", *more]) == 2
+    err = capsys.readouterr().err
+    assert "not to be trusted" in err
+    assert "Scale 3 is not determined" in err
+
+
+def test_status_2_has_its_reason_on_stderr_and_0_has_none(session, capsys, monkeypatch):
+    monkeypatch.chdir(session)
+    for words in (["export", "untrusted.json", "--to", "c"], ["allan", "log.csv"]):
+        status = main(words)
+        err = capsys.readouterr().err
+        assert status == 2, (words, err)
+        assert "trihedron: not to be trusted: " in err, words
+    assert main(["segment", "log.csv"]) == 0
+    assert "not to be trusted" not in capsys.readouterr().err
+
+
+def test_outputs_are_checked_before_the_inputs_are_read(tmp_path):
+    log = tmp_path / "log.csv"
+    shutil.copy(made_once() / "log.csv", log)
+    with pytest.raises(OutputError, match="is the input"):
+        check_free([log], overwrite=True, inputs=[log])
+    with pytest.raises(OutputError, match="exists"):
+        check_free([log], overwrite=False)
+    assert json.loads((made_once() / "c.json").read_text())["format"] == "trihedron calibration"

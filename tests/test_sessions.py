@@ -1,0 +1,205 @@
+"""Many recordings of one unit: what is common, what repeats how far, what changed, and temperature."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trihedron
+from hand_made_sessions import G, Instrument, recorded
+from trihedron.cli import main
+from trihedron.estimate.sessions import changes_among, spread_between, spread_within, thermal_model
+from trihedron.files.calibration import read_calibration
+from trihedron.invariants import anchor_of, model_jacobian, model_of_numbers, numbers_jacobian, numbers_of
+from trihedron.records import Recording, Severity
+from trihedron.records.sessions import PARAMETERS, Session
+
+UNIT = Instrument()
+
+
+@pytest.fixture(scope="module")
+def four_sessions():
+    """One unit on four days; on the third its gyro zero is 0.01 rad/s away, ten times its error."""
+    units = [UNIT, UNIT, UNIT.moved(b_g=[0.01, 0.0, 0.0]), UNIT]
+    return [recorded(unit, seed) for seed, unit in enumerate(units, 1)]
+
+
+def test_numbers_free_of_the_frame_give_back_the_model_that_they_were_taken_from():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        signs = rng.choice([-1, 1], 3)
+        S_a = np.tril(np.diag(signs * rng.uniform(0.5, 2, 3)) + 0.05 * rng.normal(size=(3, 3)))
+        # Axes as boards have them: permuted, some turned round, a little out of true.
+        Q = np.eye(3)[rng.permutation(3)] * rng.choice([-1, 1], 3)
+        S_g = Q @ (np.diag(rng.uniform(0.5, 2, 3)) + 0.05 * rng.normal(size=(3, 3)))
+        b_a, b_g = rng.normal(size=3), rng.normal(size=3)
+        anchor = anchor_of(S_a, S_g)
+        S_later = S_g + 0.01 * rng.normal(size=(3, 3))
+        numbers = numbers_of(S_a, b_a, S_later, b_g, anchor)
+        for found, wanted in zip(model_of_numbers(numbers, anchor), (S_a, b_a, S_later, b_g), strict=True):
+            # Rounding of a 3 x 3 inverse and a square root.
+            np.testing.assert_allclose(found, wanted, atol=1e-12)
+        at_anchor = numbers_of(S_a, b_a, S_g, b_g, anchor)
+        product = numbers_jacobian(S_a, b_a, S_g, b_g) @ model_jacobian(at_anchor, anchor)
+        # The rotation is taken as a vector from where it is, not from the nearest axes: second order in 0.05 rad.
+        np.testing.assert_allclose(product, np.eye(21), atol=0.1)
+        np.testing.assert_allclose(product[:18], np.eye(21)[:18], atol=1e-6)
+
+
+@pytest.mark.parametrize("n", [3, 5, 10])
+def test_intervals_of_a_spread_hold_the_truth_in_95_of_100_cases(n):
+    rng = np.random.default_rng(n)
+    held = 0
+    trials = 150
+    for _ in range(trials):
+        own = np.exp(rng.uniform(-0.5, 0.5, n))
+        y = 3.0 + 1.5 * rng.normal(size=n) + own * rng.normal(size=n)
+        spread = spread_within(y, own**2, ["unit"] * n)
+        held += spread.low <= 1.5 <= spread.high
+    # Binomial: 95 % of 150 is 142.5 ± 2.7; four standard deviations below.
+    assert held >= 132
+
+
+def test_days_and_turn_ons_are_told_apart():
+    rng = np.random.default_rng(4)
+    groups = [day for day in range(8) for _ in range(4)]
+    day = 5.0 * rng.normal(size=8)
+    y = day[groups] + 0.5 * rng.normal(size=32) + 0.2 * rng.normal(size=32)
+    own = np.full(32, 0.04)
+    within, between = spread_within(y, own, groups), spread_between(y, own, groups)
+    assert within.low < 0.5 < within.high < 1.0
+    assert between.low < 5.0 < between.high
+    assert between.low > 2.0
+
+
+def made(numbers, covariance, **more):
+    return Session("s", "", numbers, covariance, np.zeros(len(numbers)), **more)
+
+
+def test_a_unit_that_did_not_change_is_rarely_called_changed():
+    rng = np.random.default_rng(5)
+    sigma = np.full(21, 1e-3)
+    false = 0
+    for _ in range(100):
+        sessions = [made(sigma * rng.normal(size=21), np.diag(sigma**2)) for _ in range(5)]
+        false += any(change.significant for change in changes_among([sessions], alpha=0.01))
+    # 1 % of 100 is 1; 6 has a chance of 1e-3 under it.
+    assert false <= 6
+
+
+def test_the_common_model_and_the_session_that_is_apart_are_found(four_sessions):
+    result = trihedron.calibrate_sessions(four_sessions, gravity_m_s2=G)
+    changed = [change for change in result.model.changes if change.significant]
+    assert [(c.id, c.kind, c.where) for c in changed] == [("gyro-zero", "apart", "session-3.csv")]
+    size = np.array(changed[0].size)
+    # Five of its own standard errors: the truth of the zero along the axis, with its sign (b is added to S w').
+    np.testing.assert_allclose(size, [-0.01, 0.0, 0.0], atol=5 * max(changed[0].std) + 1e-4)
+    accel = result.calibration.accelerometer
+    z = (accel.S - UNIT.S_a)[np.tril_indices(3)] / accel.sigma_S[np.tril_indices(3)]
+    assert np.abs(z).max() < 4.0
+    zero_x = next(one for one in result.model.repeated if one.parameter.id == "gyro-zero")
+    # 0.01 in one of four is a standard deviation of 0.005.
+    assert zero_x.within.low < 0.005 < zero_x.within.high
+    assert "gyro-zero" in str(result)
+    assert "session-3.csv" in str(result)
+
+
+def test_a_recording_that_cannot_be_calibrated_is_left_out_with_its_reason(four_sessions):
+    still = Recording(np.arange(500) / 50.0, np.tile([0.0, 0.0, G], (500, 1)) + 1e-3, None, 50.0, source="still.csv")
+    result = trihedron.calibrate_sessions([*four_sessions[:2], still], gravity_m_s2=G)
+    assert result.model.left_out[0][0] == "still.csv"
+    assert len(result.model.sessions) == 2
+    with pytest.raises(ValueError, match="two recordings at least"):
+        trihedron.calibrate_sessions([four_sessions[0], still], gravity_m_s2=G)
+
+
+def test_dates_that_are_not_in_the_logs_are_asked_for(four_sessions):
+    with pytest.raises(ValueError, match="--labels"):
+        trihedron.calibrate_sessions(four_sessions, by="date", gravity_m_s2=G)
+    result = trihedron.calibrate_sessions(four_sessions, by="date", labels=["mon", "mon", "tue", "tue"], gravity_m_s2=G)
+    assert all(one.between is not None for one in result.model.repeated)
+
+
+def at(degc):
+    t = degc - 20.0
+    return UNIT.moved(b_a=[2e-3 * t, 0.0, 1e-4 * t**2], b_g=[0.0, 1e-4 * t, 0.0])
+
+
+@pytest.fixture(scope="module")
+def thermal():
+    temperatures = [-10.0, 0.0, 10.0, 20.0, 30.0, 40.0, 50.0]
+    sessions = [recorded(at(T), 40 + k, temperature_degc=T) for k, T in enumerate(temperatures)]
+    return trihedron.calibrate_sessions(sessions, by="temperature", gravity_m_s2=G)
+
+
+def test_a_thermal_model_has_the_order_and_size_that_the_unit_has(thermal):
+    terms = {term.id: term for term in thermal.model.thermal.terms}
+    orders = {name: term.order for name, term in terms.items()}
+    assert orders["accel-zero"] == 2
+    assert orders["gyro-zero"] == 1
+    assert all(order == 0 for name, order in orders.items() if not name.endswith("zero"))
+    slope, sigma = terms["gyro-zero"].coefficients[1], np.sqrt(terms["gyro-zero"].covariance[:, 1, 1])
+    # Zero along the axis is -(M b): -1e-4 per degree over a scale near one; four standard errors.
+    np.testing.assert_allclose(slope[1], -1e-4, atol=4 * sigma[1] + 2e-6)
+
+
+def test_apply_follows_temperature_inside_the_range_and_says_so_outside(thermal, tmp_path):
+    path = tmp_path / "thermal.json"
+    trihedron.write_calibration(thermal.calibration, path)
+    known = read_calibration(path)
+    log = recorded(at(35.0), 90, temperature_degc=35.0)
+    done = trihedron.apply(known, log)
+    still = done.accelerometer[:500].mean(axis=0)
+    # 600 readings of 0.01: 0.4 mm/s²; the model's own error is some mm/s². Without temperature z is 22 mm/s² away.
+    np.testing.assert_allclose(still, [0.0, 0.0, G], atol=6e-3)
+    assert not any(f.severity is Severity.SERIOUS for f in done.findings)
+    hot = trihedron.apply(known, replace(log, temperature_degc=np.full(log.n_samples, 90.0)))
+    assert [f.code.value for f in hot.findings if f.severity is Severity.SERIOUS] == ["outside-valid-range"]
+    at_end = trihedron.apply(known, replace(log, temperature_degc=np.full(log.n_samples, 50.0)))
+    np.testing.assert_array_equal(hot.accelerometer, at_end.accelerometer)
+    without = trihedron.apply(known, replace(log, temperature_degc=None))
+    assert [f.code.value for f in without.findings if f.severity is Severity.SERIOUS] == ["temperature-missing"]
+
+
+def test_hysteresis_between_heating_and_cooling_is_found_and_not_invented():
+    rng = np.random.default_rng(8)
+    picked = [k for k, p in enumerate(PARAMETERS) if p.id == "gyro-zero"]
+    found = {}
+    for size in (0.0, 4e-4):
+        sessions = []
+        for k, T in enumerate(np.linspace(-10, 50, 12)):
+            y = 1e-4 * rng.normal(size=21)
+            branch = 1 if k % 2 else -1
+            y[picked] += 1e-5 * T + size * branch
+            sessions.append(
+                made(y, np.eye(21) * 1e-8, temperature_degc=T, temperature_range_degc=(T, T), branch=branch)
+            )
+        found[size] = {term.id: term.hysteresis for term in thermal_model(sessions).terms}
+    assert all(value is None for value in found[0.0].values())
+    # Twelve sessions of 1e-4: 3e-5; four standard errors.
+    np.testing.assert_allclose(found[4e-4]["gyro-zero"], 4e-4, atol=1.2e-4)
+
+
+def test_several_logs_on_the_command_line_make_one_calibration(four_sessions, tmp_path, capsys):
+    paths = []
+    for k, recording in enumerate(four_sessions[:3]):
+        paths.append(tmp_path / f"day-{k}.csv")
+        trihedron.convert(recording, paths[-1])
+    out = tmp_path / "unit.json"
+    status = main(["calibrate", *map(str, paths), "--gravity", str(G), "-o", str(out), "--json"])
+    document = json.loads(capsys.readouterr().out)
+    assert status == 0
+    assert {change["id"] for change in document["changes"] if change["significant"]} == {"gyro-zero"}
+    known = read_calibration(out)
+    assert len(known.extensions["sessions"]) == 3
+    assert main(["apply", str(out), str(paths[0]), "-o", str(tmp_path / "si.csv")]) == 0
+    capsys.readouterr()
+
+
+def test_options_that_belong_to_one_log_are_refused_for_several(tmp_path, capsys):
+    assert main(["calibrate", "a.csv", "b.csv", "--faces", "1,-1"]) == 1
+    assert "several logs" in capsys.readouterr().err
+    assert main(["calibrate", "a.csv", "--labels", "x"]) == 1
+    assert main(["calibrate", str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]) == 1
+    assert "there is no such file" in capsys.readouterr().err
