@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from trihedron.estimate.attitude import integrate_rate
     from trihedron.estimate.noise import identify_noise
     from trihedron.files.calibration import read_calibration
+    from trihedron.fleet import fleet
     from trihedron.pipeline import (
         allan_deviation,
         apply,
@@ -97,6 +98,7 @@ __all__ = [
     "diagnose",
     "export",
     "extend",
+    "fleet",
     "guide",
     "identify_noise",
     "integrate_rate",
@@ -117,6 +119,7 @@ __all__ = [
 
 _HOME = {"Diagnosis": "trihedron.records.diagnosis"}
 _HOME |= {"integrate_rate": "trihedron.estimate.attitude"}
+_HOME |= {"fleet": "trihedron.fleet"}
 _HOME |= {"identify_noise": "trihedron.estimate.noise", "read_calibration": "trihedron.files.calibration"}
 _HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")
 # The others are verbs.
