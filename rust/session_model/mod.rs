@@ -11,7 +11,6 @@ pub mod fit;
 pub mod held_out;
 pub mod move_rows;
 pub mod moves;
-mod possible;
 pub mod predict;
 pub mod response;
 mod rest_rows;

@@ -1,8 +1,9 @@
 //! Strengths of the processes behind the zeros, by marginal likelihood (docs/model-session.md, 11.12).
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::chain::Chain;
+use super::factor::Factor;
 use super::fit::{Fit, RIDGE, chi2_of, fit, gradient};
 use super::move_rows::{Weights, Whitening};
 use super::moves::N_MOVE;
@@ -30,6 +31,12 @@ const SCATTER_GATE: f64 = 5.41;
 /// How far a zero leaves the line between its poses, tried in units of its scatter: a leap at an instant that may be any
 /// is √(1/12) of a leap of √2 (0.4), a leap at either end of the move √2/2 (0.7), a third zero √(3/2) (1.2).
 const BETWEEN: [f64; 8] = [0.15, 0.3, 0.42, 0.6, 0.85, 1.2, 1.7, 2.4];
+/// Scatters of the accelerometer's zero that its error bars allow for, in units of the reference, together as likely
+/// beforehand as none; and corner times of its walk beside them, s.
+const POSSIBLE_SCATTER: [f64; 8] = [0.35, 0.55, 0.85, 1.3, 2.0, 3.2, 5.0, 10.0];
+const POSSIBLE_CORNER_S: [f64; 4] = [20.0, 80.0, 320.0, 2560.0];
+/// Possibilities less likely than this beside the best change no error bar.
+const LEAST_WEIGHT: f64 = 1e-2;
 /// Rows of moves count this much less while strengths of walk and scatter are chosen.
 const DEAF: f64 = 1e-3;
 
@@ -76,7 +83,7 @@ pub fn tune(
 }
 
 /// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.
-pub(super) struct Part {
+struct Part {
     chain: Chain,
     side: DMatrix<f64>,
     sum: f64,
@@ -84,7 +91,7 @@ pub(super) struct Part {
 }
 
 /// Normal equations by process, ready to be weighed anew.
-pub(super) struct Evidence {
+struct Evidence {
     at: Strengths,
     /// Readings of the poses, and priors.
     rest: Part,
@@ -94,7 +101,7 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    pub(super) fn of(fit: &Fit) -> Self {
+    fn of(fit: &Fit) -> Self {
         let layout = fit.layout();
         let part = |is_in: &dyn Fn(&Group) -> bool, is_bordered: bool| {
             let groups: Vec<Group> = fit.groups.iter().filter(|g| is_in(g)).cloned().collect();
@@ -123,7 +130,7 @@ impl Evidence {
     }
 
     /// Normal equations, `Jᵀr`, `Σ r²` and normalisation at other strengths, with the rows of the moves as given.
-    pub(super) fn combined(
+    fn combined(
         &self,
         strengths: &Strengths,
         moves: &Part,
@@ -160,7 +167,7 @@ impl Evidence {
         -0.5 * chi2 - 0.5 * factor.log_det() + weight
     }
 
-    pub(super) fn at(&self, strengths: &Strengths) -> f64 {
+    fn at(&self, strengths: &Strengths) -> f64 {
         self.with(strengths, &self.moves, DEAF)
     }
 
@@ -282,8 +289,63 @@ fn peak([before, here, after]: [f64; 3]) -> f64 {
     }
 }
 
+/// One way the accelerometer's zeros may scatter: how likely, the step that the fit would make, its normal equations.
+pub(super) struct Possible {
+    pub weight: f64,
+    pub step: DVector<f64>,
+    pub factor: Factor,
+}
+
+/// Ways the accelerometer's zeros may scatter and walk, weighed by their evidence (11.12b); nothing where that is not
+/// asked, or known.
+///
+/// Some twenty lengths of gravity less nine unknowns tell a scatter as large as their noise in half of all sessions
+/// only: error bars that take the one best answer for true cover too little there.
+pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Possible>> {
+    if session.scatter.is_none() || session.is_scatter_given {
+        return Ok(Vec::new());
+    }
+    let evidence = Evidence::of(fit);
+    let n_some = POSSIBLE_SCATTER.len() as f64;
+    let mut tried = Vec::new();
+    let some = POSSIBLE_SCATTER.map(|scatter| (scatter, -n_some.ln()));
+    for (scatter, prior) in std::iter::once((NO_SCATTER, 0.0)).chain(some) {
+        for corner in POSSIBLE_CORNER_S {
+            let mut at = fit.strengths;
+            at.scatter = [scatter, fit.likely_scatter[1]];
+            at.corner_s[0] = corner;
+            tried.push((evidence.at(&at) + prior, at));
+        }
+    }
+    let best = tried
+        .iter()
+        .map(|(v, _)| *v)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let mut out = Vec::new();
+    for (value, at) in tried {
+        let weight = (value - best).exp();
+        if weight < LEAST_WEIGHT {
+            continue;
+        }
+        let (moves, _) = reweighed(fit, &at)?;
+        let (chain, side, _, _) = evidence.combined(&at, &moves, 1.0);
+        let factor = chain.factor(RIDGE, None)?;
+        let step = -factor.solve(&side).column(0).into_owned();
+        out.push(Possible {
+            weight,
+            step,
+            factor,
+        });
+    }
+    let total: f64 = out.iter().map(|one| one.weight).sum();
+    for one in &mut out {
+        one.weight /= total;
+    }
+    Ok(out)
+}
+
 /// The rows of the moves at other strengths, and the logarithm of their normalisation.
-pub(super) fn reweighed(fit: &Fit, strengths: &Strengths) -> Result<(Part, f64)> {
+fn reweighed(fit: &Fit, strengths: &Strengths) -> Result<(Part, f64)> {
     let layout = fit.layout();
     let weights = Weights::of(&fit.passed, strengths)?;
     let mut weight = 0.0;

@@ -2,7 +2,6 @@
 
 mod fit;
 mod poses;
-mod read_out;
 
 use std::sync::Arc;
 
