@@ -44,6 +44,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from trihedron.estimate.noise import identify_noise
     from trihedron.files.calibration import read_calibration
+    from trihedron.fleet import fleet
     from trihedron.pipeline import (
         allan_deviation,
         apply,
@@ -93,6 +94,7 @@ __all__ = [
     "diagnose",
     "export",
     "extend",
+    "fleet",
     "guide",
     "identify_noise",
     "kalman",
@@ -111,6 +113,7 @@ __all__ = [
 ]
 
 _HOME = {"Diagnosis": "trihedron.records.diagnosis"}
+_HOME |= {"fleet": "trihedron.fleet"}
 _HOME |= {"identify_noise": "trihedron.estimate.noise", "read_calibration": "trihedron.files.calibration"}
 _HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")
 # The others are verbs.
