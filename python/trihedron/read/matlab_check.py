@@ -1,4 +1,4 @@
-"""A MATLAB file before 7.3 walked through before SciPy reads it, which trusts its sizes and ends the program over wrong ones.
+"""A MATLAB file before 7.3 walked through first: SciPy trusts its sizes, and over wrong ones it ends the program.
 
 Level 5 MAT-files (The MathWorks, MAT-File Format): a header of 128 bytes, then elements of type, size and content; an
 array is an element of elements: flags, dimensions, name, and what its class asks for.
@@ -15,17 +15,8 @@ from math import prod
 _SIZE = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
 """Bytes of a value by type of element."""
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED, _UTF8 = 1, 5, 6, 14, 15, 16
-_CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FIRST_NUMBERS, _LAST_NUMBERS, _FUNCTION, _OPAQUE = (
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    15,
-    16,
-    17,
-)
+_CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FIRST_NUMBERS = 1, 2, 3, 4, 5, 6
+_LAST_NUMBERS, _FUNCTION, _OPAQUE = 15, 16, 17
 _HEADER = 128
 _DEEPEST = 40
 _LONGEST_NAME = 1024
@@ -115,7 +106,7 @@ def _matrix(data: bytes, at: int, end: int, order: str, depth: int) -> None:
     _expect(min(dimensions) >= 0, shape.start)
     count = prod(dimensions)
     _expect(take(_INT8, _UTF8).size <= _LONGEST_NAME, at)
-    if kind == _CELL or kind == _FUNCTION:
+    if kind in (_CELL, _FUNCTION):
         for _ in _counted(count if kind == _CELL else 1, at, end):
             _inner(data, take(_MATRIX), order, depth)
     elif kind in (_STRUCT, _OBJECT):
