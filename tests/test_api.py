@@ -118,8 +118,13 @@ def _worked_on(given):
     return calibration, done.accelerometer[0]
 
 
-def test_results_cross_processes_by_spawn(result, recording):
-    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+@pytest.mark.parametrize("how", ["spawn", "fork"])
+# Python 3.12 warns of any fork beside threads; that it goes well is what is shown here.
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_results_cross_processes(result, recording, how):
+    if how not in multiprocessing.get_all_start_methods():
+        pytest.skip(f"no {how} on this system")
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context(how)) as pool:
         back, first = pool.submit(_worked_on, (result, recording)).result(timeout=120)
     assert np.array_equal(back.calibration.covariance, result.calibration.covariance)
     here = trihedron.apply(result, recording).accelerometer[0]

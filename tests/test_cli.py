@@ -65,17 +65,19 @@ def test_calibrate_prints_a_report_and_writes_what_was_asked_for(session, tmp_pa
     )
     out, err = capsys.readouterr()
     assert status == 0
-    assert "Accelerometer   f = S a′ + b" in out
+    assert "Accelerometer: f = S a′ + b" in out
     assert "±" in out
     assert "report:" in err
     document = json.loads(machine.read_text())
     assert np.shape(document["accelerometer"]["S"]) == (3, 3)
     assert document["gravity_m_s2"] == 9.80665
     text = page.read_text()
-    assert text.count("data:image/png;base64,") == 4
-    # Self-contained: nothing is fetched.
+    # Four figures, drawn as they are read: no pictures of pictures.
+    assert text.count("<figure id=") == 4
+    assert "data:image" not in text
+    # Self-contained: nothing is fetched; its one script is inside it.
     assert "http" not in text
-    assert "<script" not in text
+    assert "<script src" not in text
 
 
 @pytest.mark.parametrize("command", ["segment", "check", "calibrate", "verify", "apply"])

@@ -8,13 +8,13 @@ import pytest
 
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.effects.stamp_errors import stamp_errors
-from trihedron.diagnose.residuals.aliasing import unresolved_variance
 from trihedron.diagnose.session.observations import observe
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
 from trihedron.records import FindingCode
 from trihedron.segment import resegment, segment_recording
+from trihedron.session.aliasing import unresolved_variance
 
 
 def diagnosed(gravity: float, **arguments: object):

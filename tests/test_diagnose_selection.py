@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.residuals.coloured_noise import coloured_variance
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.segment import resegment, segment_recording
+from trihedron.session.coloured_noise import coloured_variance
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.named import _of

@@ -22,7 +22,7 @@ STILL_BARE = {
     "effects/lever_arm.py": 4,
     "effects/quantisation.py": 13,
     "effects/sample_steps.py": 5,
-    "effects/saturation.py": 9,
+    "effects/saturation.py": 3,
     "effects/stamp_errors.py": 2,
     "effects/supply_sensitivity.py": 1,
     "effects/table_tilt.py": 3,

@@ -1,10 +1,11 @@
 """Damaged files through the reader: a recording whose rows are all accounted for, or one sentence; nothing else.
 
-    python benches/formats/mutate.py [COUNT] [SEED]
+    python benches/formats/mutate.py [COUNT] [SEED] [PROCESSES]
 
 Text files of several makers (40 rows) get one to three kinds of damage. What must hold: no exception but the reader's
 own, no text of a panic in it, ``rows_in_file == rows_read + rows_reported``, and, counted here without the reader, as
-many rows in the file as it has lines below its header. Containers (npz, npy, Parquet, zip, gzip, bags, ULog, DataFlash,
+many rows in the file as it has lines below its header; and nothing on standard
+error. Containers (npz, npy, Parquet, zip, gzip, bags, ULog, DataFlash,
 HDF5, MATLAB) get damaged bytes.
 """
 
@@ -20,6 +21,8 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -230,9 +233,27 @@ def _late(*_: object) -> None:
 
 
 def main() -> int:
-    signal.signal(signal.SIGALRM, _late)
     count = int(float(sys.argv[1])) if len(sys.argv) > 1 else 2000
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    processes = int(sys.argv[3]) if len(sys.argv) > 3 else 1
+    shares = [(len(range(k, count, processes)), seed + 1000 * k) for k in range(processes)]
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        done = list(pool.map(damaged_and_read, *zip(*shares, strict=True)))
+    tally = sum((tally for tally, _, _ in done), Counter())
+    failures = [failure for _, found, _ in done for failure in found]
+    seeds = ", ".join(str(of) for _, of in shares)
+    print(f"{count} damaged files, seed {seeds}, {sum(s for _, _, s in done):.0f} s of CPU: {dict(tally)}")
+    print(f"{len(failures)} failures")
+    for failure in failures[:25]:
+        print("  ", failure)
+    return int(bool(failures))
+
+
+def damaged_and_read(count: int, seed: int) -> tuple[Counter[str], list[str], float]:
+    """What became of so many files, what went wrong, CPU seconds; standard error is read as well."""
+    signal.signal(signal.SIGALRM, _late)
+    printed = tempfile.TemporaryFile()  # noqa: SIM115 -- for as long as this process lives
+    os.dup2(printed.fileno(), 2)
     rng = np.random.default_rng(seed)
     texts = {name: shortened(name) for name in (*COUNTED, *OTHERS)}
     tally: Counter[str] = Counter()
@@ -291,11 +312,11 @@ def main() -> int:
                     )
                     if os.environ.get("KEEP"):
                         Path(f"{os.environ['KEEP']}{k}").write_bytes(content)
-    print(f"{count} damaged files, seed {seed}, {time.process_time() - began:.0f} s: {dict(tally)}")
-    print(f"{len(failures)} failures")
-    for failure in failures[:25]:
-        print("  ", failure)
-    return int(bool(failures))
+    printed.seek(0)
+    said = printed.read().decode(errors="replace").strip()
+    if said:
+        failures.append(f"printed on standard error: {said[:300]!r}")
+    return tally, failures, time.process_time() - began
 
 
 if __name__ == "__main__":

@@ -19,9 +19,16 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     return _PIECES.sub(_piece, markdown)
 
 
+_TAG = re.compile(r"\\tag\{([^}]*)\}")
+
+
 def _piece(match: re.Match[str]) -> str:
     if match["code"] is not None:
         return match["code"]
-    if match["block"] is not None:
-        return f'<div class="equation">{convert(match["block"].strip(), display="block")}</div>'
-    return convert(match["inline"])
+    if match["block"] is None:
+        # Within a span: a line that begins with <math> would be taken for a paragraph of its own.
+        return f"<span>{convert(match['inline'])}</span>"
+    number = _TAG.search(match["block"])
+    equation = convert(_TAG.sub("", match["block"]).strip(), display="block")
+    label = f'<span class="number">({number[1]})</span>' if number else ""
+    return f'<div class="equation">{equation}{label}</div>'

@@ -448,33 +448,37 @@ def attitude_in_moves(time_s: FloatArray, rate: FloatArray, moves: list[tuple[in
 
 # the joint model of a session
 @final
-class SessionModel:
+class SessionPoses:
     def __new__(
         cls,
         *,
-        gravity_m_s2: float,
-        hold_time_s: FloatArray,
-        hold_force: FloatArray,
-        hold_force_sigma: FloatArray,
+        time_s: FloatArray,
+        force: FloatArray,
+        force_sigma: FloatArray,
         force_density: FloatArray,
-        hold_rate: FloatArray | None,
-        hold_rate_sigma: FloatArray | None,
+        rate: FloatArray | None,
+        rate_sigma: FloatArray | None,
         rate_density: FloatArray | None,
+    ) -> SessionPoses: ...
+
+@final
+class SessionMoves:
+    def __new__(
+        cls,
+        *,
+        hold_time_s: FloatArray,
         time_s: FloatArray,
         force: FloatArray,
         rate: FloatArray | None,
         ranges: npt.NDArray[np.int64],
         before: npt.NDArray[np.int64],
         unresolved: FloatArray,
-        jitter_s: float,
-        nominal_step_s: float,
-        inflation: tuple[float, float],
-        prior: tuple[FloatArray, FloatArray] | None,
-        is_prior_weak: bool,
-        scatter: FloatArray | None,
-    ) -> SessionModel: ...
-    def fit(
-        self,
+    ) -> SessionMoves: ...
+
+@final
+class SessionState:
+    def __new__(
+        cls,
         *,
         force_scale: FloatArray,
         force_bias: FloatArray,
@@ -483,22 +487,30 @@ class SessionModel:
         rate_zero: FloatArray,
         force_zero: FloatArray,
         effect: FloatArray,
-        corners_s: tuple[float, float],
-        scatter: tuple[float, float],
+    ) -> SessionState: ...
+
+@final
+class SessionModel:
+    def __new__(
+        cls,
+        *,
+        gravity_m_s2: float,
+        poses: SessionPoses,
+        moves: SessionMoves,
+        noise: tuple[float, float, tuple[float, float]],
+        prior: tuple[FloatArray, FloatArray, bool] | None,
+        scatter: tuple[FloatArray, bool] | None,
+    ) -> SessionModel: ...
+    def fit(
+        self,
+        *,
+        state: SessionState,
+        strengths: tuple[tuple[float, float], tuple[float, float], tuple[float, float]],
         force_effect: FloatArray | None,
         rate_effect: FloatArray | None,
         is_tuned: bool,
     ) -> SessionFit: ...
-    def move_residuals(
-        self,
-        *,
-        force_scale: FloatArray,
-        force_bias: FloatArray,
-        rate_scale: FloatArray,
-        up: FloatArray,
-        rate_zero: FloatArray,
-        force_zero: FloatArray,
-    ) -> FloatArray: ...
+    def move_residuals(self, state: SessionState) -> FloatArray: ...
 
 @final
 class SessionFit:
@@ -520,6 +532,8 @@ class SessionFit:
     def corners_s(self) -> tuple[float, float]: ...
     @property
     def scatter(self) -> tuple[float, float]: ...
+    @property
+    def strengths(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]: ...
     @property
     def is_walk_at_edge(self) -> tuple[bool, bool]: ...
     @property
@@ -551,6 +565,9 @@ class SessionFit:
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
     def border_covariance(self) -> FloatArray: ...
     def linear_covariance(self, force_origin: FloatArray, rate_origin: FloatArray) -> tuple[FloatArray, FloatArray]: ...
+    def without(
+        self, rows: npt.NDArray[np.bool_], force_origin: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]: ...
     def jacobian(self) -> FloatArray: ...
 
 # zero_process

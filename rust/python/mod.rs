@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 
 mod accelerometer;
 mod allan;
+mod arrays;
 mod chi_square;
 mod doorway;
 mod gyro_alignment;

@@ -1,9 +1,14 @@
 //! The fit of a session, and the strengths of the processes behind its zeros (docs/model-session.md, 11.9-11.12).
 
+use std::cell::RefCell;
+
 use nalgebra::{DMatrix, DVector};
 
-use super::chain::{Chain, Factor, Layout};
-use super::rows::{Group, N_PROCESSES, Passed, Weights};
+use super::chain::{Chain, Layout};
+use super::factor::Factor;
+use super::move_rows::{Passed, Weights};
+use super::rows::Group;
+use super::strengths::CORNER_GRID_S;
 use super::{Distortion, Session, State, Strengths};
 use crate::error::Result;
 use crate::gauss_newton::{Descent, Local, Options, Stop, descend};
@@ -14,18 +19,6 @@ pub const RIDGE: f64 = 1e-12;
 const STEP_TOLERANCE: f64 = 1e-3;
 /// Renewals of the moves' weights; they follow the state in second order and settle in two.
 const RENEWALS: usize = 6;
-
-/// Corner times tried, s. A bias that walks faster than the first is drift.
-pub const CORNER_GRID_S: [f64; 7] = [20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 2560.0];
-/// Scatter that counts as none, in units of the session's reference.
-pub const NO_SCATTER: f64 = 1e-3;
-/// Scatters tried beyond none: a factor of 1.5 apart, up to a thousand times the reference.
-const N_SCATTER: i32 = 26;
-const SCATTER_FROM: f64 = 0.05;
-const SCATTER_RATIO: f64 = 1.5;
-/// Twice the gain in log-likelihood that makes a scatter count: 5.41 is passed in 1 % of sessions without any (half of
-/// χ² with one degree of freedom, the variance being at its boundary).
-const SCATTER_GATE: f64 = 5.41;
 
 /// A fitted session.
 #[derive(Debug)]
@@ -95,7 +88,7 @@ impl Fit {
     }
 }
 
-fn chi2_of(groups: &[Group]) -> f64 {
+pub(super) fn chi2_of(groups: &[Group]) -> f64 {
     groups.iter().map(|g| g.rows.residual.norm_squared()).sum()
 }
 
@@ -116,6 +109,8 @@ struct Held<'a> {
     distortion: &'a Distortion,
     strengths: Strengths,
     weights: &'a Weights,
+    /// The moves at the state that the descent begins at, already carried.
+    first: RefCell<Option<Vec<Passed>>>,
 }
 
 /// The linear problem of a state.
@@ -133,7 +128,11 @@ impl Descent for Held<'_> {
     type Local = Here;
 
     fn linearise(&self, state: &State, _previous: Option<&Here>) -> Result<Here> {
-        let passed = self.session.pass(state, self.distortion, self.weights);
+        let known = self.first.borrow_mut().take();
+        let passed = known.unwrap_or_else(|| {
+            self.session
+                .pass(state, self.distortion, &self.weights.plane)
+        });
         let groups = self.session.groups(
             state,
             &self.strengths,
@@ -247,17 +246,21 @@ pub fn fit(
     };
     let mut state = start;
     let mut iterations = 0;
+    let planes = session.planes(&state);
+    let mut passed = session.pass(&state, distortion, &planes);
     for renewal in 0.. {
-        let (weights, _) = session.weigh(&state, distortion)?;
+        let weights = Weights::of(&passed, &strengths)?;
         let held = Held {
             session,
             distortion,
             strengths,
             weights: &weights,
+            first: RefCell::new(Some(passed)),
         };
         let ended = descend(&held, state, &options)?;
         iterations += ended.iterations;
         state = ended.point;
+        passed = ended.local.passed;
         let is_settled = ended.iterations == 1 || session.moves.is_empty();
         if is_settled || renewal >= RENEWALS {
             let factor = ended.local.chain.factor(RIDGE, None)?;
@@ -266,7 +269,7 @@ pub fn fit(
                 strengths,
                 distortion: distortion.clone(),
                 weights,
-                passed: ended.local.passed,
+                passed,
                 groups: ended.local.groups,
                 chain: ended.local.chain,
                 factor,
@@ -278,143 +281,4 @@ pub fn fit(
         }
     }
     unreachable!("the loop returns at its last renewal")
-}
-
-/// Fits a session with the strengths of its processes chosen by marginal likelihood (11.12).
-///
-/// Only rows of the processes depend on a strength, each in proportion: the evidence of every strength follows from the
-/// rows already made, in time linear in the poses.
-///
-/// # Errors
-/// As [`fit`].
-pub fn tune(
-    session: &Session,
-    start: State,
-    strengths: Strengths,
-    distortion: &Distortion,
-) -> Result<Fit> {
-    let first = fit(session, start, strengths, distortion)?;
-    let best = Evidence::of(&first).search(session);
-    if best == first.strengths {
-        return Ok(first);
-    }
-    fit(session, first.state, best, distortion)
-}
-
-/// Normal equations by process, ready to be weighed anew.
-struct Evidence {
-    at: Strengths,
-    fixed: Chain,
-    fixed_side: DMatrix<f64>,
-    fixed_sum: f64,
-    process: Vec<(Chain, DMatrix<f64>, f64, usize)>,
-}
-
-impl Evidence {
-    fn of(fit: &Fit) -> Self {
-        let layout = fit.layout();
-        let part = |process: Option<usize>| {
-            let groups: Vec<Group> = fit
-                .groups
-                .iter()
-                .filter(|group| group.kind.process() == process)
-                .cloned()
-                .collect();
-            let chain = Chain::of(layout, groups.iter().map(|group| &group.rows));
-            let n = groups.iter().map(|group| group.rows.len()).sum();
-            (chain, gradient(layout, &groups), chi2_of(&groups), n)
-        };
-        let (fixed, fixed_side, fixed_sum, _) = part(None);
-        Self {
-            at: fit.strengths,
-            fixed,
-            fixed_side,
-            fixed_sum,
-            process: (0..N_PROCESSES).map(|p| part(Some(p))).collect(),
-        }
-    }
-
-    /// Log-evidence at other strengths, from the linear problem here.
-    fn at(&self, strengths: &Strengths) -> f64 {
-        let factors = [
-            strengths.corner_s[0] / self.at.corner_s[0],
-            strengths.corner_s[1] / self.at.corner_s[1],
-            self.at.scatter[0] / strengths.scatter[0],
-            self.at.scatter[1] / strengths.scatter[1],
-        ];
-        let mut chain = self.fixed.clone();
-        let mut side = self.fixed_side.clone();
-        let mut sum = self.fixed_sum;
-        let mut weight = 0.0;
-        for ((part, part_side, part_sum, n), factor) in self.process.iter().zip(factors) {
-            let squared = factor * factor;
-            chain.add_scaled(part, squared);
-            side += part_side * squared;
-            sum += part_sum * squared;
-            weight += *n as f64 * factor.ln();
-        }
-        let Ok(factor) = chain.factor(RIDGE, None) else {
-            return f64::NEG_INFINITY;
-        };
-        let chi2 = sum - side.dot(&factor.solve(&side));
-        -0.5 * chi2 - 0.5 * factor.log_det() + weight
-    }
-
-    /// One process after the other until none moves.
-    fn search(&self, session: &Session) -> Strengths {
-        let has_rate = session.rate.is_some();
-        let mut best = self.at;
-        if session.scatter.is_some() {
-            best.scatter = [NO_SCATTER; 2];
-        }
-        self.search_corners(&mut best, has_rate);
-        if session.scatter.is_none() {
-            return best;
-        }
-        let none = self.at(&best);
-        for sensor in 0..if has_rate { 2 } else { 1 } {
-            let mut tried = best;
-            for _ in 0..2 {
-                self.search_scatter(&mut tried, sensor);
-                self.search_corners(&mut tried, has_rate);
-            }
-            let base = if best.scatter == [NO_SCATTER; 2] {
-                none
-            } else {
-                self.at(&best)
-            };
-            if 2.0 * (self.at(&tried) - base) > SCATTER_GATE {
-                best = tried;
-            }
-        }
-        best
-    }
-
-    fn search_corners(&self, best: &mut Strengths, has_rate: bool) {
-        // One sensor after the other, and the first again: their walks hardly meet in a row.
-        for sensor in [0, 1, 0] {
-            if sensor == 1 && !has_rate {
-                continue;
-            }
-            let values = CORNER_GRID_S.map(|corner| {
-                let mut tried = *best;
-                tried.corner_s[sensor] = corner;
-                (self.at(&tried), corner)
-            });
-            if let Some((_, corner)) = values.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
-                best.corner_s[sensor] = corner;
-            }
-        }
-    }
-
-    fn search_scatter(&self, best: &mut Strengths, sensor: usize) {
-        let values = (0..N_SCATTER).map(|k| {
-            let mut tried = *best;
-            tried.scatter[sensor] = SCATTER_FROM * SCATTER_RATIO.powi(k);
-            (self.at(&tried), tried.scatter[sensor])
-        });
-        if let Some((_, scatter)) = values.max_by(|a, b| a.0.total_cmp(&b.0)) {
-            best.scatter[sensor] = scatter;
-        }
-    }
 }

@@ -1,47 +1,19 @@
 //! What a fitted session says beyond its optimum: leverage, projections for score tests, held-out prediction, covariance
 //! of both linear models (docs/model-session.md, 11.13-11.16).
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
-use rayon::prelude::*;
+use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
-use super::chain::Chain;
-use super::fit::{Fit, RIDGE, gradient};
+use super::chain::{Chain, Layout};
+use super::fit::{Fit, gradient};
 use super::rows::{Domain, Group};
-use super::{AtRest, LOWER, Session};
+use super::strengths::possible_scatters;
+use super::{LOWER, Session, State};
 use crate::error::Result;
 
 /// Domains that are judged: all but the prior.
 pub const N_DOMAINS: usize = 4;
-/// Ridge of the training rows: the held-out pose's own unknowns keep a weak prior, the same for every model compared.
-const TRAINING_RIDGE: f64 = 1e-6;
-/// Directions of a fold whose predicted variance is above this many noise variances were left open by the training rows.
-const OPEN: f64 = 1e4;
-
-/// Held-out prediction of blocks of rows.
-#[derive(Debug, Clone)]
-pub struct HeldOut {
-    /// `(folds, domains)` innovation χ².
-    pub chi2: Vec<[f64; N_DOMAINS]>,
-    /// `(folds)` log-determinant of the predicted covariance.
-    pub log_det: Vec<f64>,
-    /// `(domains)` directions predicted.
-    pub n_rows: [f64; N_DOMAINS],
-    /// `(rows)` whitened innovations.
-    pub residual: Vec<f64>,
-    /// `(rows)` the same over each row's own noise alone.
-    pub innovation: Vec<f64>,
-}
-
-/// One zero for the session, raw and centred.
-#[derive(Debug, Clone)]
-pub struct SessionZero {
-    /// Weight of every pose.
-    pub weights: Vec<Vector3<f64>>,
-    /// The zero.
-    pub mean: Vector3<f64>,
-    /// Its variance by poses that differ beyond their noise.
-    pub variance: Vector3<f64>,
-}
+/// Ridge of what is left when rows are taken out: a pose without its accelerometer has a vertical that nothing may see.
+const LEFT_OUT_RIDGE: f64 = 1e-9;
 
 /// Domain of row `r` of a group.
 #[must_use]
@@ -103,155 +75,18 @@ impl Fit {
         out
     }
 
-    /// Predicts every fold's rows from the others (blocked cross-validation). A fold is a list of groups.
-    ///
-    /// # Errors
-    /// When the rest of the rows determines nothing at all.
-    pub fn held_out(&self, folds: &[Vec<usize>]) -> Result<HeldOut> {
-        let layout = self.layout();
-        let firsts = self.first_rows();
-        let side = gradient(layout, &self.groups);
-        let scale = self.chain.diagonal().map(|value| {
-            let length = value.max(0.0).sqrt();
-            if length > 0.0 { length } else { 1.0 }
-        });
-        let parts: Vec<Result<FoldPart>> = folds
-            .par_iter()
-            .map(|fold| {
-                let held = Chain::of(layout, fold.iter().map(|&g| &self.groups[g].rows));
-                let mut train = self.chain.clone();
-                train.add_scaled(&held, -1.0);
-                let factor = train.factor(TRAINING_RIDGE, Some(&scale))?;
-                let n: usize = fold.iter().map(|&g| self.groups[g].rows.len()).sum();
-                let mut jacobian_t = DMatrix::zeros(layout.n(), n);
-                let mut residual = DVector::zeros(n);
-                let mut at = 0;
-                for &g in fold {
-                    let rows = &self.groups[g].rows;
-                    let r = rows.len();
-                    let mut part = DMatrix::zeros(layout.n(), r);
-                    rows.add_transposed(layout, &DMatrix::identity(r, r), &mut part);
-                    jacobian_t.columns_mut(at, r).copy_from(&part);
-                    residual.rows_mut(at, r).copy_from(&rows.residual);
-                    at += r;
-                }
-                // The training optimum is one linear step from that of all rows.
-                let others = &side - &jacobian_t * &residual;
-                let solved = factor.solve(&jacobian_t);
-                let mut spread = jacobian_t.tr_mul(&solved);
-                for i in 0..n {
-                    spread[(i, i)] += 1.0;
-                }
-                let innovation = &residual - solved.tr_mul(&others).column(0);
-                let spread = (&spread + spread.transpose()) * 0.5;
-                let eigen = spread.symmetric_eigen();
-                let along = eigen.eigenvectors.tr_mul(&innovation);
-                let mut whitened = DVector::zeros(n);
-                let mut plain = DVector::zeros(n);
-                let mut share = DVector::zeros(n);
-                let mut log_det = 0.0;
-                for k in 0..n {
-                    let value = eigen.eigenvalues[k];
-                    if value < OPEN {
-                        let vector = eigen.eigenvectors.column(k);
-                        whitened.axpy(along[k] / value.sqrt(), &vector, 1.0);
-                        plain.axpy(along[k], &vector, 1.0);
-                        share += vector.component_mul(&vector);
-                        log_det += value.ln();
-                    }
-                }
-                Ok(FoldPart {
-                    whitened,
-                    plain,
-                    share,
-                    log_det,
-                })
-            })
-            .collect();
-        let mut out = HeldOut {
-            chi2: Vec::with_capacity(folds.len()),
-            log_det: Vec::with_capacity(folds.len()),
-            n_rows: [0.0; N_DOMAINS],
-            residual: vec![0.0; self.n_rows()],
-            innovation: vec![0.0; self.n_rows()],
-        };
-        for (fold, part) in folds.iter().zip(parts) {
-            let part = part?;
-            let mut chi2 = [0.0; N_DOMAINS];
-            let mut at = 0;
-            for &g in fold {
-                let group = &self.groups[g];
-                for r in 0..group.rows.len() {
-                    let domain = domain_of(group, r) as usize;
-                    if domain < N_DOMAINS {
-                        chi2[domain] += part.whitened[at].powi(2);
-                        out.n_rows[domain] += part.share[at];
-                    }
-                    out.residual[firsts[g] + r] = part.whitened[at];
-                    out.innovation[firsts[g] + r] = part.plain[at];
-                    at += 1;
-                }
-            }
-            out.chi2.push(chi2);
-            out.log_det.push(part.log_det);
-        }
-        Ok(out)
-    }
-
-    /// The session's one zero of the gyro: weights of the poses, raw mean, variance of it by poses that differ beyond
-    /// their noise (11.16).
-    #[must_use]
-    pub fn session_zero(&self, session: &Session) -> Option<SessionZero> {
-        let rate = session.rate.as_ref()?;
-        let (weights, spread) = pooled(rate, &self.read_zeros(rate));
-        let mut mean = Vector3::zeros();
-        let mut variance = Vector3::zeros();
-        for (w, z) in weights.iter().zip(&self.state.rate_zero) {
-            mean += w.component_mul(z);
-            variance += w.component_mul(w).component_mul(&spread);
-        }
-        Some(SessionZero {
-            weights,
-            mean,
-            variance,
-        })
-    }
-
-    /// What each pose reads less what effects add there.
-    fn read_zeros(&self, rate: &AtRest) -> Vec<Vector3<f64>> {
-        let effects = super::Distortion::at(
-            self.distortion.rate.as_ref(),
-            self.distortion.k,
-            &self.state.effect,
-        );
-        let inverse = self.state.rate_scale.try_inverse();
-        rate.mean
-            .iter()
-            .enumerate()
-            .map(|(i, mean)| match (&effects, inverse) {
-                (Some(effects), Some(inverse)) => mean - inverse * effects[i],
-                _ => *mean,
-            })
-            .collect()
-    }
-
     /// `(24, 24)` covariance of `(S_a, b_a, S_ω, b_ω)` row by row, on raw readings whose centres were `origins`
     /// (accelerometer, gyro), and `b_ω` itself.
-    #[must_use]
+    ///
+    /// # Errors
+    /// When a way in which the zeros may scatter leaves the session undetermined.
     pub fn linear_covariance(
         &self,
         session: &Session,
         origins: &[Vector3<f64>; 2],
-    ) -> (DMatrix<f64>, Vector3<f64>) {
+    ) -> Result<(DMatrix<f64>, Vector3<f64>)> {
         let layout = self.layout();
-        let mut map = DMatrix::zeros(layout.n(), 24);
-        for (c, &(i, j)) in LOWER.iter().enumerate() {
-            map[(c, 3 * i + j)] = 1.0;
-            map[(c, 9 + i)] -= origins[0][j];
-        }
-        for i in 0..3 {
-            map[(6 + i, 9 + i)] = 1.0;
-        }
+        let mut map = force_map(layout, &origins[0], 24);
         let mut bias = Vector3::zeros();
         let mut beyond = Matrix3::zeros();
         if let Some(one) = self.session_zero(session) {
@@ -269,12 +104,20 @@ impl Fit {
                 }
             }
         }
-        let solved = self.factor.solve(&map);
-        let mut covariance = map.tr_mul(&solved);
+        let mut covariance = DMatrix::zeros(24, 24);
+        let possible = possible_scatters(self, session)?;
+        for one in &possible {
+            let shift = map.tr_mul(&one.step);
+            covariance += map.tr_mul(&one.factor.solve(&map)) * one.weight;
+            covariance.ger(one.weight, &shift, &shift, 1.0);
+        }
+        if possible.is_empty() {
+            covariance = map.tr_mul(&self.factor.solve(&map));
+        }
         let mut corner = covariance.view_mut((21, 21), (3, 3));
         corner += beyond;
         let covariance = (&covariance + covariance.transpose()) * 0.5;
-        (covariance, bias)
+        Ok((covariance, bias))
     }
 
     /// Covariance of the border: both linear models, then effects.
@@ -291,15 +134,34 @@ impl Fit {
             .into_owned()
     }
 
-    /// The factor of all rows but those of some groups: what the others say.
+    /// What the other rows say when those of some groups are left out: one linear step from the optimum, its model, and
+    /// the `(12, 12)` covariance of `(S_a, b_a)` on raw readings whose centre was `origin`.
     ///
     /// # Errors
     /// When they determine nothing.
-    pub fn without(&self, groups: &[usize]) -> Result<super::chain::Factor> {
-        let held = Chain::of(self.layout(), groups.iter().map(|&g| &self.groups[g].rows));
+    pub fn without(
+        &self,
+        groups: &[usize],
+        origin: &Vector3<f64>,
+    ) -> Result<(State, DMatrix<f64>)> {
+        let layout = self.layout();
+        let held = Chain::of(layout, groups.iter().map(|&g| &self.groups[g].rows));
         let mut rest = self.chain.clone();
         rest.add_scaled(&held, -1.0);
-        rest.factor(RIDGE.max(TRAINING_RIDGE), None)
+        let factor = rest.factor(LEFT_OUT_RIDGE, None)?;
+        let mut side = gradient(layout, &self.groups);
+        for &g in groups {
+            let rows = &self.groups[g].rows;
+            let r = DMatrix::from_column_slice(rows.len(), 1, rows.residual.as_slice());
+            rows.add_transposed(layout, &-r, &mut side);
+        }
+        let step = -factor.solve(&side).column(0).into_owned();
+        let map = force_map(layout, origin, 12);
+        let covariance = map.tr_mul(&factor.solve(&map));
+        Ok((
+            self.state.moved(&step, layout),
+            (&covariance + covariance.transpose()) * 0.5,
+        ))
     }
 
     /// Covariance of the five residuals of each move, SI, before the fit used any of it up.
@@ -307,54 +169,20 @@ impl Fit {
     pub fn move_covariance(&self) -> Vec<SMatrix<f64, 5, 5>> {
         self.passed
             .iter()
-            .map(|one| one.response.covariance)
+            .map(|one| one.covariance(&self.strengths))
             .collect()
     }
 }
 
-struct FoldPart {
-    whitened: DVector<f64>,
-    plain: DVector<f64>,
-    share: DVector<f64>,
-    log_det: f64,
-}
-
-/// A spread of the zeros counts when χ² exceeds its degrees of freedom by four of its standard deviations.
-const BEYOND_CHANCE: f64 = 4.0;
-
-/// Random-effects weights of zero readings and the variance between them (`DerSimonian` and Laird 1986), axis by axis.
-fn pooled(rate: &AtRest, zeros: &[Vector3<f64>]) -> (Vec<Vector3<f64>>, Vector3<f64>) {
-    let n = zeros.len();
-    let mut weights = vec![Vector3::zeros(); n];
-    let mut spread = Vector3::zeros();
-    for axis in 0..3 {
-        let precision: Vec<f64> = rate.sigma.iter().map(|s| s[axis].powi(-2)).collect();
-        let total: f64 = precision.iter().sum();
-        let mean = precision
-            .iter()
-            .zip(zeros)
-            .map(|(p, z)| p * z[axis])
-            .sum::<f64>()
-            / total;
-        let chi2: f64 = precision
-            .iter()
-            .zip(zeros)
-            .map(|(p, z)| p * (z[axis] - mean).powi(2))
-            .sum();
-        let dof = n as f64 - 1.0;
-        let squares: f64 = precision.iter().map(|p| p * p).sum();
-        if chi2 > dof + BEYOND_CHANCE * (2.0 * dof.max(1.0)).sqrt() {
-            spread[axis] = (chi2 - dof) / (total - squares / total).max(f64::MIN_POSITIVE);
-        }
-        let raw: Vec<f64> = rate
-            .sigma
-            .iter()
-            .map(|s| 1.0 / (s[axis].powi(2) + spread[axis]))
-            .collect();
-        let sum: f64 = raw.iter().sum();
-        for (w, value) in weights.iter_mut().zip(raw) {
-            w[axis] = value / sum;
-        }
+/// From all unknowns to `(S_a, b_a)` on raw readings, row by row, in the first of `n` columns.
+fn force_map(layout: Layout, origin: &Vector3<f64>, n: usize) -> DMatrix<f64> {
+    let mut map = DMatrix::zeros(layout.n(), n);
+    for (c, &(i, j)) in LOWER.iter().enumerate() {
+        map[(c, 3 * i + j)] = 1.0;
+        map[(c, 9 + i)] -= origin[j];
     }
-    (weights, spread)
+    for i in 0..3 {
+        map[(6 + i, 9 + i)] = 1.0;
+    }
+    map
 }

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use trihedron::rotation::exp;
 use trihedron::session_model::chain::{Chain, Layout, Rows};
 use trihedron::session_model::fit::fit;
+use trihedron::session_model::move_rows::Weights;
 use trihedron::session_model::moves::{Move, MoveNoise};
 use trihedron::session_model::{AtRest, Distortion, Session, State, Strengths};
 
@@ -105,7 +106,7 @@ fn made(scatter: bool) -> (Session, State) {
         time_s: hold_time,
         force: at_rest(force_mean, noise_force),
         rate: Some(at_rest(zeros.clone(), noise_rate)),
-        moves,
+        moves: std::sync::Arc::new(moves),
         noise: MoveNoise {
             force_density: noise_force,
             rate_density: noise_rate,
@@ -115,6 +116,7 @@ fn made(scatter: bool) -> (Session, State) {
         },
         prior: None,
         scatter: scatter.then_some([noise_force / 2.0, noise_rate / 2.0]),
+        is_scatter_given: false,
     };
     let state = State {
         force_scale,
@@ -135,6 +137,7 @@ fn made(scatter: bool) -> (Session, State) {
 const STRENGTHS: Strengths = Strengths {
     corner_s: [40.0, 40.0],
     scatter: [1.0, 1.0],
+    between: [0.6, 0.6],
 };
 
 fn residuals(
@@ -143,8 +146,10 @@ fn residuals(
     weighed_at: &State,
     effects: &Distortion,
 ) -> DVector<f64> {
-    let (weights, _) = session.weigh(weighed_at, effects).expect("weights");
-    let passed = session.pass(state, effects, &weights);
+    let planes = session.planes(weighed_at);
+    let weights =
+        Weights::of(&session.pass(weighed_at, effects, &planes), &STRENGTHS).expect("weights");
+    let passed = session.pass(state, effects, &planes);
     let groups = session
         .groups(state, &STRENGTHS, effects, &weights, &passed)
         .expect("rows");
@@ -156,8 +161,8 @@ fn residuals(
 }
 
 fn jacobian(session: &Session, state: &State, effects: &Distortion) -> DMatrix<f64> {
-    let (weights, _) = session.weigh(state, effects).expect("weights");
-    let passed = session.pass(state, effects, &weights);
+    let passed = session.pass(state, effects, &session.planes(state));
+    let weights = Weights::of(&passed, &STRENGTHS).expect("weights");
     let groups = session
         .groups(state, &STRENGTHS, effects, &weights, &passed)
         .expect("rows");
@@ -333,7 +338,7 @@ fn the_score_vanishes_at_the_truth_on_average_though_zeros_scatter() {
             }
             state.rate_zero[i] = rest.mean[i];
         }
-        for one in &mut session.moves {
+        for one in std::sync::Arc::make_mut(&mut session.moves) {
             for k in 0..one.rate.len() {
                 let x = one.fraction[k];
                 one.rate[k] += zeros[one.before] * (1.0 - x) + zeros[one.before + 1] * x;

@@ -27,11 +27,14 @@ from trihedron.cli.demo import demo
 from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
 from trihedron.cli.guide import guide
+from trihedron.cli.help import WIDEST, Command, Group
 from trihedron.cli.kalman import kalman
 from trihedron.cli.plan import plan
 from trihedron.cli.ports import ports
+from trihedron.cli.provenance import begin
 from trihedron.cli.segment import segment
 from trihedron.cli.simulate import simulate
+from trihedron.cli.speech import spell_out
 from trihedron.cli.verify import verify
 from trihedron.interruption import SENTENCE, Interrupted, status_of
 from trihedron.printable import printable
@@ -76,14 +79,15 @@ def build_app() -> typer.Typer:
     app = typer.Typer(
         name="trihedron",
         help="Calibrate an IMU from a raw log, with honest error bars.",
-        add_completion=False,
+        cls=Group,
+        add_completion=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
-        context_settings={"help_option_names": ["-h", "--help"]},
+        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": WIDEST},
     )
     app.callback()(trihedron)
     for command in COMMANDS:
-        app.command(name=command.__name__.replace("_", "-"))(command)
+        app.command(name=command.__name__.replace("_", "-"), cls=Command)(command)
     return app
 
 
@@ -98,6 +102,8 @@ def trihedron(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status; never a traceback for a question that cannot be answered."""
     words = _with_stdout_as_default(list(sys.argv[1:] if arguments is None else arguments)) or ["--help"]
+    spell_out()
+    begin(words)
     try:
         _make_writable()
         status = typer.main.get_command(build_app()).main(words, prog_name="trihedron", standalone_mode=False)

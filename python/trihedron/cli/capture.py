@@ -26,7 +26,7 @@ LOSSES_NOT_TRUSTED = 0.05
 def capture(
     port: Annotated[
         Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Argument(metavar="[PORT]", help="Port, tcp://host:port, a file of bytes, or - (stdin)."),
+        typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin)."),
     ] = None,
     output: Annotated[
         Optional[Path],  # noqa: UP045

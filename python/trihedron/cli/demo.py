@@ -10,7 +10,7 @@ from typing import Annotated, Optional
 import typer
 
 from trihedron.cli.options import Force
-from trihedron.cli.output import columns, leave, say
+from trihedron.cli.output import leave, put, step, style
 
 FOLDER = "trihedron-demo"
 
@@ -18,7 +18,7 @@ FOLDER = "trihedron-demo"
 def demo(
     folder: Annotated[
         Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Argument(metavar="[FOLDER]", help=f"Where to write; {FOLDER} when not said, or the next free name."),
+        typer.Argument(metavar="FOLDER", help=f"Where to write; {FOLDER} when not said, or the next free name."),
     ] = None,
     seed: Annotated[
         Optional[int],  # noqa: UP045
@@ -33,12 +33,13 @@ def demo(
     from trihedron.pipeline.demonstrating import demonstrate
     from trihedron.report import to_text
 
-    done = demonstrate(target, overwrite=force, say=say)
-    typer.echo(to_text(done.document, width=columns()), nl=False)
+    done = demonstrate(target, overwrite=force, say=step)
+    put(to_text(done.document, style=style()))
     from trihedron.pipeline.disagreeing import disagree
 
     drawn = secrets.randbelow(1_000_000) if seed is None else seed
-    typer.echo(to_text(disagree(target, drawn, overwrite=force, say=say).document), nl=False)
+    typer.echo("")
+    put(to_text(disagree(target, drawn, overwrite=force, say=step).document, style=style()))
     leave((*done.result.findings, *done.verification.findings))
 
 

@@ -89,21 +89,18 @@ def finish(
     recording: Recording, cut_s: float | None, gravity: float | None, output: Path | None, *, force: bool
 ) -> None:
     """Calibrate, verify on the poses held back, report; status 2 where the answer is not to be trusted."""
-    from trihedron.cli.output import columns, leave
+    from trihedron.cli.output import leave, put, style
     from trihedron.files.calibration import write_calibration
     from trihedron.pipeline.guiding import conclude
     from trihedron.report import calibration_report, to_text, verification_report
 
     result, check = conclude(recording, cut_s, gravity_m_s2=gravity)
-    typer.echo(
-        to_text(calibration_report(result.calibration, result.segments, result.recording), sections=3, width=columns()),
-        nl=False,
-    )
+    put(to_text(calibration_report(result.calibration, result.segments, result.recording), sections=2, style=style()))
     findings = list(result.calibration.findings)
     if check is not None:
         typer.echo("")
         document = verification_report(check.verification, check.segments, check.recording)
-        typer.echo(to_text(document, sections=2, width=columns()), nl=False)
+        put(to_text(document, sections=2, style=style()))
     if output is not None:
         write_calibration(result.calibration, output, overwrite=force)
         typer.echo(f"calibration: {output}", err=True)

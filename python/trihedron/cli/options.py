@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
+from trihedron.cli.provenance import note_input, note_options
+
 if TYPE_CHECKING:
     from trihedron.records import Recording
 
@@ -73,7 +75,7 @@ class LogSource(ReadingOptions):
     log: Annotated[
         Optional[Path],  # noqa: UP045
         typer.Argument(
-            metavar="[LOG]", help="Log: text of any layout, .npz, .npy, Parquet, zip; bags and others with extras."
+            metavar="LOG", help="Log: text of any layout, .npz, .npy, Parquet, zip; bags and others with extras."
         ),
     ] = None
     accel: Annotated[
@@ -98,7 +100,7 @@ class LogSource(ReadingOptions):
         from trihedron.read import read_recording
 
         with progress("reading") as report:
-            return read_recording(
+            recording = read_recording(
                 self.log,
                 accelerometer_path=self.accel,
                 gyroscope_path=self.gyro,
@@ -112,6 +114,8 @@ class LogSource(ReadingOptions):
                 instance=self.instance,
                 progress=report,
             )
+        note_input(recording)
+        return recording
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,7 @@ class LogsSource(ReadingOptions):
 
     log: Annotated[
         Optional[list[Path]],  # noqa: UP045
-        typer.Argument(metavar="[LOG]...", help="Log, or several of one unit; files and archives as for `read`."),
+        typer.Argument(metavar="LOG", help="Log, or several of one unit; files and archives as for `read`."),
     ] = None
     accel: Annotated[
         Optional[list[Path]],  # noqa: UP045
@@ -215,6 +219,7 @@ def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[...
 
         @functools.wraps(command)
         def run(**given: Any) -> None:
+            note_options(given)
             for name, group in groups.items():
                 given[name] = group(**{f.name: given.pop(f.name) for f in fields(group)})
             command(**given)
@@ -229,27 +234,39 @@ def with_options(**groups: type) -> Callable[[Callable[..., None]], Callable[...
 
 @contextmanager
 def progress(task: str, after_s: float = 1.0) -> Iterator[Callable[[float, str], None]]:
-    """A bar on stderr for what takes longer than ``after_s``; silent before."""
+    """A bar on stderr with rate and time left for what takes longer than ``after_s``; silent before, and in a pipe."""
     began = time.monotonic()
     bar: Any = None
     handle: Any = None
+    is_seen = sys.stderr.isatty()
 
     def report(done: float, text: str) -> None:
         nonlocal bar, handle
         if bar is None:
             # A bar in a file or a pipe would be garbage.
-            if time.monotonic() - began < after_s or not sys.stderr.isatty():
+            if not is_seen or time.monotonic() - began < after_s:
                 return
-            from rich.console import Console
-            from rich.progress import Progress
-
-            bar = Progress(console=Console(stderr=True), transient=True)
+            bar = _bar()
             bar.start()
-            handle = bar.add_task(task, total=1.0)
-        bar.update(handle, completed=done, description=text or task)
+            handle = bar.add_task(task, total=100.0)
+        bar.update(handle, completed=100.0 * done, description=text or task)
 
     try:
         yield report
     finally:
         if bar is not None:
             bar.stop()
+
+
+def _bar() -> Any:
+    """What, how far, how fast, how long still."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, ProgressColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.text import Text
+
+    class Rate(ProgressColumn):
+        def render(self, task: Any) -> Text:
+            return Text("" if not task.speed else f"{task.speed:.3g} %/s", style="dim")
+
+    columns = (TextColumn("{task.description}"), BarColumn(None), TaskProgressColumn(), Rate(), TimeRemainingColumn())
+    return Progress(*columns, console=Console(stderr=True), transient=True, expand=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 from collections.abc import Iterable
@@ -10,12 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from trihedron.cli.provenance import with_provenance
+from trihedron.cli.speech import speaks_unicode
 from trihedron.files.output import OutputError, check_free, write_whole
 from trihedron.printable import printable
 
 if TYPE_CHECKING:
     from trihedron.records import Finding
     from trihedron.report import Document
+    from trihedron.report.text import Style
 
 NOT_TO_BE_TRUSTED = 2
 REPORT_KINDS = (".html", ".txt", ".json")
@@ -40,6 +44,7 @@ def write_report(document: Document, machine: dict[str, Any], report: Path | Non
     """The report in the format that its name asks for."""
     if report is None:
         return
+    document = with_provenance(document)
     kind = report.suffix.lower()
     if kind == ".html":
         from trihedron.report.page import to_html
@@ -47,8 +52,9 @@ def write_report(document: Document, machine: dict[str, Any], report: Path | Non
         content = to_html(document)
     elif kind == ".txt":
         from trihedron.report import to_text
+        from trihedron.report.document import with_its_making
 
-        content = to_text(document)
+        content = to_text(with_its_making(document))
     else:
         from trihedron.report.machine import json_text
 
@@ -75,19 +81,41 @@ def show(document: Document, json_target: Path | None, *, sections: int | None) 
     if json_target is None or str(json_target) != "-":
         from trihedron.report import to_text
 
-        typer.echo(printable(to_text(document, sections=sections, width=columns())), nl=False)
+        put(to_text(document, sections=sections, style=style()))
 
 
-def columns() -> int:
-    """Columns of the terminal; those of a file where stdout is none."""
-    from trihedron.report.text import WIDTH
+def style() -> Style:
+    """What stdout can show: the terminal's columns, colour where it is one and NO_COLOR is unset, ASCII where it must.
 
-    return shutil.get_terminal_size((WIDTH, 24)).columns if sys.stdout.isatty() else WIDTH
+    A pipe has the columns of a file; ``COLUMNS`` overrides both.
+    """
+    from trihedron.report.text import WIDTH, Style
+
+    is_terminal = sys.stdout.isatty()
+    is_said = os.environ.get("COLUMNS", "").isdigit()
+    width = shutil.get_terminal_size((WIDTH, 24)).columns if is_terminal or is_said else WIDTH
+    return Style(width, has_colour(), not speaks_unicode(sys.stdout))
+
+
+def has_colour() -> bool:
+    """A terminal that shows colours, and nobody who does not want them (no-color.org)."""
+    return sys.stdout.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def put(text: str) -> None:
+    """Text for people on stdout, with its colours where it has any."""
+    typer.echo(text, nl=False, color=has_colour())
 
 
 def say(sentence: str) -> None:
     """To stderr: what was done, not what was found."""
     typer.echo(printable(sentence), err=True)
+
+
+def step(sentence: str) -> None:
+    """To a terminal: what is being done now. A pipe is told results only."""
+    if sys.stderr.isatty():
+        say(sentence)
 
 
 def leave(findings: Iterable[Finding]) -> None:

@@ -13,7 +13,7 @@ from trihedron.cli.options import Force
 def simulate(
     scenario: Annotated[
         Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Argument(metavar="[SCENARIO]", help="A .toml file, or the name of a ready-made scenario (--list)."),
+        typer.Argument(metavar="SCENARIO", help="A .toml file, or the name of a ready-made scenario (--list)."),
     ] = None,
     output: Annotated[
         Optional[Path],  # noqa: UP045

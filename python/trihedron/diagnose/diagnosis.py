@@ -156,7 +156,7 @@ def _with_late(
         if known is None or known.p_value is None or (one.p_value is not None and one.p_value < known.p_value):
             candidates = candidates | {key: one}
     if len(late.accepted) == len(model.accepted):
-        return model, candidates
+        return late, candidates  # the same model, which remembers what was looked for in vain
     scored, _ = scores(late, exclude=late.refused)
     return judged_again(_grown(late, scored, alpha, lambda _part: None)), candidates
 

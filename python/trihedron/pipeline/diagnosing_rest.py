@@ -55,7 +55,9 @@ def _is_rest(recording: Recording, segments: Segments, gravity_m_s2: float) -> b
         near = free & (np.arccos(np.clip(up @ up[first], -1.0, 1.0)) < SAME_POSE_RAD)
         of_orientations.append(float(lasts[near].sum()))
         free &= ~near
-    if len(of_orientations) <= TWO_ORIENTATIONS:
+    # Counts about the middle of a converter's range all point the same way: there the fit alone tells.
+    is_known = acceleration_to_si(recording.accelerometer_unit) is not None
+    if is_known and len(of_orientations) <= TWO_ORIENTATIONS:
         return _turns(recording, segments) <= MOST_TURNS
     longest = sum(sorted(of_orientations)[-TWO_ORIENTATIONS:])
     if longest < MOSTLY * sum(of_orientations):

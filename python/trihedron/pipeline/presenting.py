@@ -109,9 +109,9 @@ def as_html(result: object) -> str:
 def pictures(result: object) -> dict[str, document.Picture]:
     """The figures of a result's report by name."""
     found = {"allan": noise_picture(result)} if isinstance(result, Noise) else {}
-    for section in _kind(result).document(result).sections:
-        found |= {block.name: block for block in section.blocks if isinstance(block, document.Picture)}
-    return found
+    laid_out = _kind(result).document(result)
+    every = [laid_out.lead, *(block for section in laid_out.sections for block in section.blocks)]
+    return found | {b.name: b for b in every if isinstance(b, document.Picture) and b.draw is not None}
 
 
 def plot(result: object, name: str | None = None) -> ShownFigure:
@@ -129,7 +129,9 @@ def plot(result: object, name: str | None = None) -> ShownFigure:
     if chosen is None or chosen not in there:
         listed = ", ".join(repr(key) for key in there) or "none"
         raise ValueError(f"there is no figure {chosen!r} of this {type(result).__name__}; there are: {listed}.")
-    return there[chosen].draw()
+    draw = there[chosen].draw
+    assert draw is not None
+    return draw()
 
 
 def report(result: object, path: str | os.PathLike[str] | None = None, *, overwrite: bool = False) -> str:

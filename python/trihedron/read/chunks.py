@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.errors import ReadError, check_readable, from_os_error
+from trihedron.read.panics import panics_unprinted
 
 ROWS = 1 << 18
 ROLES = ("ax", "ay", "az", "gx", "gy", "gz")
@@ -92,9 +93,12 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
         import polars
 
         try:
-            table = polars.scan_parquet(path)
-            n_rows = int(table.select(polars.len()).collect().item())
-            n_columns = len(table.collect_schema())
+            with panics_unprinted():
+                table = polars.scan_parquet(path)
+                n_rows = int(table.select(polars.len()).collect().item())
+                n_columns = len(table.collect_schema())
+        except polars.exceptions.PanicException:
+            raise ReadError(f"{path}: this Parquet file's description of itself is damaged.") from None
         except polars.exceptions.PolarsError as error:
             raise ReadError(f"{path}: this Parquet file is damaged ({str(error).splitlines()[0]}).") from None
     else:

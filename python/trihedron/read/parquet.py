@@ -8,6 +8,7 @@ import numpy as np
 import polars as pl
 
 from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.panics import panics_unprinted
 from trihedron.read.table import FloatArray, Table, check_memory, file_sha256
 from trihedron.records import Finding, FindingCode, Severity
 
@@ -15,13 +16,16 @@ from trihedron.records import Finding, FindingCode, Severity
 def read_parquet(path: Path) -> Table:
     """Numeric and time columns of a Parquet file; anything else is left out and said so."""
     try:
-        n_rows = pl.scan_parquet(path).select(pl.len()).collect().item()
-        schema = pl.read_parquet_schema(path)
-        check_memory(path, n_rows, len(schema))
-        frame = pl.read_parquet(path)
+        with panics_unprinted():
+            n_rows = pl.scan_parquet(path).select(pl.len()).collect().item()
+            schema = pl.read_parquet_schema(path)
+            check_memory(path, n_rows, len(schema))
+            frame = pl.read_parquet(path)
     except OSError as error:
         raise from_os_error(path, error) from None
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, ValueError) as error:
+    except pl.exceptions.PanicException:
+        raise ReadError(f"{path}: this Parquet file's description of itself is damaged; write it again.") from None
+    except (pl.exceptions.PolarsError, ValueError) as error:
         if isinstance(error, ReadError):
             raise
         first = str(error).strip().split("\n")[0][:160]

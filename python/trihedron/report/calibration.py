@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
 from trihedron.report.axes import Axes, axes_of
-from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.calibration_charts import (
+    correlation_table,
+    move_chart,
+    move_noise_deg,
+    residual_chart,
+    sphere_chart,
+)
+from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import (
@@ -19,6 +28,7 @@ from trihedron.report.numbers import (
     unit_in_print,
     with_sigma,
 )
+from trihedron.report.segments import signals_picture
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, mrad_from_radians
 
 SYMBOLS = {"accelerometer": ("f", "a"), "gyroscope": ("ω", "w")}
@@ -48,7 +58,36 @@ def calibration_report(
         verdict=verdict(calibration),
         is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
+        headlines=tuple(_headlines(calibration)),
+        lead=_residual_picture(calibration),
     )
+
+
+def _headlines(calibration: Calibration) -> list[Headline]:
+    """How well gravity is predicted: at rest by the accelerometer, through a move by the gyro."""
+    out = []
+    quality = calibration.accelerometer.quality
+    if quality is not None:
+        rms, kind = (quality.rms, "in sample") if quality.held_out_rms is None else (quality.held_out_rms, "held out")
+        beside = f"rms, {kind}; noise alone {plain_number(mm_s2_from_m_s2(quality.floor))}"
+        out.append(Headline("gravity at rest missed by", plain_number(mm_s2_from_m_s2(rms)), "mm/s²", beside))
+    gyroscope = calibration.gyroscope
+    if gyroscope is not None and gyroscope.quality is not None:
+        seen = [(label, rms) for label, rms, _ in _angles(gyroscope.quality)]
+        if seen:
+            beside = f"rms, {seen[-1][0]}; noise alone {plain_number(_move_floor(gyroscope.quality))}°"
+            out.append(Headline("gravity after a move missed by", plain_number(seen[-1][1]), "°", beside))
+    for name, sensor in _sensors(calibration):
+        relative = sensor.sigma_S.diagonal() / np.abs(sensor.S.diagonal())
+        words = f"{plain_number(1e6 * float(relative.max()), 2)}"
+        out.append(Headline(f"{name} scale known to", words, "ppm", "of the worst axis, one standard error"))
+    return out
+
+
+def _move_floor(quality: FitQuality) -> float:
+    """Angle after a move by noise alone, rms over the moves that count, degrees."""
+    noise = move_noise_deg(quality)[_counted(quality)]
+    return float(np.sqrt(np.mean(noise**2))) if len(noise) else float("nan")
 
 
 def verdict(calibration: Calibration) -> str:
@@ -98,7 +137,8 @@ def parameter_table(name: str, sensor: SensorCalibration) -> Table:
     )
     per = "" if sensor.raw_unit == sensor.si_unit else f" per {one_of(sensor.raw_unit)}"
     caption = (
-        f"{name.capitalize()}   {true} = S {raw}′ + b   {raw}′ in {unit_in_print(sensor.raw_unit)}, S in {unit}{per}"
+        f"{name.capitalize()}: {true} = S {raw}′ + b, with {raw}′ in {unit_in_print(sensor.raw_unit)} "
+        f"and S in {unit}{per}"
     )
     return Table(head, rows, caption)
 
@@ -119,34 +159,52 @@ def _norm_words(quality: FitQuality) -> str:
     def words(value: float) -> str:
         return f"{plain_number(mm_s2_from_m_s2(value))} mm/s² ({plain_number(mg_from_m_s2(value), 2)} mg)"
 
-    parts = []
-    if quality.dof > 0:
-        parts.append(f"{words(quality.rms_dof)} per pose in sample (rms per degree of freedom, {quality.dof})")
-    else:
-        parts.append("none: as many parameters as poses, so the fit cannot be judged")
+    n = how_many(len(quality.residual), "pose")
+    parts = [f"{words(quality.rms)} rms in sample ({n})"]
+    if quality.dof <= 0:
+        parts = ["none in sample: as many parameters as poses, so the fit cannot be judged"]
     if quality.held_out_rms is not None:
         parts.append(f"{words(quality.held_out_rms)} held out")
     parts.append(f"noise alone {words(quality.floor)}")
     return "; ".join(parts)
 
 
+def _counted(quality: FitQuality) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(m,) the moves that were not left out."""
+    assert quality.angle_deg is not None
+    seen = np.isfinite(quality.angle_deg)
+    if quality.weights is not None and len(quality.weights) == len(seen):
+        seen &= quality.weights > 0
+    return seen
+
+
+def _angles(quality: FitQuality) -> list[tuple[str, float, float]]:
+    """Label, rms and worst angle, in and out of sample, over the same moves."""
+    if quality.angle_deg is None:
+        return []
+    counted = _counted(quality)
+    held = quality.held_out_angle_deg
+    pairs = [("in sample", quality.angle_deg)]
+    if held is not None and np.any(np.isfinite(held[counted])):
+        pairs.append(("held out", held))
+    out = []
+    for label, angles in pairs:
+        known = angles[counted & np.isfinite(angles)]
+        if len(known):
+            out.append((label, float(np.sqrt(np.mean(known**2))), float(known.max())))
+    return out
+
+
 def _angle_words(quality: FitQuality) -> str:
-    parts = []
-    for label, angles in (("in sample", quality.angle_deg), ("held out", quality.held_out_angle_deg)):
-        if angles is None:
-            continue
-        finite = angles[np.isfinite(angles)]
-        if quality.weights is not None and len(quality.weights) == len(angles):
-            finite = angles[np.isfinite(angles) & (quality.weights > 0)]
-        if len(finite):
-            rms, worst = float(np.sqrt(np.mean(finite**2))), float(finite.max())
-            parts.append(f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}")
-    if parts:
+    angles = _angles(quality)
+    if angles:
+        parts = [f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}" for label, rms, worst in angles]
+        parts.append(f"noise alone {plain_number(_move_floor(quality))}° rms")
         return "gravity after a move predicted to " + "; ".join(parts)
     if quality.dof <= 0:
         return "none: as many parameters as measured turns, so the fit cannot be judged"
-    seen, noise = (plain_number(degrees_from_radians(value)) for value in (quality.rms_dof, quality.floor))
-    return f"angle of a turn missed by {seen}° (rms per degree of freedom, {quality.dof}); noise alone {noise}°"
+    seen, noise = (plain_number(degrees_from_radians(value)) for value in (quality.rms, quality.floor))
+    return f"angle of a turn missed by {seen}° rms; noise alone {noise}°"
 
 
 def _meaning(calibration: Calibration) -> tuple[Block, ...]:
@@ -207,6 +265,10 @@ def _certainty(calibration: Calibration) -> list[Block]:
             per_dof = sensor.quality.chi2 / sensor.quality.dof
             rows.append(("χ² per dof", f"{plain_number(per_dof)} over {sensor.quality.dof} degrees of freedom"))
         blocks.append(Facts(tuple(rows)))
+    found = correlation_table(calibration)
+    if found is not None:
+        caption = "Correlations of all free parameters (a: accelerometer, w: gyroscope)"
+        blocks.append(Table(*found, caption))
     return blocks
 
 
@@ -254,17 +316,17 @@ def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
     assert quality.angle_deg is not None
     moves = segments.moves if segments is not None and len(segments.moves) == len(quality.angle_deg) else None
     rows = []
+    noise = move_noise_deg(quality)
     for k, angle in enumerate(quality.angle_deg):
         row = [str(k)]
         if moves is not None:
             row.append(f"{moves[k].hold_before} → {moves[k].hold_after}")
         held = quality.held_out_angle_deg
-        noise = degrees_from_radians(float(np.linalg.norm(quality.sigma[k])) / 9.8)
         is_out = quality.weights is not None and len(quality.weights) > k and quality.weights[k] == 0.0
         row += [
             plain_number(float(angle), 2),
             "–" if held is None else plain_number(float(held[k]), 2),
-            plain_number(noise, 2),
+            plain_number(float(noise[k]), 2),
             "left out" if is_out else "",
         ]
         rows.append(tuple(row))
@@ -274,28 +336,16 @@ def _move_table(quality: FitQuality, segments: Segments | None) -> Table:
 
 def _figures(calibration: Calibration, segments: Segments | None, recording: Recording | None) -> list[Block]:
     blocks: list[Block] = []
-    if segments is not None and recording is not None:
-        draw = later("figures", "draw_signals", recording, segments)
-        blocks.append(Picture("signals", "The recording; shaded where the sensor stood still.", draw))
-    quality = calibration.accelerometer.quality
-    if quality is not None:
+    if segments is not None and segments.accelerometer_mean is not None:
         blocks.append(
             Picture(
-                "residuals",
-                "Norm of gravity minus its true value in every still pose, with the standard "
-                "error that noise alone gives; open circles: predicted by a fit that did not see that pose.",
-                later("figures", "draw_residuals", quality),
+                "poses",
+                "Directions of 'up' in the sensor's trihedron, upper and lower hemisphere. Empty regions are poses "
+                "that were not recorded; triangles are the poses that the fit would gain most from, in that order.",
+                later("figures", "draw_poses", calibration.accelerometer, segments.accelerometer_mean),
+                partial(sphere_chart, calibration.accelerometer, segments.accelerometer_mean),
             )
         )
-        if segments is not None and segments.accelerometer_mean is not None:
-            blocks.append(
-                Picture(
-                    "poses",
-                    "Directions of 'up' in the sensor's trihedron, upper and lower hemisphere. Empty "
-                    "regions are poses that were not recorded.",
-                    later("figures", "draw_poses", calibration.accelerometer, segments.accelerometer_mean),
-                )
-            )
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None and gyroscope.quality.angle_deg is not None:
         blocks.append(
@@ -303,6 +353,23 @@ def _figures(calibration: Calibration, segments: Segments | None, recording: Rec
                 "moves",
                 "Angle between predicted and measured gravity after every move, in sample and held out.",
                 later("figures", "draw_moves", gyroscope.quality),
+                partial(move_chart, gyroscope.quality, segments),
             )
         )
+    if segments is not None and recording is not None:
+        blocks.append(signals_picture(recording, segments))
     return blocks
+
+
+def _residual_picture(calibration: Calibration) -> Picture | None:
+    quality = calibration.accelerometer.quality
+    if quality is None:
+        return None
+
+    return Picture(
+        "residuals",
+        "Norm of gravity minus its true value in every still pose, against three standard errors of noise alone; "
+        "circles: predicted by a fit that did not see that pose.",
+        later("figures", "draw_residuals", quality),
+        partial(residual_chart, quality),
+    )

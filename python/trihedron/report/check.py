@@ -6,9 +6,9 @@ import numpy as np
 
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
 from trihedron.report.axes import axes_of
-from trihedron.report.document import Block, Document, Facts, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import plain_number, unit_in_print
+from trihedron.report.numbers import how_many, plain_number, unit_in_print
 from trihedron.report.segments import recording_facts, signals_picture
 from trihedron.units import mrad_from_radians
 
@@ -27,12 +27,26 @@ def check_report(
         verdict=verdict_of(findings, "Fit for calibration.", "Fit for calibration", "NOT FIT for calibration"),
         is_trustworthy=not any(finding.severity.value == "serious" for finding in findings),
         sections=(
-            Section("Recording", (Facts(recording_facts(recording, segments)),)),
-            *((Section("Error bars to expect", tuple(blocks)),) if blocks else ()),
+            Section("Result", (Facts(recording_facts(recording, segments)), *blocks)),
             Section("Findings", (findings_block(findings),)),
-            Section("Figures", (signals_picture(recording, segments),)),
         ),
+        headlines=tuple(_headlines(segments, calibration)),
+        lead=signals_picture(recording, segments),
     )
+
+
+def _headlines(segments: Segments, calibration: Calibration | None) -> list[Headline]:
+    out = []
+    for name, sensor in (
+        (("accelerometer", calibration.accelerometer), ("gyroscope", calibration.gyroscope)) if calibration else ()
+    ):
+        if sensor is None:
+            out.append(Headline(f"{name} scale", "none", "", "this log cannot tell it"))
+            continue
+        scale = _expected_cells(sensor)[0]
+        out.append(Headline(f"{name} scale to expect to", scale, "", "standard error of the worst axis"))
+    out.append(Headline("still poses", str(segments.n_holds), "", how_many(len(segments.moves), "move")))
+    return out
 
 
 def _expected(calibration: Calibration) -> Table:
@@ -42,7 +56,8 @@ def _expected(calibration: Calibration) -> Table:
             rows.append((name, "–", "–", "–"))
             continue
         rows.append((name, *_expected_cells(sensor)))
-    return Table(("standard error (largest of the axes)", "scale", "zero", "angles between axes"), tuple(rows))
+    head = ("", "scale", "zero", "angles between axes")
+    return Table(head, tuple(rows), "Error bars to expect: standard error, the largest of the axes")
 
 
 def _expected_cells(sensor: SensorCalibration) -> tuple[str, str, str]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from functools import partial
 
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis, DomainResiduals, DomainTest, HeldOut
+from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
 from trihedron.report.diagnosis_laws import laws_blocks
 from trihedron.report.diagnosis_numbers import (
     differing_in_short,
@@ -15,7 +18,7 @@ from trihedron.report.diagnosis_numbers import (
     numbers_blocks,
     stages_blocks,
 )
-from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Level, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block
 from trihedron.report.numbers import (
@@ -46,6 +49,14 @@ _CAPTIONS = {
     "moves": "Angle between gravity carried through a move by the gyro and gravity measured after it.",
     "dynamics": "Velocity over a move that the two poses at its ends do not allow.",
 }
+_LEVELS: dict[str, Level] = {
+    "consistent": "good",
+    "parameters-differ": "usable",
+    "missing-physics": "usable",
+    "not-testable": "usable",
+    "unexplained": "bad",
+}
+"""A diagnosis that names what is missing has done its work; one that cannot is no base for anything."""
 MOST_NAMED = 4
 MOST_PARAMETERS = 9
 
@@ -57,7 +68,7 @@ def first_screen(diagnosis: Diagnosis) -> int:
 
 def diagnosis_report(diagnosis: Diagnosis) -> Document:
     """Lay out a diagnosis; the first sections fit one screen."""
-    sections = [Section("Where recording and model differ", _located(diagnosis))]
+    sections = [Section("Result", _located(diagnosis))]
     if diagnosis.parameters:
         numbers = [*differing_numbers(diagnosis), *differing_noise(diagnosis)]
         words = tuple(("", word) for word in numbers) or (("", "None of the given numbers differs."),)
@@ -77,8 +88,9 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
     findings: Iterable[Finding] = getattr(diagnosis, "findings", ())
     if findings:
         sections.append(Section("Findings", (findings_block(findings),)))
-    if diagnosis.residuals:
-        sections.append(Section("Figures", tuple(_picture(diagnosis, r) for r in diagnosis.residuals)))
+    pictures = _pictures(diagnosis)
+    if pictures[1:]:
+        sections.append(Section("Figures", tuple(pictures[1:])))
     found = getattr(diagnosis, "reference", None)
     if found is not None:
         sections.insert(0, Section("Against the reference", reference_blocks(found)))
@@ -88,6 +100,9 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         verdict=verdict_in_words(diagnosis),
         is_trustworthy=diagnosis.verdict == "consistent",
         sections=tuple(sections),
+        headlines=tuple(_headlines(diagnosis)),
+        lead=pictures[0] if pictures else None,
+        stated_level=_LEVELS[diagnosis.verdict],
     )
 
 
@@ -212,7 +227,11 @@ def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         return (Paragraph("No effect of the catalogue earns its place in the model."),)
     blocks: list[Block] = []
     for k, effect in enumerate(diagnosis.effects):
-        rows = [(f"{k + 1}. {effect.id}", effect.statement), ("", _parameters(effect)), ("", _evidence(effect))]
+        rows = [
+            (f"{k + 1}. {effect.id}", _without_strongest(effect.statement)),
+            ("", _parameters(effect)),
+            ("", _evidence(effect)),
+        ]
         if effect.confounded_with:
             rows.append(
                 ("", f"This recording cannot tell it from {listed(list(effect.confounded_with))}. To separate them: ")
@@ -220,6 +239,15 @@ def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             rows[-1] = ("", rows[-1][1] + (effect.separating_experiment or "record other poses and moves") + ".")
         blocks.append(Facts(tuple(row for row in rows if row[1])))
     return tuple(blocks)
+
+
+def _without_strongest(statement: str) -> str:
+    """The sentence without its strongest term, which stands below it with the digits that its error bar allows."""
+    return _capital(re.sub(r"\s*\(strongest term [^:]*: [^;]*?\)(?=\.|$|;)", "", statement))
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _parameters(effect: AcceptedEffect) -> str:
@@ -357,13 +385,56 @@ def _number_with_sigma(value: float, sigma: float) -> str:
     return f"({_value(scale * value, scale * sigma)}) {power_of_ten(exponent)}"
 
 
+def _pictures(diagnosis: Diagnosis) -> list[Picture]:
+    """The effects against what drives them, then each domain before and after."""
+    return [*_physics(diagnosis), *(_picture(diagnosis, r) for r in diagnosis.residuals)]
+
+
+def _physics(diagnosis: Diagnosis) -> list[Picture]:
+    """One picture per effect, where the recording is at hand and the effect acts on poses or moves one by one."""
+    made = [getattr(diagnosis, name, None) for name in ("recording", "segments", "calibration")]
+    if any(one is None for one in made):
+        return []
+    out = []
+    for effect in diagnosis.effects:
+        chart = effect_chart(effect, diagnosis.residuals, *made)  # type: ignore[arg-type]
+        if chart is not None:
+            caption = f"{effect.id}: data (dots) against what drives it, with the model. "
+            caption += _without_strongest(effect.statement)
+            out.append(Picture(f"effect-{effect.id}", caption, None, lambda drawn=chart: drawn))  # type: ignore[misc]
+    return out
+
+
 def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
     has_effects = bool(diagnosis.effects)
 
-    made = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
+    draw = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
     n = len(residuals.before)
     caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'hold' else 'move')}; "
     caption += "bars: twice the noise predicted for one number."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."
-    return Picture(f"{residuals.domain}", caption, made)
+    chart = partial(before_after_chart, residuals, has_effects=has_effects)
+    return Picture(f"{residuals.domain}", caption, draw, chart)
+
+
+def _headlines(diagnosis: Diagnosis) -> list[Headline]:
+    """The strongest effect by what it gains on unseen poses and moves; else the worst domain."""
+    for effect in diagnosis.effects:
+        if effect.held_out:
+            held = effect.held_out[0]
+            after, _, unit = _size(held.rms_after, held.unit).partition(" ")
+            before = _size(held.rms_before, held.unit)
+            if effect.share is not None:
+                words = f"{plain_number(100.0 * effect.share, 2)}"
+                return [
+                    Headline(f"{effect.id} explains", words, "%", "of the misfit"),
+                    Headline(MEANING[held.domain], after, unit, f"held out, with it; {before} without"),
+                ]
+            return [Headline(MEANING[held.domain], after, unit, f"held out, with {effect.id}; {before} without")]
+    tests = [d for d in diagnosis.domains if d.dof > 0]
+    if not tests:
+        return []
+    worst = min(tests, key=lambda d: (not d.disagrees, d.p_value))
+    beside = f"χ² per degree of freedom, 1 by noise alone; p {_probability(worst.p_value)}"
+    return [Headline(MEANING[worst.domain], plain_number(worst.chi2_per_dof), "", beside)]

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal
 
-from trihedron.records import Finding
+from trihedron.records import Finding, Severity
 
 if TYPE_CHECKING:
+    from trihedron.report.chart import Chart
     from trihedron.report.figures import ShownFigure
+
+Level = Literal["good", "usable", "bad"]
+"""The colour of a verdict: nothing speaks against it, something does, not to be trusted."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,13 @@ class Table:
 
 
 @dataclass(frozen=True)
+class Code:
+    """Lines of a file or a command, to be copied as they are."""
+
+    text: str
+
+
+@dataclass(frozen=True)
 class FindingList:
     """Findings, gravest first."""
 
@@ -44,14 +55,18 @@ class FindingList:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure that is drawn when a writer can show it: ``draw`` raises ``NoFiguresError`` without matplotlib."""
+    """A figure that is drawn when a writer can show it, ``chart`` by a page.
+
+    ``draw`` is for a notebook or a file, and raises ``NoFiguresError`` without matplotlib; None where only pages draw.
+    """
 
     name: str
     caption: str
-    draw: Callable[[], ShownFigure]
+    draw: Callable[[], ShownFigure] | None
+    chart: Callable[[], Chart] | None = None
 
 
-Block = Paragraph | Facts | Table | FindingList | Picture
+Block = Paragraph | Facts | Table | Code | FindingList | Picture
 
 
 @dataclass(frozen=True)
@@ -63,11 +78,47 @@ class Section:
 
 
 @dataclass(frozen=True)
+class Headline:
+    """A number that the reader came for: ``beside`` says what to hold it against."""
+
+    what: str
+    value: str
+    unit: str = ""
+    beside: str = ""
+
+
+@dataclass(frozen=True)
 class Document:
-    """A whole report. The first section is the one that fits one screen."""
+    """A whole report. The first section is the one that fits one screen.
+
+    ``headlines`` (the first matters most) and the ``lead`` figure stand beside the verdict; ``stated_level`` overrides
+    the colour that follows from ``is_trustworthy`` and the findings; ``provenance`` says how the report was made.
+    """
 
     title: str
     subtitle: str
     verdict: str
     is_trustworthy: bool
     sections: tuple[Section, ...] = field(default=())
+    headlines: tuple[Headline, ...] = ()
+    lead: Picture | None = None
+    stated_level: Level | None = None
+    provenance: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def level(self) -> Level:
+        """The verdict's colour."""
+        if self.stated_level is not None:
+            return self.stated_level
+        if not self.is_trustworthy:
+            return "bad"
+        lists = [b for section in self.sections for b in section.blocks if isinstance(b, FindingList)]
+        is_warned = any(f.severity is Severity.WARNING for found in lists for f in found.findings)
+        return "usable" if is_warned else "good"
+
+
+def with_its_making(document: Document) -> Document:
+    """The document with how it was made as its last section, for writers that have no foot."""
+    if not document.provenance:
+        return document
+    return replace(document, sections=(*document.sections, Section("How this was made", (Facts(document.provenance),))))

@@ -1,34 +1,98 @@
-"""Findings in reading order, and the sentence they add up to."""
+"""Findings in reading order, each said once, and the sentence they add up to."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from trihedron.records import Finding, Severity
 from trihedron.report.document import FindingList, Paragraph
-from trihedron.report.numbers import how_many
+from trihedron.report.numbers import how_many, listed
 
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
+# A number that is a value; one that names a thing (hold 3) is told apart by the word before it.
+_NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+_NAMED = re.compile(r"^(Move|Hold|Still pose|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
+_AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.DOTALL | re.IGNORECASE)
 
 
 def findings_block(findings: Iterable[Finding]) -> FindingList | Paragraph:
-    """Gravest first; within a severity in the order of the stages."""
-    ordered = tuple(sorted((_sentence(finding) for finding in findings), key=lambda f: _ORDER[f.severity]))
+    """Gravest first; within a severity in the order of the stages; what recurs, once."""
+    ordered = tuple(sorted(map(_sentence, told_once(findings)), key=lambda f: _ORDER[f.severity]))
     return FindingList(ordered) if ordered else Paragraph("None.")
 
 
 def verdict_of(findings: Iterable[Finding], good: str, usable: str, bad: str) -> str:
     """``bad`` with the first serious finding; ``usable`` with the number of warnings; or ``good``."""
-    found = tuple(findings)
+    found = told_once(findings)
     serious = [finding for finding in found if finding.severity is Severity.SERIOUS]
     n_warnings = sum(finding.severity is Severity.WARNING for finding in found)
     if serious:
         more = f" ({how_many(len(serious) - 1, 'more serious finding')})" if len(serious) > 1 else ""
-        return f"{bad}: {serious[0].seen}{more}"
+        return f"{bad}: {_capital(serious[0].seen)}{more}"
     return f"{usable}, with {how_many(n_warnings, 'warning')}." if n_warnings else good
+
+
+def told_once(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """What several axes, poses or moves have in common as one finding that names them all."""
+    groups: dict[tuple[str, str, str, str], list[Finding]] = {}
+    for finding in findings:
+        key = (finding.code.value, finding.severity.value, finding.cause, finding.action)
+        groups.setdefault(key, []).append(finding)
+    return tuple(
+        same[0] if len(same) == 1 else replace(same[0], seen=_together([f.seen for f in same]))
+        for same in groups.values()
+    )
+
+
+def _together(sentences: Sequence[str]) -> str:
+    """One sentence for all that differ in nothing but their subject and their numbers; else one after another."""
+    for pattern, name in ((_AXIS, _axes), (_NAMED, _things)):
+        parts = [pattern.match(text) for text in sentences]
+        if all(parts):
+            rest = _ranged([part[part.re.groups] for part in parts if part is not None])
+            if rest is not None:
+                return name([part for part in parts if part is not None], rest)
+    whole = _ranged(sentences)
+    if whole is not None and not re.search(r"\b(hold|pose|move|sample|line|axis)s? \d", sentences[0], re.IGNORECASE):
+        return whole
+    return " ".join(map(_capital, sentences))
+
+
+def _axes(parts: Sequence[re.Match[str]], rest: str) -> str:
+    """``Gyro x, y and z: above 0.8 to 1.1 Hz ...``"""
+    groups: dict[str, list[str]] = {}
+    for part in parts:
+        sensor, _, axis = part[1].partition(" ")
+        groups.setdefault(sensor, []).append(axis)
+    words = [f"{sensor} {listed(axes)}".strip() for sensor, axes in groups.items()]
+    return f"{_capital('; '.join(words))}: {rest[:1].lower()}{rest[1:]}"
+
+
+def _things(parts: Sequence[re.Match[str]], rest: str) -> str:
+    """``Moves 7, 9 and 22: each misses gravity by ...``"""
+    return f"{parts[0][1]}s {listed([part[2] for part in parts])}: each {rest}"
+
+
+def _ranged(sentences: Sequence[str]) -> str | None:
+    """The sentence they share, with ranges where its numbers differ; None where more than numbers differs."""
+    skeleton = _NUMBER.sub("\0", sentences[0])
+    if any(_NUMBER.sub("\0", text) != skeleton for text in sentences[1:]):
+        return None
+    columns = list(zip(*(_NUMBER.findall(text) for text in sentences), strict=True))
+    words = []
+    for column in columns:
+        low, high = min(column, key=float), max(column, key=float)
+        words.append(low if low == high else f"{low} to {high}")
+    pieces = skeleton.split("\0")
+    return pieces[0] + "".join(word + piece for word, piece in zip(words, pieces[1:], strict=True))
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _sentence(finding: Finding) -> Finding:
     """What was seen, with a capital letter."""
-    return replace(finding, seen=finding.seen[:1].upper() + finding.seen[1:])
+    return replace(finding, seen=_capital(finding.seen), cause=_capital(finding.cause))

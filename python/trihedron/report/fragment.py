@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from trihedron.records import Severity
-from trihedron.report.document import Document, FindingList, Picture
+from trihedron.report.document import Code, Document, FindingList, Picture
 from trihedron.report.numbers import how_many
 from trihedron.report.page import KINDS, template
 
-_NOT_SHOWN = (Picture, FindingList)
+_NOT_SHOWN = (Picture, FindingList, Code)
 
 
 def to_fragment(document: Document) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,17 @@ from trihedron.records import (
     NormKalmanCalibration,
 )
 from trihedron.report.calibration import parameter_table
-from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import plain_number, unit_in_print, with_sigma
+from trihedron.report.kalman_charts import (
+    convergence_chart,
+    drift_chart,
+    innovations_chart,
+    norm_convergence_chart,
+    residual_chart,
+)
+from trihedron.report.numbers import how_many, plain_number, unit_in_print, with_sigma
 from trihedron.units import mm_s2_from_m_s2
 
 FloatArray = npt.NDArray[np.float64]
@@ -35,6 +43,10 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         sections = _with_references(outcome, calibration)
     else:
         sections = _without_references(outcome, calibration)
+    # What decides whether the error bars hold stands beside the verdict; the rest of the pictures below.
+    pictures = [b for section in sections for b in section.blocks if isinstance(b, Picture)]
+    lead = next(picture for picture in pictures if picture.name == "innovations")
+    sections = [Section(s.heading, tuple(b for b in s.blocks if b is not lead)) for s in sections]
     return Document(
         title="Calibration by Kalman filter",
         subtitle=calibration.recording_source or "no recording named",
@@ -46,7 +58,35 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         ),
         is_trustworthy=calibration.is_trustworthy,
         sections=tuple(sections),
+        headlines=tuple(_headlines(outcome)),
+        lead=lead,
     )
+
+
+def _headlines(outcome: KalmanCalibration | NormKalmanCalibration) -> list[Headline]:
+    """Innovations against what the filter predicted, and what is left of the poses."""
+    seen = _consistencies(outcome)
+    name, worst, n = max(seen, key=lambda one: abs(np.log(max(one[1].nis_mean, 1e-12))))
+    beside = (
+        f"innovations² over predicted variance; 1 when right, {_limits(worst)} in 99 % of cases; {worst.n} of {n} poses"
+    )
+    of = "" if len(seen) == 1 else f", axis {name}"
+    rms = float(np.sqrt(np.mean(outcome.residual_m_s2**2)))
+    return [
+        Headline(f"mean NIS{of}", plain_number(worst.nis_mean), "", beside),
+        Headline("residual", plain_number(mm_s2_from_m_s2(rms)), "mm/s²", f"rms over {how_many(n, 'pose')}, in sample"),
+    ]
+
+
+def _consistencies(outcome: KalmanCalibration | NormKalmanCalibration) -> list[tuple[str, Consistency, int]]:
+    """Name, what was seen and the number of poses, of which only those after the start are judged."""
+    if isinstance(outcome, KalmanCalibration):
+        return [(AXES[axis.axis], axis.consistency, outcome.n_poses) for axis in outcome.axes]
+    return [("norm", outcome.consistency, len(outcome.residual_m_s2))]
+
+
+def _limits(seen: Consistency) -> str:
+    return f"{plain_number(seen.nis_low)} to {plain_number(seen.nis_high)}"
 
 
 def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> list[Section]:
@@ -62,31 +102,35 @@ def _with_references(outcome: KalmanCalibration, calibration: Calibration) -> li
             f"Constants of axis {AXES[axis.axis]} after every pose by every method, with the filter's 3σ band around "
             "its last value.",
             later("kalman_figures", "draw_convergence", axis),
+            partial(convergence_chart, axis, outcome.accelerometer.raw_unit),
         )
         for axis in outcome.axes
     ]
     pictures += [
         Picture(
             "innovations",
-            "Normalised innovations squared, running mean over 15 poses, with the interval in which 99 % of such means "
-            "lie when the noise model is right.",
+            "Normalised innovations squared: every pose that is judged, their running mean, and where 99 % of such "
+            "means lie when the noise model is right.",
             later("kalman_figures", "draw_innovations", outcome.axes),
+            partial(innovations_chart, outcome.axes),
         ),
         Picture(
             "drift",
             "Slow noise that the filter saw: while it ran, and smoothed with all readings, with 1σ bands.",
             later("kalman_figures", "draw_drift", outcome.axes),
+            partial(drift_chart, outcome.axes, outcome.accelerometer.raw_unit),
         ),
         Picture(
             "residual",
             "Corrected minus reference specific force of every pose.",
             later("kalman_figures", "draw_residual", outcome.residual_m_s2),
+            partial(residual_chart, outcome.residual_m_s2),
         ),
     ]
     return [
         Section("Result", (Facts(facts), *(_constants_table(a, outcome.accelerometer.raw_unit) for a in outcome.axes))),
         Section("Findings", (findings_block(calibration.findings),)),
-        Section("Innovations", (_consistency_table([(AXES[a.axis], a.consistency) for a in outcome.axes]),)),
+        Section("Innovations", (_consistency_table(_consistencies(outcome)),)),
         Section("Calibration", (parameter_table("accelerometer", outcome.accelerometer),)),
         Section("Convergence", (_arrival_table(outcome),)),
         Section("Poses", (_pose_table(outcome),)),
@@ -106,23 +150,26 @@ def _without_references(outcome: NormKalmanCalibration, calibration: Calibration
             "convergence",
             "S and b after every pose, with the 3σ band around their last values.",
             later("kalman_figures", "draw_norm_convergence", outcome),
+            partial(norm_convergence_chart, outcome),
         ),
         Picture(
             "innovations",
-            "Normalised innovations squared, running mean over 15 poses, with the interval in which 99 % of such means "
-            "lie when the noise model is right.",
+            "Normalised innovations squared: every pose that is judged, their running mean, and where 99 % of such "
+            "means lie when the noise model is right.",
             later("kalman_figures", "draw_innovations", (outcome,)),
+            partial(innovations_chart, (outcome,)),
         ),
         Picture(
             "residual",
             "Length of the corrected reading minus |g| in every pose.",
             later("kalman_figures", "draw_residual", outcome.residual_m_s2[:, None]),
+            partial(residual_chart, outcome.residual_m_s2[:, None]),
         ),
     )
     return [
         Section("Result", (Facts(facts), parameter_table("accelerometer", outcome.accelerometer))),
         Section("Findings", (findings_block(calibration.findings),)),
-        Section("Innovations", (_consistency_table([("norm", outcome.consistency)]),)),
+        Section("Innovations", (_consistency_table(_consistencies(outcome)),)),
         Section("Figures", pictures),
     ]
 
@@ -148,19 +195,23 @@ def _row(constants: FloatArray, sigma: FloatArray) -> tuple[str, ...]:
     return tuple(with_sigma(float(c), float(s)) for c, s in zip(constants, sigma, strict=True))
 
 
-def _consistency_table(seen: list[tuple[str, Consistency]]) -> Table:
+def _consistency_table(seen: list[tuple[str, Consistency, int]]) -> Table:
     rows = tuple(
         (
             name,
-            str(c.n),
+            f"{c.n} of {n}",
             plain_number(c.nis_mean),
-            f"{plain_number(c.nis_low)} to {plain_number(c.nis_high)}",
+            _limits(c),
             plain_number(c.whiteness_p, 2),
         )
-        for name, c in seen
+        for name, c, n in seen
     )
-    head = ("axis", "innovations", "mean NIS", "99 % when the noise is right", "whiteness, p")
-    return Table(head, rows, "Innovations squared over their predicted variance, and Ljung-Box test of whiteness")
+    head = ("axis", "poses judged", "mean NIS", "99 % when right", "whiteness, p")
+    caption = (
+        "NIS: innovations squared over their predicted variance; Ljung-Box test of whiteness. The first poses only "
+        "start the filter, which predicts nothing yet"
+    )
+    return Table(head, rows, caption)
 
 
 def arrival(constants: FloatArray) -> int:

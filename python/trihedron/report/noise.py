@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
 from trihedron.records import Finding, FindingCode, Noise, NoiseAxis, NoiseTerm, TermName
-from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.document import Block, Code, Document, Facts, Headline, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.noise_charts import allan_chart
 from trihedron.report.noise_units import TERM_WORDS, customary, unit_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
-from trihedron.units import micro_g_from_m_s2
+from trihedron.units import degrees_from_radians, micro_g_from_m_s2
 
 _NO_UNIT = (
     "The unit of the log is not known: say it with --gyro-unit and --accel-unit, or the size of a count with "
@@ -25,7 +27,7 @@ def noise_report(
     noise: Noise, lengths: Mapping[str, Mapping[TermName, float | None]] | None = None, accuracy: float = 0.1
 ) -> Document:
     """Lay out the noise of one log; ``lengths`` are seconds of recording per axis and term for ``accuracy``."""
-    findings = told_once(noise)
+    findings = all_findings(noise)
     length = noise.curve.n_samples / noise.curve.rate_hz
     facts = [
         ("length", f"{duration(length)}, {noise.curve.n_samples} samples at {plain_number(noise.curve.rate_hz, 5)} Hz"),
@@ -48,16 +50,58 @@ def noise_report(
             "NOT TO BE TRUSTED",
         ),
         is_trustworthy=noise.is_trustworthy,
+        headlines=tuple(_headlines(groups)),
+        lead=_picture(noise, *groups[0]) if groups else None,
         sections=(
             Section("Result", tuple(tables)),
             Section("Findings", (findings_block(findings),)),
+            *((Section("Figures", tuple(_picture(noise, *group) for group in groups[1:])),) if groups[1:] else ()),
             *_intervals(groups),
             Section("Customary units", tuple(b for unit, axes in groups for b in _customary(axes, unit))),
             *([Section("How long to record", (_lengths_table(noise, lengths, accuracy),))] if lengths else []),
-            Section("Kalibr", (Facts(tuple(kalibr_rows(noise).items())),)),
-            Section("Allan deviation", tuple(_picture(noise, unit, axes) for unit, axes in groups)),
+            Section("Kalibr", _kalibr(noise)),
         ),
     )
+
+
+def _headlines(groups: list[tuple[str, list[NoiseAxis]]]) -> list[Headline]:
+    """White noise of each sensor, root mean square of its axes, and how long to average."""
+    out = []
+    for unit, axes in groups:
+        name = {"gyro": "gyroscope", "accel": "accelerometer"}.get(axes[0].name.split()[0], axes[0].name.split()[0])
+        factor, printed = _density_unit(unit)
+        present = [a.terms[TermName.WHITE].value for a in axes if a.terms[TermName.WHITE].is_present]
+        if present:
+            rms = factor * math.sqrt(float(np.mean(np.square(present))))
+            beside = f"N, rms of {how_many(len(present), 'axis').replace('axiss', 'axes')}"
+            out.append(Headline(f"{name}, white noise", plain_number(rms), printed, beside))
+        best = [found[0] for a in axes if (found := a.optimal_averaging()) is not None]
+        if best:
+            low, high = (plain_number(t, 2) for t in (min(best), max(best)))
+            words = low if low == high else f"{low} to {high}"
+            out.append(Headline(f"{name}, average for", words, "s", "where the Allan deviation is least"))
+    return out
+
+
+def _density_unit(unit: str) -> tuple[float, str]:
+    """Factor and unit that data sheets use for a density."""
+    if unit == "rad/s":
+        return degrees_from_radians(1.0), "°/s/√Hz"
+    if unit == "m/s^2":
+        return micro_g_from_m_s2(1.0), "µg/√Hz"
+    return 1.0, f"{unit_in_print(unit)}/√Hz"
+
+
+def _kalibr(noise: Noise) -> tuple[Block, ...]:
+    """Kalibr's imu.yaml, to be copied."""
+    rows = kalibr_rows(noise)
+    if len(rows) < 2:
+        return (Paragraph(_NO_UNIT),)
+    lines = ["#Kalibr's imu.yaml: one number for the axes of a sensor, their root mean square".replace("#", "# ")]
+    for key, words in rows.items():
+        value, _, rest = words.partition("  ")
+        lines.append(f"{key}: {value}  {rest if rest.startswith('#') else '# ' + rest.replace('  # ', ', ')}")
+    return (Code("\n".join(lines)),)
 
 
 def all_findings(noise: Noise) -> tuple[Finding, ...]:
@@ -68,23 +112,6 @@ def all_findings(noise: Noise) -> tuple[Finding, ...]:
         for f in axis.findings
     ]
     return (*noise.findings, *named)
-
-
-def told_once(noise: Noise) -> tuple[Finding, ...]:
-    """The same: what several axes have in common in one finding, each axis with its own figures."""
-    groups: dict[tuple[str, str, str, str], list[Finding]] = {}
-    for finding in all_findings(noise):
-        key = (finding.code.value, finding.severity.value, finding.cause, finding.action)
-        groups.setdefault(key, []).append(finding)
-    return tuple(
-        Finding(first.code, first.severity, " ".join(_capital(f.seen) for f in same), first.cause, first.action)
-        for first, *_ in groups.values()
-        for same in [groups[first.code.value, first.severity.value, first.cause, first.action]]
-    )
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _coloured(noise: Noise) -> list[tuple[str, str]]:
@@ -272,10 +299,14 @@ def kalibr_rows(noise: Noise) -> dict[str, str]:
 def _picture(noise: Noise, unit: str, axes: list[NoiseAxis]) -> Picture:
     caption = (
         "Allan deviation with its 95 % interval, fitted terms (thin) and their sum (dashed); "
-        "the cross marks the least deviation of the sum."
+        "letters stand where N (at 1 s), B and K (at 3 s) are read off; the orange mark is the least deviation."
     )
-    draw = later("noise_figures", "draw_allan", noise.curve, [(unit, axes)])
-    return Picture(f"allan-{axes[0].name.split()[0]}", caption, draw)
+    return Picture(
+        f"allan-{axes[0].name.split()[0]}",
+        caption,
+        later("noise_figures", "draw_allan", noise.curve, [(unit, axes)]),
+        partial(allan_chart, noise.curve, unit, axes),
+    )
 
 
 def noise_picture(noise: Noise) -> Picture:

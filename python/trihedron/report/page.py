@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 import base64
+from functools import cache
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as installed
+from importlib.resources import files
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from markupsafe import Markup
 
-from trihedron.report.document import Block, Document, Facts, FindingList, Paragraph, Picture, Table
+from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawing import NoFiguresError
 
 KINDS: dict[type, str] = {
     Paragraph: "paragraph",
+    Code: "code",
     Facts: "facts",
     Table: "table",
     FindingList: "findings",
     Picture: "picture",
 }
+LONG = 14
+"""Rows of a table that is folded from here on: what fits beside its figure on a screen is not."""
+WORDY = 28
+"""A column with longer cells holds sentences: they wrap, and begin at the left."""
 
 
 def to_html(document: Document) -> str:
@@ -25,11 +35,18 @@ def to_html(document: Document) -> str:
         {"heading": section.heading, "blocks": [_shown(block) for block in section.blocks]}
         for section in document.sections
     ]
-    head: dict[str, Any] = {"title": document.title, "subtitle": document.subtitle, "verdict": document.verdict}
-    head |= {"is_trustworthy": document.is_trustworthy, "sections": sections}
-    return template("page.html.j2").render(document=head)
+    lead = None if document.lead is None else _shown(document.lead)
+    return template("page.html.j2").render(
+        document=document,
+        sections=sections,
+        lead=lead,
+        version=_version(),
+        style=Markup(_file("page.css")),
+        script=Markup(_file("page.js")),
+    )
 
 
+@cache
 def template(name: str) -> Template:
     """A template of this room; whatever goes into it is escaped."""
     return Environment(
@@ -49,17 +66,44 @@ def png_of(picture: Picture) -> bytes:
     NoFiguresError
         When matplotlib is not installed.
     """
+    if picture.draw is None:
+        raise NoFiguresError(f"the figure {picture.name} is drawn in reports alone: write a report to an .html file.")
     figure = picture.draw()
     from trihedron.report.figures import png
 
     return png(figure)
 
 
-def _shown(block: Block) -> dict[str, Any]:
-    if not isinstance(block, Picture):
-        return {"kind": KINDS[type(block)], "it": block}
+@cache
+def _file(name: str) -> str:
+    return (files("trihedron.report") / name).read_text(encoding="utf-8")
+
+
+def _version() -> str:
     try:
-        return {"kind": "picture", "it": block, "png": base64.b64encode(png_of(block)).decode()}
+        return installed("trihedron")
+    except PackageNotFoundError:
+        return ""
+
+
+def _shown(block: Block) -> dict[str, Any]:
+    shown: dict[str, Any] = {"kind": KINDS[type(block)], "it": block}
+    if isinstance(block, Picture):
+        shown |= {"name": block.name, "caption": block.caption, "drawn": Markup(_drawn(block))}
+    if isinstance(block, Table):
+        shown["is_long"] = len(block.rows) > LONG
+        shown["words"] = [k > 0 and any(len(row[k]) > WORDY for row in block.rows) for k in range(len(block.head))]
+    return shown
+
+
+def _drawn(picture: Picture) -> str:
+    if picture.chart is not None:
+        from trihedron.report.drawn import drawn
+
+        return drawn(picture.chart(), picture.caption)
+    try:
+        png = base64.b64encode(png_of(picture)).decode()
     except NoFiguresError as error:
         # A page without its figures is still the whole answer; it says what is missing and how to have it.
-        return {"kind": "paragraph", "it": Paragraph(f"[{block.caption} Not drawn: {error}]")}
+        return str(Markup("<p>[Not drawn: {}]</p>").format(error))
+    return str(Markup('<img alt="{}" src="data:image/png;base64,{}">').format(picture.caption, png))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from trihedron.records import Recording, Segments
-from trihedron.report.document import Document, Facts, Picture, Section, Table
+from trihedron.report.document import Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import duration, how_many, plain_number, unit_in_print, with_sigma
+from trihedron.report.session_charts import signals_chart
 
 
 def segments_report(recording: Recording, segments: Segments) -> Document:
@@ -25,11 +28,15 @@ def segments_report(recording: Recording, segments: Segments) -> Document:
         ),
         is_trustworthy=not any(finding.severity.value == "serious" for finding in findings),
         sections=(
-            Section("Recording", (Facts(recording_facts(recording, segments)),)),
+            Section("Result", (Facts(recording_facts(recording, segments)),)),
             Section("Findings", (findings_block(findings),)),
             Section("Still poses", (hold_table(recording, segments),)),
-            Section("Figures", (signals_picture(recording, segments),)),
         ),
+        headlines=(
+            Headline("still poses", str(segments.n_holds), "", f"{duration(_still_s(segments))} in all"),
+            Headline("moves between them", str(len(segments.moves))),
+        ),
+        lead=signals_picture(recording, segments),
     )
 
 
@@ -50,10 +57,14 @@ def recording_facts(recording: Recording, segments: Segments) -> tuple[tuple[str
                 f"; noise of one sample {', '.join(plain_number(float(s), 2) for s in sigma)} {unit_in_print(unit)}"
             )
         facts.append((name, words))
-    still_s = float(np.sum(segments.duration_s)) if segments.n_holds else 0.0
+    still_s = _still_s(segments)
     poses, moves = how_many(segments.n_holds, "still pose"), how_many(len(segments.moves), "move")
     facts.append(("found", f"{poses} ({duration(still_s)} in all), {moves}"))
     return tuple(facts)
+
+
+def _still_s(segments: Segments) -> float:
+    return float(np.sum(segments.duration_s)) if segments.n_holds else 0.0
 
 
 def hold_table(recording: Recording, segments: Segments) -> Table:
@@ -87,8 +98,10 @@ def hold_table(recording: Recording, segments: Segments) -> Table:
 
 def signals_picture(recording: Recording, segments: Segments) -> Picture:
     """The signals with the holds shaded."""
+    draw = later("figures", "draw_signals", recording, segments)
     return Picture(
         "signals",
-        "The recording; shaded where the sensor stood still, red where a still pose was bumped.",
-        later("figures", "draw_signals", recording, segments),
+        "The recording; shaded where the sensor stood still, orange where a still pose was bumped.",
+        draw,
+        partial(signals_chart, recording, segments),
     )

@@ -4,58 +4,94 @@ from __future__ import annotations
 
 import textwrap
 import unicodedata
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
+from trihedron.printable import printable
 from trihedron.records import Finding
-from trihedron.report.document import Block, Document, Facts, FindingList, Paragraph, Picture, Table
+from trihedron.report.ascii import ascii_of
+from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 
 WIDTH = 100
 """Columns of a report that goes into a file, a pipe or a notebook."""
 NARROWEST, WIDEST = 60, 200
 _GAP = 3
+# The sixteen colours: the terminal's own theme decides what is readable on its background.
+_COLOURS = {"good": "1;32", "usable": "1;33", "bad": "1;31", "serious": "1;31", "warning": "1;33", "note": "1;36"}
+_BOLD, _DIM = "1", "2"
 
 
-def to_text(document: Document, *, sections: int | None = None, width: int = WIDTH) -> str:
+@dataclass(frozen=True)
+class Style:
+    """What the place of a report can show."""
+
+    width: int = WIDTH
+    has_colour: bool = False
+    is_ascii: bool = False
+
+    def paint(self, text: str, code: str) -> str:
+        """Coloured where there is colour."""
+        return f"\x1b[{code}m{text}\x1b[0m" if self.has_colour and text else text
+
+    def plain(self, text: str) -> str:
+        """In the characters there are, and none that steers a terminal: a log's names are somebody else's."""
+        return printable(ascii_of(text) if self.is_ascii else text)
+
+
+def to_text(document: Document, *, sections: int | None = None, width: int = WIDTH, style: Style | None = None) -> str:
     """Title, verdict and sections; ``sections`` limits how many (the first fits one screen), ``width`` the columns.
 
-    A table that is wider is cut between columns, and every part begins with the first column again.
+    A table that is wider is cut between columns; every part begins with the first column again and says what it is.
     """
-    width = min(max(width, NARROWEST), WIDEST)
-    lines = [*_wrap(document.title, width), *_wrap(document.subtitle, width), "", *_wrap(document.verdict, width)]
+    style = Style(width) if style is None else style
+    style = replace(style, width=min(max(style.width, NARROWEST), WIDEST))
+    title = [style.paint(line, _BOLD) for line in _wrap(style.plain(document.title), style.width)]
+    verdict = _wrap(style.plain(document.verdict), style.width)
+    lines = [*title, *_wrap(style.plain(document.subtitle), style.width), ""]
+    lines += [style.paint(line, _COLOURS[document.level]) for line in verdict]
     for section in document.sections[:sections]:
-        shown = [_block(block, width) for block in section.blocks if not isinstance(block, Picture)]
+        shown = [_block(block, style) for block in section.blocks if not isinstance(block, Picture)]
         if not shown:
             continue
-        lines += ["", section.heading, "─" * _width(section.heading)]
+        heading = style.plain(section.heading)
+        lines += ["", style.paint(heading, _BOLD), style.plain("─") * _width(heading)]
         for k, block in enumerate(shown):
             lines += ([""] if k else []) + block
     return "\n".join(line.rstrip() for line in lines) + "\n"
 
 
-def _block(block: Block, width: int) -> list[str]:
+def _block(block: Block, style: Style) -> list[str]:
     if isinstance(block, Paragraph):
-        return _wrap(block.text, width)
+        return _wrap(style.plain(block.text), style.width)
+    if isinstance(block, Code):
+        return style.plain(block.text).splitlines()
     if isinstance(block, Facts):
-        return _facts(block, width)
+        return _facts(block, style)
     if isinstance(block, Table):
-        return _table(block, width)
+        return _table(block, style)
     if isinstance(block, FindingList):
-        return [line for finding in block.findings for line in finding_lines(finding, width)]
+        return [line for finding in block.findings for line in finding_lines(finding, style)]
     return []
 
 
-def finding_lines(finding: Finding, width: int = WIDTH) -> list[str]:
+def finding_lines(finding: Finding, style: Style) -> list[str]:
     """Seen, cause and next action, hanging below the severity."""
-    label = f"{finding.severity.value:<8}"
-    lines = _wrap(finding.seen, width, label, " " * 8)
+    name, width = finding.severity.value, style.width
+    first, *rest = _wrap(style.plain(finding.seen), width, f"{name:<8}", " " * 8)
+    lines = [style.paint(name, _COLOURS[name]) + first[len(name) :], *rest]
     if finding.cause:
-        lines += _wrap(f"Likely: {finding.cause[0].lower()}{finding.cause[1:]}", width, " " * 8, " " * 8)
+        cause = style.plain(f"Likely: {finding.cause[0].lower()}{finding.cause[1:]}")
+        lines += [style.paint(line, _DIM) for line in _wrap(cause, width, " " * 8, " " * 8)]
     if finding.action:
-        lines += _wrap(f"→ {finding.action}", width, " " * 8, " " * 10)
+        lines += _wrap(style.plain(f"→ {finding.action}"), width, " " * 8, " " * 10)
     return lines
 
 
 def _wrap(text: str, width: int, first: str = "", rest: str = "") -> list[str]:
-    return textwrap.wrap(text, width, initial_indent=first, subsequent_indent=rest, break_long_words=False) or [""]
+    # A name such as accel-scale is one word.
+    return textwrap.wrap(
+        text, width, initial_indent=first, subsequent_indent=rest, break_long_words=False, break_on_hyphens=False
+    ) or [""]
 
 
 def _width(text: str) -> int:
@@ -67,29 +103,42 @@ def _pad(text: str, width: int, *, right: bool) -> str:
     return space + text if right else text + space
 
 
-def _facts(facts: Facts, columns: int) -> list[str]:
-    width = max((_width(label) for label, _ in facts.rows), default=0) + 2
+def _facts(facts: Facts, style: Style) -> list[str]:
+    columns = style.width
+    rows = [(style.plain(label), style.plain(text)) for label, text in facts.rows]
+    width = max((_width(label) for label, _ in rows), default=0) + 2
     if width > columns // 2:
         # Long labels on a narrow terminal: the text goes below them.
-        hanging = [(_wrap(label, columns), _wrap(text, columns, "    ", "    ")) for label, text in facts.rows]
+        hanging = [(_wrap(label, columns), _wrap(text, columns, "    ", "    ")) for label, text in rows]
         return [line for label, text in hanging for line in (*label, *text)]
     lines: list[str] = []
-    for label, text in facts.rows:
-        lines += _wrap(text, columns, _pad(label, width, right=False), " " * width)
+    for label, text in rows:
+        first, *rest = _wrap(text, columns, _pad(label, width, right=False), " " * width)
+        lines += [style.paint(label, _DIM) + first[len(label) :], *rest]
     return lines
 
 
-def _table(table: Table, columns: int) -> list[str]:
-    cells = [table.head, *table.rows]
+def _table(table: Table, style: Style) -> list[str]:
+    cells = [tuple(map(style.plain, row)) for row in (table.head, *table.rows)]
     widths = [max(_width(row[k]) for row in cells) for k in range(len(table.head))]
-
-    def line(row: tuple[str, ...], chosen: list[int]) -> str:
-        return (" " * _GAP).join(_pad(row[k], widths[k], right=k > 0) for k in chosen)
-
-    out = _wrap(table.caption, columns) if table.caption else []
-    for n, part in enumerate(_parts(widths, columns)):
-        out += ([""] if n else []) + [line(row, part) for row in cells]
+    out = _wrap(style.plain(table.caption), style.width) if table.caption else []
+    for n, part in enumerate(_parts(widths, style.width)):
+        if n:
+            names = ", ".join(cells[0][k].strip() or f"column {k + 1}" for k in part[1:])
+            out += ["", *_wrap(f"(continued: {names})", style.width)]
+        head, *rows = (_line(row, part, widths, style.width) for row in cells)
+        out += [style.paint(line.rstrip(), _BOLD) for line in head]
+        out += [line for row in rows for line in row]
     return out
+
+
+def _line(row: Sequence[str], chosen: Sequence[int], widths: Sequence[int], columns: int) -> list[str]:
+    """One row of a part; a last cell that is too long for the terminal is wrapped."""
+    cells = [_pad(row[k], widths[k], right=k > 0) for k in chosen]
+    line = (" " * _GAP).join(cells)
+    if _width(line) <= columns or len(chosen) < 2:
+        return [line]
+    return [cells[0].rstrip(), *_wrap(row[chosen[-1]], columns, "    ", "    ")]
 
 
 def _parts(widths: list[int], columns: int) -> list[list[int]]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from trihedron.records import Recording, Segments, Verification
-from trihedron.report.document import Block, Document, Facts, Picture, Section, Table
+from trihedron.report.document import Block, Document, Facts, Headline, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
-from trihedron.report.numbers import plain_number, with_sigma
+from trihedron.report.numbers import how_many, plain_number, with_sigma
 from trihedron.report.segments import signals_picture
+from trihedron.report.session_charts import verification_chart
 from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2
 
 
@@ -22,10 +25,8 @@ def verification_report(
         Section("Findings", (findings_block(verification.findings),)),
         Section("Poses and moves", tuple(_tables(verification, segments))),
     ]
-    figures: list[Block] = [_errors_picture(verification)]
     if segments is not None and recording is not None:
-        figures.append(signals_picture(recording, segments))
-    sections.append(Section("Figures", tuple(figures)))
+        sections.append(Section("Figures", (signals_picture(recording, segments),)))
     return Document(
         title="Verification",
         subtitle=verification.source,
@@ -37,7 +38,21 @@ def verification_report(
         ),
         is_trustworthy=verification.is_passed,
         sections=tuple(sections),
+        headlines=tuple(_headlines(verification)),
+        lead=_errors_picture(verification),
     )
+
+
+def _headlines(v: Verification) -> list[Headline]:
+    expected = plain_number(mm_s2_from_m_s2(float(np.sqrt(np.mean(v.norm_sigma**2)))))
+    norm = plain_number(mm_s2_from_m_s2(v.norm_rms))
+    beside = f"rms over {how_many(len(v.norm_error), 'pose')}; to be expected {expected}"
+    out = [Headline("gravity at rest missed by", norm, "mm/s²", beside)]
+    if len(v.angle_deg):
+        expected = plain_number(float(np.sqrt(np.mean(v.angle_sigma_deg**2))))
+        beside = f"rms over {how_many(len(v.angle_deg), 'move')}; to be expected {expected}"
+        out.append(Headline("gravity after a move missed by", plain_number(v.angle_rms_deg), "°", beside))
+    return out
 
 
 def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
@@ -110,8 +125,10 @@ def _tables(verification: Verification, segments: Segments | None) -> list[Block
 
 
 def _errors_picture(verification: Verification) -> Picture:
+    draw = later("figures", "draw_verification", verification)
     return Picture(
         "errors",
         "Error in every still pose and after every move, with what was to be expected.",
-        later("figures", "draw_verification", verification),
+        draw,
+        partial(verification_chart, verification),
     )

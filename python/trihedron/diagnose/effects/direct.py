@@ -52,6 +52,8 @@ class DirectEffect(Effect):
 
     is_late: ClassVar[bool] = False
     """Whether it is looked for after the competition, in what the effects of other mechanisms leave (scatter)."""
+    is_sought_again: ClassVar[bool] = False
+    """Whether it is looked for once more then: what another effect had hidden, or what was mistaken for it."""
     is_proof: ClassVar[bool] = False
     """Whether the samples alone prove it (a range that ends): else mending it must predict held-out moves better."""
 

@@ -68,7 +68,13 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
     obs, twin = context.obs, context.fitted.twin
     if len(twin.effect):
         return ()
-    whole = observe(obs.recording, obs.whole)
+    # In the noise that the cut poses are judged by: one widened for what nothing explains makes another chi-square.
+    whole = replace(
+        observe(obs.recording, obs.whole),
+        jitter_s=obs.jitter_s,
+        moves_inflation=obs.moves_inflation,
+        dynamics_inflation=obs.dynamics_inflation,
+    )
     force = whole.hold_force @ twin.accel_S.T + twin.accel_b
     n = whole.n_holds
     start = replace(

@@ -94,6 +94,7 @@ class DroppedSamples(DirectEffect):
     """Both sensors jump at once by the same whole number of samples; put back, the motion is smooth again."""
 
     id = "dropped-samples"
+    is_sought_again = True
     is_of_session = True
     mechanism = "samples are missing though the time stamps run on evenly"
     experiment = "log the sensor's own sample counter"

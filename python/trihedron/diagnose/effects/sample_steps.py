@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.ndimage import percentile_filter
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.saturation import plateaus
+from trihedron.diagnose.effects.plateaus import plateaus
 from trihedron.diagnose.session.observations import FloatArray, Observations
 
 HALF_WINDOW = 6

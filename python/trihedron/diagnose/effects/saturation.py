@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -12,19 +12,11 @@ from scipy.special import chdtrc
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
+from trihedron.diagnose.effects.plateaus import BAND_SIGMA, MIN_PLATEAUS, Plateau, plateaus, shared_levels
 from trihedron.diagnose.session.observations import FloatArray, Observations
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES
 from trihedron.records.diagnosis import EffectParameter, Where
 
-BAND_SIGMA = 4.0
-"""A plateau is a run of samples within four standard deviations of the limit."""
-REACH = 4
-"""Samples before and behind a plateau from which the slope of arrival and departure is taken."""
-MIN_RUN = 4
-MIN_PLATEAUS = 3
-"""Smooth peaks differ in height from move to move; three that end on one level within noise do not happen by chance."""
-LONG_RUN, HIGH = 8, 15.0
-"""One plateau is enough if it is this long and the parabola cut off by it would reach this many sigma higher."""
 NEAR_LIMIT = 0.97
 """Moves that come this close to a known limit on any axis are left out: the limit is the sensor's, not one axis's."""
 CLEARLY = 5.0
@@ -33,120 +25,6 @@ MEDIAN_CHI2 = 0.455
 """Median of a chi-square of one degree of freedom."""
 CONTRADICTION = 4.0
 """Chi-square per row of the moves concerned above which their readings are false."""
-STEEP = 6.0
-"""Height in sigma that a parabola with the slopes at both ends of a plateau would reach: it would not look flat."""
-
-
-@dataclass(frozen=True)
-class Plateau:
-    """One run at the limit: samples ``[start, stop)`` of channel ``axis``, on the side ``sign``.
-
-    ``is_rail``: every sample is the same number, the largest of the recording. One such run is proof enough.
-    """
-
-    axis: int
-    sign: int
-    start: int
-    stop: int
-    level: float
-    is_rail: bool = False
-
-
-def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int], ...]) -> list[Plateau]:
-    """Runs of a raw (n, 3) signal on a common limit inside moves."""
-    found: list[Plateau] = []
-    for axis in range(signal.shape[1]):
-        for sign in (1, -1):
-            x = sign * signal[:, axis]
-            pieces = [x[a:b] for a, b in ranges]
-            if not pieces:
-                continue
-            top = np.array([p.max() for p in pieces])
-            codes = np.unique(np.concatenate(pieces))
-            step_size = float(np.diff(codes).min()) if len(codes) > 1 else 0.0
-            rails = _rails(x, step_size, float(sigma[axis]), axis, sign, ranges)
-            if rails:
-                found += rails
-                continue
-            noise = max(float(sigma[axis]), 0.5 * step_size, 1e-300)
-            best: list[Plateau] = []
-            # The limit is a level that moves end on and that nothing exceeds but noise.
-            ends = np.round((top[top > top.max() - 2.0 * BAND_SIGMA * noise] - 2.0 * noise) / noise) * noise
-            for level in np.unique(ends):
-                runs = _on_level(x, float(level), noise, axis, sign, ranges)
-                if len(runs) > len(best):
-                    best = runs
-            # Nothing is read beyond a limit but noise.
-            if best and float(top.max()) <= best[0].level * sign + BAND_SIGMA * noise:
-                found += best
-    return found
-
-
-def _on_level(
-    x: FloatArray, level: float, noise: float, axis: int, sign: int, ranges: tuple[tuple[int, int], ...]
-) -> list[Plateau]:
-    """Runs that arrive steeply at a level, stay flat on it within noise, leave it steeply, and agree about it."""
-    width = BAND_SIGMA * noise
-    runs, means, errors, clear = [], [], [], []
-    for a, b in ranges:
-        near = np.abs(x[a:b] - level) <= width
-        edges = np.flatnonzero(np.diff(np.r_[0, near.astype(np.int8), 0]))
-        for first, last in edges.reshape(-1, 2):
-            n = last - first
-            if n < MIN_RUN or first < REACH or last > b - a - REACH:
-                continue
-            run = x[a + first : a + last]
-            arrival = (run[0] - x[a + first - REACH]) / REACH
-            departure = (run[-1] - x[a + last - 1 + REACH]) / REACH
-            # A parabola with these slopes at its edges would rise this high above them.
-            if min(arrival, departure) * n / 4.0 < STEEP * noise or not _is_flat(_middle(run) / noise):
-                continue
-            height = min(arrival, departure) * n / 4.0 / noise
-            runs.append(Plateau(axis, sign, a + int(first), a + int(last), 0.0))
-            clear.append(n >= LONG_RUN and height > HIGH)
-            means.append(float(_middle(run).mean()))
-            errors.append(noise / np.sqrt(len(_middle(run))))
-    if len(runs) < MIN_PLATEAUS and not any(clear):
-        return []
-    # Peaks that merely end in one band differ by more than the error of their means.
-    common = float(np.average(means, weights=1.0 / np.square(errors)))
-    agree = [abs(m - common) < 4.0 * e + 0.5 * noise for m, e in zip(means, errors, strict=True)]
-    kept = [replace(r, level=sign * common) for r, good in zip(runs, agree, strict=True) if good]
-    return kept if len(kept) >= MIN_PLATEAUS or any(c and g for c, g in zip(clear, agree, strict=True)) else []
-
-
-def _middle(run: FloatArray) -> FloatArray:
-    """A run without the ends that still arrive and already leave."""
-    cut = max(len(run) // 6, 1)
-    return run[cut:-cut]
-
-
-def _is_flat(run: FloatArray) -> bool:
-    """Whether a slope and a curvature explain no more of a run (in units of its noise) than chance does."""
-    n = len(run)
-    if n < 4:
-        return float(np.ptp(run)) < 5.0
-    k = np.linspace(-1.0, 1.0, n)
-    basis, _ = np.linalg.qr(np.stack([np.ones(n), k, k * k], axis=1))
-    return bool(float(((basis[:, 1:].T @ run) ** 2).sum()) < 18.0)  # chi-square of 2: one run in ten thousand
-
-
-def _rails(
-    x: FloatArray, step_size: float, sigma: float, axis: int, sign: int, ranges: tuple[tuple[int, int], ...]
-) -> list[Plateau]:
-    """Runs of one number, the largest of the recording, where noise should have told neighbours apart."""
-    # On a coarse grid equal readings are the rule, at the top of a peak too.
-    if not 0.0 < step_size < sigma:
-        return []
-    shortest = 4 if step_size < 0.3 * sigma else 6
-    top = np.nanmax(x)
-    found = []
-    for a, b in ranges:
-        edges = np.flatnonzero(np.diff(np.r_[0, (x[a:b] == top).astype(np.int8), 0]))
-        for first, last in edges.reshape(-1, 2):
-            if last - first >= shortest:
-                found.append(Plateau(axis, sign, a + int(first), a + int(last), sign * float(top), True))
-    return found
 
 
 class _Saturation(DirectEffect):
@@ -235,22 +113,20 @@ class _Saturation(DirectEffect):
         return sorted(close | set(touched)) if is_gyro or limit > 1.2 * twin.gravity else touched
 
     def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:
+        """Limits in SI along every channel, with the exact code where readings end on one."""
         scale, zero = self._scale_and_zero(context)
         obs = context.obs
-        unit = "rad/s" if self.sensor == "gyro" else "m/s^2"
+        is_gyro = self.sensor == "gyro"
+        origin = obs.rate_origin if is_gyro else obs.force_origin
         out = []
-        for axis in range(3):
-            for sign in (1, -1):
-                levels = [r.level for r in runs if r.axis == axis and r.sign == sign]
-                origin = obs.rate_origin if self.sensor == "gyro" else obs.force_origin
-                if levels:
-                    name = f"limit_{AXES[axis]}{'+' if sign > 0 else '-'}"
-                    value = float(levels[0] * scale[axis] + zero[axis])
-                    out.append(EffectParameter(name, value, float(sigma[axis] * scale[axis]), unit))
-                    raw = float(levels[0] + origin[axis])
-                    is_rail = any(r.is_rail for r in runs if r.axis == axis and r.sign == sign)
-                    if is_rail:  # every sample is the same number: it is exact, whatever the scale factor
-                        out.append(EffectParameter(f"raw_{name}", round(raw, 9), 0.0, "raw"))
+        for (axis, sign), (level, is_exact) in sorted(
+            shared_levels(runs, origin, sigma).items(), key=lambda item: (item[0][0], -item[0][1])
+        ):
+            name = f"limit_{AXES[axis]}{'+' if sign > 0 else '-'}"
+            value = float((level - origin[axis]) * scale[axis] + zero[axis])
+            out.append(EffectParameter(name, value, float(sigma[axis] * scale[axis]), "rad/s" if is_gyro else "m/s^2"))
+            if is_exact:  # every sample is the same number: it is exact, whatever the scale factor
+                out.append(EffectParameter(f"raw_{name}", round(level, 9), 0.0, "raw"))
         out.append(EffectParameter("samples", float(sum(run.stop - run.start for run in runs)), 0.0, "1"))
         return tuple(out)
 

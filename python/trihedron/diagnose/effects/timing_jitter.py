@@ -47,6 +47,7 @@ class TimingJitter(DirectEffect):
     """Steps of both sensors scatter together, in proportion to the slope of the signal."""
 
     id = "timing-jitter"
+    is_sought_again = True
     mechanism = "samples are taken at other instants than their time stamps say"
     experiment = "let the sensor's own clock trigger the sampling, or log its data-ready times"
 

@@ -120,7 +120,7 @@ def _of_zeros(zeros: Zeros | None) -> ZeroLaws:
 
 
 def _squares_before(misfit: Misfit) -> float:
-    total, _, n = misfit.held_out()
+    total, _, n = misfit.held_out
     return misfit.variance * total / n
 
 

@@ -7,6 +7,7 @@ fits anyway. The residual of a block b that nothing of the fit has seen is ``P_b
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -63,6 +64,18 @@ class Judged:
 
 
 @dataclass(frozen=True, eq=False)
+class _Block:
+    """Rows left out together: their precision is one in the coordinates ``root`` (r, rows); ``along`` (r,) is the
+    residual there that nothing of the fit has seen.
+    """
+
+    rows: npt.NDArray[np.intp]
+    root: FloatArray
+    along: FloatArray
+    log_det: float
+
+
+@dataclass(frozen=True, eq=False)
 class Misfit:
     """``P`` (n, n) on the rows of a domain, ``Py`` (n,), ``square`` = yᵀPy, ``dof``, and the ``unit`` of every row.
 
@@ -101,9 +114,8 @@ class Misfit:
             return None
         spread = left / dof
         p = float(fdtrc(k, dof, max(taken, 0.0) / k / spread))
-        before = self.held_out()
-        P = self.P - columns.projected @ inverse @ columns.projected.T
-        after = self._held_out(P, self.Py - columns.projected @ estimate)
+        before = self.held_out
+        after = self._held_out_with(columns.projected, estimate, (vector / np.sqrt(value)) / length[:, None])
         n = before[2]
         gain = 0.5 * n * np.log(before[0] / max(after[0], 1e-300)) + 0.5 * (before[1] - after[1])
         return Judged(
@@ -111,9 +123,48 @@ class Misfit:
             left, self.variance * before[0] / n, self.variance * after[0] / n,
         )  # fmt: skip
 
+    @cached_property
     def held_out(self) -> tuple[float, float, float]:
-        """Sum of squares, log-determinant and number of blocks left out, predicted by the rest without a law."""
-        return self._held_out(self.P, self.Py)
+        """Sum of squares, log-determinant and number of what blocks left out are predicted by the rest, no law."""
+        total = sum(float(block.along @ block.along) for block in self._blocks)
+        count = float(sum(len(block.along) for block in self._blocks))
+        return max(total, 1e-300), sum(block.log_det for block in self._blocks), max(count, 1.0)
+
+    @cached_property
+    def _blocks(self) -> tuple[_Block, ...]:
+        out = []
+        for units in np.array_split(np.unique(self.unit), N_BLOCKS):
+            rows = np.flatnonzero(np.isin(self.unit, units))
+            if not len(rows):
+                continue
+            value, vector = np.linalg.eigh(self.P[np.ix_(rows, rows)])
+            seen = value > RIGID * max(float(value[-1]), 1e-300)
+            root = (vector[:, seen] / np.sqrt(value[seen])).T
+            out.append(_Block(rows, root, root @ self.Py[rows], -float(np.log(value[seen]).sum())))
+        return tuple(out)
+
+    def _held_out_with(
+        self, projected: FloatArray, estimate: FloatArray, half: FloatArray
+    ) -> tuple[float, float, float]:
+        """The same with columns beside: ``P − U C Uᵀ``, ``U`` = ``projected``, ``C`` = ``half halfᵀ``.
+
+        In the coordinates in which a block of ``P`` is one, what is taken off has rank k: ``1 − G Gᵀ`` with
+        ``G = root U half``. Its inverse and determinant follow from the k eigenvalues of ``GᵀG``; directions that it
+        takes off whole are those that only the block itself tells.
+        """
+        total, log_det, count = 0.0, 0.0, 0.0
+        for block in self._blocks:
+            seen = block.root @ projected[block.rows]
+            along = block.along - seen @ estimate
+            value, vector = np.linalg.eigh((seen @ half).T @ (seen @ half))
+            stays = 1.0 - value
+            open_ = stays > RIGID
+            inside = (seen @ half @ vector).T @ along
+            total += float(along @ along)
+            total += float((inside[open_] ** 2 / stays[open_]).sum())
+            log_det += block.log_det - float(np.log(stays[open_]).sum())
+            count += float(len(along) - (~open_).sum())
+        return max(total, 1e-300), log_det, max(count, 1.0)
 
     def squares_with(self, columns: Columns) -> float:
         """What is left of the square with these columns."""
@@ -122,21 +173,6 @@ class Misfit:
         scaled = normal / np.outer(length, length) + 1e-9 * np.eye(len(length))
         side = columns.side / length
         return float(self.square - side @ np.linalg.solve(scaled, side))
-
-    def _held_out(self, P: FloatArray, Py: FloatArray) -> tuple[float, float, float]:
-        """Sum of squares, log-determinant and number of what blocks left out are predicted by the rest."""
-        total, log_det, count = 0.0, 0.0, 0.0
-        for block in np.array_split(np.unique(self.unit), N_BLOCKS):
-            rows = np.isin(self.unit, block)
-            if not rows.any():
-                continue
-            value, vector = np.linalg.eigh(P[np.ix_(rows, rows)])
-            seen = value > RIGID * max(float(value[-1]), 1e-300)
-            along = vector[:, seen].T @ Py[rows]
-            total += float((along**2 / value[seen]).sum())
-            log_det -= float(np.log(value[seen]).sum())
-            count += float(seen.sum())
-        return max(total, 1e-300), log_det, max(count, 1.0)
 
 
 def misfit_of(y: FloatArray, base: FloatArray, V: FloatArray, unit: npt.NDArray[np.intp]) -> Misfit:

@@ -23,7 +23,9 @@ def with_evidence(
 
     ``is_late`` asks for those that are looked for in what the competition has left.
     """
-    taken = {one.effect.id for one in model.accepted if not one.effect.repeatable}
+    taken = {one.effect.id for one in model.accepted if not one.effect.repeatable} | (
+        model.refused if is_late else set()
+    )
     found, candidates = _looked_for(model.context, alpha, taken, is_late=is_late)
     for effect, evidence in found:
         model = _with_one(model, effect, evidence)
@@ -37,7 +39,9 @@ def _looked_for(
     candidates: dict[str, Candidate] = {}
     found: list[tuple[DirectEffect, Evidence]] = []
     for effect in catalogue():
-        if not isinstance(effect, DirectEffect) or effect.is_late != is_late or effect.id in taken:
+        if not isinstance(effect, DirectEffect) or effect.id in taken:
+            continue
+        if effect.is_late != is_late and not (is_late and effect.is_sought_again):
             continue
         reason = effect.unavailable(context)
         if reason is not None:

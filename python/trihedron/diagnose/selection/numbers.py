@@ -21,6 +21,7 @@ from trihedron.records.diagnosis import DomainTest
 
 SCATTERS = 0.01
 """p-value from which poses scatter enough for their error bars, though too little for a name."""
+WEIGHTS = ("hold_force_sigma", "hold_rate_sigma", "zero_scatter")
 
 
 def final_numbers(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> Fit:
@@ -51,10 +52,8 @@ def final_numbers(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> Fi
         moves_inflation=max(obs.moves_inflation, float(np.sqrt(max(left.get("moves", 1.0), 1.0)))),
         dynamics_inflation=max(obs.dynamics_inflation, float(np.sqrt(max(left.get("dynamics", 1.0), 1.0)))),
     )
-    same = obs.hold_force_sigma is model.obs.hold_force_sigma and obs.hold_rate_sigma is model.obs.hold_rate_sigma
-    if same and (obs.moves_inflation, obs.dynamics_inflation) == (
-        model.obs.moves_inflation,
-        model.obs.dynamics_inflation,
+    if all(getattr(obs, name) is getattr(model.obs, name) for name in WEIGHTS) and (
+        obs.moves_inflation == model.obs.moves_inflation and obs.dynamics_inflation == model.obs.dynamics_inflation
     ):
         return model.fitted
     return tune_noise(obs, model.fitted.twin, stacked(model.distortions), model.prior)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.diagnose.residuals.aliasing import unresolved_variance
-from trihedron.diagnose.residuals.coloured_noise import coloured_variance
+from trihedron import _core
 from trihedron.records import Recording, Segments
+from trihedron.session.noise import measure_noise
 
 FloatArray = npt.NDArray[np.float64]
 LONGEST_MOVE_S = 180.0
@@ -31,7 +32,8 @@ class Observations:
     their stamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
     ``unresolved`` maps a move's two holds to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
     by motion faster than the samples and by noise slower than a move.
-    ``is_scatter_free`` lets zeros scatter from hold to hold beside their walk, as far as the evidence goes.
+    ``zero_scatter`` (2, 3), once a diagnosis has found it: how far zeros scatter from hold to hold beside their walk,
+    accelerometer and gyro, raw units.
     The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
     """
 
@@ -57,7 +59,7 @@ class Observations:
     unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
     moves_inflation: float = 1.0
     dynamics_inflation: float = 1.0
-    is_scatter_free: bool = False
+    zero_scatter: FloatArray | None = None
 
     @property
     def n_holds(self) -> int:
@@ -68,6 +70,40 @@ class Observations:
     def n_moves(self) -> int:
         """Number of moves between neighbouring poses."""
         return len(self.move_ranges)
+
+    @property
+    def hold_force_spread(self) -> FloatArray:
+        """(h, 3) what the means at rest may differ by: noise and scatter of the zeros, accelerometer."""
+        if self.zero_scatter is None:
+            return self.hold_force_sigma
+        out: FloatArray = np.hypot(self.hold_force_sigma, self.zero_scatter[0])
+        return out
+
+    @property
+    def hold_rate_spread(self) -> FloatArray | None:
+        """(h, 3) the same of the gyro."""
+        if self.hold_rate_sigma is None or self.zero_scatter is None:
+            return self.hold_rate_sigma
+        out: FloatArray = np.hypot(self.hold_rate_sigma, self.zero_scatter[1])
+        return out
+
+    @cached_property
+    def core_moves(self) -> _core.SessionMoves:
+        """The samples of the moves, arranged once for many fits."""
+        unresolved = np.zeros((self.n_moves, 2, 3))
+        for m, (before, after) in enumerate(self.move_holds):
+            found = self.unresolved.get((int(before), int(after)))
+            if found is not None:
+                unresolved[m] = found
+        return _core.SessionMoves(
+            hold_time_s=np.ascontiguousarray(self.hold_time_s, dtype=np.float64),
+            time_s=np.ascontiguousarray(self.time_s),
+            force=np.ascontiguousarray(self.raw_force),
+            rate=None if self.raw_rate is None else np.ascontiguousarray(self.raw_rate),
+            ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
+            before=np.ascontiguousarray(self.move_holds[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
+            unresolved=unresolved,
+        )
 
 
 def observe(recording: Recording, segments: Segments) -> Observations:
@@ -88,20 +124,13 @@ def observe(recording: Recording, segments: Segments) -> Observations:
     t = recording.time_s
     whole = segments if segments.whole is None else segments.whole
     bumped = tuple((float(t[a]), float(t[min(b, len(t) - 1)])) for hold in whole.holds for a, b in hold.disturbed)
-    assert segments.accelerometer_sigma is not None
-    assert segments.accelerometer_mean is not None
-    assert segments.accelerometer_sigma_mean is not None
-    step_s = 1.0 / recording.rate_hz
     force_origin = segments.accelerometer_mean.mean(axis=0)
     rate_origin = np.zeros(3)
-    raw_rate = hold_rate = hold_rate_sigma = rate_density = None
+    raw_rate = hold_rate = None
     if recording.gyroscope is not None and segments.gyroscope_mean is not None:
-        assert segments.gyroscope_sigma is not None
         rate_origin = segments.gyroscope_mean.mean(axis=0)
         raw_rate = recording.gyroscope - rate_origin
         hold_rate = segments.gyroscope_mean - rate_origin
-        hold_rate_sigma = segments.gyroscope_sigma_mean
-        rate_density = segments.gyroscope_sigma * np.sqrt(step_s)
     ranges, holds = [], []
     for move in segments.moves:
         start, stop = max(move.start - 1, 0), min(move.stop + 1, recording.n_samples)
@@ -112,21 +141,7 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         if finite and is_short and stop - start >= 3:
             ranges.append((start, stop))
             holds.append((move.hold_before, move.hold_after))
-    spans = [(hold.start, hold.stop) for hold in segments.holds]
-    variances = np.zeros((len(ranges), 2, 3))
-    lasts = np.array([(hold.stop - hold.start) * step_s for hold in segments.holds])
-    moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
-    slow = (
-        (segments.accelerometer_sigma_mean, segments.accelerometer_sigma * np.sqrt(step_s)),
-        (hold_rate_sigma, rate_density),
-    )
-    for k, readings in enumerate((recording.accelerometer, recording.gyroscope)):
-        if readings is not None:
-            variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s)
-        sigma, density = slow[k]
-        if readings is not None and sigma is not None and density is not None and ranges:
-            halves = np.array([_second_half_minus_first(readings[a:b]) for a, b in spans])
-            variances[:, k] += coloured_variance(sigma, halves, density, lasts, moves_last)
+    noise = measure_noise(recording, segments, ranges)
     return Observations(
         recording=recording,
         segments=segments,
@@ -138,19 +153,13 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         rate_origin=rate_origin,
         hold_force=segments.accelerometer_mean - force_origin,
         hold_rate=hold_rate,
-        hold_force_sigma=segments.accelerometer_sigma_mean,
-        hold_rate_sigma=hold_rate_sigma,
+        hold_force_sigma=noise.force_sigma,
+        hold_rate_sigma=noise.rate_sigma,
         hold_time_s=np.array([0.5 * (t[hold.start] + t[hold.stop - 1]) for hold in segments.holds]),
         move_ranges=tuple(ranges) if raw_rate is not None else (),
         move_holds=np.array(holds if raw_rate is not None else [], dtype=np.intp).reshape(-1, 2),
-        force_density=segments.accelerometer_sigma * np.sqrt(step_s),
-        rate_density=rate_density,
+        force_density=noise.force_density,
+        rate_density=noise.rate_density,
         bumped_s=bumped,
-        unresolved=dict(zip(holds, variances, strict=True)),
+        unresolved=dict(zip(holds, noise.unresolved, strict=True)),
     )
-
-
-def _second_half_minus_first(values: FloatArray) -> FloatArray:
-    first, second = np.array_split(values, 2)
-    out: FloatArray = np.nanmean(second, axis=0) - np.nanmean(first, axis=0)
-    return out

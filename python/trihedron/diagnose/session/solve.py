@@ -28,11 +28,10 @@ from trihedron.diagnose.session.twin import (
     stacked,
     twin_of,
 )
+from trihedron.session.noise import START_STRENGTHS
 
 N_DOMAINS = 4
 """Domains of residual rows: the first four labels."""
-START_SCATTER = (1e-3, 1e-3)
-"""Scatter that counts as none, in its units."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,16 +89,16 @@ class Fit:
 def _fitted(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None, *, is_tuned: bool) -> Fit:
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
+    corners = (float(start.accel_corner_s), float(start.gyro_corner_s))
+    scatter = START_STRENGTHS[1] if obs.zero_scatter is None else (1.0, 1.0)
     core = core_model(obs, start.gravity, prior).fit(
-        **core_state(start),
-        effect=np.ascontiguousarray(start.effect, dtype=np.float64),
-        corners_s=(float(start.accel_corner_s), float(start.gyro_corner_s)),
-        scatter=START_SCATTER,
+        state=core_state(start),
+        strengths=(corners, scatter, start.between),
         force_effect=None if distortion.force is None else np.ascontiguousarray(distortion.force, dtype=np.float64),
         rate_effect=None if distortion.rate is None else np.ascontiguousarray(distortion.rate, dtype=np.float64),
         is_tuned=is_tuned,
     )
-    twin = twin_of(core, obs, start.gravity)
+    twin = twin_of(core, start.gravity)
     return Fit(twin, Linearisation(obs, twin, distortion, prior, core))
 
 
@@ -128,7 +127,7 @@ def extend(base: Fit, accepted: Distortion, added: Distortion, n_iterations: int
 
 def move_misfit(obs: Observations, twin: Twin) -> FloatArray:
     """(moves,) chi-square of gravity and velocity after every move at a point, nothing fitted."""
-    residual = core_model(obs, twin.gravity, None).move_residuals(**core_state(twin))
+    residual = core_model(obs, twin.gravity, None).move_residuals(core_state(twin))
     out: FloatArray = (residual**2).sum(axis=1)
     return out
 

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.session.noise import START_STRENGTHS, scatter_unit
 
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 """Labels of residual rows; ``PRIOR`` rows keep flat directions finite and belong to no domain."""
@@ -42,8 +41,8 @@ class Prior:
 class Twin:
     """State of the model. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per hold.
 
-    Biases are in SI; ``accel_scatter``, ``gyro_scatter`` (SI) are how far they scatter from hold to hold, where that is
-    part of the model.
+    Biases are in SI; ``between`` is how far those that scatter leave, during a move, the line from hold to hold, in
+    units of their scatter (accelerometer, gyro).
     """
 
     gravity: float
@@ -56,8 +55,7 @@ class Twin:
     gyro_corner_s: float
     accel_corner_s: float
     effect: FloatArray
-    accel_scatter: float = 0.0
-    gyro_scatter: float = 0.0
+    between: tuple[float, float] = START_STRENGTHS[2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,72 +187,54 @@ def _contiguous(values: FloatArray | None) -> FloatArray | None:
 
 def core_model(obs: Observations, gravity_m_s2: float, prior: Prior | None) -> _core.SessionModel:
     """The Rust model of some observations."""
-    h = obs.n_holds
-    unresolved = np.zeros((obs.n_moves, 2, 3))
-    for m, (before, after) in enumerate(obs.move_holds):
-        found = obs.unresolved.get((int(before), int(after)))
-        if found is not None:
-            unresolved[m] = found
-    # Where nothing scatters (a simulation without noise) a billionth of a unit stands for the rounding of the log.
-    floor = 1e-9 * max(float(np.abs(obs.hold_force).max()), 1e-300)
-    rate = obs.hold_rate is not None and obs.hold_rate_sigma is not None and obs.rate_density is not None
+    has_rate = obs.hold_rate is not None and obs.hold_rate_sigma is not None and obs.rate_density is not None
+    poses = _core.SessionPoses(
+        time_s=np.ascontiguousarray(obs.hold_time_s, dtype=np.float64),
+        force=np.ascontiguousarray(obs.hold_force),
+        force_sigma=np.ascontiguousarray(obs.hold_force_sigma),
+        force_density=np.ascontiguousarray(obs.force_density),
+        rate=_contiguous(obs.hold_rate) if has_rate else None,
+        rate_sigma=_contiguous(obs.hold_rate_sigma) if has_rate else None,
+        rate_density=_contiguous(obs.rate_density) if has_rate else None,
+    )
+    # A sensor that does not scatter has a scatter that counts as none.
+    least = START_STRENGTHS[1][0] * scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma)
     return _core.SessionModel(
         gravity_m_s2=gravity_m_s2,
-        hold_time_s=np.ascontiguousarray(obs.hold_time_s, dtype=np.float64),
-        hold_force=np.ascontiguousarray(obs.hold_force),
-        hold_force_sigma=np.maximum(obs.hold_force_sigma, floor),
-        force_density=np.ascontiguousarray(obs.force_density),
-        hold_rate=_contiguous(obs.hold_rate) if rate else None,
-        hold_rate_sigma=np.maximum(np.asarray(obs.hold_rate_sigma), 1e-300) if rate else None,
-        rate_density=_contiguous(obs.rate_density) if rate else None,
-        time_s=np.ascontiguousarray(obs.time_s),
-        force=np.ascontiguousarray(obs.raw_force),
-        rate=_contiguous(obs.raw_rate),
-        ranges=np.array(obs.move_ranges, dtype=np.int64).reshape(-1, 2),
-        before=np.ascontiguousarray(obs.move_holds[:, 0] if obs.n_moves else np.zeros(0), dtype=np.int64),
-        unresolved=unresolved,
-        jitter_s=float(obs.jitter_s),
-        nominal_step_s=1.0 / obs.recording.rate_hz,
-        inflation=(float(obs.moves_inflation), float(obs.dynamics_inflation)),
-        prior=None if prior is None else (np.ascontiguousarray(prior.mean), np.ascontiguousarray(prior.covariance)),
-        is_prior_weak=prior is not None and prior.is_weak,
-        scatter=None if h < 2 or not obs.is_scatter_free else scatter_unit(obs),
+        poses=poses,
+        moves=obs.core_moves,
+        noise=(
+            float(obs.jitter_s),
+            1.0 / obs.recording.rate_hz,
+            (float(obs.moves_inflation), float(obs.dynamics_inflation)),
+        ),
+        prior=None
+        if prior is None
+        else (np.ascontiguousarray(prior.mean), np.ascontiguousarray(prior.covariance), prior.is_weak),
+        scatter=None if obs.zero_scatter is None else (np.maximum(obs.zero_scatter, least), True),
     )
 
 
-def scatter_unit(obs: Observations) -> FloatArray:
-    """(2, 3) the scatter that strength one means: the median standard error of a hold, accelerometer and gyro, raw."""
-    out = np.ones((2, 3))
-    out[0] = np.median(obs.hold_force_sigma, axis=0)
-    if obs.hold_rate_sigma is not None:
-        out[1] = np.median(obs.hold_rate_sigma, axis=0)
-    return np.maximum(out, 1e-300)
-
-
-def core_state(twin: Twin) -> MappingProxyType[str, Any]:
+def core_state(twin: Twin) -> _core.SessionState:
     """A point in the unknowns of the Rust model: biases in raw units."""
-    return MappingProxyType(
-        {
-            "force_scale": np.ascontiguousarray(twin.accel_S),
-            "force_bias": np.ascontiguousarray(twin.accel_b),
-            "rate_scale": np.ascontiguousarray(twin.gyro_S),
-            "up": np.ascontiguousarray(twin.up),
-            "rate_zero": np.ascontiguousarray(np.linalg.solve(twin.gyro_S, twin.gyro_bias.T).T),
-            "force_zero": np.ascontiguousarray(np.linalg.solve(twin.accel_S, twin.accel_bias.T).T),
-        }
+    return _core.SessionState(
+        force_scale=np.ascontiguousarray(twin.accel_S),
+        force_bias=np.ascontiguousarray(twin.accel_b),
+        rate_scale=np.ascontiguousarray(twin.gyro_S),
+        up=np.ascontiguousarray(twin.up),
+        rate_zero=np.ascontiguousarray(np.linalg.solve(twin.gyro_S, twin.gyro_bias.T).T),
+        force_zero=np.ascontiguousarray(np.linalg.solve(twin.accel_S, twin.accel_bias.T).T),
+        effect=np.ascontiguousarray(twin.effect, dtype=np.float64),
     )
 
 
-def twin_of(core: _core.SessionFit, obs: Observations, gravity_m_s2: float) -> Twin:
+def twin_of(core: _core.SessionFit, gravity_m_s2: float) -> Twin:
     """The point where a fit ended, biases in SI."""
     accel_S, gyro_S = np.asarray(core.force_scale), np.asarray(core.rate_scale)
     accel_corner, gyro_corner = core.corners_s
-    unit, strength = scatter_unit(obs), core.scatter
-    sizes = [float(np.linalg.norm(S * u) / np.sqrt(3.0)) for S, u in zip((accel_S, gyro_S), unit, strict=True)]
     return Twin(
         gravity=gravity_m_s2, accel_S=accel_S, accel_b=np.asarray(core.force_bias), gyro_S=gyro_S,
         up=np.asarray(core.up), gyro_bias=core.rate_zero @ gyro_S.T, accel_bias=core.force_zero @ accel_S.T,
         gyro_corner_s=gyro_corner, accel_corner_s=accel_corner, effect=np.asarray(core.effect),
-        accel_scatter=sizes[0] * strength[0] if obs.is_scatter_free else 0.0,
-        gyro_scatter=sizes[1] * strength[1] if obs.is_scatter_free else 0.0,
+        between=core.strengths[2],
     )  # fmt: skip

@@ -97,11 +97,16 @@ def walk_of_noise(context: Context) -> float:
 
 
 def with_gyro_scatter(obs: Observations, sigma: FloatArray, si_per_raw: FloatArray) -> Observations:
-    """Means of rates at rest as uncertain as zeros that scatter by ``sigma`` (3,) rad/s make them."""
-    assert obs.hold_rate_sigma is not None
-    return replace(obs, hold_rate_sigma=np.hypot(obs.hold_rate_sigma, sigma / si_per_raw))
+    """Zeros of the gyro that scatter by ``sigma`` (3,) rad/s from pose to pose, during moves too."""
+    return _with_scatter(obs, 1, sigma / si_per_raw)
 
 
 def with_accel_scatter(obs: Observations, sigma: float, si_per_raw: FloatArray) -> Observations:
-    """Means of forces at rest as uncertain as zeros that scatter by ``sigma`` m/s² per axis make them."""
-    return replace(obs, hold_force_sigma=np.hypot(obs.hold_force_sigma, sigma / si_per_raw))
+    """Zeros of the accelerometer that scatter by ``sigma`` m/s² per axis from pose to pose, during moves too."""
+    return _with_scatter(obs, 0, sigma / si_per_raw)
+
+
+def _with_scatter(obs: Observations, sensor: int, raw: FloatArray) -> Observations:
+    scatter = np.zeros((2, 3)) if obs.zero_scatter is None else obs.zero_scatter.copy()
+    scatter[sensor] = np.hypot(scatter[sensor], raw)
+    return replace(obs, zero_scatter=scatter)

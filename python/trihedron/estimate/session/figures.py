@@ -5,14 +5,14 @@ Norm of gravity at rest with one zero for the session; gravity carried through e
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.session.fit import SessionSolution, fitted
+from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, SessionSolution
 from trihedron.estimate.session.observed import Observed
 from trihedron.records.calibration import FitQuality
 
@@ -123,39 +123,31 @@ def held_out(
 ) -> HeldOut | None:
     """Every k-th hold, then every k-th move, left out of the whole fit; ``None`` where too few would remain.
 
-    Strengths of the zeros and widening of the moves are those of the whole session.
+    Strengths of the zeros and widening of the moves are those of the whole session; what the others say is one linear
+    step from its optimum (eq. 11.15).
     """
     n, m = len(observed.hold_force), len(observed.before)
     if n_folds < 2 or m - -(-m // n_folds) < N_GYROSCOPE // 2 + 1 or n - -(-n // n_folds) < N_ACCELEROMETER:
         return None
-    observed = replace(observed, inflation=solution.inflation)
-    b_a = solution.b_a + solution.S_a @ observed.force_origin
+    core = solution.core
+    labels = core.labels
+    is_reading = labels[:, 3] == 0
     norm, norm_sigma = np.full(n, np.nan), np.full(n, np.nan)
     empty = np.full((measured.n_moves, 3), np.nan)
     parts = Carried(empty.copy(), empty.copy(), empty[:, 0].copy(), empty[:, 0].copy())
     number = {int(hold): k for k, hold in enumerate(measured.links[:, 0])}
-    is_move = np.zeros(m, dtype=bool)
-    is_hold = np.zeros(n, dtype=bool)
     for fold in range(n_folds):
         holds = np.arange(n) % n_folds == fold
-        core = fitted(
-            observed.without(holds, is_move), solution.S_a, b_a, solution.S_w, solution.core,
-            is_tuned=False, scatter_unit=observed.scatter_unit,
-        )  # fmt: skip
-        S, b = np.asarray(core.force_scale), np.asarray(core.force_bias)
+        rows = is_reading & (labels[:, 0] == STATIC_FORCE) & holds[labels[:, 1]]
+        S, b, _, covariance = core.without(rows, observed.force_origin)
         residual, noise = norm_errors(observed, S, b - S @ observed.force_origin)
-        covariance, _ = core.linear_covariance(observed.force_origin, observed.rate_origin)
         norm[holds] = residual[holds]
-        norm_sigma[holds] = np.sqrt(noise**2 + _of_model(observed, S, b, covariance[:12, :12]))[holds]
+        norm_sigma[holds] = np.sqrt(noise**2 + _of_model(observed, S, b, covariance))[holds]
         moves = np.arange(m) % n_folds == fold
-        core = fitted(
-            observed.without(is_hold, moves), solution.S_a, b_a, solution.S_w, solution.core,
-            is_tuned=False, scatter_unit=observed.scatter_unit,
-        )  # fmt: skip
-        S = np.asarray(core.force_scale)
-        seen = carried(
-            time_s, measured, anchors_s, S, core.force_bias - S @ observed.force_origin, np.asarray(core.rate_scale)
-        )
+        is_held = np.isin(labels[:, 0], (MOVES, DYNAMICS)) & is_reading
+        is_held[is_held] = moves[labels[is_held, 1]]
+        S, b, S_w, _ = core.without(is_held, observed.force_origin)
+        seen = carried(time_s, measured, anchors_s, S, b - S @ observed.force_origin, S_w)
         which = [number[int(hold)] for hold in observed.before[moves]]
         for mine, theirs in ((parts.residual, seen.residual), (parts.sigma, seen.sigma),
                              (parts.angle_deg, seen.angle_deg), (parts.floor2, seen.floor2)):  # fmt: skip

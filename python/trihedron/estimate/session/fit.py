@@ -10,6 +10,7 @@ from scipy.special import fdtrc
 
 from trihedron import _core
 from trihedron.estimate.session.observed import Observed
+from trihedron.session.noise import START_STRENGTHS
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -17,13 +18,11 @@ FALSE_ALARM = 1e-3
 """Chance that the moves of a sound session are taken for noisier than their samples."""
 NOISE_DOF = 100.0
 """The predicted noise is itself measured in the recording: to about 7 %, as 100 degrees of freedom give."""
-START_CORNER_S = 160.0
-NO_SCATTER = 1e-3
 DEAF = 1e3
 """Widening at which a row no longer says anything beside the others."""
 MOST_WIDENINGS = 8
-MOVES, DYNAMICS = 2, 3
-"""Labels of rows: gravity after a move, velocity over it."""
+STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
+"""Labels of rows: accelerometer at rest, gravity after a move, velocity over it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,19 +59,17 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     Moves that miss by more than their samples' noise explains count with the noise that they show, and a velocity that
     does is left out: what the linear model lacks there must not be spread over the accelerometer.
     """
-    # Strengths of the zeros are chosen by a session that hardly listens to moves: one that moves had bent would explain
-    # their misfit as scatter of the accelerometer's zero, and then believe the poses even less.
-    core = fitted(replace(observed, inflation=(DEAF, DEAF)), S_a, b_a + S_a @ observed.force_origin, S_w, None)
+    core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w, None)
     inflation = (1.0, 1.0)
     for _ in range(MOST_WIDENINGS):
-        core = fitted(
-            replace(observed, inflation=inflation), core.force_scale, core.force_bias, core.rate_scale, core,
-            is_tuned=False,
-        )  # fmt: skip
         wider = _inflation(core, inflation)
         if wider == inflation:
             break
         inflation = wider
+        core = fitted(
+            replace(observed, inflation=inflation), core.force_scale, core.force_bias, core.rate_scale, core,
+            is_tuned=False,
+        )  # fmt: skip
     chi2, dof = _misfit(core, MOVES)
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
@@ -104,21 +101,21 @@ def fitted(
     at: _core.SessionFit | None,
     *,
     is_tuned: bool = True,
-    scatter_unit: FloatArray | None = None,
 ) -> _core.SessionFit:
-    """One fit on centred readings; ``at`` gives zeros and strengths to begin with."""
+    """One fit on centred readings; ``at`` gives verticals and strengths to begin with."""
     force = observed.hold_force @ S_a.T + b_a
-    n = len(force)
-    return observed.model(scatter_unit).fit(
+    state = _core.SessionState(
         force_scale=np.ascontiguousarray(S_a),
         force_bias=np.ascontiguousarray(b_a),
         rate_scale=np.ascontiguousarray(S_w),
         up=np.ascontiguousarray(force / np.linalg.norm(force, axis=1, keepdims=True) if at is None else at.up),
         rate_zero=np.ascontiguousarray(observed.hold_rate),
-        force_zero=np.zeros((n, 3)),
+        force_zero=np.zeros((len(force), 3)),
         effect=np.zeros(0),
-        corners_s=(START_CORNER_S, START_CORNER_S) if at is None else at.corners_s,
-        scatter=(NO_SCATTER, NO_SCATTER) if at is None else at.scatter,
+    )
+    return observed.model().fit(
+        state=state,
+        strengths=START_STRENGTHS if at is None else at.strengths,
         force_effect=None,
         rate_effect=None,
         is_tuned=is_tuned,

@@ -125,7 +125,7 @@ def to_ros(calibration: Calibration, options: ExportOptions) -> str:
     if options.rate_hz is None or options.accelerometer_noise is None:
         raise ValueError("the covariance of a message needs the noise and the rate: add --noise ALLAN.json --rate HZ.")
     equation = "sensor_msgs/Imu: variance of one message = N^2 * rate, in SI; apply S and b before publishing."
-    lines = [f"# {line}" for line in heading(known, equation)]
+    lines = [f"# {line}" for line in (*heading(known, equation), *_lost_without_intrinsics(known))]
     pairs = (("linear_acceleration", options.accelerometer_noise), ("angular_velocity", options.gyroscope_noise))
     for name, noise in pairs:
         if noise is None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 import polars as pl
 
 from trihedron.read.errors import ReadError
+from trihedron.read.panics import panics_unprinted
 from trihedron.read.table import FloatArray
 from trihedron.read.text.dates import form_of, seconds
 from trihedron.read.text.layout import MISSING, Layout
@@ -68,18 +69,21 @@ def parse(
         When the block is no table.
     """
     try:
-        return pl.read_csv(
-            io.BytesIO(data),
-            has_header=False,
-            separator=layout.separator,
-            schema=schema,
-            ignore_errors=True,
-            truncate_ragged_lines=True,
-            quote_char='"' if b'"' in data else None,
-            decimal_comma=layout.decimal_comma,
-            encoding="utf8-lossy",
-        )
-    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+        with panics_unprinted():
+            return pl.read_csv(
+                io.BytesIO(data),
+                has_header=False,
+                separator=layout.separator,
+                schema=schema,
+                ignore_errors=True,
+                truncate_ragged_lines=True,
+                quote_char='"' if b'"' in data else None,
+                decimal_comma=layout.decimal_comma,
+                encoding="utf8-lossy",
+            )
+    except pl.exceptions.PanicException:
+        raise ReadError(f"{path}: the text from line {first_line} on cannot be read as a table.") from None
+    except pl.exceptions.PolarsError as error:
         first = str(error).strip().split("\n")[0]
         raise ReadError(
             f"{path}: the text from line {first_line} on cannot be read as a table ({first[:160]})."

@@ -1,0 +1,81 @@
+"""Commands to copy, for every command's help: what each is for, and the line."""
+
+from __future__ import annotations
+
+EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
+    "": (
+        ("two acts on a simulated sensor, with reports", "trihedron demo"),
+        ("is this log fit for a calibration?", "trihedron check LOG"),
+        ("calibrate, with a report", "trihedron calibrate LOG --latitude 50 -o cal.json --report cal.html"),
+        ("what a command does, its options, examples", "trihedron COMMAND --help"),
+    ),
+    "demo": (("Into a folder of that name; the same flaw every time:", "trihedron demo tour --seed 3"),),
+    "plan": (
+        ("Turns of 90° on a table against a wall that gives the angle to 0.1°:", "trihedron plan --turn-error 0.1"),
+        ("With the noise of your own sensor:", "trihedron plan --gyro-noise 0.01 --accel-noise 200"),
+    ),
+    "capture": (
+        ("The only board that is plugged in, for ten minutes:", "trihedron capture -o log.csv --seconds 600"),
+        ("Led through a calibration:", "trihedron capture -o log.csv --guide --calibration cal.json"),
+        ("A stream over the network:", "trihedron capture tcp://192.168.1.20:9000 -o log.csv"),
+    ),
+    "guide": (
+        ("What the guide would have said:", "trihedron guide log.csv"),
+        (
+            "How long such a session must be for twice the accuracy:",
+            'trihedron guide log.csv --accuracy "accel 0.05 %"',
+        ),
+    ),
+    "check": (("Before anything else:", "trihedron check log.csv"),),
+    "segment": (
+        ("The table of poses and the signals with them shaded:", "trihedron segment log.csv --report poses.html"),
+    ),
+    "calibrate": (
+        ("Everything by itself; gravity from the latitude:", "trihedron calibrate log.csv --latitude 50.1 -o cal.json"),
+        (
+            "Two files, one per sensor, and a report:",
+            "trihedron calibrate --accel a.csv --gyro g.csv --report cal.html",
+        ),
+        ("A table without header or time:", "trihedron calibrate log.txt --columns ax,ay,az,gx,gy,gz --rate 100"),
+        (
+            "Six faces of a square case, turns of 90° between:",
+            "trihedron calibrate log.csv --method faces --turns 90,-90",
+        ),
+    ),
+    "kalman": (
+        ("With the noise of a rest log:", "trihedron kalman log.csv --noise rest.csv --report kalman.html"),
+        (
+            "Poses of a dividing head, its angles known to 0.01°:",
+            "trihedron kalman log.csv --reference poses.csv --angle-sigma 0.01",
+        ),
+    ),
+    "allan": (
+        ("The terms, the curves and Kalibr's imu.yaml:", "trihedron allan rest.csv --report noise.html"),
+        (
+            "Counts of a known size:",
+            'trihedron allan rest.npz --rate 100 --gyro-lsb "0.05 deg/s" --accel-lsb "3.33 mg"',
+        ),
+        ("Without the first minute and a knock:", "trihedron allan rest.csv --exclude :60 --exclude 812:815"),
+        ("A log larger than the memory:", "trihedron allan rest.npy --stream --columns gx,gy,gz --rate 1000"),
+    ),
+    "verify": (
+        ("Does it still hold?", "trihedron verify cal.json today.csv"),
+        ("Status 2 beyond 2 mg, for a script:", "trihedron verify cal.json today.csv --limit-mg 2"),
+    ),
+    "diagnose": (
+        ("What the linear model leaves out:", "trihedron diagnose log.csv --latitude 50.1 --report diagnosis.html"),
+        ("Is this still the sensor of last year?", "trihedron diagnose log.csv --calibration cal.json"),
+        ("Why does my simulation not fit?", "trihedron diagnose log.csv --against sim.toml --improved better.toml"),
+    ),
+    "apply": (("To m/s² and rad/s:", "trihedron apply cal.json log.csv -o corrected.csv"),),
+    "export": (
+        ("Kalibr's imu.yaml:", "trihedron export cal.json --to kalibr --noise noise.json -o imu.yaml"),
+        ("C code for the board:", "trihedron export cal.json --to c -o imu_calibration.h"),
+    ),
+    "convert": (("Any log as a plain table:", "trihedron convert flight.ulg -o log.csv"),),
+    "simulate": (
+        ("What there is ready-made:", "trihedron simulate --list"),
+        ("A log with its truth beside it:", "trihedron simulate hand-session -o log.csv --truth truth.json --seed 3"),
+        ("The twin of a recording:", "trihedron simulate --like log.csv --calibration cal.json -o twin.csv"),
+    ),
+}

@@ -1,0 +1,208 @@
+"""Runs of readings on a common limit: where, on which channel, on which code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from trihedron.diagnose.session.observations import FloatArray
+
+BAND_SIGMA = 4.0
+"""A plateau is a run of samples within four standard deviations of the limit."""
+REACH = 4
+"""Samples before and behind a plateau from which the slope of arrival and departure is taken."""
+MIN_RUN = 4
+MIN_PLATEAUS = 3
+"""Smooth peaks differ in height from move to move; three that end on one level within noise do not happen by chance."""
+LONG_RUN, HIGH = 8, 15.0
+"""One plateau is enough if it is this long and the parabola cut off by it would reach this many sigma higher."""
+STEEP = 6.0
+"""Height in sigma that a parabola with the slopes at both ends of a plateau would reach: it would not look flat."""
+
+
+AGREE, HALF_STEP = 4.0, 0.5
+"""Errors of its mean, and noises of a sample, by which a run may differ from the level of the others."""
+FEWEST_FOR_CURVE, SPREAD = 4, 5.0
+"""Samples from which slope and curvature are fitted; fewer are flat if they spread by less than five sigma."""
+FLAT = 18.0
+"""Chi-square of slope and curvature (2): one flat run in ten thousand exceeds it."""
+FINE_STEP = 0.3
+"""Steps of the converter over the noise, below which four equal readings are not chance; above, six."""
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """One run at the limit: samples ``[start, stop)`` of channel ``axis``, on the side ``sign``.
+
+    ``is_rail``: every sample is the same number, the largest of the recording. One such run is proof enough.
+    """
+
+    axis: int
+    sign: int
+    start: int
+    stop: int
+    level: float
+    is_rail: bool = False
+
+
+def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int], ...]) -> list[Plateau]:
+    """Runs of a raw (n, 3) signal on a common limit inside moves."""
+    found: list[Plateau] = []
+    for axis in range(signal.shape[1]):
+        for sign in (1, -1):
+            x = sign * signal[:, axis]
+            pieces = [x[a:b] for a, b in ranges]
+            if not pieces:
+                continue
+            top = np.array([p.max() for p in pieces])
+            codes = np.unique(np.concatenate(pieces))
+            step_size = float(np.diff(codes).min()) if len(codes) > 1 else 0.0
+            rails = _rails(x, step_size, float(sigma[axis]), axis, sign, ranges) or _piled_up(
+                x, step_size, float(sigma[axis]), axis, sign, ranges
+            )
+            if rails:
+                found += rails
+                continue
+            noise = max(float(sigma[axis]), 0.5 * step_size, 1e-300)
+            best: list[Plateau] = []
+            # The limit is a level that moves end on and that nothing exceeds but noise.
+            ends = np.round((top[top > top.max() - 2.0 * BAND_SIGMA * noise] - 2.0 * noise) / noise) * noise
+            for level in np.unique(ends):
+                runs = _on_level(x, float(level), noise, axis, sign, ranges)
+                if len(runs) > len(best):
+                    best = runs
+            # Nothing is read beyond a limit but noise.
+            if best and float(top.max()) <= best[0].level * sign + BAND_SIGMA * noise:
+                found += best
+    return found
+
+
+def _on_level(
+    x: FloatArray, level: float, noise: float, axis: int, sign: int, ranges: tuple[tuple[int, int], ...]
+) -> list[Plateau]:
+    """Runs that arrive steeply at a level, stay flat on it within noise, leave it steeply, and agree about it."""
+    width = BAND_SIGMA * noise
+    runs, means, errors, clear = [], [], [], []
+    for a, b in ranges:
+        near = np.abs(x[a:b] - level) <= width
+        edges = np.flatnonzero(np.diff(np.r_[0, near.astype(np.int8), 0]))
+        for first, last in edges.reshape(-1, 2):
+            n = last - first
+            if n < MIN_RUN or first < REACH or last > b - a - REACH:
+                continue
+            run = x[a + first : a + last]
+            arrival = (run[0] - x[a + first - REACH]) / REACH
+            departure = (run[-1] - x[a + last - 1 + REACH]) / REACH
+            # A parabola with these slopes at its edges would rise this high above them.
+            rise = min(arrival, departure) * n / 4.0
+            if rise < STEEP * noise or not _is_flat(_middle(run) / noise):
+                continue
+            height = rise / noise
+            runs.append(Plateau(axis, sign, a + int(first), a + int(last), 0.0))
+            clear.append(n >= LONG_RUN and height > HIGH)
+            means.append(float(_middle(run).mean()))
+            errors.append(noise / np.sqrt(len(_middle(run))))
+    if len(runs) < MIN_PLATEAUS and not any(clear):
+        return []
+    # Peaks that merely end in one band differ by more than the error of their means.
+    common = float(np.average(means, weights=1.0 / np.square(errors)))
+    agree = [abs(m - common) < AGREE * e + HALF_STEP * noise for m, e in zip(means, errors, strict=True)]
+    kept = [replace(r, level=sign * common) for r, good in zip(runs, agree, strict=True) if good]
+    return kept if len(kept) >= MIN_PLATEAUS or any(c and g for c, g in zip(clear, agree, strict=True)) else []
+
+
+def _middle(run: FloatArray) -> FloatArray:
+    """A run without the ends that still arrive and already leave."""
+    cut = max(len(run) // 6, 1)
+    return run[cut:-cut]
+
+
+def _is_flat(run: FloatArray) -> bool:
+    """Whether a slope and a curvature explain no more of a run (in units of its noise) than chance does."""
+    n = len(run)
+    if n < FEWEST_FOR_CURVE:
+        return float(np.ptp(run)) < SPREAD
+    k = np.linspace(-1.0, 1.0, n)
+    basis, _ = np.linalg.qr(np.stack([np.ones(n), k, k * k], axis=1))
+    return bool(float(((basis[:, 1:].T @ run) ** 2).sum()) < FLAT)
+
+
+def _rails(
+    x: FloatArray, step_size: float, sigma: float, axis: int, sign: int, ranges: tuple[tuple[int, int], ...]
+) -> list[Plateau]:
+    """Runs of one number, the largest of the recording, where noise should have told neighbours apart."""
+    # On a coarse grid equal readings are the rule, at the top of a peak too.
+    if not 0.0 < step_size < sigma:
+        return []
+    shortest = 4 if step_size < FINE_STEP * sigma else 6
+    top = np.nanmax(x)
+    found = []
+    for a, b in ranges:
+        edges = np.flatnonzero(np.diff(np.r_[0, (x[a:b] == top).astype(np.int8), 0]))
+        for first, last in edges.reshape(-1, 2):
+            if last - first >= shortest:
+                found.append(Plateau(axis, sign, a + int(first), a + int(last), sign * float(top), True))
+    return found
+
+
+NEIGHBOURS, LEAST_PILED, PILED = 40, 6, 10.0
+"""A smooth motion passes neighbouring codes alike: the last code read this often, ten times as often as the codes
+below it, is a rail."""
+SHARED_SIGMA = 4.0
+"""Levels of several channels within this many of their errors are one limit of the part."""
+
+
+def _piled_up(
+    x: FloatArray, step_size: float, sigma: float, axis: int, sign: int, ranges: tuple[tuple[int, int], ...]
+) -> list[Plateau]:
+    """Readings of one number, the largest of the recording, far more often than of the numbers below it.
+
+    A part that turns back and forth across its limit ends there for two samples at a time.
+    """
+    if not 0.0 < step_size < sigma:
+        return []
+    top = np.nanmax(x)
+    inside = np.concatenate([x[a:b] for a, b in ranges])
+    n_top = int((inside == top).sum())
+    n_below = int(((inside < top) & (inside >= top - NEIGHBOURS * step_size)).sum())
+    if n_top < LEAST_PILED or n_top < PILED * n_below / NEIGHBOURS:
+        return []
+    found = []
+    for a, b in ranges:
+        edges = np.flatnonzero(np.diff(np.r_[0, (x[a:b] == top).astype(np.int8), 0]))
+        for first, last in edges.reshape(-1, 2):
+            found.append(Plateau(axis, sign, a + int(first), a + int(last), sign * float(top), True))
+    return found
+
+
+def shared_levels(
+    runs: list[Plateau], origin: FloatArray, sigma: FloatArray
+) -> dict[tuple[int, int], tuple[float, bool]]:
+    """(axis, sign) → raw level and whether it is exact: channels of one part that end on one level have one limit.
+
+    A level that only noise tells takes the exact code of another channel, or the mean of all, where it agrees with it;
+    the two sides of a converter count as one limit where they agree in size.
+    """
+    levels: dict[tuple[int, int], tuple[float, float, bool]] = {}
+    for key in sorted({(r.axis, r.sign) for r in runs}):
+        own = [r for r in runs if (r.axis, r.sign) == key]
+        n = sum(r.stop - r.start for r in own)
+        is_rail = any(r.is_rail for r in own)
+        error = 0.0 if is_rail else float(sigma[key[0]]) / np.sqrt(max(n, 1))
+        levels[key] = (own[0].level + float(origin[key[0]]), error, is_rail)
+    out = {}
+    for key, (level, error, is_rail) in levels.items():
+        if is_rail:
+            out[key] = (level, True)
+            continue
+        alike = [other for other in levels.values()
+                 if abs(abs(other[0]) - abs(level)) < SHARED_SIGMA * np.hypot(other[1], error)]  # fmt: skip
+        exact = [abs(value) for value, _, rail in alike if rail]
+        if exact:
+            out[key] = (float(np.copysign(exact[0], level)), True)
+            continue
+        weights = [1.0 / max(e, 1e-300) ** 2 for _, e, _ in alike]
+        mean = float(np.average([abs(value) for value, _, _ in alike], weights=weights))
+        out[key] = (float(np.copysign(mean, level)), False)
+    return out

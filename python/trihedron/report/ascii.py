@@ -1,0 +1,38 @@
+"""Text for terminals and files that know no more than ASCII."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+_RAISED = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "+-0123456789")
+_WORDS = {
+    "′": "'", "″": '"', "±": "+/-", "−": "-", "–": "-", "—": "-", "×": "x", "·": "*", "°": "deg",
+    "→": "->", "←": "<-", "…": "...", "─": "-", "│": "|", "≤": "<=", "≥": ">=", "≈": "~", "≠": "!=", "∞": "inf",
+    "Δ": "d", "Σ": "sum", "α": "alpha", "β": "beta", "θ": "theta", "λ": "lambda", "π": "pi", "ρ": "rho", "σ": "sigma",
+    "τ": "tau", "φ": "phi", "χ": "chi", "ψ": "psi", "ω": "w", "Ω": "Ohm", "µ": "u", "μ": "u", "•": "*",
+    "‘": "'", "’": "'", "“": '"', "”": '"',
+    "\u00a0": " ", "\u202f": " ",
+    "↑": "^", "↓": "v", "█": "#", "╭": "+", "╮": "+", "╰": "+", "╯": "+", "━": "=", "╸": "=", "╺": "-",
+}  # fmt: skip
+_TABLE = str.maketrans(_WORDS)
+
+
+def ascii_of(text: str) -> str:
+    """The same in ASCII: ``10⁻³`` is ``10^-3``, ``±`` is ``+/-``, ``°/s`` is ``deg/s``; letters lose their accents.
+
+    Examples
+    --------
+    >>> ascii_of("σ = 1.5 ± 0.2 × 10⁻³ m/s²")
+    'sigma = 1.5 +/- 0.2 x 10^-3 m/s^2'
+    """
+    if text.isascii():
+        return text
+    text = re.sub("[⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda found: "^" + found[0].translate(_RAISED), text)
+    text = re.sub(r"√(\w+)", r"sqrt(\1)", text).translate(_TABLE)
+    return "".join(c if c.isascii() else _bare(c) for c in text)
+
+
+def _bare(character: str) -> str:
+    plain = unicodedata.normalize("NFKD", character).encode("ascii", "ignore").decode()
+    return plain or ("" if unicodedata.combining(character) else "?")

@@ -1,0 +1,147 @@
+"""What a page draws of a calibration: residuals with their limits, the sphere of poses, moves, correlations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Segments, SensorCalibration
+from trihedron.report.chart import Band, Bars, Chart, Disc, Level, Panel, Points, Scale
+from trihedron.report.disc import equal_area
+from trihedron.report.drawn import said
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+
+FloatArray = npt.NDArray[np.float64]
+
+LIMIT_SIGMAS = 3.0
+"""A pose or move beyond it happens by chance once in 370."""
+
+
+def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> Chart:
+    """Residual of every pose in and out of sample, against three standard errors of noise alone."""
+    pose = np.arange(len(quality.residual), dtype=np.float64)
+    residual, sigma = mm_s2(quality.residual), mm_s2(quality.sigma)
+    label = [f"pose {k}" for k in range(len(pose))] if names is None else list(names)
+    limit = LIMIT_SIGMAS * np.abs(sigma)
+    edge = np.concatenate([pose - 0.5, pose + 0.5]).reshape(2, -1).T.ravel()
+    marks: list[Band | Level | Points] = [
+        Band(edge, -np.repeat(limit, 2), np.repeat(limit, 2), "3σ of noise alone"),
+        Level(y=0.0),
+    ]
+    if quality.held_out is not None and np.any(np.isfinite(quality.held_out)):
+        held = mm_s2(quality.held_out)
+        held_sigma = None if quality.held_out_sigma is None else mm_s2(quality.held_out_sigma)
+        told = [
+            said(f"{name}, held out", "", v, "mm/s²", None if held_sigma is None else s)
+            for name, v, s in zip(label, held, held if held_sigma is None else held_sigma, strict=True)
+        ]
+        marks.append(
+            Points(pose + 0.17, held, told, held_sigma, "held out (predicted by a fit without it)", "accent", True)
+        )
+    told = [said(name, "", v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
+    marks.append(Points(pose - 0.17, residual, told, None, "in sample", "c1"))
+    x = Scale("still pose", limits=(-0.7, len(pose) - 0.3), whole=True)
+    return Chart((Panel(x, Scale("|f| − |g|  [mm/s²]", "mm/s²"), tuple(marks)),))
+
+
+def mm_s2(values: FloatArray) -> FloatArray:
+    """Accelerations in mm/s²."""
+    return values * mm_s2_from_m_s2(1.0)
+
+
+def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
+    """Angle missed after every move, in and out of sample, and what noise alone gives (rms)."""
+    assert quality.angle_deg is not None
+    n = len(quality.angle_deg)
+    move = np.arange(n, dtype=np.float64)
+    is_out = np.zeros(n, dtype=bool)
+    if quality.weights is not None and len(quality.weights) == n:
+        is_out = quality.weights == 0.0
+    moves = segments.moves if segments is not None and len(segments.moves) == n else None
+    names = [
+        f"move {k}" + ("" if moves is None else f" (pose {moves[k].hold_before} → {moves[k].hold_after})")
+        for k in range(n)
+    ]
+    told = [
+        f"{said(w, '', v, '°')}{', left out' if out else ''}"
+        for w, v, out in zip(names, quality.angle_deg, is_out, strict=True)
+    ]
+    noise = move_noise_deg(quality)
+    marks: list[Bars | Points] = []
+    held = quality.held_out_angle_deg
+    width = 0.38 if held is not None else 0.7
+    shift = 0.2 if held is not None else 0.0
+    inside = np.where(is_out, np.nan, quality.angle_deg)
+    marks.append(Bars(move - shift, inside, width, told, "in sample", "c1"))
+    if np.any(is_out):
+        marks.append(Bars(move - shift, np.where(is_out, quality.angle_deg, np.nan), width, told, "left out", "soft"))
+    if held is not None:
+        told_held = [said(f"{w}, held out", "", v, "°") for w, v in zip(names, held, strict=True)]
+        marks.append(Bars(move + shift, np.where(is_out, np.nan, held), width, told_held, "held out", "accent"))
+    told_noise = [said(f"{w}, noise alone", "", v, "° rms") for w, v in zip(names, noise, strict=True)]
+    marks.append(Points(move, noise, told_noise, None, "noise alone (rms)", "ink"))
+    shown = np.concatenate([quality.angle_deg[~is_out], [] if held is None else held[~is_out]])
+    shown = shown[np.isfinite(shown)]
+    # A move that was left out may be a hundred times as wrong: the rest must stay readable.
+    top = 1.1 * float(max(shown.max(initial=0.0), np.nanmax(noise, initial=0.0))) or 1.0
+    y = Scale("gravity missed by  [°]", "°", limits=(0.0, top))
+    return Chart((Panel(Scale("move", limits=(-0.7, n - 0.3), whole=True), y, tuple(marks), height_px=200),))
+
+
+def move_noise_deg(quality: FitQuality) -> FloatArray:
+    """(m,) angle that noise alone gives after each move, rms, degrees."""
+    out: FloatArray = np.asarray(degrees_from_radians(1.0) * np.linalg.norm(quality.sigma, axis=1) / 9.8)
+    return out
+
+
+def sphere_chart(sensor: SensorCalibration, means: FloatArray) -> Chart:
+    """Directions of "up", with those that the fit gains most from."""
+    force = means @ sensor.S.T + sensor.b
+    up = force / np.linalg.norm(force, axis=1)[:, None]
+    advice = sensor.observability.advice if sensor.observability is not None else ()
+    wanted = [(words, direction) for words in advice if (direction := direction_in_words(words)) is not None]
+    discs = []
+    for sign, title in ((1.0, "axis 3 above the horizon"), (-1.0, "axis 3 below the horizon")):
+        points = []
+        for k, u in enumerate(up):
+            # A pose with level axis 3 lies on the rim of both.
+            if sign * u[2] >= -1e-2:
+                words = " ".join(f"{c:+.2f}" for c in u).replace("-", "−")
+                points.append((*equal_area((u[0], u[1], u[2])), str(k), f"pose {k}: up is {words}", "taken"))
+        for n, (words, d) in enumerate(wanted):
+            if sign * d[2] >= -1e-2:
+                points.append((*equal_area((d[0], d[1], d[2])), str(n + 1), f"to add, {n + 1}: {words}", "wanted"))
+        discs.append(Disc(title, tuple(points)))  # type: ignore[arg-type]
+    return Chart(tuple(discs), columns=2, legend=False)
+
+
+def direction_in_words(words: str) -> FloatArray | None:
+    """The unit vector (3,) of 'axis 1 up, then tilted 45° so that axis 2 points half up'; None where there is none."""
+    first = re.match(r"axis (\d) (up|down)", words)
+    if first is None:
+        return None
+    up = np.zeros(3)
+    for axis, side in [first.groups(), *re.findall(r"axis (\d) points half (up|down)", words)]:
+        up[int(axis) - 1] = 1.0 if side == "up" else -1.0
+    out: FloatArray = up / np.linalg.norm(up)
+    return out
+
+
+def correlation_table(calibration: Calibration) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]] | None:
+    """Head and rows of the correlations of all free parameters, two decimals."""
+    both = (("a", calibration.accelerometer), ("w", calibration.gyroscope))
+    names = [f"{sign}.{name}" for sign, sensor in both if sensor is not None for name in PARAMETER_NAMES]
+    sigma = np.sqrt(np.maximum(np.diag(calibration.covariance), 0.0))
+    free = np.flatnonzero(sigma > 0.0)
+    if not len(free):
+        return None
+    r = calibration.covariance[np.ix_(free, free)] / np.outer(sigma[free], sigma[free])
+    kept = [names[k] for k in free]
+    rows = tuple(
+        (kept[i], *("" if j > i else "1" if j == i else f"{r[i, j]:.2f}".replace("-", "−") for j in range(len(free))))
+        for i in range(len(free))
+    )
+    return ("", *kept), rows

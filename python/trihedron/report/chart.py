@@ -1,0 +1,190 @@
+"""A figure as data: panels with axes and marks, that a page draws sharp at any width, in light, dark and on paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+Colour = Literal["c1", "c2", "c3", "accent", "ink", "soft", "shade", "warn", "grey"]
+"""Names, not values: the page gives each a colour for light, dark and paper. c1, c2, c3 are the axes x, y, z."""
+AXIS_COLOURS: tuple[Colour, Colour, Colour] = ("c1", "c2", "c3")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """An axis of a panel: ``limits`` in data units (found from the marks where None), ``unit`` for values shown."""
+
+    label: str
+    unit: str = ""
+    is_log: bool = False
+    limits: tuple[float, float] | None = None
+    includes: tuple[float, ...] = ()
+    whole: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A curve; NaN interrupts it."""
+
+    x: FloatArray
+    y: FloatArray
+    name: str = ""
+    colour: Colour = "c1"
+    is_dashed: bool = False
+    is_thin: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Dots with ``sigma`` as error bars; ``said`` is what a reader who points at one is told."""
+
+    x: FloatArray
+    y: FloatArray
+    said: Sequence[str]
+    sigma: FloatArray | None = None
+    name: str = ""
+    colour: Colour = "c1"
+    is_hollow: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Bars from zero (or from ``base``), ``width`` in data units."""
+
+    x: FloatArray
+    y: FloatArray
+    width: float
+    said: Sequence[str]
+    name: str = ""
+    colour: Colour = "c1"
+    base: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """The area between two curves."""
+
+    x: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    name: str = ""
+    colour: Colour = "shade"
+
+
+@dataclass(frozen=True)
+class Span:
+    """A stretch of x, shaded over the whole height."""
+
+    first: float
+    last: float
+    name: str = ""
+    colour: Colour = "shade"
+
+
+@dataclass(frozen=True)
+class Level:
+    """A straight rule at one y, or one x."""
+
+    y: float | None = None
+    x: float | None = None
+    name: str = ""
+    colour: Colour = "ink"
+    is_dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Note:
+    """A word at a place; ``side`` says on which side of it."""
+
+    x: float
+    y: float
+    text: str
+    colour: Colour = "ink"
+    side: Literal["above", "below", "right", "left"] = "above"
+
+
+Mark = Line | Points | Bars | Band | Span | Level | Note
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes. Panels of a chart stand side by side where there is room for them."""
+
+    x: Scale
+    y: Scale
+    marks: tuple[Mark, ...]
+    title: str = ""
+    height_px: int = 230
+
+
+@dataclass(frozen=True, eq=False)
+class Disc:
+    """Directions on a hemisphere seen along axis 3 (Lambert's equal-area projection), radius one at the rim.
+
+    ``points`` are (x, y, label, what is said, kind), kind one of ``taken``, ``wanted``.
+    """
+
+    title: str
+    points: tuple[tuple[float, float, str, str, Literal["taken", "wanted"]], ...]
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Panels under one legend. ``columns`` side by side on a wide page; linked panels zoom along x together."""
+
+    panels: tuple[Panel | Disc, ...]
+    columns: int = 1
+    is_linked: bool = False
+    legend: bool = True
+    extra: tuple[str, ...] = field(default=())
+
+
+def limits_of(panel: Panel) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Data limits (x, y) of a panel: those stated, or what its marks need and a margin."""
+    x = panel.x.limits or _reach([v for m in panel.marks for v in _xs(m)], panel.x)
+    y = panel.y.limits or _reach([v for m in panel.marks for v in _ys(m)], panel.y)
+    return x, y
+
+
+def _xs(mark: Mark) -> list[FloatArray]:
+    if isinstance(mark, Line | Points | Band):
+        return [mark.x]
+    if isinstance(mark, Bars):
+        return [mark.x - mark.width / 2, mark.x + mark.width / 2]
+    if isinstance(mark, Span):
+        return []
+    return [np.array([mark.x])] if mark.x is not None and isinstance(mark, Note) else []
+
+
+def _ys(mark: Mark) -> list[FloatArray]:
+    if isinstance(mark, Points):
+        if mark.sigma is None:
+            return [mark.y]
+        bar = np.where(np.isfinite(mark.sigma), mark.sigma, 0.0)
+        return [mark.y - bar, mark.y + bar]
+    if isinstance(mark, Line):
+        return [mark.y]
+    if isinstance(mark, Bars):
+        return [mark.y, np.zeros(1) if mark.base is None else mark.base]
+    if isinstance(mark, Band):
+        return [mark.lower, mark.upper]
+    return [np.array([mark.y])] if isinstance(mark, Level) and mark.y is not None else []
+
+
+def _reach(values: list[FloatArray], scale: Scale) -> tuple[float, float]:
+    every = np.concatenate([*(np.ravel(v) for v in values), np.array(scale.includes, dtype=np.float64)])
+    every = every[np.isfinite(every) & ((every > 0) | (not scale.is_log))]
+    if not len(every):
+        return (1.0, 10.0) if scale.is_log else (0.0, 1.0)
+    low, high = float(every.min()), float(every.max())
+    if scale.is_log:
+        return low / 1.3, high * 1.3
+    room = 0.06 * (high - low) or 0.5 * abs(high) or 0.5
+    # A quantity that is never negative keeps its zero at the edge.
+    return (0.0 if low == 0.0 else low - room), (0.0 if high == 0.0 and low < 0.0 else high + room)

@@ -1,0 +1,43 @@
+"""A hemisphere of directions, drawn."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+
+from trihedron.report.chart import Disc
+
+_RADIUS = 100.0
+
+
+def drawn_disc(disc: Disc, caption: str) -> str:
+    """Rim, circles of 30° and 60° above it, axes 1 and 2, poses taken and poses wanted."""
+    circles = "".join(
+        f'<circle class="rim" r="{_RADIUS * math.sqrt(1.0 - math.sin(math.radians(e))):.1f}"/>' for e in (0, 30, 60)
+    )
+    cross = f'<path class="rim" d="M-{_RADIUS} 0H{_RADIUS}M0-{_RADIUS}V{_RADIUS}"/>'
+    names = "".join(
+        f'<text x="{x}" y="{y}">{word}</text>'
+        for word, x, y in (("+1", 113, 4), ("−1", -113, 4), ("+2", 0, -106), ("−2", 0, 115))
+    )
+    marks = []
+    # What is wanted lies on top.
+    for x, y, label, said, kind in sorted(disc.points, key=lambda p: p[4]):
+        place = f'transform="translate({_RADIUS * x:.1f} {-_RADIUS * y:.1f})"'
+        shape = '<circle r="7.5"/>' if kind == "taken" else '<path d="M0-10L9 6H-9z"/>'
+        drop = 3 if kind == "taken" else 4
+        marks.append(
+            f'<g class="pose {kind}" data-t="{escape(said)}" {place}>{shape}<text y="{drop}">{escape(label)}</text></g>'
+        )
+    about = f"{disc.title}: {caption}"
+    return (
+        f'<div class="disc"><div class="ptitle">{escape(disc.title)}</div>'
+        f'<svg role="img" aria-label="{escape(about)}" viewBox="-128 -122 256 244">{circles}{cross}{names}'
+        f"{''.join(marks)}</svg></div>"
+    )
+
+
+def equal_area(up: tuple[float, float, float]) -> tuple[float, float]:
+    """Lambert's azimuthal projection of a unit vector about the pole it is nearest to, the equator at radius one."""
+    factor = 1.0 / math.sqrt(1.0 + abs(up[2]))
+    return up[0] * factor, up[1] * factor

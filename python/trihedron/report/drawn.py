@@ -1,0 +1,233 @@
+"""Charts drawn: marks as SVG that is stretched to its place, axes and words as HTML that is not."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.report.chart import Band, Bars, Chart, Disc, Level, Line, Mark, Note, Panel, Points, Span, limits_of
+from trihedron.report.disc import drawn_disc
+from trihedron.report.numbers import plain_number
+from trihedron.report.ticks import ticks
+
+FloatArray = npt.NDArray[np.float64]
+
+UNITS = 10000
+"""Across a panel, both ways. Marks are in these; a page of 4 k is a third as fine."""
+
+
+def drawn(chart: Chart, caption: str) -> str:
+    """The chart as HTML with inline SVG; ``caption`` is what a screen reader is told of each panel."""
+    link = " data-linked" if chart.is_linked else ""
+    parts = [_legend(chart)] if chart.legend else []
+    parts.append(f'<div class="panels n{chart.columns}"{link}>')
+    parts += [drawn_disc(p, caption) if isinstance(p, Disc) else _panel(p, caption) for p in chart.panels]
+    parts.append("</div>")
+    return "".join(parts)
+
+
+def _legend(chart: Chart) -> str:
+    seen: dict[str, str] = {}
+    for panel in chart.panels:
+        for mark in () if isinstance(panel, Disc) else panel.marks:
+            if not isinstance(mark, Note) and mark.name and mark.name not in seen:
+                seen[mark.name] = _swatch(mark)
+    if not seen:
+        return ""
+    items = "".join(
+        f'<span class="key"><i class="{kind}" aria-hidden="true"></i>{escape(name)}</span>'
+        for name, kind in seen.items()
+    )
+    return f'<div class="legend">{items}</div>'
+
+
+def _swatch(mark: Mark) -> str:
+    shape = {Line: "ln", Points: "dot", Bars: "box", Band: "box", Span: "box", Level: "ln", Note: ""}[type(mark)]
+    if (isinstance(mark, Line | Level) and mark.is_dashed) or (isinstance(mark, Points) and mark.is_hollow):
+        shape += " open"
+    return f"{shape} {mark.colour}"
+
+
+class _Places:
+    """Data units to units of the panel."""
+
+    def __init__(self, panel: Panel) -> None:
+        self.x_limits, self.y_limits = limits_of(panel)
+        self.x_log, self.y_log = panel.x.is_log, panel.y.is_log
+
+    def x(self, values: npt.ArrayLike) -> FloatArray:
+        return _placed(values, self.x_limits, is_log=self.x_log)
+
+    def y(self, values: npt.ArrayLike) -> FloatArray:
+        return UNITS - _placed(values, self.y_limits, is_log=self.y_log)
+
+
+def _placed(values: npt.ArrayLike, limits: tuple[float, float], *, is_log: bool) -> FloatArray:
+    v = np.asarray(values, dtype=np.float64)
+    low, high = limits
+    if is_log:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            v = np.log10(v)
+        low, high = math.log10(low), math.log10(high)
+    # Marks far outside must not leave the range of a float32 of the renderer.
+    out: FloatArray = np.clip((v - low) / ((high - low) or 1.0) * UNITS, -9 * UNITS, 10 * UNITS)
+    return out
+
+
+def _panel(panel: Panel, caption: str) -> str:
+    at = _Places(panel)
+    (x0, x1), (y0, y1) = at.x_limits, at.y_limits
+    x_ticks = ticks(x0, x1, is_log=panel.x.is_log, whole=panel.x.whole)
+    y_ticks = ticks(y0, y1, is_log=panel.y.is_log, whole=panel.y.whole, most=5)
+    xs, ys = at.x([t for t, _ in x_ticks]), at.y([t for t, _ in y_ticks])
+    grid = "".join(f"M{x:.0f} 0V{UNITS}" for x in xs) + "".join(f"M0 {y:.0f}H{UNITS}" for y in ys)
+    x_words = "".join(_word(w, f"left:{x / UNITS:.2%}") for x, (_, w) in zip(xs, x_ticks, strict=True) if w)
+    y_words = "".join(_word(w, f"top:{y / UNITS:.2%}") for y, (_, w) in zip(ys, y_ticks, strict=True) if w)
+    room = max((len(w) for _, w in y_ticks), default=1)
+    notes = "".join(_note(mark, at) for mark in panel.marks if isinstance(mark, Note))
+    back: list[str] = []
+    front: list[str] = []
+    for mark in panel.marks:
+        (back if isinstance(mark, Band | Span) else front).append(_mark(mark, at))
+    about = f"{panel.title}: {caption}" if panel.title else caption
+    title = f'<div class="ptitle">{escape(panel.title)}</div>' if panel.title else ""
+    spec = f'data-x="{x0:.9g} {x1:.9g}" data-y="{y0:.9g} {y1:.9g}" data-ux="{escape(panel.x.unit)}" '
+    spec += f'data-uy="{escape(panel.y.unit)}" data-lx="{escape(panel.x.label)}"'
+    spec += (" data-xlog" if panel.x.is_log else "") + (" data-ylog" if panel.y.is_log else "")
+    spec += " data-xwhole" if panel.x.whole else ""
+    return (
+        f'<div class="panel" {spec} style="--room:{room}ch;--high:{panel.height_px}px">{title}'
+        f'<div class="ylabel">{escape(panel.y.label)}</div>'
+        f'<div class="yticks" aria-hidden="true">{y_words}</div>'
+        f'<div class="plot"><svg role="img" aria-label="{escape(about)}" viewBox="0 0 {UNITS} {UNITS}" '
+        f'preserveAspectRatio="none"><g class="back">{"".join(back)}</g><path class="grid" d="{grid}"/>'
+        f'<g class="front">{"".join(front)}</g></svg>{notes}</div>'
+        f'<div class="xticks" aria-hidden="true">{x_words}</div><div class="xlabel">{escape(panel.x.label)}</div></div>'
+    )
+
+
+def _word(text: str, place: str) -> str:
+    return f'<span style="{place}">{escape(text)}</span>'
+
+
+def _note(note: Note, at: _Places) -> str:
+    x, y = float(at.x(note.x)), float(at.y(note.y))
+    place = f"left:{x / UNITS:.2%};top:{y / UNITS:.2%}"
+    return f'<span class="tag {note.side} t-{note.colour}" style="{place}">{escape(note.text)}</span>'
+
+
+def _mark(mark: Mark, at: _Places) -> str:
+    if isinstance(mark, Line):
+        thin = (" dash" if mark.is_dashed else "") + (" thin" if mark.is_thin else "")
+        # Strokes of noise are no curve to read a value from.
+        name = f' data-n="{escape(mark.name)}"' if mark.name and mark.colour != "shade" else ""
+        return f'<path class="ln {mark.colour}{thin}"{name} d="{_path(at.x(mark.x), at.y(mark.y))}"/>'
+    if isinstance(mark, Points):
+        return _points(mark, at)
+    if isinstance(mark, Bars):
+        return _bars(mark, at)
+    if isinstance(mark, Band):
+        return _band(mark, at)
+    if isinstance(mark, Span):
+        first, last = at.x([mark.first, mark.last])
+        return f'<path class="area {mark.colour}" d="M{first:.0f} 0H{last:.0f}V{UNITS}H{first:.0f}z"/>'
+    if isinstance(mark, Level):
+        dash = " dash" if mark.is_dashed else ""
+        where = (
+            f"M0 {float(at.y(mark.y)):.0f}H{UNITS}"
+            if mark.y is not None
+            else f"M{float(at.x(mark.x or 0.0)):.0f} 0V{UNITS}"
+        )
+        return f'<path class="level {mark.colour}{dash}" d="{where}"/>'
+    return ""
+
+
+def _path(x: FloatArray, y: FloatArray) -> str:
+    """Relative steps in whole units: the shortest text that keeps every point within half a unit."""
+    good = np.isfinite(x) & np.isfinite(y)
+    xi = np.round(np.where(good, x, 0.0)).astype(int).tolist()
+    yi = np.round(np.where(good, y, 0.0)).astype(int).tolist()
+    out: list[str] = []
+    before: tuple[int, int] | None = None
+    for a, b, is_good in zip(xi, yi, good.tolist(), strict=True):
+        if not is_good:
+            before = None
+            continue
+        if before is None:
+            # A lone point before a gap leaves no step to say.
+            if out and out[-1].endswith("l"):
+                out[-1] = out[-1][:-1]
+            out.append(f"M{a} {b}l")
+        else:
+            dx, dy = a - before[0], b - before[1]
+            out.append(f"{dx}{dy}" if dy < 0 else f"{dx} {dy}")
+            out.append(" ")
+        before = (a, b)
+    return "".join(out).rstrip(" l")
+
+
+def _points(mark: Points, at: _Places) -> str:
+    xs, ys = at.x(mark.x), at.y(mark.y)
+    sigma = np.zeros(len(xs)) if mark.sigma is None else np.where(np.isfinite(mark.sigma), mark.sigma, 0.0)
+    low, high = at.y(mark.y - sigma), at.y(mark.y + sigma)
+    out = []
+    if mark.sigma is not None:
+        bars = "".join(
+            f"M{x:.0f} {a:.0f}V{b:.0f}" for x, a, b in zip(xs, low, high, strict=True) if math.isfinite(x + a + b)
+        )
+        out.append(f'<path class="err {mark.colour}" d="{bars}"/>')
+    for x, y, said in zip(xs, ys, mark.said, strict=True):
+        if math.isfinite(x + y):
+            dot = f'd="M{x:.0f} {y:.0f}h0"'
+            out.append(f'<path class="dot {mark.colour}" data-t="{escape(said)}" {dot}/>')
+            if mark.is_hollow:
+                out.append(f'<path class="hole" {dot}/>')
+    return "".join(out)
+
+
+def _bars(mark: Bars, at: _Places) -> str:
+    left, right = at.x(mark.x - mark.width / 2), at.x(mark.x + mark.width / 2)
+    top = at.y(mark.y)
+    foot = at.y(np.zeros(len(top)) if mark.base is None else mark.base)
+    return "".join(
+        f'<path class="area {mark.colour}" data-t="{escape(said)}" d="M{a:.0f} {f:.0f}V{t:.0f}H{b:.0f}V{f:.0f}z"/>'
+        for a, b, t, f, said in zip(left, right, top, foot, mark.said, strict=True)
+        if math.isfinite(a + b + t + f)
+    )
+
+
+def _band(mark: Band, at: _Places) -> str:
+    good = np.isfinite(mark.x) & np.isfinite(mark.lower) & np.isfinite(mark.upper)
+    if not np.any(good):
+        return ""
+    x = np.concatenate([mark.x[good], mark.x[good][::-1]])
+    y = np.concatenate([mark.upper[good], mark.lower[good][::-1]])
+    return f'<path class="area {mark.colour}" d="{_path(at.x(x), at.y(y))}z"/>'
+
+
+def envelope(x: FloatArray, y: FloatArray, most: int = 2400) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest value of each block: a long log drawn whole, with no peak lost."""
+    n = len(y)
+    if n <= most:
+        return x, y
+    block = -(-n // (most // 2))
+    whole = n // block * block
+    parts = y[:whole].reshape(-1, block)
+    empty = ~np.isfinite(parts).any(axis=1)
+    low_high = np.column_stack(
+        [np.where(np.isfinite(parts), parts, np.inf).min(1), np.where(np.isfinite(parts), parts, -np.inf).max(1)]
+    )
+    low_high[empty] = np.nan
+    middle = x[:whole].reshape(-1, block)
+    return np.column_stack([middle[:, 0], middle[:, block // 2]]).ravel(), low_high.ravel()
+
+
+def said(what: str, x: str, value: float, unit: str, sigma: float | None = None) -> str:
+    """What a reader is told of a point: ``pose 7: 1.53 ± 0.98 mm/s²``."""
+    from trihedron.report.numbers import with_sigma
+
+    number = plain_number(value) if sigma is None else with_sigma(value, sigma)
+    return f"{what}{' ' if x else ''}{x}: {number} {unit}".strip()

@@ -1,0 +1,137 @@
+"""What a page draws of a calibration by Kalman filter: convergence, innovations, slow noise, residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from trihedron.records import CONSTANT_NAMES, AxisKalmanResult, NormKalmanCalibration
+from trihedron.report.calibration_charts import mm_s2
+from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Panel, Points, Scale
+from trihedron.report.drawn import said
+from trihedron.report.numbers import unit_in_print
+
+FloatArray = npt.NDArray[np.float64]
+
+WINDOW = 15
+"""Poses of a running mean of NIS: its 99 % interval is then 0.31 to 2.19 (χ² with 15 degrees of freedom)."""
+METHODS: dict[str, tuple[str, Colour, bool]] = {
+    "recursive least squares": ("recursive least squares", "accent", False),
+    "recursive generalised least squares": ("recursive generalised least squares", "c3", True),
+    "kalman": ("Kalman filter", "c1", False),
+}
+
+
+def convergence_chart(axis: AxisKalmanResult, raw_unit: str) -> Chart:
+    """Every constant of one axis by every method, with the filter's 3σ band about its last value."""
+    track = axis.track("kalman")
+    pose = np.arange(1, len(track.constants) + 1, dtype=np.float64)
+    unit = unit_in_print(raw_unit)
+    panels = []
+    for k, name in enumerate(CONSTANT_NAMES):
+        last, sigma = float(track.constants[-1, k]), track.sigma[:, k]
+        lines = [
+            Line(pose, found.constants[:, k], *METHODS[found.method])
+            for found in axis.tracks
+            if found.method in METHODS
+        ]
+        batch = [Level(y=float(c[k]), colour="ink", is_dashed=True, name="batch") for c, _ in axis.batch.values()]
+        of = unit if name == "U0" else f"{unit}/(m/s²)"
+        y = Scale(f"{name} [{of}]", of, limits=_frame([t.constants[:, k] for t in axis.tracks], sigma, last))
+        band = Band(pose, last - 3 * sigma, last + 3 * sigma, "3σ of the filter")
+        panels.append(
+            Panel(Scale("poses", whole=True, limits=(1, max(2, len(pose)))), y, (band, *batch, *lines), height_px=150)
+        )
+    return Chart(tuple(panels), columns=2, is_linked=False)
+
+
+def norm_convergence_chart(outcome: NormKalmanCalibration) -> Chart:
+    """S and b after every pose with their 3σ bands; what the frame fixes at zero is left out."""
+    n = len(outcome.parameters)
+    pose = np.arange(1, n + 1, dtype=np.float64)
+    panels = []
+    for k in range(12):
+        name = f"S{k // 3 + 1}{k % 3 + 1}" if k < 9 else f"b{k - 8}"
+        value, sigma = outcome.parameters[:, k], outcome.sigma[:, k]
+        if sigma[-1] == 0.0:
+            continue
+        last = float(value[-1])
+        unit = (
+            "m/s²"
+            if k >= 9 or outcome.accelerometer.raw_unit == "m/s^2"
+            else "m/s² per " + outcome.accelerometer.raw_unit.removesuffix("s")
+        )
+        y = Scale(f"{name} [{unit}]", unit, limits=_frame([value], sigma, last))
+        marks = (
+            Band(pose, last - 3 * sigma, last + 3 * sigma, "3σ about the last value"),
+            Line(pose, value, "after so many poses", "c1"),
+        )
+        panels.append(Panel(Scale("poses", whole=True, limits=(1, max(2, n))), y, marks, height_px=110))
+    return Chart(tuple(panels), columns=3)
+
+
+def _frame(tracks: Sequence[FloatArray], sigma: FloatArray, last: float) -> tuple[float, float]:
+    """Limits that show the approach and not the first guesses."""
+    n = len(sigma)
+    reach = [float(np.max(np.abs(track[n // 8 :] - last))) for track in tracks]
+    # Where a constant is seen late, its band at mid-session still fits.
+    half = 1.1 * max(*reach, 3.0 * float(sigma[n // 3]), 6.0 * float(sigma[-1]))
+    half = min(half, 60.0 * float(sigma[-1])) or abs(last) or 1.0
+    return last - half, last + half
+
+
+def innovations_chart(results: Sequence[AxisKalmanResult | NormKalmanCalibration]) -> Chart:
+    """Squared innovations of every judged pose, their running mean, and where 99 % of such means lie."""
+    marks: list[Band | Line | Points | Level] = []
+    window, n = WINDOW, 2
+    for k, result in enumerate(results):
+        pose = np.flatnonzero(result.is_settled).astype(np.float64)
+        nis = result.nis[result.is_settled]
+        window = max(1, min(WINDOW, len(pose) // 2))
+        n = max(n, len(result.is_settled))
+        mean = np.convolve(nis, np.ones(window) / window, mode="valid")
+        name = f"axis {'xyz'[result.axis]}" if isinstance(result, AxisKalmanResult) else "norm of gravity"
+        told = [
+            said(f"pose {p:.0f}, {name}", "", float(v), "times its predicted variance")
+            for p, v in zip(pose, nis, strict=True)
+        ]
+        marks.append(Points(pose, np.minimum(nis, 12.0), told, None, f"{name}: one pose", AXIS_COLOURS[k], True))
+        marks.append(Line(pose[window - 1 :], mean, f"{name}: mean of {window}", AXIS_COLOURS[k]))
+    low, high = (float(stats.chi2.ppf(p, window)) / window for p in (0.005, 0.995))
+    across = np.array([-0.5, n - 0.5])
+    band = Band(across, np.full(2, low), np.full(2, high), f"99 % of means of {window} when the noise model is right")
+    y = Scale("innovation² / predicted variance", "", includes=(0.0,))
+    return Chart((Panel(Scale("pose", limits=(-0.7, n - 0.3), whole=True), y, (band, Level(y=1.0), *marks)),))
+
+
+def drift_chart(results: Sequence[AxisKalmanResult], raw_unit: str) -> Chart:
+    """Slow noise that the filter saw while it ran, and smoothed with all readings."""
+    panels = []
+    for result in results:
+        pose = np.arange(len(result.drift), dtype=np.float64)
+        smooth, sigma = result.smoothed_drift, result.smoothed_drift_sigma
+        marks = (
+            Band(pose, smooth - sigma, smooth + sigma, "1σ"),
+            Line(pose, result.drift, "filtered", "accent", is_thin=True),
+            Line(pose, smooth, "smoothed", "c1"),
+        )
+        unit = unit_in_print(raw_unit)
+        y = Scale(f"axis {'xyz'[result.axis]} [{unit}]", unit)
+        panels.append(Panel(Scale("pose", whole=True, limits=(0, max(1, len(pose) - 1))), y, marks, height_px=140))
+    return Chart(tuple(panels), is_linked=True)
+
+
+def residual_chart(residual: FloatArray) -> Chart:
+    """Residual (n, 3) of the components or (n, 1) of the length, m/s²."""
+    pose = np.arange(len(residual), dtype=np.float64)
+    marks: list[Level | Points] = [Level(y=0.0)]
+    for k in range(residual.shape[1]):
+        name = f"f{'xyz'[k]}" if residual.shape[1] == 3 else "|f| − |g|"
+        values = mm_s2(residual[:, k])
+        told = [said(f"pose {p}, {name}", "", float(v), "mm/s²") for p, v in enumerate(values)]
+        marks.append(Points(pose, values, told, None, name, AXIS_COLOURS[k]))
+    x = Scale("pose", limits=(-0.7, len(pose) - 0.3), whole=True)
+    return Chart((Panel(x, Scale("residual [mm/s²]", "mm/s²"), tuple(marks)),))

@@ -1,0 +1,78 @@
+"""What a page draws of a recording, and of a calibration tested on it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.records import Recording, Segments, Verification
+from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
+from trihedron.report.chart import AXIS_COLOURS, Band, Bars, Chart, Level, Line, Panel, Points, Scale, Span
+from trihedron.report.drawn import envelope, said
+from trihedron.report.numbers import unit_in_print
+
+
+def signals_chart(recording: Recording, segments: Segments) -> Chart:
+    """Both sensors over time, holds shaded, bumps marked."""
+    spans = [
+        Span(float(recording.time_s[h.start]), float(recording.time_s[h.stop - 1]), "still pose")
+        for h in segments.holds
+    ]
+    last = recording.n_samples - 1
+    bumps = [
+        Span(float(recording.time_s[a]), float(recording.time_s[min(b, last)]), "disturbed, left out", "warn")
+        for hold in segments.holds
+        for a, b in hold.disturbed
+    ]
+    panels = []
+    limits = (float(recording.time_s[0]), float(recording.time_s[-1]) or 1.0)
+    for readings, name, unit in (
+        (recording.accelerometer, "accelerometer", recording.accelerometer_unit.value),
+        (recording.gyroscope, "gyroscope", recording.gyroscope_unit.value),
+    ):
+        if readings is None:
+            continue
+        lines = [
+            Line(*envelope(recording.time_s, readings[:, k]), f"axis {k + 1}", AXIS_COLOURS[k], is_thin=True)
+            for k in range(3)
+        ]
+        printed = unit_in_print(unit)
+        y = Scale(f"{name}  [{printed}]", printed)
+        panels.append(Panel(Scale("time [s]", "s", limits=limits), y, (*spans, *bumps, *lines), height_px=190))
+    return Chart(tuple(panels), is_linked=True)
+
+
+def verification_chart(verification: Verification) -> Chart:
+    """Norm error of every pose against what was to be expected, and the angle missed after every move."""
+    v = verification
+    pose = np.arange(len(v.norm_error), dtype=np.float64)
+    error, sigma = mm_s2(v.norm_error), mm_s2(v.norm_sigma)
+    edge = np.column_stack([pose - 0.5, pose + 0.5]).ravel()
+    limit = np.repeat(LIMIT_SIGMAS * sigma, 2)
+    told = [
+        said(f"pose {k}", "", e, f"mm/s² ({e / s:+.1f}σ)".replace("-", "−"))
+        for k, (e, s) in enumerate(zip(error, sigma, strict=True))
+    ]
+    norm = Panel(
+        Scale("still pose", limits=(-0.7, len(pose) - 0.3), whole=True),
+        Scale("|f| − |g|  [mm/s²]", "mm/s²"),
+        (
+            Band(edge, -limit, limit, "3σ of noise and of the calibration's own error"),
+            Level(y=0.0),
+            Points(pose, error, told, None, "error in the pose", "c1"),
+        ),
+    )
+    if not len(v.angle_deg):
+        return Chart((norm,))
+    move = np.arange(len(v.angle_deg), dtype=np.float64)
+    told = [said(f"move {k}", "", a, "°") for k, a in enumerate(v.angle_deg)]
+    expected = [said(f"move {k}, to be expected", "", a, "° rms") for k, a in enumerate(v.angle_sigma_deg)]
+    moves = Panel(
+        Scale("move", limits=(-0.7, len(move) - 0.3), whole=True),
+        Scale("gravity missed by  [°]", "°", includes=(0.0,)),
+        (
+            Bars(move, v.angle_deg, 0.7, told, "missed after the move", "c3"),
+            Points(move, v.angle_sigma_deg, expected, None, "to be expected (rms)", "ink"),
+        ),
+        height_px=180,
+    )
+    return Chart((norm, moves))

@@ -1,0 +1,57 @@
+"""Where an axis is marked, and with what."""
+
+from __future__ import annotations
+
+import math
+
+from trihedron.report.numbers import MINUS, power_of_ten
+
+Tick = tuple[float, str]
+"""Place in data units, and its words (empty: a line without a word)."""
+
+
+def ticks(low: float, high: float, *, is_log: bool, whole: bool = False, most: int = 6) -> list[Tick]:
+    """Round values between the limits, at most about ``most``."""
+    return _log_ticks(low, high, most) if is_log else _linear_ticks(low, high, whole, most)
+
+
+def _linear_ticks(low: float, high: float, whole: bool, most: int) -> list[Tick]:
+    if not high > low:
+        return [(low, _word(low, 0))]
+    rough = (high - low) / most
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(power * m for m in (1.0, 2.0, 2.5, 5.0, 10.0) if power * m >= rough * (1 - 1e-9))
+    if whole:
+        step = max(1.0, float(math.ceil(step)))
+    places = max(0, -math.floor(math.log10(step) + 1e-9))
+    if step / 10.0**-places % 1.0 > 1e-6:
+        places += 1
+    first = math.ceil(low / step - 1e-9)
+    last = math.floor(high / step + 1e-9)
+    return [(k * step, _word(k * step, places)) for k in range(first, last + 1)]
+
+
+def _log_ticks(low: float, high: float, most: int) -> list[Tick]:
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    every = max(1, math.ceil((last - first) / most))
+    narrow = math.log10(high / low) < 2.0
+    out = []
+    for n in range(first, last + 1):
+        for m in (1, 2, 5) if narrow else (1,):
+            value = m * 10.0**n
+            if low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
+                word = "" if n % every else _log_word(m, n)
+                out.append((value, word))
+    return out
+
+
+def _log_word(mantissa: int, n: int) -> str:
+    if -2 <= n <= 3:
+        return f"{mantissa * 10.0**n:g}"
+    return power_of_ten(n) if mantissa == 1 else f"{mantissa}·{power_of_ten(n)}"
+
+
+def _word(value: float, places: int) -> str:
+    if value != 0.0 and (abs(value) >= 1e6 or places > 5):
+        return f"{value:.1e}".replace("e-0", "e-").replace("e+0", "e").replace("-", MINUS)
+    return f"{value if round(value, places) else 0.0:.{places}f}".replace("-", MINUS)

@@ -1,0 +1,97 @@
+"""Noise of a session, measured once: `calibrate` and `diagnose` weigh every reading alike (docs/model-session.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.records.recording import Recording
+from trihedron.records.segments import Segments
+from trihedron.session.aliasing import unresolved_variance
+from trihedron.session.coloured_noise import coloured_variance
+
+FloatArray = npt.NDArray[np.float64]
+LEAST_SHARE = 1e-9
+"""Where nothing scatters (a simulation without noise) a billionth of a unit stands for the rounding of the log."""
+START_STRENGTHS = ((160.0, 160.0), (1e-3, 1e-3), (1.0, 1.0))
+"""Where the search of the zeros' strengths begins: corner times [s], scatter that counts as none, straying between
+poses in units of the scatter; accelerometer, gyro each."""
+
+
+@dataclass(frozen=True, eq=False)
+class SessionNoise:
+    """Noise of one session in raw units.
+
+    Standard errors of pose means (h, 3), white noise ``density`` (3,) raw · √s, and ``unresolved`` (m, 2, 3): variance
+    of every move's integrals, force and rate, (raw unit · s)², by motion faster than the samples and by noise slower
+    than a move.
+    """
+
+    force_sigma: FloatArray
+    force_density: FloatArray
+    rate_sigma: FloatArray | None
+    rate_density: FloatArray | None
+    unresolved: FloatArray
+
+
+def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[int, int]]) -> SessionNoise:
+    """Noise of poses and of the moves in half-open sample ``ranges``.
+
+    Raises
+    ------
+    ValueError
+        When the segments do not say how certain their means are.
+    """
+    if (
+        recording.accelerometer is None
+        or segments.accelerometer_sigma is None
+        or segments.accelerometer_sigma_mean is None
+        or segments.accelerometer_mean is None
+    ):
+        raise ValueError("the segments do not say how certain their hold means are")
+    step_s = 1.0 / recording.rate_hz
+    floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), 1e-300)
+    has_rate = recording.gyroscope is not None and segments.gyroscope_sigma is not None
+    sigmas = (
+        np.maximum(segments.accelerometer_sigma_mean, floor),
+        None if not has_rate else np.maximum(np.asarray(segments.gyroscope_sigma_mean), 1e-300),
+    )
+    densities = (
+        np.asarray(segments.accelerometer_sigma) * np.sqrt(step_s),
+        None if not has_rate else np.asarray(segments.gyroscope_sigma) * np.sqrt(step_s),
+    )
+    spans = [(hold.start, hold.stop) for hold in segments.holds]
+    lasts = np.array([(stop - start) * step_s for start, stop in spans])
+    moves_last = np.array([recording.time_s[b - 1] - recording.time_s[a] for a, b in ranges])
+    variances = np.zeros((len(ranges), 2, 3))
+    for k, readings in enumerate((recording.accelerometer, recording.gyroscope)):
+        sigma, density = sigmas[k], densities[k]
+        if readings is None or not ranges:
+            continue
+        variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s)
+        if sigma is not None and density is not None:
+            halves = np.array([_second_half_minus_first(readings[a:b]) for a, b in spans])
+            variances[:, k] += coloured_variance(sigma, halves, density, lasts, moves_last)
+    assert sigmas[0] is not None
+    assert densities[0] is not None
+    return SessionNoise(sigmas[0], densities[0], sigmas[1], densities[1], variances)
+
+
+def _second_half_minus_first(values: FloatArray) -> FloatArray:
+    first, second = np.array_split(values, 2)
+    out: FloatArray = np.nanmean(second, axis=0) - np.nanmean(first, axis=0)
+    return out
+
+
+def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None) -> FloatArray:
+    """(2, 3) the scatter that strength one means: the usual standard error of a pose, accelerometer and gyro, raw.
+
+    One size for three axes: an axis that is noisier than the others need not scatter more.
+    """
+    out = np.ones((2, 3))
+    out[0] = np.sqrt(np.mean(np.median(force_sigma, axis=0) ** 2))
+    if rate_sigma is not None:
+        out[1] = np.sqrt(np.mean(np.median(rate_sigma, axis=0) ** 2))
+    return np.maximum(out, 1e-300)

@@ -1,0 +1,253 @@
+//! Problems over a plain vector, their Jacobian compressed to an R factor.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::linear::{Certainty, Linear, Scaled, certainty, column_norms, cosine, positive_or_one};
+use super::{Descent, Local, Loss, Options, Stop, descend};
+use crate::error::{Error, Result};
+
+/// A problem the solver can work on. Weighted by the loss already.
+pub trait Problem {
+    /// The compressed problem at `x`.
+    ///
+    /// # Errors
+    /// When the model cannot be evaluated there at all.
+    fn linearise(&self, x: &DVector<f64>) -> Result<Linear>;
+
+    /// F of GN1 at `x`; infinite where the model does not hold, which the solver treats as a wall.
+    ///
+    /// # Errors
+    /// When the model cannot be evaluated there at all.
+    fn cost(&self, x: &DVector<f64>) -> Result<f64>;
+}
+
+/// Where the solver ended and how sure that is.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// The parameters `(p)`.
+    pub parameters: DVector<f64>,
+    /// Why it stopped.
+    pub stop: Stop,
+    /// Linearisations made.
+    pub iterations: usize,
+    /// F of GN1.
+    pub cost: f64,
+    /// Σ r² of the whitened residuals, without the loss.
+    pub chi2: f64,
+    /// Left side of GN4.
+    pub gradient: f64,
+    /// Left side of GN3 over `|D x|`.
+    pub step: f64,
+    /// `RᵀR = JᵀWJ` at the solution.
+    pub r_factor: DMatrix<f64>,
+    /// Number of residuals.
+    pub n_residuals: usize,
+    /// Certainty of the parameters.
+    pub certainty: Certainty,
+}
+
+/// Minimises a problem given by rows: `linearise` returns whitened residuals `(m)` and their Jacobian `(m, p)`,
+/// `residuals` the same residuals alone (cheaper; used for trial steps).
+///
+/// # Errors
+/// When there are no parameters, blocks do not divide the residuals, or the start gives a cost that is not finite.
+pub fn minimise(
+    linearise: impl Fn(&DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>)>,
+    residuals: impl Fn(&DVector<f64>) -> Result<DVector<f64>>,
+    start: DVector<f64>,
+    options: &Options,
+) -> Result<Solution> {
+    minimise_problem(
+        &Rows {
+            linearise,
+            residuals,
+            options: *options,
+        },
+        start,
+        options,
+    )
+}
+
+/// Minimises a [`Problem`].
+///
+/// # Errors
+/// When there are no parameters or the start gives a cost that is not finite.
+pub fn minimise_problem(
+    problem: &impl Problem,
+    start: DVector<f64>,
+    options: &Options,
+) -> Result<Solution> {
+    if start.is_empty() {
+        return Err(Error::bad_input("a fit needs at least one parameter"));
+    }
+    let dense = Dense {
+        problem,
+        rank_tolerance: options.rank_tolerance,
+    };
+    let ended = descend(&dense, start, options)?;
+    let linear = ended.local.linear;
+    Ok(Solution {
+        parameters: ended.point,
+        stop: ended.stop,
+        iterations: ended.iterations,
+        cost: linear.cost,
+        chi2: linear.chi2,
+        gradient: ended.gradient,
+        step: ended.step,
+        certainty: certainty(
+            &linear.r_factor,
+            options.loss.covariance_factor(options.block),
+            options.rank_tolerance,
+        ),
+        n_residuals: linear.n_residuals,
+        r_factor: linear.r_factor,
+    })
+}
+
+/// A [`Problem`] over a plain vector, its Jacobian compressed to an R factor.
+struct Dense<'a, P> {
+    problem: &'a P,
+    rank_tolerance: f64,
+}
+
+struct DenseLocal {
+    linear: Linear,
+    scale: DVector<f64>,
+    scaled: Scaled,
+    size: f64,
+    rank_tolerance: f64,
+}
+
+impl<P: Problem> Descent for Dense<'_, P> {
+    type Point = DVector<f64>;
+    type Local = DenseLocal;
+
+    fn linearise(&self, x: &DVector<f64>, previous: Option<&DenseLocal>) -> Result<DenseLocal> {
+        let linear = self.problem.linearise(x)?;
+        if linear.r_factor.iter().any(|value| !value.is_finite()) {
+            return Err(Error::bad_input(
+                "the residuals or their derivatives are not finite at the start of the fit; check the input for NaN",
+            ));
+        }
+        // Marquardt's scaling, never shrinking: a column that fades must not let its parameter run away.
+        let before = previous.map_or_else(|| DVector::zeros(x.len()), |local| local.scale.clone());
+        let scale = before.zip_map(&column_norms(&linear.r_factor), f64::max);
+        let scaled = Scaled::new(&linear.r_factor, &scale.map(positive_or_one), &linear.rhs);
+        let size = scaled.d.component_mul(x).norm();
+        Ok(DenseLocal {
+            linear,
+            scale,
+            scaled,
+            size,
+            rank_tolerance: self.rank_tolerance,
+        })
+    }
+
+    fn cost(&self, x: &DVector<f64>) -> Result<f64> {
+        self.problem.cost(x)
+    }
+
+    fn moved(&self, x: &DVector<f64>, step: &DVector<f64>) -> DVector<f64> {
+        x + step
+    }
+}
+
+impl Local for DenseLocal {
+    fn cost(&self) -> f64 {
+        self.linear.cost
+    }
+
+    fn n_residuals(&self) -> usize {
+        self.linear.n_residuals
+    }
+
+    fn is_finite(&self) -> bool {
+        self.linear.rhs.iter().all(|value| value.is_finite())
+    }
+
+    fn gradient_cosine(&self) -> f64 {
+        cosine(&self.linear)
+    }
+
+    fn step(&self, lambda: f64) -> Result<DVector<f64>> {
+        let unit = self.scaled.s[0] * self.scaled.s[0];
+        Ok(self.scaled.step(lambda * unit, self.rank_tolerance))
+    }
+
+    fn predicted(&self, step: &DVector<f64>) -> f64 {
+        let linear = &self.linear;
+        0.5 * (linear.rhs.norm_squared() - (&linear.r_factor * step + &linear.rhs).norm_squared())
+    }
+
+    fn length(&self, step: &DVector<f64>) -> f64 {
+        if self.size > 0.0 {
+            self.scaled.d.component_mul(step).norm() / self.size
+        } else {
+            f64::INFINITY
+        }
+    }
+}
+
+/// The adapter from closures that return rows.
+struct Rows<L, R> {
+    linearise: L,
+    residuals: R,
+    options: Options,
+}
+
+impl<L, R> Rows<L, R> {
+    /// Cost of the residuals, and √ρ' of each block.
+    fn charge(&self, residuals: &DVector<f64>) -> Result<(f64, Vec<f64>)> {
+        let block = self.options.block;
+        if block == 0 || !residuals.len().is_multiple_of(block) {
+            return Err(Error::bad_input(format!(
+                "{} residuals cannot be split into blocks of {block}",
+                residuals.len()
+            )));
+        }
+        let mut cost = 0.0;
+        let roots = residuals
+            .as_slice()
+            .chunks_exact(block)
+            .map(|chunk| {
+                let (value, slope, _) = self.options.loss.rho(chunk.iter().map(|r| r * r).sum());
+                cost += 0.5 * value;
+                slope.sqrt()
+            })
+            .collect();
+        Ok((cost, roots))
+    }
+}
+
+impl<L, R> Problem for Rows<L, R>
+where
+    L: Fn(&DVector<f64>) -> Result<(DVector<f64>, DMatrix<f64>)>,
+    R: Fn(&DVector<f64>) -> Result<DVector<f64>>,
+{
+    fn linearise(&self, x: &DVector<f64>) -> Result<Linear> {
+        let (mut residuals, mut jacobian) = (self.linearise)(x)?;
+        if jacobian.nrows() != residuals.len() || jacobian.ncols() != x.len() {
+            return Err(Error::bad_input(format!(
+                "a Jacobian of shape {:?} does not fit {} residuals and {} parameters",
+                jacobian.shape(),
+                residuals.len(),
+                x.len()
+            )));
+        }
+        let chi2 = residuals.norm_squared();
+        let (cost, roots) = self.charge(&residuals)?;
+        if self.options.loss != Loss::Linear {
+            for (i, residual) in residuals.iter_mut().enumerate() {
+                let root = roots[i / self.options.block];
+                *residual *= root;
+                jacobian.row_mut(i).scale_mut(root);
+            }
+        }
+        Ok(Linear::from_rows(residuals, jacobian, cost, chi2))
+    }
+
+    fn cost(&self, x: &DVector<f64>) -> Result<f64> {
+        let residuals = (self.residuals)(x)?;
+        Ok(self.charge(&residuals)?.0)
+    }
+}

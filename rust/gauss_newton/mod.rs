@@ -1,0 +1,256 @@
+//! The only solver: weighted nonlinear least squares by Gauss-Newton with Levenberg-Marquardt damping.
+//!
+//! It knows no sensor. Residuals arrive *whitened* (divided by their standard error), so that the inverse of `JᵀJ` at
+//! the solution is the covariance of the parameters. It minimises
+//!
+//! ```text
+//! F(x) = ½ Σ_k ρ(|r_k|²)                                                             (GN1)
+//! ```
+//!
+//! over blocks `r_k` of residuals (single ones by default), ρ being the [`Loss`]. Each step solves the reweighted linear
+//! problem in scaled parameters `D x`, `D = diag|J_j|`:
+//!
+//! ```text
+//! δ(λ) = -D⁻¹ V diag(s/(s² + λ)) Uᵀ q,      U diag(s) Vᵀ = R D⁻¹,   RᵀR = JᵀWJ,  Rᵀq = JᵀWr   (GN2)
+//! ```
+//!
+//! with λ = 0 (a pure Gauss-Newton step) whenever that lowers the cost. The two ways to converge are inequalities,
+//! evaluated on magnitudes, whatever the sign of the last change of cost:
+//!
+//! ```text
+//! |D δ(0)| ≤ step_tolerance · |D x|                     the undamped step no longer moves the parameters   (GN3)
+//! max_j |J_jᵀWr| / (|J_j| |r|) ≤ gradient_tolerance     the residual is orthogonal to every column         (GN4)
+//! ```
+
+mod dense;
+mod linear;
+mod loss;
+
+use nalgebra::DVector;
+
+use crate::error::{Error, Result};
+use crate::interrupt;
+pub use dense::{Problem, Solution, minimise, minimise_problem};
+pub use linear::{Certainty, Linear, certainty};
+pub use loss::Loss;
+
+/// When to stop, and how residuals are charged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// GN3.
+    pub step_tolerance: f64,
+    /// GN4.
+    pub gradient_tolerance: f64,
+    /// Linearisations allowed.
+    pub max_iterations: usize,
+    /// The loss of one block.
+    pub loss: Loss,
+    /// Residuals per block: 1, or 3 when a residual is a vector that is right or wrong as a whole.
+    pub block: usize,
+    /// A singular value of the column-scaled Jacobian below this fraction of the largest counts as zero.
+    pub rank_tolerance: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            step_tolerance: 1e-10,
+            gradient_tolerance: 1e-12,
+            max_iterations: 100,
+            loss: Loss::Linear,
+            block: 1,
+            rank_tolerance: 1e-9,
+        }
+    }
+}
+
+/// Why the iteration ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// GN3 holds.
+    SmallStep,
+    /// GN4 holds.
+    SmallGradient,
+    /// The residuals vanish to rounding.
+    ZeroResidual,
+    /// No step along the descent direction lowers the cost: it is flat to rounding, or the model is not smooth there.
+    NoDescent,
+    /// `max_iterations` linearisations were made.
+    TooManyIterations,
+}
+
+impl Stop {
+    /// The solution satisfies one of the convergence inequalities.
+    #[must_use]
+    pub fn is_converged(self) -> bool {
+        matches!(
+            self,
+            Self::SmallStep | Self::SmallGradient | Self::ZeroResidual
+        )
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::SmallStep => "converged: the Gauss-Newton step no longer moves the parameters",
+            Self::SmallGradient => "converged: the residual is orthogonal to every parameter",
+            Self::ZeroResidual => "converged: the residual vanishes to rounding",
+            Self::NoDescent => "stopped: no step lowers the cost any further",
+            Self::TooManyIterations => "stopped: iteration limit reached before convergence",
+        }
+    }
+}
+
+/// The linear problem at one point, whatever form its normal equations have.
+pub trait Local {
+    /// F of GN1 here.
+    fn cost(&self) -> f64;
+    /// Residuals behind it.
+    fn n_residuals(&self) -> usize;
+    /// Whether residuals and derivatives are all numbers.
+    fn is_finite(&self) -> bool;
+    /// Left side of GN4.
+    fn gradient_cosine(&self) -> f64;
+    /// GN2; λ counts in units of the largest eigenvalue of the scaled normal equations.
+    ///
+    /// # Errors
+    /// When the damped equations cannot be solved.
+    fn step(&self, lambda: f64) -> Result<DVector<f64>>;
+    /// By how much the step lowers the linear problem's cost.
+    fn predicted(&self, step: &DVector<f64>) -> f64;
+    /// What the step tolerance limits: for dense problems the left side of GN3 over `|D x|`.
+    fn length(&self, step: &DVector<f64>) -> f64;
+}
+
+/// A problem whose points need not be vectors and whose normal equations may have structure.
+pub trait Descent {
+    /// Where the problem is evaluated.
+    type Point;
+    /// Its linearisation.
+    type Local: Local;
+
+    /// The linear problem at a point; `previous` is the one before, for scales that must not shrink.
+    ///
+    /// # Errors
+    /// When the model cannot be evaluated there at all.
+    fn linearise(&self, point: &Self::Point, previous: Option<&Self::Local>)
+    -> Result<Self::Local>;
+
+    /// F of GN1; infinite where the model does not hold, which the solver treats as a wall.
+    ///
+    /// # Errors
+    /// When the model cannot be evaluated there at all.
+    fn cost(&self, point: &Self::Point) -> Result<f64>;
+
+    /// The point a step away.
+    fn moved(&self, point: &Self::Point, step: &DVector<f64>) -> Self::Point;
+}
+
+/// Where a descent ended.
+#[derive(Debug)]
+pub struct Ended<P, L> {
+    /// The point.
+    pub point: P,
+    /// Its linear problem.
+    pub local: L,
+    /// Why it stopped.
+    pub stop: Stop,
+    /// Linearisations made.
+    pub iterations: usize,
+    /// Left side of GN4.
+    pub gradient: f64,
+    /// Length of the undamped step, as [`Local::length`] counts it.
+    pub step: f64,
+}
+
+/// The descent itself: Gauss-Newton steps, damped where a full one does not lower the cost.
+///
+/// # Errors
+/// When the start gives a cost that is not finite, or the model cannot be evaluated.
+pub fn descend<D: Descent>(
+    problem: &D,
+    start: D::Point,
+    options: &Options,
+) -> Result<Ended<D::Point, D::Local>> {
+    let mut point = start;
+    let mut previous: Option<D::Local> = None;
+    let mut damping = 0.0_f64;
+    let mut iterations = 0;
+    loop {
+        if interrupt::is_requested() {
+            return Err(Error::not_determined("the fit was interrupted"));
+        }
+        let local = problem.linearise(&point, previous.as_ref())?;
+        iterations += 1;
+        if !local.cost().is_finite() || !local.is_finite() {
+            return Err(Error::bad_input(
+                "the residuals or their derivatives are not finite at the start of the fit; check the input for NaN",
+            ));
+        }
+        let gradient = local.gradient_cosine();
+        let step = local.length(&local.step(0.0)?);
+        // Whitened residuals are of order one; a root mean square of 1e-13 is rounding whatever the unit.
+        let mut stop = if local.cost() <= 1e-26 * local.n_residuals() as f64 {
+            Some(Stop::ZeroResidual)
+        } else if step <= options.step_tolerance {
+            Some(Stop::SmallStep)
+        } else if gradient <= options.gradient_tolerance {
+            Some(Stop::SmallGradient)
+        } else if iterations > options.max_iterations {
+            Some(Stop::TooManyIterations)
+        } else {
+            None
+        };
+        if stop.is_none() {
+            match lower(problem, &point, &local, &mut damping)? {
+                Some(next) => point = next,
+                None => stop = Some(Stop::NoDescent),
+            }
+        }
+        if let Some(stop) = stop {
+            return Ok(Ended {
+                point,
+                local,
+                stop,
+                iterations,
+                gradient,
+                step,
+            });
+        }
+        previous = Some(local);
+    }
+}
+
+/// A step that lowers the cost, undamped when possible; `None` when even a tiny one does not.
+fn lower<D: Descent>(
+    problem: &D,
+    point: &D::Point,
+    local: &D::Local,
+    damping: &mut f64,
+) -> Result<Option<D::Point>> {
+    for _ in 0..60 {
+        let delta = local.step(*damping)?;
+        let moved = problem.moved(point, &delta);
+        let cost = problem.cost(&moved)?;
+        let predicted = local.predicted(&delta);
+        let gain = (local.cost() - cost) / predicted;
+        if cost.is_finite() && predicted > 0.0 && gain > 1e-4 {
+            if gain > 0.75 {
+                *damping = if *damping > 1e-6 { *damping * 0.1 } else { 0.0 };
+            } else if gain < 0.25 {
+                *damping = (*damping * 4.0).max(1e-4);
+            }
+            return Ok(Some(moved));
+        }
+        // Flat to rounding: the change is below what the sum of squares can resolve, so take the Newton step as it is.
+        if *damping == 0.0
+            && predicted <= 1e-13 * local.cost()
+            && (cost - local.cost()).abs() <= 1e-12 * local.cost()
+        {
+            return Ok(Some(moved));
+        }
+        *damping = (*damping * 8.0).max(1e-4);
+    }
+    Ok(None)
+}

@@ -1,0 +1,393 @@
+//! A fitted session across the seam.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, Vector3};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::{Corners, distortion};
+use crate::python::arrays::{dmatrix, matrix, of3, vectors};
+use crate::python::poisson::vector3;
+use crate::python::{run, run_long};
+use crate::session_model::Session;
+use crate::session_model::fit::Fit;
+use crate::session_model::predict::domain_of;
+use crate::session_model::rows::Domain;
+
+type Array2<'py> = PyReadonlyArray2<'py, f64>;
+type Array3<'py> = PyReadonlyArray3<'py, f64>;
+
+/// A session at its optimum.
+#[pyclass(frozen, module = "trihedron._core")]
+pub(super) struct SessionFit {
+    pub session: Arc<Session>,
+    pub fit: Arc<Fit>,
+}
+
+#[pymethods]
+impl SessionFit {
+    #[getter]
+    fn force_scale<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        of3(py, &self.fit.state.force_scale)
+    }
+
+    #[getter]
+    fn force_bias<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.fit.state.force_bias.as_slice().to_pyarray(py)
+    }
+
+    #[getter]
+    fn rate_scale<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        of3(py, &self.fit.state.rate_scale)
+    }
+
+    #[getter]
+    fn up<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        vectors(py, &self.fit.state.up)
+    }
+
+    #[getter]
+    fn rate_zero<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        vectors(py, &self.fit.state.rate_zero)
+    }
+
+    #[getter]
+    fn force_zero<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        vectors(py, &self.fit.state.force_zero)
+    }
+
+    #[getter]
+    fn effect<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.fit.state.effect.as_slice().to_pyarray(py)
+    }
+
+    #[getter]
+    fn corners_s(&self) -> (f64, f64) {
+        let [a, b] = self.fit.strengths.corner_s;
+        (a, b)
+    }
+
+    #[getter]
+    fn scatter(&self) -> (f64, f64) {
+        let [a, b] = self.fit.strengths.scatter;
+        (a, b)
+    }
+
+    /// Corner times, s; scatter in its units; straying between poses in units of the scatter: accelerometer, gyro each.
+    #[getter]
+    fn strengths(&self) -> (Corners, Corners, Corners) {
+        let s = &self.fit.strengths;
+        let pair = |[a, b]: [f64; 2]| (a, b);
+        (pair(s.corner_s), pair(s.scatter), pair(s.between))
+    }
+
+    #[getter]
+    fn is_walk_at_edge(&self) -> (bool, bool) {
+        let [a, b] = self.fit.is_walk_at_edge();
+        (a, b)
+    }
+
+    #[getter]
+    fn chi2(&self) -> f64 {
+        self.fit.chi2()
+    }
+
+    #[getter]
+    fn log_marginal(&self) -> f64 {
+        self.fit.log_marginal()
+    }
+
+    #[getter]
+    fn log_profile(&self) -> f64 {
+        self.fit.log_profile()
+    }
+
+    #[getter]
+    fn is_converged(&self) -> bool {
+        self.fit.stop.is_converged()
+    }
+
+    #[getter]
+    fn stopped_because(&self) -> &'static str {
+        self.fit.stop.in_words()
+    }
+
+    #[getter]
+    fn iterations(&self) -> usize {
+        self.fit.iterations
+    }
+
+    /// `(undamped step in standard errors of all rows, orthogonality of the residual)` where it stopped.
+    #[getter]
+    fn convergence(&self) -> (f64, f64) {
+        (self.fit.step, self.fit.gradient)
+    }
+
+    /// `(rows,)` whitened residuals.
+    #[getter]
+    fn residual<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let flat: Vec<f64> = self
+            .fit
+            .groups
+            .iter()
+            .flat_map(|group| group.rows.residual.as_slice().to_vec())
+            .collect();
+        flat.to_pyarray(py)
+    }
+
+    /// `(rows, 4)` domain, segment, channel and process of every row.
+    #[getter]
+    fn labels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let mut flat: Vec<i64> = Vec::new();
+        for group in &self.fit.groups {
+            for r in 0..group.rows.len() {
+                let domain = domain_of(group, r);
+                let channel = match domain {
+                    Domain::Dynamics => r - 2,
+                    _ => r % 3,
+                };
+                flat.extend([
+                    domain as i64,
+                    i64::try_from(group.segment).unwrap_or(i64::MAX),
+                    i64::try_from(channel).unwrap_or(i64::MAX),
+                    group.kind as i64,
+                ]);
+            }
+        }
+        let n = flat.len() / 4;
+        flat.to_pyarray(py).reshape([n, 4])
+    }
+
+    /// `(points, 3)` corrected rate and force, `(move samples, 3, 3)` attitude since each move began.
+    #[allow(clippy::type_complexity)]
+    fn path<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray3<f64>>,
+    )> {
+        let h = self.session.n_poses();
+        let mut rate = vec![Vector3::zeros(); h];
+        let mut force: Vec<Vector3<f64>> = self
+            .fit
+            .state
+            .up
+            .iter()
+            .map(|up| up * self.session.gravity)
+            .collect();
+        let mut attitude: Vec<f64> = Vec::new();
+        for one in &self.fit.passed {
+            rate.extend_from_slice(&one.carried.rate);
+            force.extend_from_slice(&one.carried.force);
+            for turn in &one.carried.attitude {
+                attitude.extend_from_slice(turn.transpose().as_slice());
+            }
+        }
+        let n = attitude.len() / 9;
+        Ok((
+            vectors(py, &rate)?,
+            vectors(py, &force)?,
+            attitude.to_pyarray(py).reshape([n, 3, 3])?,
+        ))
+    }
+
+    /// `(moves, 5)` residuals of moves in SI and `(moves, 5, 5)` their noise.
+    #[allow(clippy::type_complexity)]
+    fn moves<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+        let m = self.fit.passed.len();
+        let residual: Vec<f64> = self
+            .fit
+            .passed
+            .iter()
+            .flat_map(|one| one.carried.residual.as_slice().to_vec())
+            .collect();
+        let covariance: Vec<f64> = self
+            .fit
+            .move_covariance()
+            .iter()
+            .flat_map(|cov| cov.as_slice().to_vec())
+            .collect();
+        Ok((
+            residual.to_pyarray(py).reshape([m, 5])?,
+            covariance.to_pyarray(py).reshape([m, 5, 5])?,
+        ))
+    }
+
+    /// `(moves, 5, 5)` whitening of the moves' residuals.
+    fn whitening<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let flat: Vec<f64> = self
+            .fit
+            .weights
+            .white
+            .iter()
+            .flat_map(|white| white.transpose().as_slice().to_vec())
+            .collect();
+        flat.to_pyarray(py)
+            .reshape([self.fit.weights.white.len(), 5, 5])
+    }
+
+    /// `(rows, k)` whitened change of every row per parameter of further effects.
+    fn columns<'py>(
+        &self,
+        py: Python<'py>,
+        force: Option<Array3<'py>>,
+        rate: Option<Array3<'py>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let effects = distortion(force.as_ref(), rate.as_ref(), self.session.n_points())?;
+        let fit = Arc::clone(&self.fit);
+        let session = Arc::clone(&self.session);
+        let parts = run_long(py, || {
+            session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, &effects)
+        })?;
+        let n = self.fit.n_rows();
+        let mut flat = Vec::with_capacity(n * effects.k);
+        for part in &parts {
+            flat.extend_from_slice(part.transpose().as_slice());
+        }
+        flat.to_pyarray(py).reshape([n, effects.k])
+    }
+
+    /// Columns `(rows, k)` minus what the unknowns of the fit can imitate.
+    fn project<'py>(
+        &self,
+        py: Python<'py>,
+        columns: Array2<'py>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        if columns.shape()[0] != self.fit.n_rows() {
+            return Err(PyValueError::new_err(format!(
+                "columns must have {} rows, got {}",
+                self.fit.n_rows(),
+                columns.shape()[0]
+            )));
+        }
+        let columns = dmatrix(&columns);
+        let fit = Arc::clone(&self.fit);
+        let out = run(py, || Ok(fit.project(&columns)))?;
+        matrix(py, &out)
+    }
+
+    /// `(rows,)` share of every row that the fit used up.
+    fn leverage<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let fit = Arc::clone(&self.fit);
+        Ok(run(py, || Ok(fit.leverage()))?.to_pyarray(py))
+    }
+
+    /// Held-out prediction of folds of rows, `(folds, rows)` flags: χ² `(folds, 4)`, log-determinants `(folds,)`,
+    /// directions `(4,)`, innovations `(rows,)` whitened, and over each row's own noise.
+    #[allow(clippy::type_complexity)]
+    fn held_out<'py>(
+        &self,
+        py: Python<'py>,
+        folds: PyReadonlyArray2<'py, bool>,
+    ) -> PyResult<(
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray1<f64>>,
+    )> {
+        if folds.shape()[1] != self.fit.n_rows() {
+            return Err(PyValueError::new_err(
+                "folds must have one flag for every row",
+            ));
+        }
+        let view = folds.as_array();
+        let firsts = self.fit.first_rows();
+        let lists: Vec<Vec<usize>> = view
+            .rows()
+            .into_iter()
+            .map(|row| (0..firsts.len()).filter(|&g| row[firsts[g]]).collect())
+            .collect();
+        let fit = Arc::clone(&self.fit);
+        let out = run_long(py, || fit.held_out(&lists))?;
+        let flat: Vec<f64> = out.chi2.iter().flatten().copied().collect();
+        Ok((
+            flat.to_pyarray(py).reshape([out.chi2.len(), 4])?,
+            out.log_det.to_pyarray(py),
+            out.n_rows.to_pyarray(py),
+            out.residual.to_pyarray(py),
+            out.innovation.to_pyarray(py),
+        ))
+    }
+
+    /// Covariance of what all poses share: both linear models (18), then effects.
+    fn border_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        matrix(py, &self.fit.border_covariance())
+    }
+
+    /// `(24, 24)` covariance of `(S_a, b_a, S_w, b_w)` on raw readings centred at two origins, and `b_w` `(3,)` with one
+    /// zero for the session.
+    #[allow(clippy::type_complexity)]
+    fn linear_covariance<'py>(
+        &self,
+        py: Python<'py>,
+        force_origin: PyReadonlyArray1<'py, f64>,
+        rate_origin: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+        let origins = [
+            vector3("force_origin", &force_origin)?,
+            vector3("rate_origin", &rate_origin)?,
+        ];
+        let (fit, session) = (Arc::clone(&self.fit), Arc::clone(&self.session));
+        let (covariance, bias) = run(py, || fit.linear_covariance(&session, &origins))?;
+        Ok((matrix(py, &covariance)?, bias.as_slice().to_pyarray(py)))
+    }
+
+    /// What the other rows say without those flagged `(rows,)`: `S_a`, `b_a`, `S_w` on centred readings, and the `(12, 12)`
+    /// covariance of `(S_a, b_a)` on raw ones.
+    #[allow(clippy::type_complexity)]
+    fn without<'py>(
+        &self,
+        py: Python<'py>,
+        rows: PyReadonlyArray1<'py, bool>,
+        force_origin: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<(
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray1<f64>>,
+        Bound<'py, PyArray2<f64>>,
+        Bound<'py, PyArray2<f64>>,
+    )> {
+        if rows.shape()[0] != self.fit.n_rows() {
+            return Err(PyValueError::new_err(
+                "there must be one flag for every row",
+            ));
+        }
+        let flags = rows.as_array();
+        let firsts = self.fit.first_rows();
+        let groups: Vec<usize> = (0..firsts.len()).filter(|&g| flags[firsts[g]]).collect();
+        let origin = vector3("force_origin", &force_origin)?;
+        let fit = Arc::clone(&self.fit);
+        let (state, covariance) = run(py, || fit.without(&groups, &origin))?;
+        Ok((
+            of3(py, &state.force_scale)?,
+            state.force_bias.as_slice().to_pyarray(py),
+            of3(py, &state.rate_scale)?,
+            matrix(py, &covariance)?,
+        ))
+    }
+
+    /// `(rows, unknowns)` the Jacobian in full: border, then pose after pose. For tests and small sessions.
+    fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let layout = self.fit.layout();
+        let mut out = DMatrix::zeros(self.fit.n_rows(), layout.n());
+        for (group, first) in self.fit.groups.iter().zip(self.fit.first_rows()) {
+            let rows = group.rows.len();
+            let mut part = DMatrix::zeros(layout.n(), rows);
+            group
+                .rows
+                .add_transposed(layout, &DMatrix::identity(rows, rows), &mut part);
+            out.rows_mut(first, rows).copy_from(&part.transpose());
+        }
+        matrix(py, &out)
+    }
+}

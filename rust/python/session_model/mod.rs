@@ -1,0 +1,248 @@
+//! The joint model of a session across the seam.
+
+mod fit;
+mod poses;
+
+use std::sync::Arc;
+
+use nalgebra::{SMatrix, Vector3};
+use numpy::{
+    PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArrayMethods, ToPyArray,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::rotation::rows3;
+use crate::session_model::fit::fit;
+use crate::session_model::move_rows::Weights;
+use crate::session_model::moves::MoveNoise;
+use crate::session_model::strengths::tune;
+use crate::session_model::{Distortion, N_MODEL, Prior, Session, Strengths};
+use fit::SessionFit;
+use poses::{SessionMoves, SessionPoses, SessionState};
+
+type Array2<'py> = PyReadonlyArray2<'py, f64>;
+type Array3<'py> = PyReadonlyArray3<'py, f64>;
+/// A figure of the accelerometer and of the gyro.
+type Corners = (f64, f64);
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<SessionPoses>()?;
+    module.add_class::<SessionMoves>()?;
+    module.add_class::<SessionState>()?;
+    module.add_class::<SessionModel>()?;
+    module.add_class::<SessionFit>()?;
+    Ok(())
+}
+
+/// What was read in a session, arranged once for many fits.
+#[pyclass(frozen, module = "trihedron._core")]
+struct SessionModel {
+    session: Arc<Session>,
+}
+
+/// `(points, 3, k)` arrays of two sensors as one distortion.
+fn distortion(
+    force: Option<&Array3<'_>>,
+    rate: Option<&Array3<'_>>,
+    n_points: usize,
+) -> PyResult<Distortion> {
+    let flat = |name: &str, array: Option<&Array3<'_>>| -> PyResult<Option<(Vec<f64>, usize)>> {
+        let Some(array) = array else { return Ok(None) };
+        let shape = array.shape();
+        if shape[0] != n_points || shape[1] != 3 {
+            return Err(PyValueError::new_err(format!(
+                "{name} must have shape ({n_points}, 3, k), got ({}, {}, {})",
+                shape[0], shape[1], shape[2]
+            )));
+        }
+        Ok(Some((array.as_array().iter().copied().collect(), shape[2])))
+    };
+    let force = flat("force", force)?;
+    let rate = flat("rate", rate)?;
+    let k = force
+        .as_ref()
+        .or(rate.as_ref())
+        .map_or(0, |(_, columns)| *columns);
+    if let (Some((_, a)), Some((_, b))) = (&force, &rate)
+        && a != b
+    {
+        return Err(PyValueError::new_err(format!(
+            "an effect has {a} columns of force and {b} of rate: they must be the same parameters"
+        )));
+    }
+    Ok(Distortion {
+        force: force.map(|(values, _)| values).filter(|_| k > 0),
+        rate: rate.map(|(values, _)| values).filter(|_| k > 0),
+        k,
+    })
+}
+
+#[pymethods]
+impl SessionModel {
+    /// `noise`: jitter of the sample instants s, usual step s, factors on the standard errors of both kinds of residuals of
+    /// moves. `prior`: mean `(18,)`, covariance `(18, 18)`, whether it is weak. `scatter`: `(2, 3)` raw, what strength one
+    /// means, and whether that is known.
+    #[new]
+    #[pyo3(signature = (*, gravity_m_s2, poses, moves, noise, prior, scatter))]
+    fn new(
+        py: Python<'_>,
+        gravity_m_s2: f64,
+        poses: &SessionPoses,
+        moves: &SessionMoves,
+        noise: (f64, f64, Corners),
+        prior: Option<(PyReadonlyArray1<'_, f64>, Array2<'_>, bool)>,
+        scatter: Option<(Array2<'_>, bool)>,
+    ) -> PyResult<Self> {
+        let prior = prior
+            .map(|(mean, covariance, is_weak)| prior_of(&mean, &covariance, is_weak))
+            .transpose()?;
+        let is_scatter_given = scatter.as_ref().is_some_and(|(_, is_given)| *is_given);
+        let scatter = scatter
+            .map(|(array, _)| match rows3("scatter", &array)?.as_slice() {
+                [a, b] => Ok([*a, *b]),
+                _ => Err(PyValueError::new_err("scatter must have shape (2, 3)")),
+            })
+            .transpose()?;
+        let (jitter_s, nominal_step_s, inflation) = noise;
+        let noise = MoveNoise {
+            force_density: poses.force.density,
+            rate_density: poses
+                .rate
+                .as_ref()
+                .map_or_else(Vector3::zeros, |rate| rate.density),
+            jitter_s,
+            nominal_step_s,
+            inflation: [inflation.0, inflation.1],
+        };
+        let session = Session {
+            gravity: gravity_m_s2,
+            time_s: poses.time_s.clone(),
+            force: poses.force.clone(),
+            rate: poses.rate.clone(),
+            moves: Arc::clone(&moves.moves),
+            noise,
+            prior,
+            scatter,
+            is_scatter_given,
+        };
+        super::run(py, || session.check())?;
+        Ok(Self {
+            session: Arc::new(session),
+        })
+    }
+
+    /// Fits from a state; of the `strengths`, corner times and scatter are chosen by marginal likelihood when `is_tuned`.
+    #[pyo3(signature = (*, state, strengths, force_effect, rate_effect, is_tuned))]
+    fn fit(
+        &self,
+        py: Python<'_>,
+        state: &SessionState,
+        strengths: (Corners, Corners, Corners),
+        force_effect: Option<Array3<'_>>,
+        rate_effect: Option<Array3<'_>>,
+        is_tuned: bool,
+    ) -> PyResult<SessionFit> {
+        let start = self.checked(state)?;
+        let effects = distortion(
+            force_effect.as_ref(),
+            rate_effect.as_ref(),
+            self.session.n_points(),
+        )?;
+        if start.effect.len() != effects.k {
+            return Err(PyValueError::new_err(format!(
+                "{} effect parameters came with {} columns",
+                start.effect.len(),
+                effects.k
+            )));
+        }
+        let pair = |(a, b): Corners| [a, b];
+        let strengths = Strengths {
+            corner_s: pair(strengths.0),
+            scatter: pair(strengths.1),
+            between: pair(strengths.2),
+        };
+        let session = Arc::clone(&self.session);
+        let found = super::run_long(py, || {
+            if is_tuned {
+                tune(&session, start, strengths, &effects)
+            } else {
+                fit(&session, start, strengths, &effects)
+            }
+        })?;
+        Ok(SessionFit {
+            session: Arc::clone(&self.session),
+            fit: Arc::new(found),
+        })
+    }
+
+    /// `(moves, 5)` whitened residuals of the moves at a state, nothing fitted.
+    fn move_residuals<'py>(
+        &self,
+        py: Python<'py>,
+        state: &SessionState,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let start = self.checked(state)?;
+        let session = Arc::clone(&self.session);
+        let (weights, passed) = super::run(py, || {
+            let planes = session.planes(&start);
+            let passed = session.pass(&start, &Distortion::default(), &planes);
+            Ok((Weights::of(&passed, &Strengths::NONE)?, passed))
+        })?;
+        let flat: Vec<f64> = weights
+            .white
+            .iter()
+            .zip(&passed)
+            .flat_map(|(white, one)| (white * one.carried.residual).as_slice().to_vec())
+            .collect();
+        flat.to_pyarray(py).reshape([passed.len(), 5])
+    }
+}
+
+impl SessionModel {
+    fn checked(&self, state: &SessionState) -> PyResult<crate::session_model::State> {
+        let h = self.session.n_poses();
+        if state.state.up.len() != h {
+            return Err(PyValueError::new_err(format!(
+                "the state needs one vertical for each of {h} poses, got {}",
+                state.state.up.len()
+            )));
+        }
+        Ok(state.state.clone())
+    }
+}
+
+fn prior_of(
+    mean: &PyReadonlyArray1<'_, f64>,
+    covariance: &Array2<'_>,
+    is_weak: bool,
+) -> PyResult<Prior> {
+    if mean.as_array().len() != N_MODEL || covariance.shape() != [N_MODEL, N_MODEL] {
+        return Err(PyValueError::new_err(
+            "a prior has 18 values and an (18, 18) covariance",
+        ));
+    }
+    let view = covariance.as_array();
+    let matrix = SMatrix::<f64, N_MODEL, N_MODEL>::from_fn(|i, j| view[[i, j]]);
+    // Counts and m/s² spread the variances over many decades: scaled to a unit diagonal first.
+    let size = matrix.diagonal().map(f64::sqrt);
+    let scaled = SMatrix::<f64, N_MODEL, N_MODEL>::from_fn(|i, j| {
+        matrix[(i, j)] / (size[i] * size[j]) + if i == j { 1e-13 } else { 0.0 }
+    });
+    let half = scaled
+        .cholesky()
+        .and_then(|half| half.l().try_inverse())
+        .ok_or_else(|| {
+            PyValueError::new_err(
+                "the covariance of the given calibration is not positive definite",
+            )
+        })?;
+    let white = SMatrix::from_fn(|i, j| half[(i, j)] / size[j]);
+    let values = mean.as_array();
+    Ok(Prior {
+        mean: nalgebra::SVector::from_fn(|i, _| values[i]),
+        white,
+        is_weak,
+    })
+}

@@ -1,0 +1,207 @@
+//! Poses, moves and a point in the unknowns, each arranged once and handed over as one object.
+
+use std::sync::Arc;
+
+use nalgebra::{DVector, Vector3};
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::python::poisson::{matrix3, samples, vector3};
+use crate::python::rotation::rows3;
+use crate::session_model::moves::Move;
+use crate::session_model::{AtRest, State};
+
+type Array1<'py> = PyReadonlyArray1<'py, f64>;
+type Array2<'py> = PyReadonlyArray2<'py, f64>;
+type Array3<'py> = PyReadonlyArray3<'py, f64>;
+
+/// Means of the still poses.
+#[pyclass(frozen, module = "trihedron._core")]
+pub(super) struct SessionPoses {
+    pub time_s: Vec<f64>,
+    pub force: AtRest,
+    pub rate: Option<AtRest>,
+}
+
+#[pymethods]
+impl SessionPoses {
+    /// `time_s` `(h,)`, means and standard errors `(h, 3)`, densities `(3,)`: raw and centred.
+    #[new]
+    #[pyo3(signature = (*, time_s, force, force_sigma, force_density, rate, rate_sigma, rate_density))]
+    fn new(
+        time_s: Array1<'_>,
+        force: Array2<'_>,
+        force_sigma: Array2<'_>,
+        force_density: Array1<'_>,
+        rate: Option<Array2<'_>>,
+        rate_sigma: Option<Array2<'_>>,
+        rate_density: Option<Array1<'_>>,
+    ) -> PyResult<Self> {
+        let at_rest = |mean: &Array2<'_>, sigma: &Array2<'_>, density: &Array1<'_>| {
+            Ok::<_, PyErr>(AtRest {
+                mean: rows3("hold means", mean)?,
+                sigma: rows3("hold sigmas", sigma)?,
+                density: vector3("density", density)?,
+            })
+        };
+        Ok(Self {
+            time_s: samples(&time_s),
+            force: at_rest(&force, &force_sigma, &force_density)?,
+            rate: match (&rate, &rate_sigma, &rate_density) {
+                (Some(mean), Some(sigma), Some(density)) => Some(at_rest(mean, sigma, density)?),
+                _ => None,
+            },
+        })
+    }
+}
+
+/// Samples of the moves between them.
+#[pyclass(frozen, module = "trihedron._core")]
+pub(super) struct SessionMoves {
+    pub moves: Arc<Vec<Move>>,
+}
+
+#[pymethods]
+impl SessionMoves {
+    /// `hold_time_s` `(h,)`; whole recording `time_s` `(n,)`, `force`, `rate` `(n, 3)` raw and centred; `ranges` `(m, 2)` of
+    /// samples, the pose `before` `(m,)` each, `unresolved` `(m, 2, 3)` variances of their integrals.
+    #[new]
+    #[pyo3(signature = (*, hold_time_s, time_s, force, rate, ranges, before, unresolved))]
+    fn new(
+        hold_time_s: Array1<'_>,
+        time_s: Array1<'_>,
+        force: Array2<'_>,
+        rate: Option<Array2<'_>>,
+        ranges: PyReadonlyArray2<'_, i64>,
+        before: PyReadonlyArray1<'_, i64>,
+        unresolved: Array3<'_>,
+    ) -> PyResult<Self> {
+        let moves = moves_of(
+            &samples(&time_s),
+            &samples(&hold_time_s),
+            &force,
+            rate.as_ref(),
+            &ranges,
+            &before,
+            &unresolved,
+        )?;
+        Ok(Self {
+            moves: Arc::new(moves),
+        })
+    }
+}
+
+/// A point in the unknowns.
+#[pyclass(frozen, module = "trihedron._core")]
+pub(super) struct SessionState {
+    pub state: State,
+}
+
+#[pymethods]
+impl SessionState {
+    /// `S_a`, `b_a`, `S_w` on centred readings; of every pose the vertical and both zeros, raw, `(h, 3)`; effects `(k,)`.
+    #[new]
+    #[pyo3(signature = (*, force_scale, force_bias, rate_scale, up, rate_zero, force_zero, effect))]
+    fn new(
+        force_scale: Array2<'_>,
+        force_bias: Array1<'_>,
+        rate_scale: Array2<'_>,
+        up: Array2<'_>,
+        rate_zero: Array2<'_>,
+        force_zero: Array2<'_>,
+        effect: Array1<'_>,
+    ) -> PyResult<Self> {
+        let up = rows3("up", &up)?;
+        let h = up.len();
+        let state = State {
+            force_scale: matrix3("force_scale", &force_scale)?,
+            force_bias: vector3("force_bias", &force_bias)?,
+            rate_scale: matrix3("rate_scale", &rate_scale)?,
+            up,
+            rate_zero: rows3("rate_zero", &rate_zero)?,
+            force_zero: rows3("force_zero", &force_zero)?,
+            own: [vec![Vector3::zeros(); h], vec![Vector3::zeros(); h]],
+            effect: DVector::from_vec(samples(&effect)),
+        };
+        if [state.rate_zero.len(), state.force_zero.len()] != [h; 2] {
+            return Err(PyValueError::new_err(format!(
+                "the state needs one zero of each sensor for each of {h} poses"
+            )));
+        }
+        Ok(Self { state })
+    }
+}
+
+fn moves_of(
+    time_s: &[f64],
+    hold_time_s: &[f64],
+    force: &Array2<'_>,
+    rate: Option<&Array2<'_>>,
+    ranges: &PyReadonlyArray2<'_, i64>,
+    before: &PyReadonlyArray1<'_, i64>,
+    unresolved: &Array3<'_>,
+) -> PyResult<Vec<Move>> {
+    let m = ranges.shape()[0];
+    if m == 0 {
+        return Ok(Vec::new());
+    }
+    if ranges.shape()[1] != 2 || before.as_array().len() != m || unresolved.shape() != [m, 2, 3] {
+        return Err(PyValueError::new_err(format!(
+            "{m} moves need ranges ({m}, 2), holds ({m},) and unresolved variances ({m}, 2, 3)"
+        )));
+    }
+    let Some(rate) = rate else {
+        return Err(PyValueError::new_err("moves need a gyro"));
+    };
+    let n = time_s.len();
+    if force.shape() != [n, 3] || rate.shape() != [n, 3] {
+        return Err(PyValueError::new_err(format!(
+            "force and rate must have shape ({n}, 3)"
+        )));
+    }
+    let (force, rate) = (force.as_array(), rate.as_array());
+    let rows = |of: &numpy::ndarray::ArrayView2<'_, f64>, start: usize, stop: usize| {
+        (start..stop)
+            .map(|k| Vector3::new(of[[k, 0]], of[[k, 1]], of[[k, 2]]))
+            .collect::<Vec<_>>()
+    };
+    let (ranges, before, unresolved) =
+        (ranges.as_array(), before.as_array(), unresolved.as_array());
+    let index = |value: i64| {
+        usize::try_from(value)
+            .map_err(|_| PyValueError::new_err(format!("{value} is not an index")))
+    };
+    let mut out = Vec::with_capacity(m);
+    let mut first_point = 0;
+    for k in 0..m {
+        let (start, stop, hold) = (
+            index(ranges[[k, 0]])?,
+            index(ranges[[k, 1]])?,
+            index(before[k])?,
+        );
+        if start + 2 > stop || stop > n {
+            return Err(PyValueError::new_err(format!(
+                "move {k} covers samples {start}..{stop} of {}",
+                time_s.len()
+            )));
+        }
+        if hold + 1 >= hold_time_s.len() {
+            return Err(PyValueError::new_err(format!(
+                "move {k} begins in pose {hold} and there is none after it"
+            )));
+        }
+        let extra = [0, 1].map(|s| Vector3::from_fn(|i, _| unresolved[[k, s, i]]));
+        out.push(Move::new(
+            hold,
+            &time_s[start..stop],
+            rows(&rate, start, stop),
+            rows(&force, start, stop),
+            [hold_time_s[hold], hold_time_s[hold + 1]],
+            extra,
+            first_point,
+        ));
+        first_point += stop - start;
+    }
+    Ok(out)
+}

@@ -1,0 +1,212 @@
+//! A factored chain: solutions, determinants, and covariances in one backward pass (docs/model-session.md, 11.9-11.13).
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::chain::{Layout, Rows, scaled};
+
+/// A factored chain.
+#[derive(Debug, Clone)]
+pub struct Factor {
+    pub(super) layout: Layout,
+    pub(super) scale: DVector<f64>,
+    pub(super) corner: Cholesky<f64, Dyn>,
+    /// Border rows of every pose after elimination of the poses before.
+    pub(super) border: Vec<DMatrix<f64>>,
+    pub(super) diagonal: Vec<Cholesky<f64, Dyn>>,
+    /// `W_i = D_i⁻¹ E_i`.
+    pub(super) gain: Vec<DMatrix<f64>>,
+}
+
+impl Factor {
+    /// `(JᵀJ)⁻¹ rhs` for columns `(n, k)`.
+    #[must_use]
+    pub fn solve(&self, rhs: &DMatrix<f64>) -> DMatrix<f64> {
+        let layout = self.layout;
+        let mut x = rhs.clone();
+        for (mut row, d) in x.row_iter_mut().zip(self.scale.iter()) {
+            row /= *d;
+        }
+        self.solve_scaled(&mut x, layout.border);
+        for (mut row, d) in x.row_iter_mut().zip(self.scale.iter()) {
+            row /= *d;
+        }
+        x
+    }
+
+    fn solve_scaled(&self, x: &mut DMatrix<f64>, n_border: usize) {
+        let layout = self.layout;
+        let mut corner = x.rows(0, n_border).into_owned();
+        let mut parts: Vec<DMatrix<f64>> = Vec::with_capacity(layout.n_poses);
+        for i in 0..layout.n_poses {
+            let mut y = x.rows(layout.at(i), layout.pose).into_owned();
+            if i > 0 {
+                y.gemm_tr(-1.0, &self.gain[i - 1], &parts[i - 1], 1.0);
+            }
+            parts.push(y);
+        }
+        // Forward parts hold y_i; the border loses Bᵢᵀ Dᵢ⁻¹ yᵢ.
+        let solved: Vec<DMatrix<f64>> = parts
+            .iter()
+            .zip(&self.diagonal)
+            .map(|(y, half)| half.solve(y))
+            .collect();
+        for (edge, z) in self.border.iter().zip(&solved) {
+            corner.gemm_tr(-1.0, edge, z, 1.0);
+        }
+        if n_border > 0 {
+            self.corner.solve_mut(&mut corner);
+            x.rows_mut(0, n_border).copy_from(&corner);
+        }
+        let mut after: Option<DMatrix<f64>> = None;
+        for i in (0..layout.n_poses).rev() {
+            let mut z = solved[i].clone();
+            if n_border > 0 {
+                z -= self.diagonal[i].solve(&(&self.border[i] * &corner));
+            }
+            if let Some(next) = &after {
+                z -= &self.gain[i] * next;
+            }
+            x.rows_mut(layout.at(i), layout.pose).copy_from(&z);
+            after = Some(z);
+        }
+    }
+
+    /// `ln det JᵀJ` over the poses alone: the border is held.
+    #[must_use]
+    pub fn log_det_poses(&self) -> f64 {
+        let inner: f64 = self.diagonal.iter().map(log_det).sum();
+        inner + 2.0 * sum_ln(&self.scale.as_slice()[self.layout.border..])
+    }
+
+    /// `ln det JᵀJ` over everything.
+    #[must_use]
+    pub fn log_det(&self) -> f64 {
+        self.log_det_poses()
+            + log_det(&self.corner)
+            + 2.0 * sum_ln(&self.scale.as_slice()[..self.layout.border])
+    }
+
+    /// Covariances of the border, of every pose, and between neighbours, in one backward pass.
+    #[must_use]
+    pub fn marginals(&self) -> Marginals {
+        let layout = self.layout;
+        let corner = self.corner.inverse();
+        // Response of the poses to the border: X = K⁻¹B.
+        let mut response: Vec<DMatrix<f64>> = vec![DMatrix::zeros(0, 0); layout.n_poses];
+        let mut own: Vec<DMatrix<f64>> = vec![DMatrix::zeros(0, 0); layout.n_poses];
+        let mut next: Vec<DMatrix<f64>> =
+            vec![DMatrix::zeros(0, 0); layout.n_poses.saturating_sub(1)];
+        for i in (0..layout.n_poses).rev() {
+            let mut x = self.diagonal[i].solve(&self.border[i]);
+            let mut p = self.diagonal[i].inverse();
+            if i + 1 < layout.n_poses {
+                let gain = &self.gain[i];
+                x -= gain * &response[i + 1];
+                let across = gain * &own[i + 1];
+                p += &across * gain.transpose();
+                next[i] = -across;
+            }
+            response[i] = x;
+            own[i] = p;
+        }
+        let d = |i: usize| self.scale.rows(layout.at(i), layout.pose).map(f64::recip);
+        let d_border = self.scale.rows(0, layout.border).map(f64::recip);
+        let with_border: Vec<DMatrix<f64>> = response.iter().map(|x| x * &corner).collect();
+        for i in 0..layout.n_poses {
+            own[i] += &with_border[i] * response[i].transpose();
+            own[i] = scaled(&own[i], &d(i), &d(i));
+            if i + 1 < layout.n_poses {
+                next[i] += &with_border[i] * response[i + 1].transpose();
+                next[i] = scaled(&next[i], &d(i), &d(i + 1));
+            }
+        }
+        Marginals {
+            layout,
+            corner: scaled(&corner, &d_border, &d_border),
+            border: (0..layout.n_poses)
+                .map(|i| -scaled(&with_border[i], &d(i), &d_border))
+                .collect(),
+            own,
+            next,
+        }
+    }
+}
+
+fn log_det(half: &Cholesky<f64, Dyn>) -> f64 {
+    2.0 * half
+        .l_dirty()
+        .diagonal()
+        .iter()
+        .map(|v| v.ln())
+        .sum::<f64>()
+}
+
+fn sum_ln(values: &[f64]) -> f64 {
+    values.iter().map(|v| v.ln()).sum()
+}
+
+/// Covariances that one backward pass gives.
+#[derive(Debug, Clone)]
+pub struct Marginals {
+    layout: Layout,
+    /// Of the border.
+    pub corner: DMatrix<f64>,
+    /// Of every pose (rows) with the border (columns).
+    pub border: Vec<DMatrix<f64>>,
+    /// Of every pose.
+    pub own: Vec<DMatrix<f64>>,
+    /// Of every pose (rows) with the next (columns).
+    pub next: Vec<DMatrix<f64>>,
+}
+
+impl Marginals {
+    /// `diag(J C Jᵀ)` of some rows: the share of each that the fit used up.
+    #[must_use]
+    pub fn leverage(&self, rows: &Rows) -> DVector<f64> {
+        let mut image = DMatrix::zeros(rows.len(), 0);
+        let mut jacobian = DMatrix::zeros(rows.len(), 0);
+        let nb = rows.border.ncols();
+        match rows.pose {
+            None => {
+                image = &rows.border * &self.corner;
+                jacobian.clone_from(&rows.border);
+            }
+            Some(i) => {
+                let with_next = rows.next.ncols() > 0;
+                let n = nb + self.layout.pose * if with_next { 2 } else { 1 };
+                let mut cov = DMatrix::zeros(n, n);
+                let p = self.layout.pose;
+                let parts = if with_next { 2 } else { 1 };
+                for k in 0..parts {
+                    let at = nb + k * p;
+                    cov.view_mut((at, at), (p, p)).copy_from(&self.own[i + k]);
+                    if nb > 0 {
+                        cov.view_mut((at, 0), (p, nb))
+                            .copy_from(&self.border[i + k]);
+                        cov.view_mut((0, at), (nb, p))
+                            .copy_from(&self.border[i + k].transpose());
+                    }
+                }
+                if nb > 0 {
+                    cov.view_mut((0, 0), (nb, nb)).copy_from(&self.corner);
+                }
+                if with_next {
+                    cov.view_mut((nb, nb + p), (p, p)).copy_from(&self.next[i]);
+                    cov.view_mut((nb + p, nb), (p, p))
+                        .copy_from(&self.next[i].transpose());
+                }
+                jacobian = jacobian.resize(rows.len(), n, 0.0);
+                if nb > 0 {
+                    jacobian.columns_mut(0, nb).copy_from(&rows.border);
+                }
+                jacobian.columns_mut(nb, p).copy_from(&rows.here);
+                if with_next {
+                    jacobian.columns_mut(nb + p, p).copy_from(&rows.next);
+                }
+                image = image.resize(rows.len(), n, 0.0);
+                image.gemm(1.0, &jacobian, &cov, 0.0);
+            }
+        }
+        DVector::from_fn(rows.len(), |r, _| image.row(r).dot(&jacobian.row(r)))
+    }
+}

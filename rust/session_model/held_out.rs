@@ -1,0 +1,133 @@
+//! Blocks of rows predicted from the others, by the same factors (docs/model-session.md, 11.15).
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::chain::Chain;
+use super::fit::{Fit, gradient};
+use super::predict::{N_DOMAINS, domain_of};
+use crate::error::Result;
+
+/// Ridge of the training rows: the held-out pose's own unknowns keep a weak prior, the same for every model compared.
+const TRAINING_RIDGE: f64 = 1e-6;
+/// Directions of a fold whose predicted variance is above this many noise variances were left open by the training rows.
+const OPEN: f64 = 1e4;
+
+/// Held-out prediction of blocks of rows.
+#[derive(Debug, Clone)]
+pub struct HeldOut {
+    /// `(folds, domains)` innovation χ².
+    pub chi2: Vec<[f64; N_DOMAINS]>,
+    /// `(folds)` log-determinant of the predicted covariance.
+    pub log_det: Vec<f64>,
+    /// `(domains)` directions predicted.
+    pub n_rows: [f64; N_DOMAINS],
+    /// `(rows)` whitened innovations.
+    pub residual: Vec<f64>,
+    /// `(rows)` the same over each row's own noise alone.
+    pub innovation: Vec<f64>,
+}
+
+impl Fit {
+    /// Predicts every fold's rows from the others (blocked cross-validation). A fold is a list of groups.
+    ///
+    /// # Errors
+    /// When the rest of the rows determines nothing at all.
+    pub fn held_out(&self, folds: &[Vec<usize>]) -> Result<HeldOut> {
+        let layout = self.layout();
+        let firsts = self.first_rows();
+        let side = gradient(layout, &self.groups);
+        let scale = self.chain.diagonal().map(|value| {
+            let length = value.max(0.0).sqrt();
+            if length > 0.0 { length } else { 1.0 }
+        });
+        let parts: Vec<Result<FoldPart>> = folds
+            .par_iter()
+            .map(|fold| {
+                let held = Chain::of(layout, fold.iter().map(|&g| &self.groups[g].rows));
+                let mut train = self.chain.clone();
+                train.add_scaled(&held, -1.0);
+                let factor = train.factor(TRAINING_RIDGE, Some(&scale))?;
+                let n: usize = fold.iter().map(|&g| self.groups[g].rows.len()).sum();
+                let mut jacobian_t = DMatrix::zeros(layout.n(), n);
+                let mut residual = DVector::zeros(n);
+                let mut at = 0;
+                for &g in fold {
+                    let rows = &self.groups[g].rows;
+                    let r = rows.len();
+                    let mut part = DMatrix::zeros(layout.n(), r);
+                    rows.add_transposed(layout, &DMatrix::identity(r, r), &mut part);
+                    jacobian_t.columns_mut(at, r).copy_from(&part);
+                    residual.rows_mut(at, r).copy_from(&rows.residual);
+                    at += r;
+                }
+                // The training optimum is one linear step from that of all rows.
+                let others = &side - &jacobian_t * &residual;
+                let solved = factor.solve(&jacobian_t);
+                let mut spread = jacobian_t.tr_mul(&solved);
+                for i in 0..n {
+                    spread[(i, i)] += 1.0;
+                }
+                let innovation = &residual - solved.tr_mul(&others).column(0);
+                let spread = (&spread + spread.transpose()) * 0.5;
+                let eigen = spread.symmetric_eigen();
+                let along = eigen.eigenvectors.tr_mul(&innovation);
+                let mut whitened = DVector::zeros(n);
+                let mut plain = DVector::zeros(n);
+                let mut share = DVector::zeros(n);
+                let mut log_det = 0.0;
+                for k in 0..n {
+                    let value = eigen.eigenvalues[k];
+                    if value < OPEN {
+                        let vector = eigen.eigenvectors.column(k);
+                        whitened.axpy(along[k] / value.sqrt(), &vector, 1.0);
+                        plain.axpy(along[k], &vector, 1.0);
+                        share += vector.component_mul(&vector);
+                        log_det += value.ln();
+                    }
+                }
+                Ok(FoldPart {
+                    whitened,
+                    plain,
+                    share,
+                    log_det,
+                })
+            })
+            .collect();
+        let mut out = HeldOut {
+            chi2: Vec::with_capacity(folds.len()),
+            log_det: Vec::with_capacity(folds.len()),
+            n_rows: [0.0; N_DOMAINS],
+            residual: vec![0.0; self.n_rows()],
+            innovation: vec![0.0; self.n_rows()],
+        };
+        for (fold, part) in folds.iter().zip(parts) {
+            let part = part?;
+            let mut chi2 = [0.0; N_DOMAINS];
+            let mut at = 0;
+            for &g in fold {
+                let group = &self.groups[g];
+                for r in 0..group.rows.len() {
+                    let domain = domain_of(group, r) as usize;
+                    if domain < N_DOMAINS {
+                        chi2[domain] += part.whitened[at].powi(2);
+                        out.n_rows[domain] += part.share[at];
+                    }
+                    out.residual[firsts[g] + r] = part.whitened[at];
+                    out.innovation[firsts[g] + r] = part.plain[at];
+                    at += 1;
+                }
+            }
+            out.chi2.push(chi2);
+            out.log_det.push(part.log_det);
+        }
+        Ok(out)
+    }
+}
+
+struct FoldPart {
+    whitened: DVector<f64>,
+    plain: DVector<f64>,
+    share: DVector<f64>,
+    log_det: f64,
+}

@@ -1,0 +1,248 @@
+//! Rows of the moves (docs/model-session.md, 11.3-11.7).
+
+use nalgebra::{DMatrix, DVector, Matrix3x2, SMatrix, Vector3};
+use rayon::prelude::*;
+
+use super::chain::{Layout, Rows};
+use super::moves::{Carried, MoveCovariance, N_MOVE, Sees, carry};
+use super::response::{Response, Sums, effect_columns, loosened, respond, sums};
+use super::rows::{Domain, Group, Kind};
+use super::{Distortion, LOWER, N_MODEL, Session, State, Strengths, tangent_plane};
+use crate::error::{Error, Result};
+
+/// `L⁻¹` of a move's covariance `L Lᵀ`.
+pub type Whitening = SMatrix<f64, N_MOVE, N_MOVE>;
+
+/// Whitening of the moves, held while the solver runs and renewed between runs: left free it would reward noise.
+#[derive(Debug, Clone)]
+pub struct Weights {
+    /// Of each move.
+    pub white: Vec<Whitening>,
+    /// Plane in which the vertical after each move is compared.
+    pub plane: Vec<Matrix3x2<f64>>,
+}
+
+impl Weights {
+    /// From moves that were carried.
+    ///
+    /// # Errors
+    /// When the noise of a move cannot be whitened.
+    pub fn of(passed: &[Passed], strengths: &Strengths) -> Result<Self> {
+        let white = passed
+            .iter()
+            .enumerate()
+            .map(|(m, one)| {
+                let half = one
+                    .covariance(strengths)
+                    .cholesky()
+                    .and_then(|half| half.l().try_inverse());
+                half.ok_or_else(|| {
+                    Error::not_determined(format!(
+                        "move {m} has no noise or turns nothing: its residuals cannot be weighed"
+                    ))
+                })
+            })
+            .collect::<Result<_>>()?;
+        Ok(Self {
+            white,
+            plane: passed.iter().map(|one| one.plane).collect(),
+        })
+    }
+}
+
+/// One move carried at a state, with its derivatives.
+#[derive(Debug, Clone)]
+pub struct Passed {
+    /// Forward.
+    pub carried: Carried,
+    /// Backward.
+    pub response: Response,
+    /// Products with the readings.
+    pub sums: Sums,
+    /// Plane of comparison.
+    pub plane: Matrix3x2<f64>,
+    /// What zeros of unit scatter (accelerometer, gyro) add to the covariance by leaving the line between the poses.
+    pub loose: Option<[MoveCovariance; 2]>,
+}
+
+impl Passed {
+    /// Covariance of the five residuals: noise of the samples, and zeros that leave the line between their poses.
+    #[must_use]
+    pub fn covariance(&self, strengths: &Strengths) -> MoveCovariance {
+        let mut out = self.response.covariance;
+        if let Some(loose) = &self.loose {
+            for s in 0..2 {
+                out += loose[s] * (strengths.scatter[s] * strengths.between[s]).powi(2);
+            }
+        }
+        out
+    }
+}
+
+impl Session {
+    pub(super) fn sees<'a>(
+        &self,
+        state: &State,
+        index: usize,
+        plane: Matrix3x2<f64>,
+        effects: &'a Effects,
+    ) -> Sees<'a> {
+        let one = &self.moves[index];
+        let (i, j) = (one.before, one.before + 1);
+        let first = self.n_poses() + one.first_point;
+        let part = |values: Option<&'a Vec<Vector3<f64>>>| -> Option<&'a [Vector3<f64>]> {
+            values.map(|v| &v[first..first + one.n_samples()])
+        };
+        Sees {
+            gravity: self.gravity,
+            force_scale: state.force_scale,
+            force_bias: state.force_bias,
+            rate_scale: state.rate_scale,
+            rate_zero: [state.rate_zero[i], state.rate_zero[j]],
+            force_zero: [state.force_zero[i], state.force_zero[j]],
+            up: [state.up[i], state.up[j]],
+            plane,
+            force_effect: part(effects.force.as_ref()),
+            rate_effect: part(effects.rate.as_ref()),
+        }
+    }
+
+    /// Planes of comparison at a state.
+    #[must_use]
+    pub fn planes(&self, state: &State) -> Vec<Matrix3x2<f64>> {
+        let plane = |m: usize| tangent_plane(&state.up[self.moves[m].before + 1]);
+        (0..self.moves.len()).map(plane).collect()
+    }
+
+    /// All moves carried at a state, with their derivatives.
+    #[must_use]
+    pub fn pass(
+        &self,
+        state: &State,
+        distortion: &Distortion,
+        planes: &[Matrix3x2<f64>],
+    ) -> Vec<Passed> {
+        let effects = Effects::at(distortion, state);
+        (0..self.moves.len())
+            .into_par_iter()
+            .map(|m| {
+                let one = &self.moves[m];
+                let sees = self.sees(state, m, planes[m], &effects);
+                let carried = carry(one, &sees);
+                let response = respond(one, &sees, &carried, &self.noise);
+                let sums = sums(one, &sees, &response, &LOWER);
+                let loose = self
+                    .scatter
+                    .as_ref()
+                    .map(|scatter| loosened(one, &sees, &response, scatter));
+                Passed {
+                    carried,
+                    response,
+                    sums,
+                    plane: planes[m],
+                    loose,
+                }
+            })
+            .collect()
+    }
+
+    /// (11.3)-(11.7): five rows of a move.
+    pub(super) fn move_rows(
+        &self,
+        index: usize,
+        state: &State,
+        distortion: &Distortion,
+        layout: Layout,
+        weights: &Weights,
+        passed: &Passed,
+    ) -> Group {
+        let one = &self.moves[index];
+        let (i, j) = (one.before, one.before + 1);
+        let mut rows = Rows::new(
+            DVector::from_column_slice(passed.carried.residual.as_slice()),
+            layout,
+            i,
+        );
+        rows.next = DMatrix::zeros(N_MOVE, layout.pose);
+        let Sums {
+            force_model,
+            rate_model,
+            rate_zero,
+            force_zero,
+        } = &passed.sums;
+        rows.border.columns_mut(0, 9).copy_from(force_model);
+        rows.border.columns_mut(9, 9).copy_from(rate_model);
+        rows.here.columns_mut(2, 3).copy_from(&rate_zero[0]);
+        rows.next.columns_mut(2, 3).copy_from(&rate_zero[1]);
+        rows.here.columns_mut(5, 3).copy_from(&force_zero[0]);
+        rows.next.columns_mut(5, 3).copy_from(&force_zero[1]);
+        let (from, to) = (tangent_plane(&state.up[i]), tangent_plane(&state.up[j]));
+        rows.here
+            .view_mut((0, 0), (2, 2))
+            .copy_from(&(passed.response.lever * from));
+        rows.here
+            .view_mut((2, 0), (3, 2))
+            .copy_from(&(-from * (self.gravity * one.duration_s)));
+        rows.next
+            .view_mut((0, 0), (2, 2))
+            .copy_from(&(-passed.plane.transpose() * to * self.gravity));
+        if distortion.k > 0 {
+            let columns = self.move_effect(index, distortion, passed);
+            rows.border
+                .columns_mut(N_MODEL, distortion.k)
+                .copy_from(&columns);
+        }
+        let white = weights.white[index];
+        let whiten = |block: &DMatrix<f64>| -> DMatrix<f64> {
+            DMatrix::from_fn(N_MOVE, block.ncols(), |r, c| {
+                (0..=r).map(|k| white[(r, k)] * block[(k, c)]).sum()
+            })
+        };
+        rows.residual = DVector::from_column_slice((white * passed.carried.residual).as_slice());
+        rows.border = whiten(&rows.border);
+        rows.here = whiten(&rows.here);
+        rows.next = whiten(&rows.next);
+        Group {
+            rows,
+            domain: Domain::Moves,
+            kind: Kind::Reading,
+            segment: index,
+            log_weight: 0.0,
+        }
+    }
+
+    pub(super) fn move_effect(
+        &self,
+        index: usize,
+        distortion: &Distortion,
+        passed: &Passed,
+    ) -> DMatrix<f64> {
+        let one = &self.moves[index];
+        let width = 3 * distortion.k;
+        let first = self.n_poses() + one.first_point;
+        let part = |values: Option<&'_ Vec<f64>>| -> Option<Vec<f64>> {
+            values.map(|v| v[first * width..(first + one.n_samples()) * width].to_vec())
+        };
+        effect_columns(
+            &passed.response,
+            part(distortion.force.as_ref()).as_deref(),
+            part(distortion.rate.as_ref()).as_deref(),
+            distortion.k,
+        )
+    }
+}
+
+/// Effects of both sensors at every point.
+pub(super) struct Effects {
+    force: Option<Vec<Vector3<f64>>>,
+    rate: Option<Vec<Vector3<f64>>>,
+}
+
+impl Effects {
+    pub(super) fn at(distortion: &Distortion, state: &State) -> Self {
+        Self {
+            force: Distortion::at(distortion.force.as_ref(), distortion.k, &state.effect),
+            rate: Distortion::at(distortion.rate.as_ref(), distortion.k, &state.effect),
+        }
+    }
+}

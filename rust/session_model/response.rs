@@ -1,0 +1,235 @@
+//! How the residuals of a move answer to every sample: one backward pass, and products with it (docs/model-session.md,
+//! equations 11.5-11.7).
+
+use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
+
+use super::moves::{Carried, Move, MoveCovariance, MoveNoise, N_MOVE, Sees};
+use crate::rotation::{exp_and_left_jacobian, skew};
+
+/// A step longer than this many usual ones has lost samples.
+const GAP: f64 = 1.5;
+
+/// Response of the five residuals to rate and force at each sample.
+#[derive(Debug, Clone)]
+pub struct Response {
+    /// `(5, 3)` a sample.
+    pub by_rate: Vec<SMatrix<f64, N_MOVE, 3>>,
+    /// `(3, 3)` a sample: the velocity alone answers to the force.
+    pub by_force: Vec<Matrix3<f64>>,
+    /// Covariance of the residuals by noise of the samples.
+    pub covariance: MoveCovariance,
+    /// `g Tᵀ C` at the end.
+    pub lever: Matrix2x3<f64>,
+}
+
+/// Response of the residuals to every sample, and their covariance (11.5, 11.6).
+#[must_use]
+pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise) -> Response {
+    let n = one.n_samples();
+    let last = one.steps.last().map_or(0, |step| step.to);
+    let lever: Matrix2x3<f64> = sees.plane.transpose() * carried.attitude[last] * sees.gravity;
+    let mut by_rate = vec![SMatrix::<f64, N_MOVE, 3>::zeros(); n];
+    let mut by_force = vec![Matrix3::zeros(); n];
+    for k in 0..n {
+        by_force[k] = carried.attitude[k].transpose() * one.weight[k];
+    }
+    let mut covariance = MoveCovariance::zeros();
+    // What the residuals answer to a turn made now: the vertical at the end, the velocity still to be gained.
+    let mut to_turn = SMatrix::<f64, N_MOVE, 3>::zeros();
+    to_turn
+        .fixed_rows_mut::<2>(0)
+        .copy_from(&(lever * skew(&sees.up[0])));
+    let var_jitter = noise.jitter_s * noise.jitter_s;
+    let mut still_to_come = Vector3::zeros();
+    for step in one.steps.iter().rev() {
+        still_to_come += by_force[step.to] * carried.force[step.to];
+        to_turn
+            .fixed_rows_mut::<3>(2)
+            .copy_from(&(-skew(&still_to_come)));
+        let (phi0, phi1) = step.moments(|k| carried.rate[k]);
+        let (_, left) = exp_and_left_jacobian(&(phi0 + phi0.cross(&phi1)));
+        let to_start = to_turn * (carried.attitude[step.from].transpose() * left);
+        let zeroth = to_start - to_start * skew(&phi1);
+        let first = to_start * skew(&phi0);
+        for j in 0..4 {
+            if step.zeroth[j] != 0.0 || step.first[j] != 0.0 {
+                by_rate[step.sample[j]] += zeroth * step.zeroth[j] + first * step.first[j];
+            }
+        }
+        let is_gap = step.h > GAP * noise.nominal_step_s;
+        if var_jitter > 0.0 || is_gap {
+            // A lost sample leaves the rate anywhere between its neighbours: uniform, so h²/12.
+            let var = var_jitter + if is_gap { step.h * step.h / 12.0 } else { 0.0 };
+            let jump = zeroth * (carried.rate[step.to] - carried.rate[step.from]);
+            covariance.ger(var, &jump, &jump, 1.0);
+            let jump = carried.attitude[step.from]
+                .tr_mul(&(carried.force[step.to] - carried.force[step.from]));
+            let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
+            velocity.ger(var, &jump, &jump, 1.0);
+        }
+    }
+    add_white(one, sees, noise, &by_rate, &by_force, &mut covariance);
+    for i in 0..N_MOVE {
+        for j in 0..N_MOVE {
+            covariance[(i, j)] *=
+                noise.inflation[usize::from(i >= 2)] * noise.inflation[usize::from(j >= 2)];
+        }
+    }
+    Response {
+        by_rate,
+        by_force,
+        covariance,
+        lever,
+    }
+}
+
+fn add_white(
+    one: &Move,
+    sees: &Sees<'_>,
+    noise: &MoveNoise,
+    by_rate: &[SMatrix<f64, N_MOVE, 3>],
+    by_force: &[Matrix3<f64>],
+    covariance: &mut MoveCovariance,
+) {
+    let diagonal = |density: &Vector3<f64>| density.component_mul(density) / one.step_s;
+    let spread = |scale: &Matrix3<f64>, density: &Vector3<f64>, fast: &Vector3<f64>| {
+        let white = scale * Matrix3::from_diagonal(&diagonal(density)) * scale.transpose();
+        // Motion faster than the samples has no known direction: the same on every axis.
+        let extra = (scale.component_mul(scale) * fast).mean() / (one.duration_s * one.step_s);
+        white + Matrix3::identity() * extra
+    };
+    let rate = spread(&sees.rate_scale, &noise.rate_density, &one.unresolved[1]);
+    let force = spread(&sees.force_scale, &noise.force_density, &one.unresolved[0]);
+    let mut of_velocity = Matrix3::zeros();
+    for (r, f) in by_rate.iter().zip(by_force) {
+        *covariance += r * rate * r.transpose();
+        of_velocity += f * force * f.transpose();
+    }
+    let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
+    velocity += of_velocity;
+}
+
+/// Derivatives of the residuals with respect to the parameters that act on the samples, `(5, k)` each.
+#[derive(Debug, Clone)]
+pub struct Sums {
+    /// With respect to the lower elements of the accelerometer's `S`, then `b`.
+    pub force_model: SMatrix<f64, N_MOVE, 9>,
+    /// With respect to the gyro's `S`, row by row.
+    pub rate_model: SMatrix<f64, N_MOVE, 9>,
+    /// With respect to the raw zeros of the gyro before and after.
+    pub rate_zero: [SMatrix<f64, N_MOVE, 3>; 2],
+    /// With respect to the raw zeros of the accelerometer before and after.
+    pub force_zero: [SMatrix<f64, N_MOVE, 3>; 2],
+}
+
+/// Sums of the response over the samples.
+#[must_use]
+pub fn sums(one: &Move, sees: &Sees<'_>, response: &Response, lower: &[(usize, usize); 6]) -> Sums {
+    let mut force_model = SMatrix::<f64, N_MOVE, 9>::zeros();
+    let mut rate_model = SMatrix::<f64, N_MOVE, 9>::zeros();
+    let mut rates = [SMatrix::<f64, N_MOVE, 3>::zeros(); 2];
+    let mut forces = [Matrix3::zeros(); 2];
+    for k in 0..one.n_samples() {
+        let x = one.fraction[k];
+        let (r, f) = (&response.by_rate[k], &response.by_force[k]);
+        let w = one.rate[k] - (sees.rate_zero[0] * (1.0 - x) + sees.rate_zero[1] * x);
+        let a = one.force[k] - (sees.force_zero[0] * (1.0 - x) + sees.force_zero[1] * x);
+        for i in 0..3 {
+            for j in 0..3 {
+                rate_model
+                    .column_mut(3 * i + j)
+                    .axpy(w[j], &r.column(i), 1.0);
+            }
+        }
+        for (c, &(i, j)) in lower.iter().enumerate() {
+            let mut column = force_model.fixed_view_mut::<3, 1>(2, c);
+            column.axpy(a[j], &f.column(i), 1.0);
+        }
+        let mut by_bias = force_model.fixed_view_mut::<3, 3>(2, 6);
+        by_bias += f;
+        rates[0] += r * (1.0 - x);
+        rates[1] += r * x;
+        forces[0] += f * (1.0 - x);
+        forces[1] += f * x;
+    }
+    let of_velocity = |part: Matrix3<f64>| {
+        let mut out = SMatrix::<f64, N_MOVE, 3>::zeros();
+        out.fixed_view_mut::<3, 3>(2, 0)
+            .copy_from(&(-part * sees.force_scale));
+        out
+    };
+    Sums {
+        force_model,
+        rate_model,
+        rate_zero: rates.map(|part| -part * sees.rate_scale),
+        force_zero: forces.map(of_velocity),
+    }
+}
+
+/// Covariance of the residuals where the zeros (accelerometer, gyro) leave the line between their poses during the move,
+/// by `scatter` at its first and at its last sample, independently (11.6).
+///
+/// A zero that is another in every pose leaps somewhere, or is a third one on the way: the line is then wrong by about
+/// its scatter, and no reading of a pose tells by how much.
+#[must_use]
+pub fn loosened(
+    one: &Move,
+    sees: &Sees<'_>,
+    response: &Response,
+    scatter: &[Vector3<f64>; 2],
+) -> [MoveCovariance; 2] {
+    let mut rates = [SMatrix::<f64, N_MOVE, 3>::zeros(); 2];
+    let mut forces = [Matrix3::zeros(); 2];
+    for k in 0..one.n_samples() {
+        let y = one.progress[k];
+        let (r, f) = (&response.by_rate[k], &response.by_force[k]);
+        rates[0] += r * (1.0 - y);
+        rates[1] += r * y;
+        forces[0] += f * (1.0 - y);
+        forces[1] += f * y;
+    }
+    let mut out = [MoveCovariance::zeros(); 2];
+    for end in 0..2 {
+        let rate = rates[end] * sees.rate_scale * Matrix3::from_diagonal(&scatter[1]);
+        out[1] += rate * rate.transpose();
+        let force = forces[end] * sees.force_scale * Matrix3::from_diagonal(&scatter[0]);
+        let mut velocity = out[0].fixed_view_mut::<3, 3>(2, 2);
+        velocity += force * force.transpose();
+    }
+    out
+}
+
+/// `(5, k)` change of the residuals per effect parameter: `force`, `rate` are `(3, k)` a sample, parameter after
+/// parameter (11.7).
+#[must_use]
+pub fn effect_columns(
+    response: &Response,
+    force: Option<&[f64]>,
+    rate: Option<&[f64]>,
+    k: usize,
+) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(N_MOVE, k);
+    for (s, (r, f)) in response.by_rate.iter().zip(&response.by_force).enumerate() {
+        if let Some(rate) = rate {
+            let row = &rate[3 * k * s..3 * k * (s + 1)];
+            for c in 0..k {
+                let d = Vector3::new(row[c], row[k + c], row[2 * k + c]);
+                let change = r * d;
+                for i in 0..N_MOVE {
+                    out[(i, c)] -= change[i];
+                }
+            }
+        }
+        if let Some(force) = force {
+            let row = &force[3 * k * s..3 * k * (s + 1)];
+            for c in 0..k {
+                let d = Vector3::new(row[c], row[k + c], row[2 * k + c]);
+                let change = f * d;
+                for i in 0..3 {
+                    out[(2 + i, c)] -= change[i];
+                }
+            }
+        }
+    }
+    out
+}

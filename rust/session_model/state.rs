@@ -1,0 +1,149 @@
+//! A point in the space of all unknowns, and what effects add there.
+
+use nalgebra::{DVector, Matrix3, Matrix3x2, SVector, Vector3};
+
+use super::chain::Layout;
+use super::{LOWER, N_MODEL, N_POSE_SCATTER};
+
+/// What effects add to the corrected readings, linear in their parameters.
+#[derive(Debug, Clone, Default)]
+pub struct Distortion {
+    /// `(points, 3, k)` row by row, SI; points are the poses, then the samples of every move.
+    pub force: Option<Vec<f64>>,
+    /// The same of the rate.
+    pub rate: Option<Vec<f64>>,
+    /// Parameters.
+    pub k: usize,
+}
+
+/// A point in the space of all unknowns.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// Accelerometer `S`, lower triangular.
+    pub force_scale: Matrix3<f64>,
+    /// Accelerometer `b`, on centred readings.
+    pub force_bias: Vector3<f64>,
+    /// Gyro `S`.
+    pub rate_scale: Matrix3<f64>,
+    /// Vertical in the body, unit.
+    pub up: Vec<Vector3<f64>>,
+    /// Raw zero of the gyro in each pose.
+    pub rate_zero: Vec<Vector3<f64>>,
+    /// Raw zero of the accelerometer in each pose, beside `b`.
+    pub force_zero: Vec<Vector3<f64>>,
+    /// The share of either zero that is one pose's alone (accelerometer, gyro); zero without scatter.
+    pub own: [Vec<Vector3<f64>>; 2],
+    /// Effect parameters.
+    pub effect: DVector<f64>,
+}
+
+impl Distortion {
+    /// Effect `Σ D p` of one sensor at every point.
+    #[must_use]
+    pub fn at(
+        columns: Option<&Vec<f64>>,
+        k: usize,
+        effect: &DVector<f64>,
+    ) -> Option<Vec<Vector3<f64>>> {
+        let columns = columns?;
+        Some(
+            columns
+                .chunks_exact(3 * k.max(1))
+                .map(|row| {
+                    Vector3::from_fn(|i, _| (0..k).map(|c| row[i * k + c] * effect[c]).sum::<f64>())
+                })
+                .collect(),
+        )
+    }
+
+    /// Two distortions side by side.
+    #[must_use]
+    pub fn beside(&self, other: &Self) -> Self {
+        let k = self.k + other.k;
+        let join = |a: Option<&Vec<f64>>, b: Option<&Vec<f64>>| {
+            if a.is_none() && b.is_none() {
+                return None;
+            }
+            let rows = a
+                .map(|a| a.len() / self.k)
+                .or_else(|| b.map(|b| b.len() / other.k))?;
+            let mut out = Vec::with_capacity(rows * k);
+            for r in 0..rows {
+                match a {
+                    Some(a) => out.extend_from_slice(&a[r * self.k..(r + 1) * self.k]),
+                    None => out.extend(std::iter::repeat_n(0.0, self.k)),
+                }
+                match b {
+                    Some(b) => out.extend_from_slice(&b[r * other.k..(r + 1) * other.k]),
+                    None => out.extend(std::iter::repeat_n(0.0, other.k)),
+                }
+            }
+            Some(out)
+        };
+        Self {
+            force: join(self.force.as_ref(), other.force.as_ref()),
+            rate: join(self.rate.as_ref(), other.rate.as_ref()),
+            k,
+        }
+    }
+}
+
+impl State {
+    /// The state a step away.
+    #[must_use]
+    pub fn moved(&self, step: &DVector<f64>, layout: Layout) -> Self {
+        let mut out = self.clone();
+        for (c, &(i, j)) in LOWER.iter().enumerate() {
+            out.force_scale[(i, j)] += step[c];
+        }
+        for i in 0..3 {
+            out.force_bias[i] += step[6 + i];
+            for j in 0..3 {
+                out.rate_scale[(i, j)] += step[9 + 3 * i + j];
+            }
+        }
+        for c in 0..layout.border - N_MODEL {
+            out.effect[c] += step[N_MODEL + c];
+        }
+        for h in 0..layout.n_poses {
+            let at = layout.at(h);
+            let turn = tangent_plane(&self.up[h]) * nalgebra::Vector2::new(step[at], step[at + 1]);
+            out.up[h] = (self.up[h] + turn).normalize();
+            let three = |first: usize| {
+                Vector3::new(step[at + first], step[at + first + 1], step[at + first + 2])
+            };
+            out.rate_zero[h] += three(2);
+            out.force_zero[h] += three(5);
+            if layout.pose == N_POSE_SCATTER {
+                out.own[1][h] += three(8);
+                out.own[0][h] += three(11);
+            }
+        }
+        out
+    }
+
+    /// The 18 parameters of the linear models.
+    #[must_use]
+    pub fn model(&self) -> SVector<f64, N_MODEL> {
+        let mut out = SVector::<f64, N_MODEL>::zeros();
+        for (c, &(i, j)) in LOWER.iter().enumerate() {
+            out[c] = self.force_scale[(i, j)];
+        }
+        for i in 0..3 {
+            out[6 + i] = self.force_bias[i];
+            for j in 0..3 {
+                out[9 + 3 * i + j] = self.rate_scale[(i, j)];
+            }
+        }
+        out
+    }
+}
+
+/// Two unit vectors across a unit vector.
+#[must_use]
+pub fn tangent_plane(up: &Vector3<f64>) -> Matrix3x2<f64> {
+    let mut helper = Vector3::zeros();
+    helper[up.iamin()] = 1.0;
+    let first = up.cross(&helper).normalize();
+    Matrix3x2::from_columns(&[first, up.cross(&first)])
+}

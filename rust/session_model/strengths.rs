@@ -1,0 +1,349 @@
+//! Strengths of the processes behind the zeros, by marginal likelihood (docs/model-session.md, 11.12).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::chain::Chain;
+use super::factor::Factor;
+use super::fit::{Fit, RIDGE, chi2_of, fit, gradient};
+use super::move_rows::{Weights, Whitening};
+use super::moves::N_MOVE;
+use super::rows::{Domain, Group, N_PROCESSES};
+use super::{Distortion, Session, State, Strengths};
+use crate::error::Result;
+
+/// Corner times tried, s. A bias that walks faster than the first is drift.
+pub const CORNER_GRID_S: [f64; 7] = [20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 2560.0];
+/// Scatter that counts as none, in units of the session's reference.
+pub const NO_SCATTER: f64 = 1e-3;
+/// Scatters tried beyond none: a factor of 1.5 apart, up to a thousand times the reference.
+const N_SCATTER: i32 = 26;
+/// Every so many of them are tried first, then the neighbours of the best.
+const COARSE: usize = 4;
+const SCATTER_FROM: f64 = 0.05;
+const SCATTER_RATIO: f64 = 1.5;
+/// Twice the gain in log-likelihood that makes a scatter count: 5.41 is passed in 1 % of sessions without any (half of
+/// χ² with one degree of freedom, the variance being at its boundary).
+const SCATTER_GATE: f64 = 5.41;
+
+/// How far a zero leaves the line between its poses, tried in units of its scatter: a leap at an instant that may be any
+/// is √(1/12) of a leap of √2 (0.4), a leap at either end of the move √2/2 (0.7), a third zero √(3/2) (1.2).
+const BETWEEN: [f64; 8] = [0.15, 0.3, 0.42, 0.6, 0.85, 1.2, 1.7, 2.4];
+/// Scatters of the accelerometer's zero that its error bars allow for, in units of the reference, together as likely
+/// beforehand as none; and corner times of its walk beside them, s.
+const POSSIBLE_SCATTER: [f64; 8] = [0.35, 0.55, 0.85, 1.3, 2.0, 3.2, 5.0, 10.0];
+const POSSIBLE_CORNER_S: [f64; 4] = [20.0, 80.0, 320.0, 2560.0];
+/// Possibilities less likely than this beside the best change no error bar.
+const LEAST_WEIGHT: f64 = 1e-2;
+/// Rows of moves count this much less while strengths of walk and scatter are chosen.
+const DEAF: f64 = 1e-3;
+
+/// Fits a session with the strengths of its processes chosen by marginal likelihood (11.12).
+///
+/// Only rows of the processes depend on a strength, each in proportion: the evidence of every strength follows from the
+/// rows already made, in time linear in the poses. Walk and scatter are what the poses show: moves that contradict them
+/// would otherwise be explained as scatter, and the poses then be believed less. How far a zero that scatters strays
+/// between its poses is what the moves show.
+///
+/// # Errors
+/// As [`fit`].
+pub fn tune(
+    session: &Session,
+    start: State,
+    strengths: Strengths,
+    distortion: &Distortion,
+) -> Result<Fit> {
+    let mut found = fit(session, start, strengths, distortion)?;
+    let best = Evidence::of(&found).search(session);
+    if best != found.strengths {
+        found = fit(session, found.state, best, distortion)?;
+    }
+    if session.scatter.is_none() || best.scatter == [NO_SCATTER; 2] || session.moves.is_empty() {
+        return Ok(found);
+    }
+    let between = Evidence::of(&found).search_between(&found);
+    if between == found.strengths.between {
+        return Ok(found);
+    }
+    let best = Strengths {
+        between,
+        ..found.strengths
+    };
+    fit(session, found.state, best, distortion)
+}
+
+/// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.
+struct Part {
+    chain: Chain,
+    side: DMatrix<f64>,
+    sum: f64,
+    n: usize,
+}
+
+/// Normal equations by process, ready to be weighed anew.
+struct Evidence {
+    at: Strengths,
+    /// Readings of the poses, and priors.
+    rest: Part,
+    /// Readings of the moves.
+    moves: Part,
+    process: Vec<Part>,
+}
+
+impl Evidence {
+    fn of(fit: &Fit) -> Self {
+        let layout = fit.layout();
+        let part = |is_in: &dyn Fn(&Group) -> bool, is_bordered: bool| {
+            let groups: Vec<Group> = fit.groups.iter().filter(|g| is_in(g)).cloned().collect();
+            let rows = groups.iter().map(|group| &group.rows);
+            Part {
+                chain: if is_bordered {
+                    Chain::of(layout, rows)
+                } else {
+                    Chain::of_poses(layout, rows)
+                },
+                side: gradient(layout, &groups),
+                sum: chi2_of(&groups),
+                n: groups.iter().map(|group| group.rows.len()).sum(),
+            }
+        };
+        let is_move = |group: &Group| group.domain == Domain::Moves && group.rows.len() == N_MOVE;
+        let is_fixed = |group: &Group| group.kind.process().is_none();
+        Self {
+            at: fit.strengths,
+            rest: part(&|g| is_fixed(g) && !is_move(g), true),
+            moves: part(&|g| is_fixed(g) && is_move(g), true),
+            process: (0..N_PROCESSES)
+                .map(|p| part(&|g: &Group| g.kind.process() == Some(p), false))
+                .collect(),
+        }
+    }
+
+    /// Normal equations, `Jᵀr`, `Σ r²` and normalisation at other strengths, with the rows of the moves as given.
+    fn combined(
+        &self,
+        strengths: &Strengths,
+        moves: &Part,
+        hearing: f64,
+    ) -> (Chain, DMatrix<f64>, f64, f64) {
+        let factors = [
+            strengths.corner_s[0] / self.at.corner_s[0],
+            strengths.corner_s[1] / self.at.corner_s[1],
+            self.at.scatter[0] / strengths.scatter[0],
+            self.at.scatter[1] / strengths.scatter[1],
+        ];
+        let mut chain = self.rest.chain.clone();
+        let mut side = self.rest.side.clone();
+        let mut sum = self.rest.sum;
+        let mut weight = 0.0;
+        let processes = self.process.iter().zip(factors);
+        for (part, factor) in processes.chain(std::iter::once((moves, hearing))) {
+            let squared = factor * factor;
+            chain.add_scaled(&part.chain, squared);
+            side += &part.side * squared;
+            sum += part.sum * squared;
+            weight += part.n as f64 * factor.ln();
+        }
+        (chain, side, sum, weight)
+    }
+
+    /// Log-evidence at other strengths, from the linear problem here.
+    fn with(&self, strengths: &Strengths, moves: &Part, hearing: f64) -> f64 {
+        let (chain, side, sum, weight) = self.combined(strengths, moves, hearing);
+        let Ok(factor) = chain.factor(RIDGE, None) else {
+            return f64::NEG_INFINITY;
+        };
+        let chi2 = sum - side.dot(&factor.solve(&side));
+        -0.5 * chi2 - 0.5 * factor.log_det() + weight
+    }
+
+    fn at(&self, strengths: &Strengths) -> f64 {
+        self.with(strengths, &self.moves, DEAF)
+    }
+
+    /// One process after the other until none moves.
+    fn search(&self, session: &Session) -> Strengths {
+        let has_rate = session.rate.is_some();
+        let mut best = self.at;
+        let is_free = session.scatter.is_some() && !session.is_scatter_given;
+        if is_free {
+            best.scatter = [NO_SCATTER; 2];
+        }
+        self.search_corners(&mut best, has_rate);
+        if !is_free {
+            return best;
+        }
+        let none = self.at(&best);
+        for sensor in 0..if has_rate { 2 } else { 1 } {
+            let mut tried = best;
+            for _ in 0..2 {
+                self.search_scatter(&mut tried, sensor);
+                self.search_corners(&mut tried, has_rate);
+            }
+            let base = if best.scatter == [NO_SCATTER; 2] {
+                none
+            } else {
+                self.at(&best)
+            };
+            if 2.0 * (self.at(&tried) - base) > SCATTER_GATE {
+                best = tried;
+            }
+        }
+        best
+    }
+
+    fn search_corners(&self, best: &mut Strengths, has_rate: bool) {
+        // One sensor after the other, and the first again: their walks hardly meet in a row.
+        for sensor in [0, 1, 0] {
+            if sensor == 1 && !has_rate {
+                continue;
+            }
+            let values = CORNER_GRID_S.map(|corner| {
+                let mut tried = *best;
+                tried.corner_s[sensor] = corner;
+                (self.at(&tried), corner)
+            });
+            if let Some((_, corner)) = values.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                best.corner_s[sensor] = corner;
+            }
+        }
+    }
+
+    /// A coarse pass over the grid, then the neighbours of the best.
+    fn search_scatter(&self, best: &mut Strengths, sensor: usize) {
+        let value = |k: i32| {
+            let mut tried = *best;
+            tried.scatter[sensor] = SCATTER_FROM * SCATTER_RATIO.powi(k);
+            (self.at(&tried), k)
+        };
+        let best_of = |ks: &mut dyn Iterator<Item = i32>| {
+            ks.map(value)
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+                .map_or(0, |(_, k)| k)
+        };
+        let coarse = best_of(&mut (0..N_SCATTER).step_by(COARSE));
+        let reach = COARSE as i32 - 1;
+        let fine = best_of(&mut ((coarse - reach).max(0)..(coarse + reach + 1).min(N_SCATTER)));
+        let shift = peak([fine - 1, fine, fine + 1].map(|k| value(k).0));
+        best.scatter[sensor] = SCATTER_FROM * SCATTER_RATIO.powf(f64::from(fine) + shift);
+    }
+
+    /// How far zeros that scatter leave the line between their poses, from the rows of the moves weighed anew.
+    fn search_between(&self, fit: &Fit) -> [f64; 2] {
+        let mut best = fit.strengths;
+        for sensor in [1, 0, 1] {
+            if best.scatter[sensor] <= NO_SCATTER {
+                continue;
+            }
+            let values = BETWEEN.map(|between| {
+                let mut tried = best;
+                tried.between[sensor] = between;
+                let evidence = reweighed(fit, &tried)
+                    .map_or(f64::NEG_INFINITY, |(moves, weight)| {
+                        self.with(&tried, &moves, 1.0) + weight
+                    });
+                (evidence, between)
+            });
+            if let Some((_, between)) = values.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                best.between[sensor] = between;
+            }
+        }
+        best.between
+    }
+}
+
+/// Where a parabola through three values at -1, 0, 1 is highest, within half a step.
+fn peak([before, here, after]: [f64; 3]) -> f64 {
+    let bend = before - 2.0 * here + after;
+    if bend < 0.0 && bend.is_finite() {
+        (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    }
+}
+
+/// One way the accelerometer's zeros may scatter: how likely, the step that the fit would make, its normal equations.
+pub(super) struct Possible {
+    pub weight: f64,
+    pub step: DVector<f64>,
+    pub factor: Factor,
+}
+
+/// Ways the accelerometer's zeros may scatter and walk, weighed by their evidence (11.12b); nothing where that is not
+/// asked, or known.
+///
+/// Some twenty lengths of gravity less nine unknowns tell a scatter as large as their noise in half of all sessions
+/// only: error bars that take the one best answer for true cover too little there.
+pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Possible>> {
+    if session.scatter.is_none() || session.is_scatter_given {
+        return Ok(Vec::new());
+    }
+    let evidence = Evidence::of(fit);
+    let n_some = POSSIBLE_SCATTER.len() as f64;
+    let mut tried = Vec::new();
+    let some = POSSIBLE_SCATTER.map(|scatter| (scatter, -n_some.ln()));
+    for (scatter, prior) in std::iter::once((NO_SCATTER, 0.0)).chain(some) {
+        for corner in POSSIBLE_CORNER_S {
+            let mut at = fit.strengths;
+            at.scatter[0] = scatter;
+            at.corner_s[0] = corner;
+            tried.push((evidence.at(&at) + prior, at));
+        }
+    }
+    let best = tried
+        .iter()
+        .map(|(v, _)| *v)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let mut out = Vec::new();
+    for (value, at) in tried {
+        let weight = (value - best).exp();
+        if weight < LEAST_WEIGHT {
+            continue;
+        }
+        let (moves, _) = reweighed(fit, &at)?;
+        let (chain, side, _, _) = evidence.combined(&at, &moves, 1.0);
+        let factor = chain.factor(RIDGE, None)?;
+        let step = -factor.solve(&side).column(0).into_owned();
+        out.push(Possible {
+            weight,
+            step,
+            factor,
+        });
+    }
+    let total: f64 = out.iter().map(|one| one.weight).sum();
+    for one in &mut out {
+        one.weight /= total;
+    }
+    Ok(out)
+}
+
+/// The rows of the moves at other strengths, and the logarithm of their normalisation.
+fn reweighed(fit: &Fit, strengths: &Strengths) -> Result<(Part, f64)> {
+    let layout = fit.layout();
+    let weights = Weights::of(&fit.passed, strengths)?;
+    let mut weight = 0.0;
+    let mut groups = Vec::with_capacity(fit.passed.len());
+    for group in &fit.groups {
+        if group.domain != Domain::Moves || group.rows.len() != N_MOVE {
+            continue;
+        }
+        let new: &Whitening = &weights.white[group.segment];
+        weight += new.diagonal().map(f64::ln).sum();
+        let Some(back) = fit.weights.white[group.segment].try_inverse() else {
+            continue;
+        };
+        let again = DMatrix::from_column_slice(N_MOVE, N_MOVE, (new * back).as_slice());
+        let mut group = group.clone();
+        group.rows.residual = &again * &group.rows.residual;
+        group.rows.border = &again * &group.rows.border;
+        group.rows.here = &again * &group.rows.here;
+        group.rows.next = &again * &group.rows.next;
+        groups.push(group);
+    }
+    let part = Part {
+        chain: Chain::of(layout, groups.iter().map(|group| &group.rows)),
+        side: gradient(layout, &groups),
+        sum: chi2_of(&groups),
+        n: N_MOVE * groups.len(),
+    };
+    Ok((part, weight))
+}
