@@ -78,7 +78,7 @@ def test_attitude_carried_by_the_gyro_is_better_by_the_reference_on_a_part_it_di
 
 
 def neighbour(seed, seconds):
-    """Another unit in SI on the same body as the tracked one of this seed, at the body's origin, on a clock of its own."""
+    """Another unit, in SI, at the origin of the body of this seed's tracked one, on a clock of its own."""
     rng = np.random.default_rng(seed)
     unit(rng)
     _, C, path = hand(rng, seconds)
