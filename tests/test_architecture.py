@@ -10,7 +10,8 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "python" / "trihedron"
 STAGES = ("read", "segment", "estimate", "diagnose", "simulate", "report", "capture")
 # What any stage may import: the nouns, the model, units. `_core` only where numbers are made.
-COMPOSERS = {"pipeline", "cli", "__init__"}
+# A fleet is the pipeline over many logs.
+COMPOSERS = {"pipeline", "cli", "fleet", "__init__"}
 
 
 def imported_modules(path: Path) -> set[str]:

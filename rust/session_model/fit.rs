@@ -27,6 +27,8 @@ pub struct Fit {
     pub state: State,
     /// Strengths of the processes there.
     pub strengths: Strengths,
+    /// Scatter (accelerometer, gyro) that is likely, though it may be too small to be taken into the fit.
+    pub likely_scatter: [f64; 2],
     /// Effects in it.
     pub distortion: Distortion,
     /// Whitening of the moves.
@@ -267,6 +269,7 @@ pub fn fit(
             return Ok(Fit {
                 state,
                 strengths,
+                likely_scatter: strengths.scatter,
                 distortion: distortion.clone(),
                 weights,
                 passed,

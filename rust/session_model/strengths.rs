@@ -21,6 +21,9 @@ const N_SCATTER: i32 = 26;
 const COARSE: usize = 4;
 const SCATTER_FROM: f64 = 0.05;
 const SCATTER_RATIO: f64 = 1.5;
+/// Scatter below the usual standard error of a pose is left out of the answer, as `diagnose` does not name it (flicker
+/// makes zeros differ by as much); error bars allow for it.
+const LEAST_SCATTER: f64 = 1.0;
 /// Twice the gain in log-likelihood that makes a scatter count: 5.41 is passed in 1 % of sessions without any (half of
 /// χ² with one degree of freedom, the variance being at its boundary).
 const SCATTER_GATE: f64 = 5.41;
@@ -53,10 +56,13 @@ pub fn tune(
     distortion: &Distortion,
 ) -> Result<Fit> {
     let mut found = fit(session, start, strengths, distortion)?;
-    let best = Evidence::of(&found).search(session);
+    let evidence = Evidence::of(&found);
+    let likely = evidence.search(session);
+    let best = evidence.without_small_scatter(&likely, session);
     if best != found.strengths {
         found = fit(session, found.state, best, distortion)?;
     }
+    found.likely_scatter = likely.scatter;
     if session.scatter.is_none() || best.scatter == [NO_SCATTER; 2] || session.moves.is_empty() {
         return Ok(found);
     }
@@ -68,7 +74,12 @@ pub fn tune(
         between,
         ..found.strengths
     };
-    fit(session, found.state, best, distortion)
+    let likely_scatter = found.likely_scatter;
+    let found = fit(session, found.state, best, distortion)?;
+    Ok(Fit {
+        likely_scatter,
+        ..found
+    })
 }
 
 /// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.
@@ -191,6 +202,23 @@ impl Evidence {
         best
     }
 
+    /// The same strengths without scatter that is smaller than the errors of the poses.
+    fn without_small_scatter(&self, likely: &Strengths, session: &Session) -> Strengths {
+        let mut best = *likely;
+        if session.scatter.is_none() || session.is_scatter_given {
+            return best;
+        }
+        for scatter in &mut best.scatter {
+            if *scatter < LEAST_SCATTER {
+                *scatter = NO_SCATTER;
+            }
+        }
+        if best.scatter != likely.scatter {
+            self.search_corners(&mut best, session.rate.is_some());
+        }
+        best
+    }
+
     fn search_corners(&self, best: &mut Strengths, has_rate: bool) {
         // One sensor after the other, and the first again: their walks hardly meet in a row.
         for sensor in [0, 1, 0] {
@@ -284,7 +312,7 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
     for (scatter, prior) in std::iter::once((NO_SCATTER, 0.0)).chain(some) {
         for corner in POSSIBLE_CORNER_S {
             let mut at = fit.strengths;
-            at.scatter[0] = scatter;
+            at.scatter = [scatter, fit.likely_scatter[1]];
             at.corner_s[0] = corner;
             tried.push((evidence.at(&at) + prior, at));
         }

@@ -26,6 +26,7 @@ from trihedron.cli.convert import convert
 from trihedron.cli.demo import demo
 from trihedron.cli.diagnose import diagnose
 from trihedron.cli.export import export
+from trihedron.cli.fleet import fleet
 from trihedron.cli.guide import guide
 from trihedron.cli.help import WIDEST, Command, Group
 from trihedron.cli.kalman import kalman
@@ -53,6 +54,7 @@ COMMANDS = (
     kalman,
     verify,
     diagnose,
+    fleet,
     apply,
     convert,
     export,

@@ -15,8 +15,9 @@ from trihedron.estimate.gyroscope.moves import gyroscope_of
 from trihedron.estimate.gyroscope.observability import describe
 from trihedron.estimate.gyroscope.start import starts
 from trihedron.estimate.gyroscope.verification import held_out
-from trihedron.estimate.session.figures import carried, move_quality, norm_quality
+from trihedron.estimate.session.carried import carried
 from trihedron.estimate.session.figures import held_out as held_out_of_session
+from trihedron.estimate.session.figures import move_quality, norm_quality
 from trihedron.estimate.session.fit import SessionSolution, solve_session
 from trihedron.estimate.session.observed import arranged
 from trihedron.records.calibration import Calibration, FitQuality, Frame, SensorCalibration

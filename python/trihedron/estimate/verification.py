@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from trihedron import _core
 from trihedron.estimate.gyroscope.measurements import measure_moves
+from trihedron.estimate.session.carried import carried
 from trihedron.records import (
     Calibration,
     Finding,
@@ -53,7 +53,6 @@ def verify_calibration(
         raise ValueError("verification needs still poses, and none was found: hold the sensor still for some seconds")
     accelerometer = calibration.accelerometer
     noise = _variance(segments.accelerometer_sigma_mean, segments.n_holds)
-    force = segments.accelerometer_mean @ accelerometer.S.T + accelerometer.b
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
     empty = np.zeros(0)
     angle, angle_noise, angle_sigma = empty, empty, empty
@@ -62,7 +61,7 @@ def verify_calibration(
     if gyroscope is not None and segments.gyroscope_mean is not None:
         rest = segments.gyroscope_mean @ gyroscope.S.T + gyroscope.b
         if any(move.stop - move.start >= 2 for move in segments.moves):
-            angle, angle_noise, angle_sigma = _carried(calibration, gyroscope, recording, segments, force)
+            angle, angle_noise, angle_sigma = _carried(calibration, gyroscope, recording, segments)
     return Verification(
         source=recording.source,
         sha256=recording.sha256,
@@ -101,73 +100,22 @@ def _variance(sigma: FloatArray | None, n: int) -> FloatArray:
 
 
 def _carried(
-    calibration: Calibration,
-    gyroscope: SensorCalibration,
-    recording: Recording,
-    segments: Segments,
-    force: FloatArray,
+    calibration: Calibration, gyroscope: SensorCalibration, recording: Recording, segments: Segments
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Angles [deg] between gravity carried through each move and gravity measured after it, and their sigmas."""
-    measured = measure_moves(recording, segments, calibration.accelerometer, 3)
-    zero = -measured.zero @ gyroscope.S.T
-    assert recording.gyroscope is not None
-    rotation, wrt_scale, wrt_before, wrt_after, cov_rate = _core.integrate_moves(
-        recording.time_s,
-        recording.gyroscope,
-        measured.edges,
-        np.ascontiguousarray(segments.time_mid_s[measured.links]),
-        gyroscope.S,
-        np.ascontiguousarray(zero[measured.links[:, 0]]),
-        np.ascontiguousarray(zero[measured.links[:, 1]]),
-        3,
-        measured.noise_density,
-        measured.sigma_time_s,
-        measured.nominal_step_s,
-    )
-    unit = force / np.linalg.norm(force, axis=1)[:, None]
-    before, after = unit[measured.links[:, 0]], unit[measured.links[:, 1]]
-    carried = np.einsum("mij,mj->mi", rotation, before)
-    angle = 2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(carried - after, axis=1), 1.0))
-    # Across the vertical only: two components of the direction's error.
-    across = np.eye(3) - before[:, :, None] * before[:, None, :]
-    S_a, g = calibration.accelerometer.S, calibration.gravity_m_s2
-    of_direction = np.einsum("ij,nj,kj->nik", S_a, measured.var_reading, S_a) / g**2
-    of_zero = np.einsum("ij,nj,kj->nik", gyroscope.S, measured.var_zero, gyroscope.S)
-    first, last = measured.links[:, 0], measured.links[:, 1]
-    skew = _cross_matrices(before)
+    """Angles [deg] between gravity carried through each move and gravity measured after it, and their sigmas.
 
-    def turned(theta: FloatArray) -> FloatArray:
-        """What a rotation vector does to the direction carried."""
-        moved: FloatArray = skew @ theta
-        return moved
-
-    def spread(part: FloatArray, covariance: FloatArray) -> FloatArray:
-        out: FloatArray = part @ covariance @ np.swapaxes(part, 1, 2)
-        return out
-
-    # The two means enter in frames that the move turns into one another; a trace does not mind.
-    noise = of_direction[first] + np.swapaxes(rotation, 1, 2) @ of_direction[last] @ rotation
-    noise = noise + spread(skew, cov_rate)
-    noise = noise + spread(turned(wrt_before), of_zero[first]) + spread(turned(wrt_after), of_zero[last])
-    # Zero readings are subtracted: S enters through wrt_scale and through the biases -S z.
-    wrt_S = np.asarray(wrt_scale).copy()
-    for i in range(3):
-        wrt_S[:, :, 3 * i : 3 * i + 3] -= (
-            wrt_before[:, :, i : i + 1] * measured.zero[first][:, None, :]
-            + wrt_after[:, :, i : i + 1] * measured.zero[last][:, None, :]
-        )
-    model = spread(turned(wrt_S), np.broadcast_to(gyroscope.covariance[:9, :9], (len(angle), 9, 9)))
-    noise_rms = np.sqrt(np.einsum("mij,mji->m", across, noise))
-    total_rms = np.sqrt(np.einsum("mij,mji->m", across, noise + model))
-    return np.degrees(angle), np.degrees(noise_rms), np.degrees(total_rms)
-
-
-def _cross_matrices(vectors: FloatArray) -> FloatArray:
-    out = np.zeros((len(vectors), 3, 3))
-    out[:, 0, 1], out[:, 0, 2] = -vectors[:, 2], vectors[:, 1]
-    out[:, 1, 0], out[:, 1, 2] = vectors[:, 2], -vectors[:, 0]
-    out[:, 2, 0], out[:, 2, 1] = -vectors[:, 1], vectors[:, 0]
-    return out
+    The figure that a calibration publishes of its own session (docs/model-session.md), with a zero per pose, here with
+    S and b held at the calibration's.
+    """
+    accelerometer = calibration.accelerometer
+    measured = measure_moves(recording, segments, accelerometer, 3)
+    seen = carried(
+        recording.time_s, measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b,
+        gyroscope.S, gyroscope.covariance[:9, :9],
+    )  # fmt: skip
+    g = calibration.gravity_m_s2
+    noise, total = np.sqrt(seen.floor2) / g, np.sqrt(seen.floor2 + np.maximum(seen.model2, 0.0)) / g
+    return seen.angle_deg, np.degrees(noise), np.degrees(total)
 
 
 def _norm_findings(error: FloatArray, sigma: FloatArray) -> list[Finding]:

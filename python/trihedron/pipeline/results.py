@@ -8,6 +8,7 @@ from typing import Any
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.presented import Presented
+from trihedron.records.published import published_figures
 from trihedron.records.reference import AgainstReference
 
 
@@ -127,6 +128,7 @@ class DiagnosisResult(Diagnosis, Presented):
             **super().to_dict(),
             "gravity_source": self.gravity_source,
             "model_is_given": self.model_is_given,
+            "figures": None if self.calibration is None or self.model_is_given else published_figures(self.calibration),
             "reference": None if self.reference is None else self.reference.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
         }

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from trihedron.records import Calibration, FitQuality, Recording, Segments, SensorCalibration
+from trihedron.records.published import AFTER_MOVES, AT_REST, counted_moves
 from trihedron.report.axes import Axes, axes_of
 from trihedron.report.calibration_charts import (
     correlation_table,
@@ -69,13 +70,13 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     quality = calibration.accelerometer.quality
     if quality is not None:
         rms, kind = (quality.rms, "in sample") if quality.held_out_rms is None else (quality.held_out_rms, "held out")
-        beside = f"rms, {kind}; noise alone {plain_number(mm_s2_from_m_s2(quality.floor))}"
+        beside = f"rms, {kind}, {AT_REST}; noise alone {plain_number(mm_s2_from_m_s2(quality.floor))}"
         out.append(Headline("gravity at rest missed by", plain_number(mm_s2_from_m_s2(rms)), "mm/s²", beside))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and gyroscope.quality is not None:
         seen = [(label, rms) for label, rms, _ in _angles(gyroscope.quality)]
         if seen:
-            beside = f"rms, {seen[-1][0]}; noise alone {plain_number(_move_floor(gyroscope.quality))}°"
+            beside = f"rms, {seen[-1][0]}, {AFTER_MOVES}; noise alone {plain_number(_move_floor(gyroscope.quality))}°"
             out.append(Headline("gravity after a move missed by", plain_number(seen[-1][1]), "°", beside))
     for name, sensor in _sensors(calibration):
         relative = sensor.sigma_S.diagonal() / np.abs(sensor.S.diagonal())
@@ -86,7 +87,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
 
 def _move_floor(quality: FitQuality) -> float:
     """Angle after a move by noise alone, rms over the moves that count, degrees."""
-    noise = move_noise_deg(quality)[_counted(quality)]
+    noise = move_noise_deg(quality)[counted_moves(quality)]
     return float(np.sqrt(np.mean(noise**2))) if len(noise) else float("nan")
 
 
@@ -149,10 +150,18 @@ def _fit_in_words(name: str, sensor: SensorCalibration) -> list[tuple[str, str]]
     if quality is None:
         return rows
     if name == "accelerometer":
-        rows.append(("residual", _norm_words(quality)))
+        rows.append((f"gravity at rest, {AT_REST}", _norm_words(quality)))
+    elif _angles(quality):
+        rows.append((f"gravity after moves, {AFTER_MOVES}", _angle_words(quality)))
     else:
         rows.append(("residual", _angle_words(quality)))
     return rows
+
+
+def figures_in_words(calibration: Calibration) -> tuple[tuple[str, str], ...]:
+    """What the saved S and b leave, each figure under its definition: the same words in every report."""
+    rows = [row for name, sensor in _sensors(calibration) for row in _fit_in_words(name, sensor)]
+    return tuple(row for row in rows if row[0] != "method")
 
 
 def _norm_words(quality: FitQuality) -> str:
@@ -169,20 +178,11 @@ def _norm_words(quality: FitQuality) -> str:
     return "; ".join(parts)
 
 
-def _counted(quality: FitQuality) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(m,) the moves that were not left out."""
-    assert quality.angle_deg is not None
-    seen = np.isfinite(quality.angle_deg)
-    if quality.weights is not None and len(quality.weights) == len(seen):
-        seen &= quality.weights > 0
-    return seen
-
-
 def _angles(quality: FitQuality) -> list[tuple[str, float, float]]:
     """Label, rms and worst angle, in and out of sample, over the same moves."""
     if quality.angle_deg is None:
         return []
-    counted = _counted(quality)
+    counted = counted_moves(quality)
     held = quality.held_out_angle_deg
     pairs = [("in sample", quality.angle_deg)]
     if held is not None and np.any(np.isfinite(held[counted])):
@@ -200,7 +200,7 @@ def _angle_words(quality: FitQuality) -> str:
     if angles:
         parts = [f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}" for label, rms, worst in angles]
         parts.append(f"noise alone {plain_number(_move_floor(quality))}° rms")
-        return "gravity after a move predicted to " + "; ".join(parts)
+        return "; ".join(parts)
     if quality.dof <= 0:
         return "none: as many parameters as measured turns, so the fit cannot be judged"
     seen, noise = (plain_number(degrees_from_radians(value)) for value in (quality.rms, quality.floor))

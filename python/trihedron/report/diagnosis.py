@@ -8,6 +8,7 @@ from functools import partial
 
 from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis, DomainResiduals, DomainTest, HeldOut
+from trihedron.report.calibration import figures_in_words
 from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
 from trihedron.report.diagnosis_laws import laws_blocks
 from trihedron.report.diagnosis_numbers import (
@@ -161,13 +162,16 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         )
         for d in diagnosis.domains
     )
-    head: tuple[str, ...] = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
+    head: tuple[str, ...] = ("what", "domain", "residual, a zero per pose", "χ²/dof", "p", "model", "with the effects")
     if not diagnosis.effects:
         head, rows = head[:-1], tuple(row[:-1] for row in rows)
     blocks: list[Block] = [Table(head, rows)]
     places = tuple((d.domain, place) for d in diagnosis.domains if d.disagrees and (place := where_in_words(d)))
     if places:
         blocks.append(Facts(places))
+    own = getattr(diagnosis, "calibration", None)
+    if own is not None and not getattr(diagnosis, "model_is_given", False):
+        blocks.append(Facts(figures_in_words(own)))
     return tuple(blocks)
 
 

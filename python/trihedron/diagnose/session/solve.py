@@ -23,6 +23,7 @@ from trihedron.diagnose.session.twin import (
     Prior,
     System,
     Twin,
+    contiguous,
     core_model,
     core_state,
     stacked,
@@ -79,11 +80,18 @@ class Fit:
 
     @cached_property
     def linear(self) -> tuple[FloatArray, FloatArray]:
-        """(24, 24) covariance of ``(S_a, b_a, S_w, b_w)`` on raw readings; ``b_w`` with one zero for the session."""
-        obs = self.line.obs
-        return self.line.core.linear_covariance(
-            np.ascontiguousarray(obs.force_origin), np.ascontiguousarray(obs.rate_origin)
-        )
+        """(24, 24) covariance of ``(S_a, b_a, S_w, b_w)`` on raw readings; ``b_w`` with one zero for the session.
+
+        Error bars allow for zeros that scatter, as those of a calibration do (eq. 11.12b).
+        """
+        obs, core = self.line.obs, self.line.core
+        if obs.zero_scatter is None:
+            core = core_model(obs, self.twin.gravity, self.line.prior, is_scatter_free=True).fit(
+                state=core_state(self.twin), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
+                force_effect=contiguous(self.line.distortion.force), rate_effect=contiguous(self.line.distortion.rate),
+                is_tuned=False,
+            )  # fmt: skip
+        return core.linear_covariance(np.ascontiguousarray(obs.force_origin), np.ascontiguousarray(obs.rate_origin))
 
 
 def _fitted(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None, *, is_tuned: bool) -> Fit:
@@ -94,8 +102,8 @@ def _fitted(obs: Observations, start: Twin, distortion: Distortion, prior: Prior
     core = core_model(obs, start.gravity, prior).fit(
         state=core_state(start),
         strengths=(corners, scatter, start.between),
-        force_effect=None if distortion.force is None else np.ascontiguousarray(distortion.force, dtype=np.float64),
-        rate_effect=None if distortion.rate is None else np.ascontiguousarray(distortion.rate, dtype=np.float64),
+        force_effect=contiguous(distortion.force),
+        rate_effect=contiguous(distortion.rate),
         is_tuned=is_tuned,
     )
     twin = twin_of(core, start.gravity)

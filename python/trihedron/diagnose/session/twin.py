@@ -152,7 +152,7 @@ class Linearisation:
 
     def columns(self, distortion: Distortion) -> FloatArray:
         """(rows, K) whitened change of every residual row per effect parameter (eq. 11.7)."""
-        return self.core.columns(_contiguous(distortion.force), _contiguous(distortion.rate))
+        return self.core.columns(contiguous(distortion.force), contiguous(distortion.rate))
 
     @cached_property
     def accel_white(self) -> FloatArray:
@@ -181,24 +181,30 @@ class Linearisation:
         return self.core.whitening()
 
 
-def _contiguous(values: FloatArray | None) -> FloatArray | None:
+def contiguous(values: FloatArray | None) -> FloatArray | None:
+    """Values as the core reads them."""
     return None if values is None else np.ascontiguousarray(values, dtype=np.float64)
 
 
-def core_model(obs: Observations, gravity_m_s2: float, prior: Prior | None) -> _core.SessionModel:
-    """The Rust model of some observations."""
+def core_model(
+    obs: Observations, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False
+) -> _core.SessionModel:
+    """The Rust model of some observations; with ``is_scatter_free`` zeros may scatter though no diagnosis says so."""
     has_rate = obs.hold_rate is not None and obs.hold_rate_sigma is not None and obs.rate_density is not None
     poses = _core.SessionPoses(
         time_s=np.ascontiguousarray(obs.hold_time_s, dtype=np.float64),
         force=np.ascontiguousarray(obs.hold_force),
         force_sigma=np.ascontiguousarray(obs.hold_force_sigma),
         force_density=np.ascontiguousarray(obs.force_density),
-        rate=_contiguous(obs.hold_rate) if has_rate else None,
-        rate_sigma=_contiguous(obs.hold_rate_sigma) if has_rate else None,
-        rate_density=_contiguous(obs.rate_density) if has_rate else None,
+        rate=contiguous(obs.hold_rate) if has_rate else None,
+        rate_sigma=contiguous(obs.hold_rate_sigma) if has_rate else None,
+        rate_density=contiguous(obs.rate_density) if has_rate else None,
     )
     # A sensor that does not scatter has a scatter that counts as none.
-    least = START_STRENGTHS[1][0] * scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma)
+    unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma)
+    scatter = (unit, False) if is_scatter_free else None
+    if obs.zero_scatter is not None:
+        scatter = (np.maximum(obs.zero_scatter, START_STRENGTHS[1][0] * unit), True)
     return _core.SessionModel(
         gravity_m_s2=gravity_m_s2,
         poses=poses,
@@ -211,7 +217,7 @@ def core_model(obs: Observations, gravity_m_s2: float, prior: Prior | None) -> _
         prior=None
         if prior is None
         else (np.ascontiguousarray(prior.mean), np.ascontiguousarray(prior.covariance), prior.is_weak),
-        scatter=None if obs.zero_scatter is None else (np.maximum(obs.zero_scatter, least), True),
+        scatter=scatter,
     )
 
 

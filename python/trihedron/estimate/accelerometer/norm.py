@@ -144,7 +144,8 @@ def calibrate_norm_samples(
     flip = np.outer(signs, signs)
     per_pose = noise * flip * count[:, None, None]
     start = _core.fit_norm(values * signs, noise * flip, settings)
-    fit = _core.fit_norm(raw * signs, per_pose[pose], settings, (start.S, start.b))
+    owner = np.ascontiguousarray(pose, dtype=np.int64)
+    fit = _core.fit_norm(raw * signs, per_pose, settings, (start.S, start.b), owner)
     apart = _core.fit_norm_held_out(values * signs, noise * flip, settings, start, _folds(len(values)))
     return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from trihedron import _core
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.estimate.session.carried import Carried, carried
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, SessionSolution
 from trihedron.estimate.session.observed import Observed
 from trihedron.records.calibration import FitQuality
@@ -19,57 +19,6 @@ from trihedron.records.calibration import FitQuality
 FloatArray = npt.NDArray[np.float64]
 
 N_ACCELEROMETER, N_GYROSCOPE = 9, 9
-
-
-@dataclass(frozen=True, eq=False)
-class Carried:
-    """Gravity carried through moves: ``residual``, ``sigma`` (m, 3) m/s², ``angle_deg`` (m,), noise ``floor2`` (m,)."""
-
-    residual: FloatArray
-    sigma: FloatArray
-    angle_deg: FloatArray
-    floor2: FloatArray
-
-
-def carried(
-    time_s: FloatArray,
-    measured: MoveMeasurements,
-    anchors_s: FloatArray,
-    S_a: FloatArray,
-    b_a: FloatArray,
-    S_w: FloatArray,
-) -> Carried:
-    """``B f_i - f_j`` of every move with the hold means at both ends, each hold with a zero of its own."""
-    zero = -measured.zero @ S_w.T
-    before, after = measured.links[:, 0], measured.links[:, 1]
-    rotation, _, wrt_before, wrt_after, cov_rate = _core.integrate_moves(
-        time_s, measured.rate, measured.edges, np.ascontiguousarray(anchors_s), np.ascontiguousarray(S_w),
-        np.ascontiguousarray(zero[before]), np.ascontiguousarray(zero[after]), 3,
-        measured.noise_density, measured.sigma_time_s, measured.nominal_step_s,
-    )  # fmt: skip
-    force = measured.reading @ S_a.T + b_a
-    start, end = force[before], force[after]
-    moved = np.einsum("mij,mj->mi", rotation, start)
-    residual = moved - end
-    unit_moved = moved / np.linalg.norm(moved, axis=1, keepdims=True)
-    unit_end = end / np.linalg.norm(end, axis=1, keepdims=True)
-    angle = np.degrees(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(unit_moved - unit_end, axis=1), 1.0)))
-    skew = np.zeros((len(start), 3, 3))
-    skew[:, [0, 1, 2], [1, 2, 0]] = -start[:, [2, 0, 1]]
-    skew[:, [1, 2, 0], [0, 1, 2]] = start[:, [2, 0, 1]]
-    turn = rotation @ skew
-
-    def spread(part: FloatArray, covariance: FloatArray) -> FloatArray:
-        out: FloatArray = part @ covariance @ np.swapaxes(part, 1, 2)
-        return out
-
-    of_force = np.einsum("ij,nj,kj->nik", S_a, measured.var_reading, S_a)
-    of_zero = np.einsum("ij,nj,kj->nik", S_w, measured.var_zero, S_w)
-    covariance = spread(turn, cov_rate) + spread(rotation, of_force[before]) + of_force[after]
-    covariance = covariance + spread(turn @ wrt_before, of_zero[before]) + spread(turn @ wrt_after, of_zero[after])
-    across = np.eye(3) - unit_end[:, :, None] * unit_end[:, None, :]
-    floor2 = np.einsum("mii->m", across @ covariance @ across)
-    return Carried(residual, np.sqrt(np.einsum("mii->mi", covariance)), angle, floor2)
 
 
 def norm_quality(
@@ -134,7 +83,7 @@ def held_out(
     is_reading = labels[:, 3] == 0
     norm, norm_sigma = np.full(n, np.nan), np.full(n, np.nan)
     empty = np.full((measured.n_moves, 3), np.nan)
-    parts = Carried(empty.copy(), empty.copy(), empty[:, 0].copy(), empty[:, 0].copy())
+    parts = Carried(empty.copy(), empty.copy(), *(empty[:, 0].copy() for _ in range(3)))
     number = {int(hold): k for k, hold in enumerate(measured.links[:, 0])}
     for fold in range(n_folds):
         holds = np.arange(n) % n_folds == fold

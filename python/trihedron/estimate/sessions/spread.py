@@ -71,10 +71,13 @@ def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[o
     points = (np.arange(QUANTILES) + 0.5) / QUANTILES
     inner = _solved(values, variances, members, np.asarray(chi2.isf(points, dof_within)))
     targets = np.asarray(chi2.isf(points, dof))
-    draws = [_solved(*_group_means(values, variances, members, s2), one_group, targets) for s2 in inner]
-    ends = np.sqrt(np.quantile(np.concatenate(draws), [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0]))
+    at_each = [_group_means(values, variances, members, s2) for s2 in inner]
+    draws = _solved_for_all(np.array([m for m, _ in at_each]), np.array([v for _, v in at_each]), targets)
+    ends = np.sqrt(np.quantile(draws, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0]))
     means, variance = _group_means(values, variances, members, within.sd**2)
     point = _restricted(means, variance, one_group)
+    if ends[1] == 0.0:
+        ends[1] = _spread(means, variance, one_group, dof).high
     return Spread(float(np.clip(point, ends[0], ends[1])), float(ends[0]), float(ends[1]), dof)
 
 
@@ -141,6 +144,27 @@ def _solved(values: FloatArray, variances: FloatArray, members: list[IntArray], 
         above = _q(values, variances, members, np.exp(middle)) > targets
         low, high = np.where(above, middle, low), np.where(above, high, middle)
     is_zero = _q(values, variances, members, np.zeros(len(targets)) + 1e-12 * scale) <= targets
+    return np.where(is_zero, 0.0, np.exp(0.5 * (low + high)))
+
+
+def _solved_for_all(means: FloatArray, variances: FloatArray, targets: FloatArray) -> FloatArray:
+    """:func:`_solved` for many sets of means and variances (m, n) at once, one group each: σ² (m, targets)."""
+
+    def q(s2: FloatArray) -> FloatArray:
+        weights = 1.0 / (variances[:, None, :] + s2[:, :, None])
+        centre = (weights * means[:, None, :]).sum(axis=2) / weights.sum(axis=2)
+        out: FloatArray = (weights * (means[:, None, :] - centre[:, :, None]) ** 2).sum(axis=2)
+        return out
+
+    scale = max(float(np.max(np.ptp(means, axis=1)) ** 2 * means.shape[1]), float(variances.max()), 1e-300)
+    shape = (len(means), len(targets))
+    low, high = np.full(shape, np.log(1e-12 * scale)), np.full(shape, np.log(1e6 * scale))
+    is_zero = q(np.exp(low)) <= targets
+    # Four decades more than the accuracy of an end of an interval asks for.
+    for _ in range(BISECTIONS // 2):
+        middle = 0.5 * (low + high)
+        above = q(np.exp(middle)) > targets
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
     return np.where(is_zero, 0.0, np.exp(0.5 * (low + high)))
 
 

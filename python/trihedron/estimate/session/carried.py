@@ -1,0 +1,85 @@
+"""Gravity carried through moves by the gyro, and what noise and stated errors allow it to miss (equation 5.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron import _core
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """Gravity carried through moves: ``residual``, ``sigma`` (m, 3) m/s², ``angle_deg`` (m,).
+
+    ``floor2`` (m,) is the variance across the vertical by noise of poses and samples, (m/s²)², ``model2`` (m,) that by
+    a covariance of the gyro's S, where one was given.
+    """
+
+    residual: FloatArray
+    sigma: FloatArray
+    angle_deg: FloatArray
+    floor2: FloatArray
+    model2: FloatArray
+
+
+def carried(
+    time_s: FloatArray,
+    measured: MoveMeasurements,
+    anchors_s: FloatArray,
+    S_a: FloatArray,
+    b_a: FloatArray,
+    S_w: FloatArray,
+    covariance_S_w: FloatArray | None = None,
+) -> Carried:
+    """``B f_i - f_j`` of every move with the hold means at both ends, each hold with a zero of its own.
+
+    The one definition of gravity after moves: in sample, held out, and of a calibration held against another session.
+    ``covariance_S_w`` (9, 9) is that of S_w row by row.
+    """
+    zero = -measured.zero @ S_w.T
+    before, after = measured.links[:, 0], measured.links[:, 1]
+    rotation, wrt_scale, wrt_before, wrt_after, cov_rate = _core.integrate_moves(
+        time_s, measured.rate, measured.edges, np.ascontiguousarray(anchors_s), np.ascontiguousarray(S_w),
+        np.ascontiguousarray(zero[before]), np.ascontiguousarray(zero[after]), 3,
+        measured.noise_density, measured.sigma_time_s, measured.nominal_step_s,
+    )  # fmt: skip
+    force = measured.reading @ S_a.T + b_a
+    start, end = force[before], force[after]
+    moved = np.einsum("mij,mj->mi", rotation, start)
+    residual = moved - end
+    unit_moved = moved / np.linalg.norm(moved, axis=1, keepdims=True)
+    unit_end = end / np.linalg.norm(end, axis=1, keepdims=True)
+    angle = np.degrees(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(unit_moved - unit_end, axis=1), 1.0)))
+    skew = np.zeros((len(start), 3, 3))
+    skew[:, [0, 1, 2], [1, 2, 0]] = -start[:, [2, 0, 1]]
+    skew[:, [1, 2, 0], [0, 1, 2]] = start[:, [2, 0, 1]]
+    turn = rotation @ skew
+
+    def spread(part: FloatArray, covariance: FloatArray) -> FloatArray:
+        out: FloatArray = part @ covariance @ np.swapaxes(part, 1, 2)
+        return out
+
+    of_force = np.einsum("ij,nj,kj->nik", S_a, measured.var_reading, S_a)
+    of_zero = np.einsum("ij,nj,kj->nik", S_w, measured.var_zero, S_w)
+    covariance = spread(turn, cov_rate) + spread(rotation, of_force[before]) + of_force[after]
+    covariance = covariance + spread(turn @ wrt_before, of_zero[before]) + spread(turn @ wrt_after, of_zero[after])
+    across = np.eye(3) - unit_end[:, :, None] * unit_end[:, None, :]
+    floor2 = np.einsum("mii->m", across @ covariance @ across)
+    model2 = np.zeros(len(angle))
+    if covariance_S_w is not None:
+        # Zero readings are subtracted: S enters through the rate and through the biases -S z.
+        wrt_S = np.asarray(wrt_scale).copy()
+        for i in range(3):
+            wrt_S[:, :, 3 * i : 3 * i + 3] -= (
+                wrt_before[:, :, i : i + 1] * measured.zero[before][:, None, :]
+                + wrt_after[:, :, i : i + 1] * measured.zero[after][:, None, :]
+            )
+        by_model = spread(turn @ wrt_S, np.broadcast_to(covariance_S_w, (len(angle), 9, 9)))
+        model2 = np.einsum("mii->m", across @ by_model @ across)
+    return Carried(residual, np.sqrt(np.einsum("mii->mi", covariance)), angle, floor2, model2)

@@ -1,0 +1,135 @@
+"""Which logs there are, which device each belongs to, and what makes a result stale."""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import json
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from trihedron.read import devices_of
+
+ENDINGS = (
+    *(".csv", ".tsv", ".txt", ".log", ".dat", ".npz", ".npy", ".parquet", ".zip", ".gz", ".bag", ".mcap", ".db3"),
+    *(".ulg", ".bin", ".h5", ".hdf5", ".mat"),
+)
+"""Files of a folder that may be logs; every other is passed over. A file that is named is taken whatever its ending."""
+BLOCK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Job:
+    """One log of one device. ``key`` changes with the bytes of the log, the options and the version of the program."""
+
+    path: str
+    device: int | None
+    serial: str
+    key: str
+
+    @property
+    def name(self) -> str:
+        """For people."""
+        return Path(self.path).name + ("" if self.device is None else f", device {self.device}")
+
+
+def find_jobs(
+    source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    options: Mapping[str, Any],
+    *,
+    serial: str | None = None,
+    apart_from: Path | None = None,
+) -> list[Job]:
+    """Every log of a folder (and the folders in it), of a pattern or of a list, one job a device.
+
+    ``serial`` is a regular expression whose first group, found in a log's path, names its device; without it devices
+    are those of an archive, or else the folder that the log lies in. ``apart_from`` is left out: our own output.
+
+    Raises
+    ------
+    ValueError
+        When there is none, a named log is missing, or the expression does not fit.
+    """
+    paths = [
+        path for path in _paths(source) if apart_from is None or apart_from.resolve() not in path.resolve().parents
+    ]
+    if not paths:
+        raise ValueError(
+            f"{source}: no log was found there; name a folder with logs, or a pattern such as 'logs/*.csv'."
+        )
+    try:
+        pattern = None if serial is None else re.compile(serial)
+    except re.error as error:
+        raise ValueError(f"--serial {serial!r} is not a regular expression ({error}).") from None
+    if pattern is not None and pattern.groups != 1:
+        raise ValueError(
+            f"--serial {serial!r} needs one group in parentheses: the part of the path that is the device."
+        )
+    root = os.path.commonpath([str(path.parent.resolve()) for path in paths])
+    jobs: list[Job] = []
+    for path in paths:
+        digest = _digest(path)
+        n = devices_of(path)
+        for device in [None] if n == 1 else range(1, n + 1):
+            name = _serial(path, device, pattern, root)
+            jobs.append(Job(str(path), device, name, _key(digest, device, options)))
+    return jobs
+
+
+def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> list[Path]:
+    if not isinstance(source, str | os.PathLike):
+        return [path for one in source for path in _paths(one)]
+    path = Path(source)
+    if path.is_dir():
+        found = (p for p in path.rglob("*") if p.suffix.lower() in ENDINGS and not p.name.startswith("."))
+        return sorted(p for p in found if p.is_file())
+    if path.exists():
+        return [path]
+    matched = sorted(Path(name) for name in glob.glob(str(source), recursive=True))
+    if not matched and not glob.has_magic(str(source)):
+        raise ValueError(f"{source}: there is no such file or folder; check the name.")
+    return [one for one in matched if one.is_file()]
+
+
+def _serial(path: Path, device: int | None, pattern: re.Pattern[str] | None, root: str) -> str:
+    if pattern is not None:
+        found = pattern.search(str(path))
+        if found is None:
+            raise ValueError(f"{path}: --serial {pattern.pattern!r} does not fit this path.")
+        return found.group(1)
+    if device is not None:
+        return f"device {device}"
+    folder = os.path.relpath(path.parent.resolve(), root)
+    return path.parent.resolve().name if folder == "." else folder
+
+
+def _digest(path: Path) -> str:
+    digest = hashlib.sha256()
+    try:
+        with path.open("rb") as stream:
+            while block := stream.read(BLOCK):
+                digest.update(block)
+    except OSError:
+        # It will fail when it is read, with its reason; the key only has to stay the same until it is mended.
+        return f"unreadable {path}"
+    return digest.hexdigest()
+
+
+def _key(digest: str, device: int | None, options: Mapping[str, Any]) -> str:
+    said = json.dumps({"log": digest, "device": device, "options": dict(options), "version": program()}, sort_keys=True)
+    return hashlib.sha256(said.encode()).hexdigest()[:24]
+
+
+def program() -> str:
+    """Name and version, a part of every key: results of another version are made anew."""
+    try:
+        return f"trihedron {version('trihedron')}"
+    except PackageNotFoundError:
+        from trihedron.files.calibration import FORMAT_VERSION
+
+        return f"trihedron (not installed), calibration format {FORMAT_VERSION}"

@@ -1,0 +1,191 @@
+"""Logs handed to workers, results kept as they come, so that nothing is done twice and nothing is lost."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
+
+from trihedron.files.calibration import plain
+from trihedron.files.output import write_whole
+from trihedron.fleet.logs import Job, find_jobs
+from trihedron.fleet.summary import FleetResult, summarise
+from trihedron.fleet.table import write_tables
+from trihedron.fleet.work import Row, work
+from trihedron.pipeline.reading import Progress
+
+RESULTS = "results"
+DEATHS = 3
+"""Workers that one log may take with it before it is given up: once can be the machine, three times is the log."""
+By = Literal["session", "date"]
+
+
+def fleet(
+    logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    *,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    diagnose: bool = True,
+    serial: str | None = None,
+    gravity_m_s2: float | None = None,
+    latitude_deg: float | None = None,
+    height_m: float | None = None,
+    columns: str | None = None,
+    rate_hz: float | None = None,
+    accelerometer_unit: str | None = None,
+    gyroscope_unit: str | None = None,
+    progress: Progress | None = None,
+) -> FleetResult:
+    """Calibrate and diagnose every log; write ``fleet.parquet``, ``fleet.csv`` and ``fleet.html`` into ``out``.
+
+    Parameters
+    ----------
+    logs : folder, pattern, file, or a list of them
+        An archive of several devices is one log a device.
+    out : folder
+        Where results go. Logs whose result is there already (same bytes, options and version) are not done again.
+    scheduler : str, optional
+        Address of a Dask scheduler, ``tcp://host:8786``: its workers must see the same paths and have trihedron.
+    workers : int, optional
+        Processes of the local cluster, as many as processors unless said; 0 works in this process, without Dask.
+    diagnose : bool
+        Without it logs are calibrated only, which is several times faster.
+    serial : str, optional
+        Regular expression whose group names the device in a log's path; else archives number them, else folders do.
+    gravity_m_s2 or latitude_deg, height_m, columns, rate_hz, accelerometer_unit, gyroscope_unit
+        As for :func:`trihedron.calibrate` and :func:`trihedron.read`; the same for all logs.
+
+    Raises
+    ------
+    ValueError
+        When there is no log, Dask is needed and not installed, or its scheduler does not answer.
+
+    Notes
+    -----
+    A script that calls this with a local cluster needs ``if __name__ == "__main__":`` around it, as every use of
+    processes in Python does.
+    """
+    folder = Path(out)
+    options = {
+        "gravity_m_s2": gravity_m_s2,
+        "latitude_deg": latitude_deg,
+        "height_m": height_m,
+        "columns": columns,
+        "rate_hz": rate_hz,
+        "accelerometer_unit": accelerometer_unit,
+        "gyroscope_unit": gyroscope_unit,
+        "diagnose": diagnose,
+    }
+    if workers is not None and workers < 0:
+        raise ValueError(f"--workers is 0 or more, not {workers}.")
+    tell = progress or (lambda _fraction, _text: None)
+    tell(0.0, "looking at logs")
+    jobs = find_jobs(logs, options, serial=serial, apart_from=folder)
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"{folder}: this is a file; name a folder for the results.")
+    (folder / RESULTS).mkdir(parents=True, exist_ok=True)
+    rows = {job.key: kept for job in jobs if (kept := _kept(folder, job)) is not None}
+    todo = list({job.key: job for job in jobs if job.key not in rows}.values())
+    n_before = len(rows)
+    for done, (job, row) in enumerate(_results(todo, options, scheduler, workers), 1):
+        _keep(folder, job, row)
+        rows[job.key] = row
+        tell(done / len(todo), f"{n_before + done} of {n_before + len(todo)} logs")
+    made = [{"path": job.path, "name": job.name, "serial": job.serial, "key": job.key} | rows[job.key] for job in jobs]
+    tell(1.0, "writing the table and the page")
+    result = summarise(made, folder, n_before)
+    write_tables(result)
+    return result
+
+
+def _kept(folder: Path, job: Job) -> Row | None:
+    """The result of an earlier run; one that crashed is tried again."""
+    path = folder / RESULTS / f"{job.key}.json"
+    try:
+        row: Row = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return None if row.get("status") == "crashed" else row
+
+
+def _keep(folder: Path, job: Job, row: Row) -> None:
+    """One file a result, put in place in one step: a run that is killed leaves whole results only."""
+    text = json.dumps(plain(row), allow_nan=False)
+    write_whole(folder / RESULTS / f"{job.key}.json", text, overwrite=True)
+
+
+def _results(
+    jobs: Sequence[Job], options: Mapping[str, Any], scheduler: str | None, workers: int | None
+) -> Iterator[tuple[Job, Row]]:
+    if not jobs:
+        return
+    if workers == 0 and scheduler is None:
+        for job in jobs:
+            yield job, work(job.path, job.device, options)
+        return
+    with _client(scheduler, workers) as client:
+        futures = {}
+        for job in jobs:
+            path = str(Path(job.path).resolve())
+            future = client.submit(work, path, job.device, dict(options), key=f"trihedron-{job.key}", pure=False)
+            futures[future] = job
+        for future in import_module("distributed").as_completed(futures, loop=client.loop):
+            job = futures[future]
+            error = future.exception() if future.status == "error" else None
+            if error is None and future.status == "finished":
+                row = future.result()
+            else:
+                row = {"status": "crashed", "reason": _why(error), "seconds": None}
+            future.release()
+            yield job, row
+
+
+def _why(error: BaseException | None) -> str:
+    if type(error).__name__ == "KilledWorker":
+        return f"it ended {DEATHS} workers, one after the other: most likely there was not enough memory for this log"
+    return f"the cluster gave it up ({type(error).__name__}: {error})"
+
+
+@contextmanager
+def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
+    """A Dask client of the given scheduler, or of a cluster of processes on this machine.
+
+    Raises
+    ------
+    ValueError
+        When Dask is not installed, or the scheduler does not answer.
+    """
+    try:
+        dask, distributed = import_module("dask"), import_module("distributed")
+    except ModuleNotFoundError:
+        raise ValueError(
+            "several workers need Dask, which is not installed: pip install 'trihedron[fleet]', or say --workers 0 to "
+            "do one log after the other in this process."
+        ) from None
+    # One log is one task of one thread: linear algebra that starts threads of its own would fight over processors.
+    settings = {"distributed.scheduler.allowed-failures": DEATHS - 1, "distributed.admin.tick.limit": "60s"}
+    with dask.config.set(settings):
+        if scheduler is not None:
+            try:
+                client = distributed.Client(scheduler, timeout="15s", set_as_default=False)
+            except (OSError, TimeoutError, ValueError) as error:
+                raise ValueError(f"{scheduler}: no Dask scheduler answers there ({error}).") from None
+            with client:
+                yield client
+            return
+        environment = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
+        cluster = distributed.LocalCluster(
+            n_workers=workers or os.cpu_count() or 1,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            silence_logs=50,
+            env=environment,
+        )
+        with cluster, distributed.Client(cluster, set_as_default=False) as client:
+            yield client

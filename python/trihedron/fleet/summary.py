@@ -1,0 +1,181 @@
+"""Rows of all logs into what a fleet says: spreads, outliers, shared physics, drift of single devices."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import beta
+from scipy.stats import t as student
+
+from trihedron.estimate.sessions import changes_among, repeated_parameters
+from trihedron.records.fleet import FleetLog, FleetSummary, Outlier, SharedEffect
+from trihedron.records.sessions import PARAMETERS, Session
+
+ALPHA = 0.01
+"""Chance that a sound fleet is told to have any outlier, or any device that changed."""
+FEWEST = 5
+"""Devices below which none is called an outlier: the spread of the others would rest on three."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FleetResult:
+    """What was made of every log (``rows``, plain types), the summary, and the folder with table and page."""
+
+    folder: Path
+    rows: tuple[dict[str, Any], ...]
+    summary: FleetSummary
+
+    @property
+    def n_done(self) -> int:
+        """Logs that were calibrated."""
+        return sum(row["status"] == "done" for row in self.rows)
+
+    def to_dataframe(self) -> Any:
+        """One row a log (polars)."""
+        from trihedron.fleet.table import frame_of
+
+        return frame_of(self.rows)
+
+    def __repr__(self) -> str:
+        return f"<FleetResult of {len(self.rows)} logs, {self.n_done} calibrated: {self.folder}>"
+
+    def __str__(self) -> str:
+        from trihedron.report import to_text
+        from trihedron.report.fleet import fleet_report
+
+        return to_text(fleet_report(self.summary))
+
+
+def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -> FleetResult:
+    """The rows of one run as a result."""
+    logs = tuple(_log(row) for row in rows)
+    comparable, passed_over = _comparable(rows)
+    sessions = [_session(row) for row in comparable]
+    by_device = _by_device(sessions)
+    repeated = repeated_parameters(sessions) if len(sessions) > 1 else ()
+    changes = changes_among(list(by_device.values()), alpha=ALPHA)
+    diagnosed = [row for row in rows if row.get("diagnosis")]
+    summary = FleetSummary(
+        logs,
+        n_before,
+        len(diagnosed),
+        len({row["serial"] for row in diagnosed}),
+        repeated,
+        changes,
+        _outliers(by_device),
+        _shared(diagnosed),
+        passed_over,
+    )
+    return FleetResult(folder, tuple(rows), summary)
+
+
+def _log(row: dict[str, Any]) -> FleetLog:
+    diagnosis = row.get("diagnosis") or {}
+    numbers = None if row.get("numbers") is None else np.array(row["numbers"], dtype=np.float64)
+    std = None
+    if row.get("covariance") is not None:
+        std = np.sqrt(np.maximum(np.diag(np.array(row["covariance"], dtype=np.float64)), 0.0))
+    return FleetLog(
+        row["name"],
+        row["serial"],
+        row["status"],
+        row.get("reason", ""),
+        diagnosis.get("verdict", ""),
+        tuple(effect["id"] for effect in diagnosis.get("effects", ())),
+        bool(row.get("is_trustworthy", False)),
+        row.get("n_poses"),
+        row.get("static_rms_m_s2"),
+        row.get("held_out_rms_m_s2"),
+        row.get("seconds"),
+        numbers,
+        std,
+    )
+
+
+def _comparable(rows: Sequence[dict[str, Any]]) -> tuple[list[dict[str, Any]], str]:
+    """Trustworthy calibrations in the commonest units and sensors, in their order in time, and who is missing."""
+    sound = [row for row in rows if row["status"] == "done" and row.get("is_trustworthy")]
+    kind = Counter((row["accelerometer_unit"], row["gyroscope_unit"], len(row["numbers"])) for row in sound)
+    if not kind:
+        return [], ""
+    chosen = kind.most_common(1)[0][0]
+    taken = [row for row in sound if (row["accelerometer_unit"], row["gyroscope_unit"], len(row["numbers"])) == chosen]
+    doubtful = sum(row["status"] == "done" for row in rows) - len(sound)
+    words = []
+    if doubtful:
+        words.append(f"{doubtful} whose own calibration is not to be trusted")
+    if len(sound) > len(taken):
+        words.append(f"{len(sound) - len(taken)} in other units or without the same sensors")
+    order = sorted(range(len(taken)), key=lambda k: (taken[k].get("start_epoch_s") or 0.0, k))
+    return [taken[k] for k in order], " and ".join(words)
+
+
+def _session(row: dict[str, Any]) -> Session:
+    numbers = np.array(row["numbers"], dtype=np.float64)
+    return Session(
+        row["name"],
+        row["serial"],
+        numbers,
+        np.array(row["covariance"], dtype=np.float64),
+        np.array(row["wander"], dtype=np.float64),
+        row.get("start_epoch_s") or 0.0,
+    )
+
+
+def _by_device(sessions: Sequence[Session]) -> dict[str, list[Session]]:
+    out: dict[str, list[Session]] = {}
+    for session in sessions:
+        out.setdefault(session.group, []).append(session)
+    return out
+
+
+def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
+    """Devices whose mean lies beyond the others': Student's deleted residual, by Bonferroni over devices and numbers.
+
+    One at a time, the farthest first, each left out before the next is looked at: two strays do not hide each other.
+    """
+    if len(by_device) < FEWEST:
+        return ()
+    names = list(by_device)
+    means = np.array([np.mean([s.numbers for s in by_device[name]], axis=0) for name in names])
+    n_tests = means.size
+    found: list[Outlier] = []
+    for k in range(means.shape[1]):
+        kept = list(range(len(names)))
+        while len(kept) >= FEWEST:
+            column = means[kept, k]
+            worst = int(np.argmax(np.abs(column - np.median(column))))
+            others = np.delete(column, worst)
+            spread = float(others.std(ddof=1)) * np.sqrt(1.0 + 1.0 / len(others))
+            sigmas = float(column[worst] - others.mean()) / max(spread, 1e-300)
+            p = min(1.0, 2.0 * float(student.sf(abs(sigmas), len(others) - 1)) * n_tests)
+            if p >= ALPHA:
+                break
+            serial = names[kept[worst]]
+            away = float(column[worst] - np.median(others))
+            found.append(Outlier(serial, PARAMETERS[k], float(column[worst]), away, sigmas, p))
+            kept.pop(worst)
+    return tuple(sorted(found, key=lambda one: one.p_adjusted))
+
+
+def _shared(diagnosed: Sequence[dict[str, Any]]) -> tuple[SharedEffect, ...]:
+    """Every effect found, the commonest first; Clopper and Pearson's interval of the share of devices."""
+    logs: Counter[str] = Counter()
+    devices: dict[str, set[str]] = {}
+    for row in diagnosed:
+        for name in {effect["id"] for effect in row["diagnosis"]["effects"]}:
+            logs[name] += 1
+            devices.setdefault(name, set()).add(row["serial"])
+    n = len({row["serial"] for row in diagnosed})
+    out = []
+    for name, count in logs.most_common():
+        k = len(devices[name])
+        low = float(beta.ppf(0.025, k, n - k + 1)) if k else 0.0
+        high = float(beta.ppf(0.975, k + 1, n - k)) if k < n else 1.0
+        out.append(SharedEffect(name, count, k, low, high))
+    return tuple(out)

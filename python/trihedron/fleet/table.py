@@ -1,0 +1,80 @@
+"""The fleet as a table: one row a log."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from trihedron.files.output import write_whole
+from trihedron.fleet.summary import FleetResult
+from trihedron.records.sessions import PARAMETERS
+
+if TYPE_CHECKING:
+    import polars
+
+PLAIN = (
+    *("path", "serial", "status", "reason", "verdict", "effects", "warnings", "serious", "is_trustworthy"),
+    *("n_samples", "duration_s", "rate_hz", "n_poses", "start_epoch_s", "temperature_degc", "gravity_m_s2"),
+    *(
+        "accelerometer_unit",
+        "gyroscope_unit",
+        "static_rms_m_s2",
+        "held_out_rms_m_s2",
+        "seconds",
+        "sha256",
+        "version",
+        "key",
+    ),
+)
+
+
+def write_tables(result: FleetResult) -> None:
+    """``fleet.parquet``, ``fleet.csv`` and ``fleet.html`` in the folder of the results; those of an earlier run go."""
+    from trihedron.report.fleet import fleet_report
+    from trihedron.report.page import to_html
+
+    frame = frame_of(result.rows)
+    buffer = io.BytesIO()
+    frame.write_parquet(buffer)
+    write_whole(result.folder / "fleet.parquet", buffer.getvalue(), overwrite=True)
+    write_whole(result.folder / "fleet.csv", frame.write_csv(), overwrite=True)
+    write_whole(result.folder / "fleet.html", to_html(fleet_report(result.summary)), overwrite=True)
+
+
+def frame_of(rows: Sequence[dict[str, Any]]) -> polars.DataFrame:
+    """One row a log: what it is, what came of it, and the 21 numbers with their standard errors (SI in the names)."""
+    import polars
+
+    text = {"path", "serial", "status", "reason", "verdict", "effects", "warnings", "serious"}
+    text |= {"accelerometer_unit", "gyroscope_unit", "sha256", "version", "key"}
+    columns: dict[str, list[Any]] = {name: [_cell(row, name) for row in rows] for name in PLAIN}
+    for k, parameter in enumerate(PARAMETERS):
+        name = f"{parameter.id}_{parameter.name}".replace("-", "_")
+        unit = {"m/s^2": "_m_s2", "rad/s": "_rad_s", "rad": "_rad", "1": "_ln_raw_per_si"}[parameter.unit]
+        columns[name + unit] = [_number(row, k) for row in rows]
+        columns[f"{name}_std"] = [_std(row, k) for row in rows]
+    kinds: dict[str, Any] = {name: polars.String if name in text else polars.Float64 for name in columns}
+    kinds |= {"is_trustworthy": polars.Boolean, "n_samples": polars.Int64, "n_poses": polars.Int64}
+    return polars.DataFrame(columns, schema=kinds, strict=False)
+
+
+def _cell(row: dict[str, Any], name: str) -> Any:
+    diagnosis = row.get("diagnosis") or {}
+    if name == "verdict":
+        return diagnosis.get("verdict", "")
+    if name == "effects":
+        return " ".join(effect["id"] for effect in diagnosis.get("effects", ()))
+    if name in ("warnings", "serious"):
+        return " ".join(row.get(name) or ())
+    return row.get(name)
+
+
+def _number(row: dict[str, Any], k: int) -> float | None:
+    numbers = row.get("numbers") or ()
+    return float(numbers[k]) if k < len(numbers) else None
+
+
+def _std(row: dict[str, Any], k: int) -> float | None:
+    covariance = row.get("covariance") or ()
+    return float(max(covariance[k][k], 0.0)) ** 0.5 if k < len(covariance) else None

@@ -1,0 +1,103 @@
+"""One log, calibrated and diagnosed: what a worker does. Plain types go in and come out."""
+
+from __future__ import annotations
+
+import os
+import time
+import traceback
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from trihedron.fleet.logs import program
+
+Row = dict[str, Any]
+
+
+def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
+    """The row of one log; never an exception: its reason stands in the row.
+
+    ``status`` is ``done``, ``refused`` (the log does not allow it: one sentence says why) or ``crashed`` (a defect of
+    the program or a machine without memory; tried again by the next run).
+    """
+    began = time.monotonic()
+    row: Row = {"version": program(), "worker": os.getpid()}
+    try:
+        row |= {"status": "done", "reason": "", **_calibrated(path, device, options)}
+    except (ValueError, OSError) as error:
+        row |= {"status": "refused", "reason": str(error)}
+    except MemoryError:
+        row |= {"status": "crashed", "reason": "there was not enough memory for this log"}
+    except Exception as error:  # a defect met in one log must not cost the results of the others
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        place = f"{os.path.basename(where.filename)}:{where.lineno}"
+        row |= {"status": "crashed", "reason": f"{type(error).__name__} in {place}: {error}"}
+    return row | {"seconds": time.monotonic() - began}
+
+
+def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
+    # Imported by the worker: the process that only hands out logs needs none of it.
+    from trihedron import pipeline
+    from trihedron.pipeline.results import CalibrationResult
+
+    reading: dict[str, Any] = {
+        key: options[key] for key in ("columns", "rate_hz", "accelerometer_unit", "gyroscope_unit") if options.get(key)
+    }
+    place: dict[str, Any] = {key: options.get(key) for key in ("gravity_m_s2", "latitude_deg", "height_m")}
+    recording = pipeline.read(path, device=device, **reading)
+    diagnosis = None
+    if options.get("diagnose", True):
+        found = pipeline.diagnose(recording, **place)
+        if found.calibration is None:
+            grave = [f.seen for f in found.findings if f.severity.value != "note"]
+            why = grave[0] if grave else "its poses determine no calibration."
+            raise ValueError(f"{recording.source}: {why} `trihedron diagnose` says what else it shows.")
+        result = CalibrationResult(found.calibration, found.segments, recording)
+        diagnosis = {
+            "verdict": found.verdict,
+            "effects": [
+                {"id": effect.id, "share": effect.share, "statement": effect.statement} for effect in found.effects
+            ],
+        }
+        findings = {f.code.value: f for f in (*found.findings, *result.findings)}.values()
+    else:
+        result = pipeline.calibrate(recording, **place)
+        findings = {f.code.value: f for f in result.findings}.values()
+    return _row(result) | {
+        "diagnosis": diagnosis,
+        "warnings": sorted(f.code.value for f in findings if f.severity.value == "warning"),
+        "serious": sorted(f.code.value for f in findings if f.severity.value == "serious"),
+    }
+
+
+def _row(result: Any) -> Row:
+    from trihedron.invariants import anchor_of
+    from trihedron.pipeline.sessions import session_of
+    from trihedron.sensor_model import in_frame
+
+    calibration = in_frame(result.calibration, "lower")
+    accel, gyro = calibration.accelerometer, calibration.gyroscope
+    anchor = anchor_of(accel.S, None if gyro is None else gyro.S)
+    session = session_of(result, anchor, result.recording.source, "")
+    quality = accel.quality
+    return {
+        "sha256": result.recording.sha256,
+        "start_epoch_s": result.recording.start_epoch_s,
+        "n_samples": result.recording.n_samples,
+        "duration_s": result.recording.duration_s,
+        "rate_hz": result.recording.rate_hz,
+        "n_poses": result.segments.n_holds,
+        "is_trustworthy": result.is_trustworthy,
+        "gravity_m_s2": calibration.gravity_m_s2,
+        "accelerometer_unit": accel.raw_unit,
+        "gyroscope_unit": "" if gyro is None else gyro.raw_unit,
+        "static_rms_m_s2": None if quality is None else float(quality.rms_dof),
+        "held_out_rms_m_s2": None if quality is None or quality.held_out_rms is None else float(quality.held_out_rms),
+        "temperature_degc": session.temperature_degc if np.isfinite(session.temperature_degc) else None,
+        "accelerometer": {"S": accel.S.tolist(), "b": accel.b.tolist()},
+        "gyroscope": None if gyro is None else {"S": gyro.S.tolist(), "b": gyro.b.tolist()},
+        "numbers": session.numbers.tolist(),
+        "covariance": session.covariance.tolist(),
+        "wander": session.wander.tolist(),
+    }

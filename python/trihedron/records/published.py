@@ -1,0 +1,53 @@
+"""The figures that a calibration publishes, each under one definition wherever it is printed or written."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from trihedron.records.calibration import Calibration, FitQuality
+
+AT_REST = "with one zero for the session"
+AFTER_MOVES = "with a zero per pose"
+"""In words: what zero the saved S and b are given before the figure is taken."""
+
+
+def counted_moves(quality: FitQuality) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(m,) the moves that were not left out."""
+    assert quality.angle_deg is not None
+    seen = np.isfinite(quality.angle_deg)
+    if quality.weights is not None and len(quality.weights) == len(seen):
+        seen &= quality.weights > 0
+    return seen
+
+
+def published_figures(calibration: Calibration) -> dict[str, dict[str, Any]]:
+    """Rms of gravity missed at rest [m/s²] and after moves [°], in sample and held out, as plain JSON types.
+
+    ``None`` stands for what could not be held out.
+    """
+    out: dict[str, dict[str, Any]] = {}
+    at_rest = calibration.accelerometer.quality
+    if at_rest is not None:
+        out["gravity_at_rest"] = {
+            "definition": f"| |S a' + b| - |g| | of the means of the poses, {AT_REST}",
+            "unit": "m/s^2",
+            "rms": float(at_rest.rms),
+            "held_out_rms": None if at_rest.held_out_rms is None else float(at_rest.held_out_rms),
+        }
+    moved = None if calibration.gyroscope is None else calibration.gyroscope.quality
+    if moved is not None and moved.angle_deg is not None:
+        counted = counted_moves(moved)
+        held = moved.held_out_angle_deg
+        out["gravity_after_moves"] = {
+            "definition": f"angle between gravity carried by the gyro and gravity measured after a move, {AFTER_MOVES}",
+            "unit": "deg",
+            "rms": _rms(moved.angle_deg[counted]),
+            "held_out_rms": None if held is None else _rms(held[counted & np.isfinite(held)]),
+        }
+    return out
+
+
+def _rms(values: np.ndarray[Any, np.dtype[np.float64]]) -> float | None:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else None

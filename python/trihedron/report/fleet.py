@@ -1,0 +1,192 @@
+"""A fleet of devices, as a report."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+from trihedron.records.fleet import FleetLog, FleetSummary
+from trihedron.records.sessions import Change, Repeated
+from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
+from trihedron.report.drawing import later
+from trihedron.report.numbers import how_many, plain_number, with_sigma
+from trihedron.report.sessions import shown
+
+VERDICTS = {
+    "consistent": "the linear model explains everything",
+    "missing-physics": "physics beyond the linear model",
+    "unexplained": "a misfit that no mechanism explains",
+    "not-testable": "cannot be tested",
+    "parameters-differ": "other numbers",
+}
+
+
+def fleet_report(summary: FleetSummary) -> Document:
+    """Lay out what came of every log, how devices differ, and what they share."""
+    n = len(summary.logs)
+    bad = [log for log in summary.logs if log.status != "done"]
+    n_done = n - len(bad)
+    devices = {log.serial for log in summary.logs if log.status == "done"}
+    sections = [Section("Result", (Facts(_facts(summary)),))]
+    if bad:
+        sections.append(Section("Logs that were not calibrated", (_bad(bad),)))
+    if summary.n_diagnosed:
+        sections.append(Section("Physics that devices share", tuple(_physics(summary))))
+    if summary.repeated:
+        sections.append(Section("How devices differ", tuple(_spread(summary))))
+    if summary.outliers or summary.repeated:
+        sections.append(Section("Outliers", tuple(_outliers(summary))))
+    if summary.changes:
+        sections.append(Section("Drift between sessions of one device", tuple(_drift(summary))))
+    if n_done:
+        picture = Picture(
+            "numbers",
+            "Every number by device, one point a log with its own error; the line is the median of devices.",
+            later("fleet_figures", "draw_numbers", summary),
+        )
+        sections.append(Section("Distributions", (picture,)))
+    sections.append(Section("Every log", (_logs(summary),)))
+    verdict = f"{n_done} of {how_many(n, 'log')} of {how_many(len(devices), 'device')} were calibrated."
+    if not bad:
+        verdict = f"All {how_many(n, 'log')} of {how_many(len(devices), 'device')} were calibrated."
+    if n_done == 0:
+        verdict = "NONE of the logs could be calibrated; the reasons are below."
+    strays = {one.serial for one in summary.outliers}
+    moved = {change.group for change in summary.changes if change.significant}
+    if strays:
+        verdict += f" {how_many(len(strays), 'device')} outside the others."
+    if moved:
+        verdict += f" {how_many(len(moved), 'device')} changed between sessions."
+    return Document(
+        title="Fleet",
+        subtitle=f"{how_many(n, 'log')}, {how_many(len({log.serial for log in summary.logs}), 'device')}",
+        verdict=verdict,
+        is_trustworthy=n_done > 0,
+        sections=tuple(sections),
+    )
+
+
+def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
+    status = Counter(log.status for log in summary.logs)
+    doubtful = sum(log.status == "done" and not log.is_trustworthy for log in summary.logs)
+    facts = [("calibrated", how_many(status["done"], "log"))]
+    if doubtful:
+        facts.append(("of these", f"{doubtful} not to be trusted by their own findings"))
+    if status["refused"]:
+        facts.append(("refused", f"{how_many(status['refused'], 'log')}: they do not allow a calibration"))
+    if status["crashed"]:
+        facts.append(("failed", f"{how_many(status['crashed'], 'log')}: tried again by the next run"))
+    if summary.n_before:
+        facts.append(("from before", f"{how_many(summary.n_before, 'result')} of an earlier run were kept"))
+    for verdict, count in Counter(log.verdict for log in summary.logs if log.verdict).most_common():
+        facts.append((verdict, f"{how_many(count, 'log')}: {VERDICTS.get(verdict, '')}"))
+    seconds = [log.seconds for log in summary.logs if log.seconds is not None]
+    if seconds:
+        facts.append(
+            (
+                "work",
+                f"{plain_number(sum(seconds), 3)} s of one worker, {plain_number(max(seconds), 2)} s the longest log",
+            )
+        )
+    return tuple(facts)
+
+
+def _bad(logs: list[FleetLog]) -> Facts:
+    return Facts(tuple((f"{log.serial}: {log.name}", f"{log.status}: {log.reason}") for log in logs))
+
+
+def _physics(summary: FleetSummary) -> list[Block]:
+    if not summary.effects:
+        return [Paragraph(f"No effect beyond the linear model was accepted in {how_many(summary.n_diagnosed, 'log')}.")]
+    n = summary.n_devices_diagnosed
+    rows = [
+        (
+            effect.id,
+            f"{effect.n_logs} of {summary.n_diagnosed}",
+            f"{effect.n_devices} of {n}",
+            f"{100 * effect.low:.0f} to {100 * effect.high:.0f} %",
+        )
+        for effect in summary.effects
+    ]
+    return [Table(("effect", "logs", "devices", "share of devices, 95 %"), tuple(rows))]
+
+
+def _spread(summary: FleetSummary) -> list[Block]:
+    is_grouped = any(one.between is not None for one in summary.repeated)
+    head = ["number", "mean ± σ", "device to device" if is_grouped else "from log to log", "95 %"]
+    head += ["session to session", "95 %"] if is_grouped else []
+    rows = [tuple(_spread_row(one, is_grouped)) for one in summary.repeated]
+    said = (
+        "Standard deviations beyond each log's own error. Scales are relative; misalignments are departures from 90°."
+    )
+    if summary.passed_over:
+        said += f" Not counted: {summary.passed_over}."
+    return [Paragraph(said), Table(tuple(head), tuple(rows))]
+
+
+def _spread_row(one: Repeated, is_grouped: bool) -> list[str]:
+    factor, unit = shown(one.parameter.unit)
+    value = one.value - (0.5 * math.pi if one.parameter.id.endswith("misalignment") else 0.0)
+    is_scale = one.parameter.id.endswith("scale")
+    cells = [f"{one.parameter.id} {one.parameter.name} [{unit}]"]
+    cells.append(f"± {plain_number(one.std * factor, 2)}" if is_scale else with_sigma(value * factor, one.std * factor))
+    for spread in (one.between, one.within) if is_grouped else (one.within,):
+        if spread is None:
+            cells += ["–", "–"]
+            continue
+        sd = "not seen" if spread.sd == 0.0 else plain_number(spread.sd * factor, 2)
+        cells += [sd, f"{plain_number(spread.low * factor, 2)} to {plain_number(spread.high * factor, 2)}"]
+    return cells
+
+
+def _outliers(summary: FleetSummary) -> list[Block]:
+    if not summary.outliers:
+        return [Paragraph("No device lies outside what the others make likely (1 % over all devices and numbers).")]
+    rows = []
+    for one in summary.outliers:
+        factor, unit = shown(one.parameter.unit)
+        away = f"{plain_number(one.deviation * factor, 2)} {unit}"
+        cells = (one.serial, f"{one.parameter.id} {one.parameter.name}", away, plain_number(one.sigmas, 2))
+        rows.append((*cells, f"{one.p_adjusted:.1g}"))
+    return [Table(("device", "number", "from the median", "in spreads of the others", "p"), tuple(rows))]
+
+
+def _drift(summary: FleetSummary) -> list[Block]:
+    moved = [change for change in summary.changes if change.significant]
+    n_devices = len({change.group for change in summary.changes})
+    tested = f"{how_many(n_devices, 'device')} with two sessions or more, seven groups of numbers each, 1 % over all."
+    if not moved:
+        return [Paragraph(f"No number of any device changed beyond its error and wander: {tested}")]
+    rows = tuple((change.group, change.id, *_drift_cells(change)) for change in moved)
+    return [Paragraph(f"Tested: {tested}"), Table(("device", "number", "how", "by", "p"), rows)]
+
+
+def _drift_cells(change: Change) -> tuple[str, str, str]:
+    factor, unit = shown(change.unit)
+    k = max(range(len(change.size)), key=lambda i: abs(change.size[i]))
+    how = {
+        "differs": "second less first",
+        "apart": f"{change.where} apart",
+        "step": f"from {change.where} on",
+        "trend": "each session",
+        "scatter": "every session",
+    }[change.kind]
+    value = change.size[k] * factor
+    amount = plain_number(value, 2) if change.kind == "scatter" else with_sigma(value, change.std[k] * factor)
+    return how, f"{amount} {unit} in {change.names[k]}", f"{change.p_adjusted:.1g}"
+
+
+def _logs(summary: FleetSummary) -> Table:
+    rows = tuple(
+        (
+            log.name,
+            log.serial,
+            log.status if log.is_trustworthy or log.status != "done" else "done, doubtful",
+            log.verdict or "–",
+            ", ".join(log.effects) or "–",
+            "–" if log.n_poses is None else str(log.n_poses),
+            "–" if log.held_out_rms_m_s2 is None else plain_number(log.held_out_rms_m_s2 * shown("m/s^2")[0], 2),
+        )
+        for log in summary.logs
+    )
+    return Table(("log", "device", "status", "verdict", "effects", "poses", "held out [mm/s²]"), rows)

@@ -1,0 +1,173 @@
+"""Many logs of many devices: one table, nothing done twice, nothing lost, one bad log stops nobody."""
+
+import json
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import polars
+import pytest
+
+import trihedron
+from hand_made_sessions import G, Instrument, recorded
+from trihedron.cli import main
+from trihedron.fleet import find_jobs, running, summarise
+from trihedron.fleet.work import work
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """Two devices of two sessions, the second device's gyro zero 0.02 rad/s away in its second, and what is no log."""
+    folder = tmp_path_factory.mktemp("fleet")
+    for unit in range(2):
+        for session in range(2):
+            moved = 0.02 if (unit, session) == (1, 1) else 0.0
+            instrument = Instrument().moved(b_g=[0.005 * unit + moved, 0.0, 0.0])
+            path = folder / f"unit_{unit}" / f"log_{session}.csv"
+            path.parent.mkdir(exist_ok=True)
+            trihedron.convert(recorded(instrument, 10 * unit + session, n_poses=14), path)
+    (folder / "unit_0" / "notes.txt").write_text("the sensor was warm\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def done(logs, tmp_path_factory):
+    out = tmp_path_factory.mktemp("out")
+    return trihedron.fleet(logs, out, workers=0, diagnose=False, gravity_m_s2=G), out
+
+
+def test_every_log_has_its_row_and_the_bad_one_its_reason(done):
+    result, out = done
+    table = polars.read_parquet(out / "fleet.parquet")
+    assert table.height == 5
+    assert result.n_done == 4
+    bad = table.filter(polars.col("status") == "refused")
+    assert bad["path"].item().endswith("notes.txt")
+    assert len(bad["reason"].item()) > 20
+    assert polars.read_csv(out / "fleet.csv").height == 5
+    zero = table.filter(polars.col("status") == "done")["gyro_zero_x_rad_s"]
+    # Zeros along the axis: -(M b) with scales within 2 % of one.
+    np.testing.assert_allclose(sorted(-zero), sorted([0.01, 0.01, 0.015, 0.035]), rtol=0.05, atol=1e-3)
+
+
+def test_the_page_names_the_device_that_changed(done):
+    result, out = done
+    moved = [(c.group, c.id) for c in result.summary.changes if c.significant]
+    assert moved == [("unit_1", "gyro-zero")]
+    page = (out / "fleet.html").read_text()
+    assert "unit_1" in page
+    assert "notes.txt" in page
+    assert "data:image/png" in page
+
+
+def test_logs_that_are_done_are_not_done_again(logs, done, monkeypatch):
+    _, out = done
+
+    def never(*_):
+        raise AssertionError("a log was done twice")
+
+    monkeypatch.setattr(running, "work", never)
+    again = trihedron.fleet(logs, out, workers=0, diagnose=False, gravity_m_s2=G)
+    assert again.summary.n_before == 5
+    assert again.n_done == 4
+
+
+def test_other_bytes_options_or_devices_make_another_key(logs, tmp_path):
+    keys = {job.key for job in find_jobs(logs, {"gravity_m_s2": G})}
+    assert len(keys) == 5
+    assert not keys & {job.key for job in find_jobs(logs, {"gravity_m_s2": 9.8})}
+    path = logs / "unit_0" / "log_0.csv"
+    changed = tmp_path / "log_0.csv"
+    changed.write_bytes(path.read_bytes() + b"\n")
+    assert find_jobs(changed, {})[0].key != find_jobs(path, {})[0].key
+
+
+def test_devices_are_named_by_the_folder_or_by_an_expression(logs):
+    assert {job.serial for job in find_jobs(logs, {})} == {"unit_0", "unit_1"}
+    assert {job.serial for job in find_jobs(logs, {}, serial=r"unit_(\d)")} == {"0", "1"}
+    with pytest.raises(ValueError, match="one group"):
+        find_jobs(logs, {}, serial="unit")
+    with pytest.raises(ValueError, match="no such file"):
+        find_jobs(logs / "nowhere", {})
+
+
+def test_an_archive_of_several_devices_is_one_log_a_device(tmp_path):
+    np.savez(tmp_path / "board.npz", counts=np.zeros((50, 3, 6), dtype=np.int16), t_s=np.arange(50) / 50.0)
+    jobs = find_jobs(tmp_path, {})
+    assert [job.serial for job in jobs] == ["device 1", "device 2", "device 3"]
+    assert len({job.key for job in jobs}) == 3
+
+
+def test_a_defect_of_the_program_is_a_row_and_is_tried_again(logs, tmp_path, monkeypatch):
+    def defect(*_args, **_options):
+        raise ZeroDivisionError("by nothing")
+
+    from trihedron import pipeline
+
+    path = logs / "unit_0" / "log_0.csv"
+    with monkeypatch.context() as patch:
+        patch.setattr(pipeline, "calibrate", defect)
+        first = trihedron.fleet(path, tmp_path, workers=0, diagnose=False, gravity_m_s2=G)
+    assert first.rows[0]["status"] == "crashed"
+    assert "ZeroDivisionError" in first.rows[0]["reason"]
+    assert trihedron.fleet(path, tmp_path, workers=0, diagnose=False, gravity_m_s2=G).n_done == 1
+
+
+def test_a_device_outside_the_others_is_an_outlier_and_nobody_else_is(tmp_path):
+    rng = np.random.default_rng(3)
+    rows = []
+    for unit in range(12):
+        for session in range(2):
+            numbers = rng.normal(size=21) * 1e-3
+            numbers[13] += 0.05 if unit == 7 else 0.0
+            rows.append(
+                {
+                    "path": "",
+                    "name": f"{unit}-{session}",
+                    "serial": f"u{unit}",
+                    "status": "done",
+                    "is_trustworthy": True,
+                }
+                | {"accelerometer_unit": "m/s^2", "gyroscope_unit": "rad/s", "numbers": numbers.tolist()}
+                | {"covariance": (np.eye(21) * 1e-8).tolist(), "wander": [0.0] * 21}
+            )
+    summary = summarise(rows, tmp_path).summary
+    assert [(one.serial, one.parameter.id, one.parameter.name) for one in summary.outliers] == [
+        ("u7", "gyro-scale", "y")
+    ]
+
+
+def test_the_diagnosis_of_a_log_is_in_its_row(logs):
+    row = work(str(logs / "unit_0" / "log_0.csv"), None, {"gravity_m_s2": G})
+    assert row["status"] == "done"
+    assert row["diagnosis"]["verdict"] == "consistent"
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_worker_that_is_killed_loses_nothing(logs, tmp_path):
+    pytest.importorskip("distributed")
+    killed = []
+
+    def kill_one(_fraction, _text):
+        kept = [json.loads(path.read_text()) for path in (tmp_path / "results").glob("*.json")]
+        pids = [row["worker"] for row in kept if row["worker"] != os.getpid()]
+        if pids and not killed:
+            killed.append(pids[0])
+            os.kill(pids[0], signal.SIGKILL)
+
+    result = trihedron.fleet(logs, tmp_path, workers=1, diagnose=False, gravity_m_s2=G, progress=kill_one)
+    assert len(killed) == 1
+    assert {row["status"] for row in result.rows if not row["path"].endswith("notes.txt")} == {"done"}
+    assert result.n_done == 4
+
+
+def test_the_command_writes_table_and_page_and_says_where(logs, done, capsys):
+    _, out = done
+    status = main(["fleet", str(logs), "--out", str(out), "--workers", "0", "--no-diagnose", "--gravity", str(G)])
+    said = capsys.readouterr()
+    assert status == 0
+    assert "4 of 5 logs of 2 devices were calibrated" in said.out
+    assert "fleet.parquet" in said.err
+    assert main(["fleet", str(Path(out) / "nothing*.csv"), "--out", str(out)]) == 1
+    assert "no log was found" in capsys.readouterr().err

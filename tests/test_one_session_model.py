@@ -1,0 +1,69 @@
+"""calibrate, verify and diagnose answer with one model: the same S and b, the same figures, the same error bars."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trihedron import calibrate, diagnose, verify
+from trihedron.records.published import published_figures
+from trihedron.report.calibration import figures_in_words
+from trihedron.simulate import hand_session, scenario_by_name, simulate
+
+
+@pytest.fixture(scope="module", params=(103, 118))
+def healthy(request):
+    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(24, layout=request.param))
+    recording, truth = simulate(scenario, request.param)
+    result = calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
+    return recording, truth.gravity_m_s2, result, diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
+
+
+def test_calibrate_and_diagnose_agree_on_every_parameter_within_a_tenth_of_its_error(healthy):
+    _, _, result, diagnosis = healthy
+    for sensor, model in (
+        (result.accelerometer, diagnosis.baseline.accelerometer),
+        (result.gyroscope, diagnosis.baseline.gyroscope),
+    ):
+        free = sensor.sigma_S > 0.0
+        apart = np.abs(sensor.S - np.array(model["S"]))[free] / sensor.sigma_S[free]
+        assert apart.max() < 0.1
+        assert (np.abs(sensor.b - np.array(model["b"])) / sensor.sigma_b).max() < 0.1
+        # One measuring of noise, one of strengths: error bars differ by what single precision of a grid leaves.
+        np.testing.assert_allclose(np.array(model["sigma_S"])[free], sensor.sigma_S[free], rtol=0.05)
+
+
+def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(healthy):
+    _, _, result, diagnosis = healthy
+    figures = published_figures(result.calibration)
+    assert diagnosis.to_dict()["figures"] == figures
+    assert set(figures) == {"gravity_at_rest", "gravity_after_moves"}
+    assert "one zero for the session" in figures["gravity_at_rest"]["definition"]
+    assert "a zero per pose" in figures["gravity_after_moves"]["definition"]
+    words = figures_in_words(result.calibration)
+    assert any("held out" in value for _, value in words)
+    for text in (str(result), str(diagnosis)):
+        flat = " ".join(text.split())
+        for _, value in words:
+            # Long cells wrap; numbers and units stay together.
+            assert all(part in flat for part in value.split("; "))
+
+
+def test_a_calibration_verified_on_its_own_session_shows_the_figures_that_it_published(healthy):
+    recording, gravity, result, _ = healthy
+    checked = verify(result.calibration, recording, gravity_m_s2=gravity)
+    assert np.sqrt(np.mean(checked.verification.norm_error**2)) == pytest.approx(
+        result.accelerometer.quality.rms, rel=1e-9
+    )
+    # Directions of the poses come from the same means; the noise of a pose was measured with another accelerometer.
+    np.testing.assert_allclose(checked.verification.angle_deg, result.gyroscope.quality.angle_deg, rtol=1e-6)
+
+
+def test_the_held_out_figure_at_rest_is_that_of_the_saved_model_refitted_without_the_poses(healthy):
+    _, gravity, result, _ = healthy
+    quality = result.accelerometer.quality
+    held = quality.held_out_rms
+    # The saved S, b leave less on poses that they have seen than on those held out, and not by much with 24 poses.
+    assert quality.rms < held < 3.0 * quality.rms
+    force = result.segments.accelerometer_mean @ result.accelerometer.S.T + result.accelerometer.b
+    np.testing.assert_allclose(np.linalg.norm(force, axis=1) - gravity, quality.residual, atol=1e-12)
