@@ -57,6 +57,16 @@ def test_commands_of_a_rate_table_are_enough():
     assert any(f.code is FindingCode.ACCELEROMETER_NOMINAL for f in result.findings)
 
 
+def test_a_log_of_a_gyro_alone_is_diagnosed_and_its_calibration_refused_in_one_sentence():
+    trial = measured_table(5, 45)
+    result = trihedron.diagnose(trial.log, reference=trial.motion, gravity_m_s2=G)
+    assert result.verdict == "consistent"
+    assert "Against the reference" in str(result)
+    assert diagnosis_document(result)["reference"]["accelerometer"] is None
+    with pytest.raises(ValueError, match="has none"):
+        trihedron.calibrate(trial.log, reference=trial.motion, gravity_m_s2=G)
+
+
 def test_g_sensitivity_and_cubic_scale_are_told_from_the_linear_numbers():
     G_true = np.array([[3e-3, 0, 0], [0, -2e-3, 1e-3], [0, 0, 2e-3]])
     trial = tracked(21, seconds=40, g_sensitivity=G_true)
