@@ -122,7 +122,8 @@ def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ..
     head = ("stage", *(size.get(d, d) for d in domains))
     if not rows:
         return (Paragraph("No stages: the model was fitted to this recording."),)
-    return (Table(head, rows, "Rms in physical units"),)
+    caption = "Rms, and χ² per degree of freedom, on poses and moves that the fit of each stage did not see"
+    return (Table(head, rows, caption),)
 
 
 def _stage(stage: Stage, domain: str) -> str:
