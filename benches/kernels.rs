@@ -1,13 +1,16 @@
 //! Throughput of the kernels (criterion): `cargo bench`.
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Matrix3, Vector3};
 use std::hint::black_box;
+use trihedron::attitude::{Form, IDENTITY, Samples};
 use trihedron::gauss_newton::Loss;
 use trihedron::kalman::{AxisFilter, NoiseTerms, Pose, Prior, ShapingModel};
 use trihedron::norm_invariant::{Frame, Objective, Readings, Settings, fit};
 use trihedron::poisson::{MoveRange, RateModel, RateNoise, prepare};
 use trihedron::rotation;
+use trihedron::simd::Instructions;
+use trihedron::stillness::block_statistics_with;
 
 fn rotations(c: &mut Criterion) {
     let v = Vector3::new(0.01, -0.02, 0.03);
@@ -45,7 +48,7 @@ fn norm_fits(c: &mut Criterion) {
     let noise = [Matrix3::identity() * 12.5];
     let mut group = c.benchmark_group("norm_invariant::fit");
     group.sample_size(10);
-    for n in [50, 1_000_000] {
+    for n in [18, 500, 1_000_000] {
         let values = still_samples(n);
         group.bench_function(format!("{n} readings"), |b| {
             b.iter(|| {
@@ -53,6 +56,7 @@ fn norm_fits(c: &mut Criterion) {
                     Readings {
                         values: black_box(&values),
                         noise: &noise,
+                        pose: &[],
                     },
                     &settings,
                     None,
@@ -92,6 +96,39 @@ fn poisson(c: &mut Criterion) {
             b.iter(|| prepared.integrate(black_box(&scale), &bias, &bias, &noise));
         });
     }
+}
+
+/// A million uneven steps: the last attitude, all of them, and blocks of still detection.
+fn long_logs(c: &mut Criterion) {
+    let n = 1_000_001_u32;
+    let time: Vec<f64> = (0..n)
+        .map(|k| 0.01 * (f64::from(k) + 0.3 * (1.7 * f64::from(k)).sin()))
+        .collect();
+    let rate: Vec<[f64; 3]> = time
+        .iter()
+        .map(|t| [2.0 * (0.3 * t).sin(), 1.5 * (0.17 * t).cos(), 0.2])
+        .collect();
+    let mut group = c.benchmark_group("a million samples");
+    group
+        .sample_size(10)
+        .throughput(Throughput::Elements(u64::from(n)));
+    for &set in Instructions::offered() {
+        let Ok(samples) = Samples::new(&time, &rate, RateModel::Linear) else {
+            return;
+        };
+        let samples = samples.with(set);
+        group.bench_function(format!("attitude, last, {}", set.name()), |b| {
+            b.iter(|| samples.last());
+        });
+        let mut out = vec![0.0; 9 * time.len()];
+        group.bench_function(format!("attitude, all, {}", set.name()), |b| {
+            b.iter(|| samples.all(IDENTITY, Form::Matrix, &mut out));
+        });
+        group.bench_function(format!("stillness, blocks of 20, {}", set.name()), |b| {
+            b.iter(|| block_statistics_with(set, black_box(rate.as_flattened()), 20));
+        });
+    }
+    group.finish();
 }
 
 /// One pose of the Kalman filter of one axis: time update, measurement update, on a regular log.
@@ -156,5 +193,12 @@ fn kalman_poses(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, rotations, norm_fits, poisson, kalman_poses);
+criterion_group!(
+    benches,
+    rotations,
+    norm_fits,
+    poisson,
+    long_logs,
+    kalman_poses
+);
 criterion_main!(benches);

@@ -4,6 +4,7 @@
 //! Vocabulary: `S`, `b` are the direct form `f = S a' + b` (raw to SI), `Mz` is the instrument trihedron.
 
 pub mod allan;
+pub mod attitude;
 pub mod banded;
 pub mod chi_square;
 pub mod ellipsoid;
@@ -13,14 +14,15 @@ pub mod gyro_alignment;
 pub mod interrupt;
 pub mod kalman;
 pub mod norm_invariant;
+pub mod number_text;
 pub mod poisson;
 pub mod rotation;
 pub mod screening;
 pub mod session_model;
+pub mod simd;
 pub mod simulate;
 pub mod spectral_likelihood;
 pub mod stillness;
-pub mod trajectory;
 pub mod zero_process;
 
 #[cfg(feature = "python")]

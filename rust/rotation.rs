@@ -4,23 +4,78 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::simd::{FUSED_BASELINE, fma};
+
 /// The cross-product matrix `[v]x`, so that `skew(v) * x == v × x`.
 #[must_use]
 pub fn skew(v: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
-/// Below this squared angle the closed forms lose digits and three Taylor terms are exact to 1e-16.
-const SMALL_ANGLE_SQUARED: f64 = 1e-4;
+/// Up to this squared angle (half a radian) seven terms of the Taylor series are exact to rounding; beyond it the closed
+/// forms lose less than two digits.
+pub(crate) const SERIES_LIMIT: f64 = 0.25;
 
-/// `(sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³)` with Taylor series near zero.
-fn series(theta2: f64) -> (f64, f64, f64) {
-    if theta2 < SMALL_ANGLE_SQUARED {
-        (
-            1.0 - theta2 / 6.0 * (1.0 - theta2 / 20.0 * (1.0 - theta2 / 42.0)),
-            0.5 - theta2 / 24.0 * (1.0 - theta2 / 30.0 * (1.0 - theta2 / 56.0)),
-            1.0 / 6.0 - theta2 / 120.0 * (1.0 - theta2 / 42.0 * (1.0 - theta2 / 72.0)),
-        )
+/// Taylor coefficients in `θ²`, highest first: of `sin θ/θ`, `(1 − cos θ)/θ²` and `(θ − sin θ)/θ³`.
+const SINE: [f64; 7] = [
+    1.0 / 6_227_020_800.0,
+    -1.0 / 39_916_800.0,
+    1.0 / 362_880.0,
+    -1.0 / 5040.0,
+    1.0 / 120.0,
+    -1.0 / 6.0,
+    1.0,
+];
+const COSINE: [f64; 7] = [
+    1.0 / 87_178_291_200.0,
+    -1.0 / 479_001_600.0,
+    1.0 / 3_628_800.0,
+    -1.0 / 40_320.0,
+    1.0 / 720.0,
+    -1.0 / 24.0,
+    0.5,
+];
+const EXCESS: [f64; 7] = [
+    1.0 / 1_307_674_368_000.0,
+    -1.0 / 6_227_020_800.0,
+    1.0 / 39_916_800.0,
+    -1.0 / 362_880.0,
+    1.0 / 5040.0,
+    -1.0 / 120.0,
+    1.0 / 6.0,
+];
+
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "loops compiled per instruction set call it"
+)]
+fn horner<const FUSED: bool>(coefficients: &[f64; 7], x: f64) -> f64 {
+    let mut sum = coefficients[0];
+    for c in &coefficients[1..] {
+        sum = fma::<FUSED>(sum, x, *c);
+    }
+    sum
+}
+
+/// [`series`] for squared angles up to [`SERIES_LIMIT`].
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "loops compiled per instruction set call it"
+)]
+pub(crate) fn short_series<const FUSED: bool>(theta2: f64) -> (f64, f64, f64) {
+    (
+        horner::<FUSED>(&SINE, theta2),
+        horner::<FUSED>(&COSINE, theta2),
+        horner::<FUSED>(&EXCESS, theta2),
+    )
+}
+
+/// `(sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³)` with Taylor series up to half a radian.
+pub(crate) fn series(theta2: f64) -> (f64, f64, f64) {
+    if theta2 <= SERIES_LIMIT {
+        short_series::<FUSED_BASELINE>(theta2)
     } else {
         let theta = theta2.sqrt();
         let half = (0.5 * theta).sin();

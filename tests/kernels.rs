@@ -1,5 +1,7 @@
 //! Property and derivative tests of the kernels, one module per room.
 
+#[path = "kernels/attitude.rs"]
+mod attitude;
 #[path = "kernels/ellipsoid.rs"]
 mod ellipsoid;
 #[path = "kernels/gauss_newton.rs"]

@@ -17,6 +17,9 @@ S, b
     raw → truth, *distort* truth → raw.
 calibration
     S and b of both sensors with the covariance of every number. (:func:`calibrate`; :func:`apply`, :func:`verify`)
+attitude
+    Where the body points: the rotation from its frame at a sample to that at the start. (:func:`integrate_rate`, from a
+    corrected rate)
 diagnosis
     Where a recording and its model differ, the effect (physical mechanism) left out, with ± and held-out proof.
     (:func:`diagnose`)
@@ -42,6 +45,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from trihedron.estimate.attitude import integrate_rate
     from trihedron.estimate.noise import identify_noise
     from trihedron.files.calibration import read_calibration
     from trihedron.fleet import fleet
@@ -97,6 +101,7 @@ __all__ = [
     "fleet",
     "guide",
     "identify_noise",
+    "integrate_rate",
     "kalman",
     "noise",
     "plan",
@@ -113,6 +118,7 @@ __all__ = [
 ]
 
 _HOME = {"Diagnosis": "trihedron.records.diagnosis"}
+_HOME |= {"integrate_rate": "trihedron.estimate.attitude"}
 _HOME |= {"fleet": "trihedron.fleet"}
 _HOME |= {"identify_noise": "trihedron.estimate.noise", "read_calibration": "trihedron.files.calibration"}
 _HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")

@@ -44,6 +44,7 @@ def fit_norm(
     noise: FloatArray,
     settings: NormSettings,
     start: tuple[FloatArray, FloatArray] | None = None,
+    pose: npt.NDArray[np.int64] | None = None,
 ) -> NormFit: ...
 def fit_norm_held_out(
     readings: FloatArray, noise: FloatArray, settings: NormSettings, fit: NormFit, folds: Sequence[int]
@@ -175,6 +176,9 @@ def integrate_raw_rate(
     moves: npt.NDArray[np.int64],
     rate_degree: int,
 ) -> tuple[FloatArray, list[float]]: ...
+
+# text
+def plain_table(text: bytes, separator: int, n_columns: int) -> FloatArray | None: ...
 
 # stillness
 def block_statistics(readings: FloatArray, length: int) -> tuple[FloatArray, FloatArray, npt.NDArray[np.uint32]]: ...
@@ -443,8 +447,15 @@ def simulate_convert(
     missing_every: int,
 ) -> FloatArray: ...
 
-# trajectory
-def attitude_in_moves(time_s: FloatArray, rate: FloatArray, moves: list[tuple[int, int]]) -> FloatArray: ...
+# attitude
+def integrate_rate(
+    time_s: FloatArray,
+    rate: FloatArray,
+    rate_degree: int,
+    form: int,
+    is_last_only: bool,
+    initial: FloatArray | None,
+) -> FloatArray: ...
 
 # the joint model of a session
 @final

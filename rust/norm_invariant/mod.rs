@@ -4,14 +4,22 @@
 //! of its mean *projected on gravity*, `σ² = uᵀ S Σ Sᵀ u` with `u = f/|f|`. σ is frozen while the solver runs and renewed
 //! between runs: left free it would reward a large `S`.
 
+mod descent;
 mod held_out;
+mod lanes;
+mod noise;
 mod problem;
+mod start;
+mod sums;
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
+use descent::{Direct, Equations};
 pub use held_out::{HeldOut, held_out};
 pub use problem::residual_gradient;
-use problem::{Frozen, PoseProblem, SampleProblem};
+use problem::{Frozen, PoseProblem};
+use start::Starts;
+use sums::At;
 
 use crate::ellipsoid::{self, Standardisation};
 use crate::error::{Error, Result};
@@ -19,6 +27,9 @@ use crate::gauss_newton::{self, Certainty, Loss, Options, Stop};
 
 /// Free parameters: six of `S`, three of `b`.
 pub const N_PARAMETERS: usize = 9;
+
+/// The solver's.
+type Parameters = SVector<f64, N_PARAMETERS>;
 
 /// The instrument trihedron in which `S` is expressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,7 +95,7 @@ pub struct Fit {
     pub residuals: Vec<f64>,
     /// Predicted standard error of each residual, m/s².
     pub sigmas: Vec<f64>,
-    /// Weight that the loss gave each residual, 1 for least squares.
+    /// Weight that the loss gave each residual; empty for least squares, where each has its full one.
     pub weights: Vec<f64>,
     /// Σ (residual/sigma)².
     pub chi2: f64,
@@ -100,25 +111,40 @@ pub struct Fit {
     pub iterations: usize,
 }
 
-/// Readings with the noise covariance of each (`noise` has one entry for all, or one per reading).
+/// Readings with the noise covariance of each: `noise` has one entry for all, or one per pose.
 #[derive(Debug, Clone, Copy)]
 pub struct Readings<'a> {
     /// Raw.
     pub values: &'a [Vector3<f64>],
     /// Raw unit squared.
     pub noise: &'a [Matrix3<f64>],
+    /// The pose of each reading; empty where each is a pose of its own.
+    pub pose: &'a [usize],
 }
 
 impl Readings<'_> {
     fn noise_of(&self, i: usize) -> &Matrix3<f64> {
-        &self.noise[if self.noise.len() == 1 { 0 } else { i }]
+        if self.noise.len() == 1 {
+            return &self.noise[0];
+        }
+        &self.noise[self.pose.get(i).copied().unwrap_or(i)]
     }
 
     fn check(&self) -> Result<()> {
         if self.values.is_empty() {
             return Err(Error::bad_input("there are no still poses to fit"));
         }
-        if self.noise.len() != 1 && self.noise.len() != self.values.len() {
+        if !self.pose.is_empty() {
+            let last = self.pose.iter().max().copied().unwrap_or(0);
+            if self.pose.len() != self.values.len() || last >= self.noise.len() {
+                return Err(Error::bad_input(format!(
+                    "{} pose numbers up to {last} do not belong to {} readings of {} poses",
+                    self.pose.len(),
+                    self.values.len(),
+                    self.noise.len()
+                )));
+            }
+        } else if self.noise.len() != 1 && self.noise.len() != self.values.len() {
             return Err(Error::bad_input(format!(
                 "{} noise covariances do not belong to {} readings",
                 self.noise.len(),
@@ -187,7 +213,8 @@ pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) ->
 fn is_shrunken(model: &Model, readings: Readings<'_>, settings: &Settings) -> bool {
     let stride = readings.values.len().div_ceil(ROWS_KEPT);
     let few: Vec<Vector3<f64>> = readings.values.iter().step_by(stride).copied().collect();
-    sphere_model(&few, settings)
+    Starts::of(&few)
+        .and_then(|starts| starts.sphere(settings))
         .is_ok_and(|sphere| model.s.determinant().abs() < 1e-2 * sphere.s.determinant().abs())
 }
 
@@ -199,45 +226,41 @@ fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -
             settings.gravity
         )));
     }
-    let standard = Standardisation::of(readings.values)?;
-    // A start need not use every sample: an even share of them shows the same poses.
-    let stride = readings.values.len().div_ceil(ROWS_KEPT);
-    let few: Vec<Vector3<f64>> = readings
-        .values
-        .chunks(stride)
-        .enumerate()
-        // One of each chunk, at a place that walks through it: a fixed one could fall in step with the poses.
-        .map(|(k, chunk)| chunk[(k * 7919) % chunk.len()])
-        .collect();
-    let nominal = match start {
-        Some(model) => in_frame(&model, settings.frame)?,
-        None => sphere_model(&few, settings)?,
+    let few = start::even_share(readings, ROWS_KEPT);
+    // Of very many readings, a share shows nearly the same answer: all are then passed over a few times only.
+    let shown = few.fitted(settings);
+    let starts = Starts::of(few.values())?;
+    let standard = match few {
+        start::Share::All(_) => starts.standard,
+        start::Share::Some { .. } => Standardisation::of(readings.values)?,
     };
-    let is_anchored = problem::is_weak(readings, settings, &nominal);
-    let begin = if is_anchored || start.is_some() {
+    let nominal = match start.or(shown) {
+        Some(model) => in_frame(&model, settings.frame)?,
+        None => starts.sphere(settings)?,
+    };
+    let mut frozen = Frozen::at(readings, settings, &nominal);
+    // What a share of the readings determines, all of them do.
+    let is_anchored =
+        shown.is_none() && problem::is_weak(&frozen.charge(readings), settings, &nominal);
+    let begin = if is_anchored || start.is_some() || shown.is_some() {
         nominal
     } else {
-        starting_model(&few, settings)?
-    };
-    let options = Options {
-        loss: settings.loss,
-        ..Options::default()
+        starts.best(settings)?
     };
     if spread(&begin, &standard) < SMALLEST_SPREAD * settings.gravity {
         return Err(Error::not_determined(WORTHLESS));
     }
     let first = pack(&begin, &standard);
-    let mut theta = first.clone();
+    let mut theta = first;
     let volume = (begin.s * standard.size).determinant().abs();
-    let anchor = is_anchored.then(|| first.clone());
+    let anchor = is_anchored.then(|| DVector::from_column_slice(first.as_slice()));
     let mut iterations = 0;
     let mut widening = 1.0;
     for renewal in 0.. {
-        let mut frozen = Frozen::at(
-            readings,
-            settings,
-            &unpack(&theta, settings.frame, &standard),
-        );
+        let model = unpack(&theta, settings.frame, &standard);
+        if renewal > 0 || begin != nominal {
+            frozen.renew(readings, settings, &model);
+        }
         frozen.widening = widening;
         let problem = PoseProblem {
             readings,
@@ -247,31 +270,85 @@ fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -
             volume,
             anchor: anchor.clone(),
         };
-        let solution = if readings.values.len() > ROWS_KEPT && anchor.is_none() {
-            gauss_newton::minimise_problem(&SampleProblem(&problem), theta.clone(), &options)?
-        } else {
-            gauss_newton::minimise(
-                |x| Ok(problem.linearise(x)),
-                |x| Ok(problem.residuals(x)),
-                theta.clone(),
-                &options,
-            )?
-        };
-        iterations += solution.iterations;
-        let change = (&solution.parameters - &theta).norm() / theta.norm();
-        theta = solution.parameters.clone();
+        let settled = settle(&problem, &theta)?;
+        iterations += settled.iterations;
+        let change = (settled.theta - theta).norm() / theta.norm();
+        theta = settled.theta;
         if is_anchored {
             // Scatter beyond the noise must not buy itself an angle of ten degrees where nothing else contradicts it.
             let spare = readings.values.len().saturating_sub(N_PARAMETERS).max(1);
-            let scatter = problem.chi2(&theta) / spare as f64;
+            let scatter =
+                problem.chi2(&DVector::from_column_slice(theta.as_slice())) / spare as f64;
             widening *= scatter.max(widening.powi(-2)).sqrt();
         }
         // σ moves with the parameters at first order only through S: 1e-7 in S is 1e-7 in σ, far below its own error.
         if change < 1e-7 || renewal >= RENEWALS {
-            return finish(&problem, &solution, iterations);
+            let mut fit = finish(&problem, &settled, iterations)?;
+            fit.sigmas = frozen.sigma;
+            return Ok(fit);
         }
     }
     unreachable!("the loop returns at its last renewal")
+}
+
+/// Where the solver ended for one set of σ.
+struct Settled {
+    theta: Parameters,
+    stop: Stop,
+    iterations: usize,
+    found: Found,
+}
+
+/// What the solution is known by.
+enum Found {
+    /// Normal equations.
+    Direct(Box<Equations>),
+    /// Rows, or normal equations too weak to be solved as they are.
+    Dense(Certainty),
+}
+
+fn settle(problem: &PoseProblem<'_>, theta: &Parameters) -> Result<Settled> {
+    let settings = problem.settings;
+    let options = Options {
+        loss: settings.loss,
+        ..Options::default()
+    };
+    let direct = Direct {
+        charged: problem.charged(),
+        at: At {
+            model: unpack_standardised(theta.as_slice(), settings.frame),
+            standard: problem.standard,
+            settings: *settings,
+            widening: problem.frozen.widening,
+        },
+        volume: problem.volume,
+    };
+    let has_anchor = problem.anchor.is_some();
+    if !has_anchor && let Ok(ended) = gauss_newton::descend(&direct, *theta, &options) {
+        return Ok(Settled {
+            theta: ended.point,
+            stop: ended.stop,
+            iterations: ended.iterations,
+            found: Found::Direct(Box::new(ended.local)),
+        });
+    }
+    let start = DVector::from_column_slice(theta.as_slice());
+    let solution = if problem.readings.values.len() > ROWS_KEPT && !has_anchor {
+        gauss_newton::minimise_problem(&direct, start, &options)?
+    } else {
+        gauss_newton::minimise(
+            |x| Ok(problem.linearise(x)),
+            |x| Ok(problem.residuals(x)),
+            start,
+            &options,
+        )?
+    };
+    Ok(Settled {
+        theta: Parameters::from_column_slice(solution.parameters.as_slice()),
+        stop: solution.stop,
+        iterations: solution.iterations,
+        found: Found::Dense(solution.certainty),
+    })
 }
 
 /// Poses whose specific forces differ by less than this fraction of |g|, half a degree, are one pose, or `S` is nothing.
@@ -285,23 +362,24 @@ fn spread(model: &Model, standard: &Standardisation) -> f64 {
     (model.s * standard.size).norm() / 3.0_f64.sqrt()
 }
 
-fn finish(
-    problem: &PoseProblem<'_>,
-    solution: &gauss_newton::Solution,
-    iterations: usize,
-) -> Result<Fit> {
+fn finish(problem: &PoseProblem<'_>, settled: &Settled, iterations: usize) -> Result<Fit> {
     let settings = problem.settings;
+    let factor = settings.loss.covariance_factor(1);
+    let held = match &settled.found {
+        Found::Direct(equations) => equations.certainty(factor),
+        Found::Dense(certainty) => certainty.clone(),
+    };
+    // Noise in a reading enters residual and derivative alike and draws S towards zero, by (σ/g)² of itself.
+    let pull = problem.noise_in_gradient(settled.theta.as_slice());
+    let theta = settled.theta + fixed(&held.covariance) * pull;
     let certainty = match problem.anchor {
-        None => solution.certainty.clone(),
+        None => held,
         Some(_) => gauss_newton::certainty(
-            &problem.data_jacobian(&solution.parameters),
-            settings.loss.covariance_factor(1),
+            &problem.data_jacobian(&DVector::from_column_slice(settled.theta.as_slice())),
+            factor,
             Options::default().rank_tolerance,
         ),
     };
-    // Noise in a reading enters residual and derivative alike and draws S towards zero, by (σ/g)² of itself.
-    let theta = &solution.parameters
-        + &solution.certainty.covariance * problem.noise_in_gradient(&solution.parameters);
     let model = unpack(&theta, settings.frame, &problem.standard);
     let shrink = (model.s * problem.standard.size).determinant().abs() / problem.volume;
     if shrink < 2.0 * problem::SMALLEST_VOLUME
@@ -310,82 +388,40 @@ fn finish(
         return Err(Error::not_determined(WORTHLESS));
     }
     let map = map_to_entries(settings.frame, &problem.standard);
-    let covariance = &map * &certainty.covariance * map.transpose();
+    let covariance = map * fixed(&certainty.covariance) * map.transpose();
     let residuals = problem.in_m_s2(&model);
-    let squared: Vec<f64> = residuals
-        .iter()
-        .zip(&problem.frozen.sigma)
-        .map(|(r, s)| (r / s).powi(2))
-        .collect();
-    let weights: Vec<f64> = squared.iter().map(|z2| settings.loss.weight(*z2)).collect();
-    let influence: f64 = squared.iter().zip(&weights).map(|(z2, w)| w * w * z2).sum();
+    let squares = || {
+        residuals
+            .iter()
+            .zip(&problem.frozen.sigma)
+            .map(|(r, s)| (r / s).powi(2))
+    };
+    let chi2 = squares().sum();
+    let (weights, robust_chi2) = if settings.loss == Loss::Linear {
+        (Vec::new(), chi2)
+    } else {
+        let weights: Vec<f64> = squares().map(|z2| settings.loss.weight(z2)).collect();
+        let influence: f64 = squares().zip(&weights).map(|(z2, w)| w * w * z2).sum();
+        (weights, influence / settings.loss.expected_influence(1))
+    };
     Ok(Fit {
         model,
-        covariance: SMatrix::from_column_slice(covariance.as_slice()),
-        chi2: squared.iter().sum(),
-        robust_chi2: influence / settings.loss.expected_influence(1),
+        covariance,
+        chi2,
+        robust_chi2,
         residuals,
-        sigmas: problem.frozen.sigma.clone(),
+        sigmas: Vec::new(),
         weights,
         certainty,
         is_anchored: problem.anchor.is_some(),
-        stop: solution.stop,
+        stop: settled.stop,
         iterations,
     })
 }
 
-/// The sphere through the readings: equal scales, square axes.
-fn sphere_model(values: &[Vector3<f64>], settings: &Settings) -> Result<Model> {
-    let standard = Standardisation::of(values)?;
-    let u: Vec<_> = values.iter().map(|a| standard.apply(a)).collect();
-    let (centre, radius) = ellipsoid::fit_sphere(&u).ok_or_else(|| {
-        Error::not_determined(format!(
-            "the still poses give no starting point: {}",
-            ellipsoid::missing_directions(&u)
-        ))
-    })?;
-    let s = Matrix3::identity() * (settings.gravity / radius);
-    Ok(standard.undo(&Model { s, b: -s * centre }))
-}
-
-/// The ellipsoid, or the sphere where the poses do not determine one; whichever explains the readings better.
-fn starting_model(values: &[Vector3<f64>], settings: &Settings) -> Result<Model> {
-    let standard = Standardisation::of(values)?;
-    let u: Vec<_> = values.iter().map(|a| standard.apply(a)).collect();
-    let g = settings.gravity;
-    let mut candidates = Vec::new();
-    if let Ok(quadric) = ellipsoid::fit_quadric(&u) {
-        candidates.extend(quadric.model(g, settings.frame));
-    }
-    if candidates.is_empty()
-        && u.len() >= N_PARAMETERS
-        && let Ok(quadric) = ellipsoid::fit_ellipsoid(&u)
-    {
-        candidates.extend(quadric.model(g, settings.frame));
-    }
-    let sphere = sphere_model(values, settings)?;
-    candidates.push(Model {
-        s: sphere.s * standard.size,
-        b: sphere.b + sphere.s * standard.centre,
-    });
-    candidates
-        .into_iter()
-        .map(|model| {
-            let misfit: f64 = u
-                .iter()
-                .map(|a| (model.correct(a).norm() - g).powi(2))
-                .sum();
-            (misfit, model)
-        })
-        .filter(|(misfit, model)| misfit.is_finite() && model.s.determinant().abs() > 0.0)
-        .min_by(|(a, _), (b, _)| a.total_cmp(b))
-        .map(|(_, model)| standard.undo(&model))
-        .ok_or_else(|| {
-            Error::not_determined(format!(
-                "the still poses give no starting point: {}",
-                ellipsoid::missing_directions(&u)
-            ))
-        })
+/// The same numbers without a heap.
+fn fixed(square: &DMatrix<f64>) -> SMatrix<f64, N_PARAMETERS, N_PARAMETERS> {
+    SMatrix::from_column_slice(square.as_slice())
 }
 
 /// The same norms in the frame asked for.
@@ -410,19 +446,19 @@ pub fn in_frame(model: &Model, frame: Frame) -> Result<Model> {
 }
 
 /// Solver's parameters: six entries of `S · size`, then `d = b + S centre`, so that columns are of one size.
-fn pack(model: &Model, standard: &Standardisation) -> DVector<f64> {
+fn pack(model: &Model, standard: &Standardisation) -> Parameters {
     let s = model.s * standard.size;
     let d = model.b + model.s * standard.centre;
-    let mut theta = DVector::zeros(N_PARAMETERS);
+    let mut theta = Parameters::zeros();
     for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
         theta[k] = s[(i, j)];
     }
-    theta.rows_mut(6, 3).copy_from(&d);
+    theta.fixed_rows_mut::<3>(6).copy_from(&d);
     theta
 }
 
 /// `S` and `d` in standardised readings.
-fn unpack_standardised(theta: &DVector<f64>, frame: Frame) -> Model {
+fn unpack_standardised(theta: &[f64], frame: Frame) -> Model {
     let mut s = Matrix3::zeros();
     for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
         s[(i, j)] = theta[k];
@@ -436,21 +472,21 @@ fn unpack_standardised(theta: &DVector<f64>, frame: Frame) -> Model {
     }
 }
 
-fn unpack(theta: &DVector<f64>, frame: Frame, standard: &Standardisation) -> Model {
-    standard.undo(&unpack_standardised(theta, frame))
+fn unpack(theta: &Parameters, frame: Frame, standard: &Standardisation) -> Model {
+    standard.undo(&unpack_standardised(theta.as_slice(), frame))
 }
 
 /// `∂(S row by row, b)/∂θ`: linear, because `b = d - S centre`.
-fn map_to_entries(frame: Frame, standard: &Standardisation) -> DMatrix<f64> {
-    let mut map = DMatrix::zeros(12, N_PARAMETERS);
+fn map_to_entries(frame: Frame, standard: &Standardisation) -> SMatrix<f64, 12, N_PARAMETERS> {
+    let mut map = SMatrix::zeros();
     for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
-        let mut places = vec![(i, j)];
-        if frame == Frame::Symmetric && i != j {
-            places.push((j, i));
-        }
-        for (row, column) in places {
+        let mut place = |row: usize, column: usize| {
             map[(3 * row + column, k)] = 1.0 / standard.size;
             map[(9 + row, k)] -= standard.centre[column] / standard.size;
+        };
+        place(i, j);
+        if frame == Frame::Symmetric && i != j {
+            place(j, i);
         }
     }
     for i in 0..3 {

@@ -1,14 +1,14 @@
-//! The norm residual and its analytic Jacobian, row by row or as normal equations.
+//! The norm residual and its analytic Jacobian, row by row.
 
-use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
-use rayon::prelude::*;
+use nalgebra::{DMatrix, DVector, SVector, Vector3};
 
+use super::noise;
+use super::sums::{self, At, Charged};
 use super::{
-    ANCHOR, Frame, Model, N_PARAMETERS, Objective, Readings, Settings, UNKNOWN, unpack_standardised,
+    ANCHOR, Frame, Model, N_PARAMETERS, Objective, Parameters, Readings, Settings, UNKNOWN,
+    unpack_standardised,
 };
 use crate::ellipsoid::Standardisation;
-use crate::error::Result;
-use crate::gauss_newton::{Linear, Problem};
 
 /// `S` may not shrink its volume below this fraction of the start's: beyond lies the minimum `S = 0, |b| = |g|`.
 pub(super) const SMALLEST_VOLUME: f64 = 1e-2;
@@ -28,17 +28,30 @@ impl Frozen {
         self.sigma[i] * self.widening
     }
 
-    pub(super) fn at(readings: Readings<'_>, settings: &Settings, model: &Model) -> Self {
-        let (sigma, excess) = (0..readings.values.len())
-            .into_par_iter()
-            .with_min_len(4096)
-            .map(|i| predicted(readings, settings, model, i))
-            .unzip();
-        Self {
-            sigma,
-            widening: 1.0,
-            excess,
+    /// The readings with what is predicted for them.
+    pub(super) fn charge<'a>(&'a self, readings: Readings<'a>) -> Charged<'a> {
+        Charged {
+            values: readings.values,
+            sigma: &self.sigma,
+            excess: &self.excess,
         }
+    }
+
+    pub(super) fn at(readings: Readings<'_>, settings: &Settings, model: &Model) -> Self {
+        let n = readings.values.len();
+        let mut new = Self {
+            sigma: vec![0.0; n],
+            widening: 1.0,
+            excess: vec![0.0; n],
+        };
+        new.renew(readings, settings, model);
+        new
+    }
+
+    /// The same memory at another model.
+    pub(super) fn renew(&mut self, readings: Readings<'_>, settings: &Settings, model: &Model) {
+        let at = At::raw(*model, *settings);
+        noise::predict(&readings, &at, &mut self.sigma, &mut self.excess);
     }
 }
 
@@ -100,7 +113,7 @@ impl PoseProblem<'_> {
 
     /// Rows of the readings, and of the anchor below them.
     pub(super) fn linearise(&self, x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
-        let model = unpack_standardised(x, self.settings.frame);
+        let model = unpack_standardised(x.as_slice(), self.settings.frame);
         let n = self.readings.values.len();
         let extra = self.anchor.as_ref().map_or(0, DVector::len);
         let mut residuals = DVector::zeros(n + extra);
@@ -135,7 +148,7 @@ impl PoseProblem<'_> {
     }
 
     pub(super) fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
-        let model = unpack_standardised(x, self.settings.frame);
+        let model = unpack_standardised(x.as_slice(), self.settings.frame);
         let n = self.readings.values.len();
         let extra = self.anchor.as_ref().map_or(0, DVector::len);
         let mut residuals = DVector::from_element(n + extra, f64::INFINITY);
@@ -153,51 +166,25 @@ impl PoseProblem<'_> {
         residuals
     }
 
-    /// `E[Jᵀr]` at the truth: what the noise common to a whitened residual and its own derivative leaves on average.
-    ///
-    /// With `n` the noise of a reading, `E[∂r/∂S_jk · r] = u_j (Σ Sᵀ u)_k + (P S Σ Sᵀ u)_j a_k/|g|`, `P = I - uuᵀ`, and
-    /// for `b` the second term without `a`.
-    pub(super) fn noise_in_gradient(&self, x: &DVector<f64>) -> DVector<f64> {
-        let model = unpack_standardised(x, self.settings.frame);
-        let n = self.readings.values.len();
-        let parts: Vec<SVector<f64, N_PARAMETERS>> = (0..n.div_ceil(SHARE))
-            .into_par_iter()
-            .map(|k| {
-                (k * SHARE..((k + 1) * SHARE).min(n))
-                    .map(|i| self.noise_in_row(&model, i))
-                    .sum()
-            })
-            .collect();
-        let total: SVector<f64, N_PARAMETERS> = parts.iter().sum();
-        DVector::from_column_slice(total.as_slice())
+    /// The readings with what the noise predicts for them.
+    pub(super) fn charged(&self) -> Charged<'_> {
+        self.frozen.charge(self.readings)
     }
 
-    fn noise_in_row(&self, model: &Model, i: usize) -> SVector<f64, N_PARAMETERS> {
-        let size = self.standard.size;
-        let reading = self.standard.apply(&self.readings.values[i]);
-        let f = model.correct(&reading);
-        let u = f / f.norm();
-        let shared = self.readings.noise_of(i) * (model.s.transpose() * u) / (size * size);
-        let spread = model.s * shared;
-        let across = (spread - u * u.dot(&spread)) / self.settings.gravity;
-        let mut mean = SVector::<f64, N_PARAMETERS>::zeros();
-        for (k, &(row, column)) in Frame::ENTRIES.iter().enumerate() {
-            mean[k] = u[row] * shared[column] + across[row] * reading[column];
-            if self.settings.frame == Frame::Symmetric && row != column {
-                mean[k] += u[column] * shared[row] + across[column] * reading[row];
-            }
-        }
-        mean.fixed_rows_mut::<3>(6).copy_from(&across);
-        mean / self.frozen.charged(i).powi(2)
+    /// `E[Jᵀr]` at the truth, see [`noise::noise_in_gradient`].
+    pub(super) fn noise_in_gradient(&self, x: &[f64]) -> Parameters {
+        let at = At {
+            model: unpack_standardised(x, self.settings.frame),
+            standard: self.standard,
+            settings: *self.settings,
+            widening: self.frozen.widening,
+        };
+        noise::noise_in_gradient(&self.readings, &self.frozen.sigma, &at)
     }
 
     /// Norm residuals in m/s² of a model in raw units.
     pub(super) fn in_m_s2(&self, model: &Model) -> Vec<f64> {
-        (0..self.readings.values.len())
-            .into_par_iter()
-            .with_min_len(4096)
-            .map(|i| self.misfit(&model.correct(&self.readings.values[i]), i))
-            .collect()
+        sums::misfits(&self.charged(), &At::raw(*model, *self.settings))
     }
 }
 
@@ -205,27 +192,8 @@ impl PoseProblem<'_> {
 ///
 /// In the truth's own coordinates `δf = M f + z`, a pose sees `uᵀδf = |g| Σ M_jk u_j u_k + zᵀu`: the information on the
 /// nine numbers depends on directions and noise alone.
-pub(super) fn is_weak(readings: Readings<'_>, settings: &Settings, model: &Model) -> bool {
-    let n = readings.values.len();
-    let parts: Vec<SMatrix<f64, N_PARAMETERS, N_PARAMETERS>> = (0..n.div_ceil(SHARE))
-        .into_par_iter()
-        .map(|k| {
-            let mut part = SMatrix::<f64, N_PARAMETERS, N_PARAMETERS>::zeros();
-            for i in k * SHARE..((k + 1) * SHARE).min(n) {
-                let f = model.correct(&readings.values[i]);
-                let u = f / f.norm();
-                let mut row = SVector::<f64, N_PARAMETERS>::zeros();
-                for (entry, &(j, k)) in Frame::ENTRIES.iter().enumerate() {
-                    row[entry] = u[j] * u[k];
-                }
-                row.fixed_rows_mut::<3>(6).copy_from(&u);
-                let sigma = predicted(readings, settings, model, i).0 / settings.gravity;
-                part.ger(sigma.powi(-2), &row, &row, 1.0);
-            }
-            part
-        })
-        .collect();
-    let information: SMatrix<f64, N_PARAMETERS, N_PARAMETERS> = parts.iter().sum();
+pub(super) fn is_weak(charged: &Charged<'_>, settings: &Settings, model: &Model) -> bool {
+    let information = sums::information(charged, &At::raw(*model, *settings));
     information
         .cholesky()
         .is_none_or(|factor| factor.inverse().diagonal().max() > UNKNOWN * UNKNOWN)
@@ -252,93 +220,4 @@ pub fn residual_gradient(
     }
     slope.fixed_rows_mut::<3>(6).copy_from(&along);
     slope
-}
-
-/// Sums over one share of the readings.
-#[derive(Clone, Copy)]
-struct Sums {
-    gram: SMatrix<f64, N_PARAMETERS, N_PARAMETERS>,
-    slope: SVector<f64, N_PARAMETERS>,
-    cost: f64,
-    chi2: f64,
-}
-
-impl Sums {
-    fn zero() -> Self {
-        Self {
-            gram: SMatrix::zeros(),
-            slope: SVector::zeros(),
-            cost: 0.0,
-            chi2: 0.0,
-        }
-    }
-
-    fn plus(self, other: &Self) -> Self {
-        Self {
-            gram: self.gram + other.gram,
-            slope: self.slope + other.slope,
-            cost: self.cost + other.cost,
-            chi2: self.chi2 + other.chi2,
-        }
-    }
-}
-
-/// Readings per share: shares are summed in order, so that the answer does not depend on the number of threads.
-const SHARE: usize = 16_384;
-
-/// The same problem when there are too many readings to keep a row of each.
-pub(super) struct SampleProblem<'a, 'b>(pub &'a PoseProblem<'b>);
-
-impl SampleProblem<'_, '_> {
-    fn shares(&self, share: impl Fn(std::ops::Range<usize>) -> Sums + Sync) -> Sums {
-        let n = self.0.readings.values.len();
-        let parts: Vec<Sums> = (0..n.div_ceil(SHARE))
-            .into_par_iter()
-            .map(|k| share(k * SHARE..((k + 1) * SHARE).min(n)))
-            .collect();
-        parts.iter().fold(Sums::zero(), Sums::plus)
-    }
-}
-
-impl Problem for SampleProblem<'_, '_> {
-    fn linearise(&self, x: &DVector<f64>) -> Result<Linear> {
-        let model = unpack_standardised(x, self.0.settings.frame);
-        let sums = self.shares(|range| {
-            let mut sums = Sums::zero();
-            for i in range {
-                let (residual, slope) = self.0.row(&model, i);
-                let squared = residual * residual;
-                let (value, weight, _) = self.0.settings.loss.rho(squared);
-                sums.gram.ger(weight, &slope, &slope, 1.0);
-                sums.slope.axpy(weight * residual, &slope, 1.0);
-                sums.cost += 0.5 * value;
-                sums.chi2 += squared;
-            }
-            sums
-        });
-        Ok(Linear::from_normal_equations(
-            &DMatrix::from_column_slice(N_PARAMETERS, N_PARAMETERS, sums.gram.as_slice()),
-            &DVector::from_column_slice(sums.slope.as_slice()),
-            sums.cost,
-            sums.chi2,
-            self.0.readings.values.len(),
-        ))
-    }
-
-    fn cost(&self, x: &DVector<f64>) -> Result<f64> {
-        let model = unpack_standardised(x, self.0.settings.frame);
-        if self.0.collapses(&model) {
-            return Ok(f64::INFINITY);
-        }
-        let sums = self.shares(|range| {
-            let mut sums = Sums::zero();
-            for i in range {
-                let f = model.correct(&self.0.standard.apply(&self.0.readings.values[i]));
-                let residual = self.0.misfit(&f, i) / self.0.frozen.charged(i);
-                sums.cost += 0.5 * self.0.settings.loss.rho(residual * residual).0;
-            }
-            sums
-        });
-        Ok(sums.cost)
-    }
 }

@@ -8,6 +8,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::lent::{as_vectors, flat3};
 use super::rotation::rows3;
 use crate::ellipsoid;
 use crate::gauss_newton::Loss;
@@ -115,6 +116,9 @@ impl NormFit {
     /// (n,) weight that the loss gave each residual.
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        if self.0.weights.is_empty() {
+            return PyArray1::from_vec(py, vec![1.0; self.0.residuals.len()]);
+        }
         self.0.weights.to_pyarray(py)
     }
 
@@ -174,15 +178,21 @@ fn matrices3(name: &str, array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Matr
 type Start<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, f64>);
 
 #[pyfunction]
-#[pyo3(signature = (readings, noise, settings, start=None))]
+#[pyo3(signature = (readings, noise, settings, start=None, pose=None))]
 fn fit_norm(
     py: Python<'_>,
     readings: PyReadonlyArray2<'_, f64>,
     noise: PyReadonlyArray3<'_, f64>,
     settings: &Bound<'_, NormSettings>,
     start: Option<Start<'_>>,
+    pose: Option<PyReadonlyArray1<'_, i64>>,
 ) -> PyResult<NormFit> {
-    let readings = rows3("readings", &readings)?;
+    let readings = flat3("readings", &readings)?;
+    let pose: Vec<usize> = pose
+        .iter()
+        .flat_map(|pose| pose.as_array().iter().copied().collect::<Vec<i64>>())
+        .map(|k| usize::try_from(k).map_err(|_| PyValueError::new_err("pose numbers start at 0")))
+        .collect::<PyResult<_>>()?;
     let noise = matrices3("noise", &noise)?;
     let start = start
         .map(|(s, b)| {
@@ -203,8 +213,9 @@ fn fit_norm(
     super::run(py, || {
         norm_invariant::fit(
             Readings {
-                values: &readings,
+                values: as_vectors(&readings),
                 noise: &noise,
+                pose: &pose,
             },
             &settings,
             start,
@@ -222,15 +233,16 @@ fn fit_norm_held_out<'py>(
     fit: &Bound<'py, NormFit>,
     folds: Vec<usize>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let readings = rows3("readings", &readings)?;
+    let readings = flat3("readings", &readings)?;
     let noise = matrices3("noise", &noise)?;
     let settings = settings.get().0;
     let full = fit.get().0.clone();
     let flat = super::run(py, || {
         let poses = norm_invariant::held_out(
             Readings {
-                values: &readings,
+                values: as_vectors(&readings),
                 noise: &noise,
+                pose: &[],
             },
             &settings,
             &full,
@@ -254,9 +266,9 @@ fn fit_ellipsoid<'py>(
     gravity_m_s2: f64,
     symmetric: bool,
 ) -> PyResult<SAndB<'py>> {
-    let readings = rows3("readings", &readings)?;
+    let readings = flat3("readings", &readings)?;
     let model = super::run(py, || {
-        ellipsoid::calibrate(&readings, gravity_m_s2, frame(symmetric))
+        ellipsoid::calibrate(as_vectors(&readings), gravity_m_s2, frame(symmetric))
     })?;
     Ok((
         rows(py, model.s.transpose().as_slice(), 3)?,

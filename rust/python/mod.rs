@@ -1,6 +1,6 @@
 //! THE SEAM: the only place that may name `pyo3` or `numpy`. One file per room of the mathematics.
 //!
-//! Every entry converts its arrays to owned memory, then calls [`run`] (or [`run_long`]), which releases the interpreter
+//! Every entry lends or copies its arrays (`lent`), then calls [`run`] (or [`run_long`]), which releases the interpreter
 //! and turns a kernel's refusal into a `ValueError` with the kernel's own sentence.
 
 // pyo3 hands arguments over by value; that is its calling convention, not a choice of ours.
@@ -11,11 +11,14 @@ use pyo3::prelude::*;
 mod accelerometer;
 mod allan;
 mod arrays;
+mod attitude;
 mod chi_square;
 mod doorway;
 mod gyro_alignment;
 mod kalman;
 mod kalman_norm;
+mod lent;
+mod number_text;
 mod poisson;
 mod rotation;
 mod screening;
@@ -23,7 +26,6 @@ mod session_model;
 mod simulate;
 mod spectral_likelihood;
 mod stillness;
-mod trajectory;
 mod zero_process;
 
 pub(crate) use doorway::{run, run_long};
@@ -32,8 +34,10 @@ pub(crate) use doorway::{run, run_long};
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     doorway::keep_panics_quiet();
     allan::register(module)?;
+    attitude::register(module)?;
     chi_square::register(module)?;
     gyro_alignment::register(module)?;
+    number_text::register(module)?;
     poisson::register(module)?;
     kalman::register(module)?;
     accelerometer::register(module)?;
@@ -44,7 +48,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     simulate::register(module)?;
     spectral_likelihood::register(module)?;
     stillness::register(module)?;
-    trajectory::register(module)?;
     zero_process::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.
     module.delattr("__all__")?;

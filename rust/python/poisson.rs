@@ -7,8 +7,11 @@ use numpy::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
+use super::lent::{as_vectors, flat1, flat3};
 use super::rotation::rows3;
+use crate::error::Result as KernelResult;
 use crate::poisson::{self, MoveRange, RateModel, RateNoise};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -108,20 +111,13 @@ fn integrate_moves<'py>(
     sigma_time_s: f64,
     nominal_step_s: f64,
 ) -> PyResult<Integrated<'py>> {
-    let time_s = samples(&time_s);
-    let raw = rows3("gyroscope", &gyroscope)?;
+    let time_s = flat1(&time_s);
+    let raw = flat3("gyroscope", &gyroscope)?;
     let ranges = ranges(&moves, &anchors_s)?;
     let scale = matrix3("scale", &scale)?;
     let before = rows3("bias_before", &bias_before)?;
     let after = rows3("bias_after", &bias_after)?;
     let m = ranges.len();
-    if before.len() != m || after.len() != m {
-        return Err(PyValueError::new_err(format!(
-            "there are {m} moves but {} biases before and {} after them",
-            before.len(),
-            after.len()
-        )));
-    }
     let noise = RateNoise {
         density: vector3("noise_density", &noise_density)?,
         sigma_time_s,
@@ -129,10 +125,16 @@ fn integrate_moves<'py>(
     };
     let turns = super::run_long(py, || {
         let model = RateModel::of_degree(rate_degree)?;
-        let prepared = poisson::prepare_all(&time_s, &raw, None, &ranges, model)?;
-        Ok(poisson::integrate_all(
-            &prepared, &scale, &before, &after, &noise,
-        ))
+        poisson::integrate_once(
+            &time_s,
+            as_vectors(&raw),
+            &ranges,
+            model,
+            &scale,
+            &before,
+            &after,
+            &noise,
+        )
     })?;
     let stack = |matrices: Vec<Matrix3<f64>>| {
         let flat: Vec<f64> = matrices
@@ -162,31 +164,29 @@ fn integrate_raw_rate<'py>(
     moves: PyReadonlyArray2<'py, i64>,
     rate_degree: u8,
 ) -> PyResult<(Bound<'py, PyArray2<f64>>, Vec<f64>)> {
-    let time_s = samples(&time_s);
-    let raw = rows3("gyroscope", &gyroscope)?;
+    let time_s = flat1(&time_s);
+    let raw = flat3("gyroscope", &gyroscope)?;
     let shape = moves.shape().to_vec();
     // The raw integral does not involve the bias: any two ordered instants serve as anchors.
     let anchors_s =
         numpy::PyArray::from_vec(py, [0.0, 1.0].repeat(shape[0])).reshape([shape[0], 2])?;
     let ranges = ranges(&moves, &anchors_s.readonly())?;
     let prepared = super::run_long(py, || {
-        poisson::prepare_all(
-            &time_s,
-            &raw,
-            None,
-            &ranges,
-            RateModel::of_degree(rate_degree)?,
-        )
+        let model = RateModel::of_degree(rate_degree)?;
+        ranges
+            .par_iter()
+            .map(|range| {
+                let one = poisson::prepare(&time_s, as_vectors(&raw), None, range, model)?;
+                Ok((one.raw_angle(), one.duration_s()))
+            })
+            .collect::<KernelResult<Vec<_>>>()
     })?;
     let angles: Vec<f64> = prepared
         .iter()
-        .flat_map(|one| one.raw_angle().as_slice().to_vec())
+        .flat_map(|(angle, _)| angle.as_slice().to_vec())
         .collect();
     Ok((
         angles.to_pyarray(py).reshape([prepared.len(), 3])?,
-        prepared
-            .iter()
-            .map(poisson::PreparedMove::duration_s)
-            .collect(),
+        prepared.iter().map(|&(_, duration)| duration).collect(),
     ))
 }

@@ -1,11 +1,9 @@
 //! Stillness across the seam.
 
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
-};
-use pyo3::exceptions::PyValueError;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 
+use super::lent::flat3;
 use crate::stillness;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -24,27 +22,15 @@ fn block_statistics<'py>(
     readings: PyReadonlyArray2<'py, f64>,
     length: usize,
 ) -> PyResult<BlockArrays<'py>> {
-    if readings.shape()[1] != 3 {
-        return Err(PyValueError::new_err(format!(
-            "readings must have shape (n, 3), got ({}, {})",
-            readings.shape()[0],
-            readings.shape()[1]
-        )));
-    }
-    // `as_slice` also succeeds on a Fortran-ordered array, whose memory runs down the columns.
-    let owned: Vec<f64> = match readings.as_slice() {
-        Ok(flat) if readings.is_c_contiguous() => flat.to_vec(),
-        _ => readings.as_array().iter().copied().collect(),
-    };
-    let blocks = super::run(py, || stillness::block_statistics(&owned, length))?;
+    let readings = flat3("readings", &readings)?;
+    let blocks = super::run(py, || stillness::block_statistics(&readings, length))?;
     let shape = [blocks.count.len(), 3];
+    let stack = |rows: Vec<[f64; 3]>| {
+        PyArray1::from_vec(py, bytemuck::cast_vec::<[f64; 3], f64>(rows)).reshape(shape)
+    };
     Ok((
-        blocks.mean.as_flattened().to_pyarray(py).reshape(shape)?,
-        blocks
-            .variance
-            .as_flattened()
-            .to_pyarray(py)
-            .reshape(shape)?,
-        blocks.count.to_pyarray(py),
+        stack(blocks.mean)?,
+        stack(blocks.variance)?,
+        PyArray1::from_vec(py, blocks.count),
     ))
 }

@@ -1,6 +1,7 @@
 //! Blocks: the mean and the variance that the definition gives, gaps skipped, offsets harmless.
 
-use trihedron::stillness::block_statistics;
+use trihedron::simd::Instructions;
+use trihedron::stillness::{block_statistics, block_statistics_with};
 
 #[test]
 fn blocks_give_mean_and_unbiased_variance() {
@@ -38,4 +39,35 @@ fn a_large_offset_costs_no_digits_of_the_variance() {
 fn a_block_of_one_is_refused() {
     assert!(block_statistics(&[1.0, 2.0, 3.0], 1).is_err());
     assert!(block_statistics(&[1.0, 2.0], 2).is_err());
+}
+
+#[test]
+fn every_instruction_set_gives_the_two_pass_statistics_of_any_block_length() {
+    let value = |k: usize| {
+        9.8 + (12.9898 * k as f64).sin() * 0.3 + if k % 997 == 0 { f64::INFINITY } else { 0.0 }
+    };
+    for length in [2, 3, 7, 8, 9, 16, 41, 200] {
+        let readings: Vec<f64> = (0..3 * (17 * length + 1)).map(value).collect();
+        for &set in Instructions::offered() {
+            let found = block_statistics_with(set, &readings, length).expect("legal question");
+            assert_eq!(found.count.len(), 17);
+            for (block, rows) in readings.chunks_exact(3 * length).enumerate() {
+                let good: Vec<&[f64]> = rows
+                    .chunks_exact(3)
+                    .filter(|row| row.iter().all(|x| x.is_finite()))
+                    .collect();
+                assert_eq!(found.count[block] as usize, good.len());
+                for axis in 0..3 {
+                    let n = good.len() as f64;
+                    let mean = good.iter().map(|row| row[axis]).sum::<f64>() / n;
+                    let square: f64 = good.iter().map(|row| (row[axis] - mean).powi(2)).sum();
+                    // Sums of up to 200 terms of order ten, and squares of order one.
+                    assert!((found.mean[block][axis] - mean).abs() < 1e-13);
+                    if good.len() > 1 {
+                        assert!((found.variance[block][axis] - square / (n - 1.0)).abs() < 1e-13);
+                    }
+                }
+            }
+        }
+    }
 }

@@ -144,7 +144,8 @@ def calibrate_norm_samples(
     flip = np.outer(signs, signs)
     per_pose = noise * flip * count[:, None, None]
     start = _core.fit_norm(values * signs, noise * flip, settings)
-    fit = _core.fit_norm(raw * signs, per_pose[pose], settings, (start.S, start.b))
+    owner = np.ascontiguousarray(pose, dtype=np.int64)
+    fit = _core.fit_norm(raw * signs, per_pose, settings, (start.S, start.b), owner)
     apart = _core.fit_norm_held_out(values * signs, noise * flip, settings, start, _folds(len(values)))
     return _assemble(fit, apart, values, noise, g, unit, signs, frame, signs_are_known=axis_signs is not None)
 
@@ -253,7 +254,7 @@ def _assemble(
             design, relative_sigma, observability.advice, is_anchored=fit.is_anchored, anchor=_core.ANCHOR
         ),
         *verdict.model_findings(S, unit, signs_are_known=signs_are_known),
-        *verdict.residual_findings(chi2, dof, rms_dof, floor),
+        *verdict.residual_findings(chi2, dof, rms, floor),
         *verdict.held_out_findings(unseen, apart[:, 1], apart[:, 2], dof),
     ]
     sensor = SensorCalibration(

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from trihedron import _core
 from trihedron.read.columns import find_columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
@@ -55,6 +56,7 @@ class TextReader:
         self.n_bytes = 0
         self.comments: list[npt.NDArray[np.int64]] = []
         self.n_left_out = 0
+        self.may_be_plain, self.n_odd_blocks = True, 0
         self.semicolons = False
 
     def read(self) -> Table:
@@ -154,6 +156,8 @@ class TextReader:
         self.text_columns = find_text_columns(rows, layout)
 
     def _block(self, data: bytes, layout: Layout) -> None:
+        if self._plain(data, layout):
+            return
         ends_with_line_end = data.endswith(b"\n")
         data = regular(data, layout)
         if not data.strip():
@@ -176,6 +180,35 @@ class TextReader:
             lines, text = self._incomplete(found, int(odd[0]), ends_with_line_end, layout)
         if len(lines):
             self._parse(text, lines, layout)
+
+    def _plain(self, data: bytes, layout: Layout) -> bool:
+        """Whether the block was nothing but rows of numbers, and is read: all but a few logs are."""
+        if not self.may_be_plain or self.text_columns or layout.decimal_comma or self.true_lines is not None:
+            return False
+        table = _core.plain_table(data, ord(layout.separator), layout.n_fields)
+        if table is None:
+            # One odd block may be the last, cut off; where there are two, looking for more costs time for nothing.
+            self.may_be_plain = self.n_odd_blocks == 0
+            self.n_odd_blocks += 1
+            return False
+        n = table.shape[1]
+        lines = np.arange(self.cursor.lines + 1, self.cursor.lines + 1 + n, dtype=np.int64)
+        self.cursor.lines += n
+        self._take(list(table), lines, len(data), layout)
+        return True
+
+    def _take(self, columns: list[FloatArray], lines: npt.NDArray[np.int64], n_bytes: int, layout: Layout) -> None:
+        """Keep the rows of a block, unless those expected behind it would not fit into memory."""
+        if self.n_rows == 0:
+            self.store = Store(layout.n_fields, self._triads(layout, columns))
+        rows = self.n_rows + len(lines)
+        rows_per_byte = rows / max(self.n_bytes + n_bytes, 1)
+        expected = int(self.size * rows_per_byte) if self.compression is None else rows
+        if expected > 1_000_000:
+            check_memory(self.path, expected, layout.n_fields, n_held=self.n_rows)
+        self.store.append(columns, max(expected, rows))
+        self.lines.append(lines)
+        self.n_rows = rows
 
     def _incomplete(
         self, found: Lines, i: int, ends_with_line_end: bool, layout: Layout
@@ -219,16 +252,7 @@ class TextReader:
             as_text = parse(self.path, data, dict.fromkeys(frame.columns, pl.String), layout, int(lines[0]))
             refuse_words(self.path, frame, as_text.select(suspects), lines, layout)
         columns = [numbers(frame[str(i)], self.text_columns.get(i)) for i in range(layout.n_fields)]
-        if self.n_rows == 0:
-            self.store = Store(layout.n_fields, self._triads(layout, columns))
-        rows = self.n_rows + len(lines)
-        rows_per_byte = rows / max(self.n_bytes + len(data), 1)
-        expected = int(self.size * rows_per_byte) if self.compression is None else rows
-        if expected > 1_000_000:
-            check_memory(self.path, expected, layout.n_fields, n_held=self.n_rows)
-        self.store.append(columns, max(expected, rows))
-        self.lines.append(lines)
-        self.n_rows = rows
+        self._take(columns, lines, len(data), layout)
 
     def _triads(self, layout: Layout, columns: list[FloatArray]) -> tuple[tuple[int, int, int], ...]:
         """Which columns will be wanted side by side; what is guessed wrong costs memory and nothing else."""

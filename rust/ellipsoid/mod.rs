@@ -3,10 +3,13 @@
 //! `|S a' + b| = |g|` is the quadric `a'ᵀ M a' + 2 mᵀ a' = |g|² - c` with `M = SᵀS`, `m = Sᵀb`, `c = bᵀb`. Readings
 //! are centred on their mean and divided by their spread before the linear step.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
+mod moments;
+
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use crate::error::{Error, Result};
 use crate::norm_invariant::{Frame, Model};
+pub(crate) use moments::Moments;
 
 /// Readings moved to the origin and to unit size: `a' = centre + size · u`.
 #[derive(Debug, Clone, Copy)]
@@ -252,9 +255,30 @@ pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Resul
         )));
     }
     let standard = Standardisation::of(readings)?;
+    let by_moments = by_moments(readings, &standard);
+    let model = match by_moments.and_then(|quadric| quadric.model(gravity, frame)) {
+        Some(model) => model,
+        None => by_rows(readings, &standard, gravity, frame)?,
+    };
+    let model = standard.undo(&model);
+    if model.s.iter().chain(model.b.iter()).all(|v| v.is_finite()) {
+        Ok(model)
+    } else {
+        Err(Error::not_determined(
+            "the ellipsoid through the still poses has no finite size: check the readings",
+        ))
+    }
+}
+
+/// From rows: where sums lose too many digits, or the quadric is no ellipsoid.
+fn by_rows(
+    readings: &[Vector3<f64>],
+    standard: &Standardisation,
+    gravity: f64,
+    frame: Frame,
+) -> Result<Model> {
     let u: Vec<_> = readings.iter().map(|a| standard.apply(a)).collect();
-    let free = fit_quadric(&u)?;
-    let model = free
+    fit_quadric(&u)?
         .model(gravity, frame)
         .or_else(|| {
             fit_ellipsoid(&u)
@@ -266,15 +290,25 @@ pub fn calibrate(readings: &[Vector3<f64>], gravity: f64, frame: Frame) -> Resul
                 "the quadric through the still poses is not an ellipsoid: {}",
                 missing_directions(&u)
             ))
-        })?;
-    let model = standard.undo(&model);
-    if model.s.iter().chain(model.b.iter()).all(|v| v.is_finite()) {
-        Ok(model)
-    } else {
-        Err(Error::not_determined(
-            "the ellipsoid through the still poses has no finite size: check the readings",
-        ))
+        })
+}
+
+/// [`fit_quadric`] in two passes over readings of which no row is kept: the sums, then one step of refinement, which
+/// gives back the digits that sums of squares lose. `None` where they would lose too many.
+fn by_moments(readings: &[Vector3<f64>], standard: &Standardisation) -> Option<Quadric> {
+    let moments = Moments::of(readings, standard);
+    let first = moments.quadric()?;
+    let mut rest = SVector::<f64, 9>::zeros();
+    for reading in readings {
+        let u = standard.apply(reading);
+        let missing = 1.0 - u.dot(&(first.a * u)) - 2.0 * first.h.dot(&u);
+        rest += SVector::from(row(&u)) * missing;
     }
+    let more = quadric(moments.correction(&rest)?.as_slice());
+    Some(Quadric {
+        a: first.a + more.a,
+        h: first.h + more.h,
+    })
 }
 
 /// Which half axes no reading points to within 55° (the angle from an axis to the corner of a cube), in words.

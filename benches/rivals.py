@@ -1,0 +1,207 @@
+"""Our hot paths beside what else there is, on the same data in one run: medians, ratios, peak memory.
+
+python benches/rivals.py [--rounds 3] [--rows 3e6] [--only norm] [--write]
+
+Each method runs in a process of its own, in turn, `--rounds` times; a round is the fastest of some calls after a first.
+Numbers are CPU time on one core (`two cores` and reading: wall time), so that a busy machine shifts them little; quote
+ratios. `--write` puts the tables into docs/speed.md, the short one into README.md, and draws docs/figures/speed.png.
+A rival that is not installed is left out: `pip install numba python-ins bottleneck pandas pyarrow`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import rival_paths  # noqa: F401
+
+# numba looks for a package `coverage` and would find our bench of that name.
+sys.path.remove(str(Path(__file__).parent))
+
+FACTORIES = ("ours", "numba_chain", "sensitivities", "parser")
+"""Functions that make the function to be timed, so that imports and compilation stay outside."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One table: what is timed, in which unit, and of how much."""
+
+    key: str
+    title: str
+    module: str
+    methods: str
+    n: int
+    unit: str
+    per: float
+    slow: dict[str, int]
+    on_both: bool = False
+
+    @property
+    def count(self) -> float:
+        """What a call's seconds are divided by, in units of ``per`` seconds."""
+        return self.per
+
+
+def subjects(rows: int) -> list[Subject]:
+    ns, us, ms = 1e-9, 1e-6, 1e-3
+    million = 10**6
+    return [
+        Subject("last", "Rotation over 10⁶ steps, the last attitude", "attitude", "LAST", million, "ns/step", ns, {}),
+        Subject(
+            "trajectory",
+            "Attitude at each of 10⁶ steps",
+            "attitude",
+            "TRAJECTORY",
+            million,
+            "ns/step",
+            ns,
+            {"SciPy steps, loop of products": 20_000},
+        ),
+        Subject(
+            "sensitivities",
+            "Rotation with 12 sensitivities and covariance, 10⁶ uneven steps in moves of 2000",
+            "attitude",
+            "SENSITIVITIES",
+            million,
+            "ns/step",
+            ns,
+            {},
+        ),
+        Subject("norm18", "Accelerometer from 18 poses", "norm", "FIT", 18, "µs", us, {}),
+        Subject("norm500", "Accelerometer from 500 poses", "norm", "FIT", 500, "µs", us, {}),
+        Subject("norm1e6", "Accelerometer from 10⁶ raw samples", "norm", "FIT", million, "ms", ms, {}),
+        Subject("still", "Still detection, 10⁷ × 3", "still", "DETECT", 10 * million, "ns/sample", ns, {}),
+        Subject(
+            "read", f"Reading {rows:.2g} × 7 numbers of CSV, two cores", "reading", "READ", rows, "s", 1.0, {}, True
+        ),
+    ]
+
+
+def worker(subject: Subject, method: str) -> None:
+    """Time one method and print JSON."""
+    if not subject.on_both:
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    module = __import__(f"rival_paths.{subject.module}", fromlist=["data"])
+    function = getattr(module, subject.methods)[method]
+    if function.__name__ in FACTORIES:
+        function = function()
+    n = subject.slow.get(method, subject.n)
+    arguments = module.data(n)
+    first = arguments if subject.on_both else module.data(min(n, 20_000))
+    if not subject.on_both:
+        function(*first)
+    base = peak(reset=True)
+    walls, cpus = [], []
+    start = time.perf_counter()
+    # Three calls of what is long, as many as fit into 0.2 s of what is short.
+    while len(walls) < (1 if subject.on_both else 3) or (time.perf_counter() - start < 0.2 and len(walls) < 2000):
+        cpu, wall = time.process_time(), time.perf_counter()
+        function(*arguments)
+        walls.append(time.perf_counter() - wall)
+        cpus.append(time.process_time() - cpu)
+    per_item = n if subject.unit.startswith("ns") else 1
+    print(json.dumps({"wall": min(walls) / per_item, "cpu": min(cpus) / per_item, "peak": peak() - base}))
+
+
+def peak(*, reset: bool = False) -> float:
+    """Largest resident size so far, MiB; from now on where ``reset``."""
+    if reset:
+        Path("/proc/self/clear_refs").write_text("5")
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmRSS:" if reset else "VmHWM:"):
+            return int(line.split()[1]) / 1024
+    return float("nan")
+
+
+def measure(subject: Subject, rounds: int) -> dict[str, dict[str, float]]:
+    """Medians over rounds of every method that runs here."""
+    module = __import__(f"rival_paths.{subject.module}", fromlist=["data"])
+    methods = [name for name, function in getattr(module, subject.methods).items() if function is not None]
+    threads = "2" if subject.on_both else "1"
+    names = ("RAYON", "POLARS_MAX", "OMP", "OPENBLAS", "ARROW_IO", "NUMBA")
+    environment = os.environ | {
+        ("POLARS_MAX_THREADS" if name == "POLARS_MAX" else f"{name}_NUM_THREADS"): threads for name in names
+    }
+    if subject.on_both:
+        module.data(subject.n)
+    seen: dict[str, list[dict[str, float]]] = {name: [] for name in methods}
+    for _ in range(rounds):
+        for name in list(seen):
+            command = [sys.executable, __file__, "--worker", subject.key, "--method", name, "--rows", str(subject.n)]
+            done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+            if done.returncode:
+                print(f"  {name}: left out ({done.stderr.strip().splitlines()[-1][:120]})", file=sys.stderr)
+                del seen[name]
+                continue
+            seen[name].append(json.loads(done.stdout.strip().splitlines()[-1]))
+    return {
+        name: {key: statistics.median(run[key] for run in runs) for key in ("wall", "cpu", "peak")}
+        for name, runs in seen.items()
+    }
+
+
+def table(subject: Subject, found: dict[str, dict[str, float]]) -> str:
+    """One Markdown table, ours first, with the ratio to it."""
+    clock = "wall" if subject.on_both else "cpu"
+    mine = next(iter(found.values()))[clock]
+    lines = [f"| {subject.title} | {subject.unit} | times ours | peak MiB |", "|---|---:|---:|---:|"]
+    for name, one in found.items():
+        value = one[clock] / subject.per
+        lines.append(f"| {name} | {value:.3g} | {one[clock] / mine:.3g} | {one['peak']:.0f} |")
+    return "\n".join(lines)
+
+
+def put(path: Path, mark: str, text: str) -> None:
+    """Replace what stands between two marks of a document."""
+    before, rest = path.read_text().split(f"<!-- {mark} -->\n", 1)
+    _, after = rest.split(f"<!-- /{mark} -->", 1)
+    path.write_text(f"{before}<!-- {mark} -->\n{text}\n<!-- /{mark} -->{after}")
+
+
+def short(results: dict[str, tuple[Subject, dict[str, dict[str, float]]]]) -> str:
+    """One line a path: ours, and how many times as long the others take."""
+    lines = ["| path | trihedron | times as long |", "|---|---:|---|"]
+    for subject, found in results.values():
+        clock = "wall" if subject.on_both else "cpu"
+        mine = next(iter(found.values()))[clock]
+        others = [f"{name} {one[clock] / mine:.2g}" for name, one in found.items() if not name.startswith("trihedron")]
+        lines.append(f"| {subject.title} | {mine / subject.per:.3g} {subject.unit} | {', '.join(others)} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--rows", default="3e6")
+    parser.add_argument("--only", default="")
+    parser.add_argument("--write", action="store_true")
+    parser.add_argument("--worker")
+    parser.add_argument("--method")
+    options = parser.parse_args()
+    rows = int(float(options.rows))
+    if options.worker:
+        worker(next(s for s in subjects(rows) if s.key == options.worker), options.method)
+        return
+    results = {}
+    for subject in subjects(rows):
+        if options.only in subject.key:
+            results[subject.key] = (subject, measure(subject, options.rounds))
+            print(table(*results[subject.key]) + "\n", flush=True)
+    if options.write:
+        from rival_paths.growth import draw
+
+        root = Path(__file__).parents[1]
+        put(root / "docs/speed.md", "rivals", "\n\n".join(table(*pair) for pair in results.values()))
+        put(root / "README.md", "rivals", short(results))
+        draw(root / "docs/figures/speed.png")
+
+
+if __name__ == "__main__":
+    main()

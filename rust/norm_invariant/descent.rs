@@ -1,0 +1,208 @@
+//! The norm fit by its normal equations: nothing is allocated per reading, nothing decomposed per step but nine by nine.
+//!
+//! Normal equations cost half the digits of what poses leave free. They are used where the poses leave nothing nearly
+//! free ([`SMALLEST_PIVOT`]); elsewhere rows are kept and compressed orthogonally.
+
+use nalgebra::{Cholesky, Const, DMatrix, DVector, SMatrix, SVector};
+
+use super::sums::{self, At, Charged};
+use super::{N_PARAMETERS, problem, unpack_standardised};
+use crate::error::{Error, Result};
+use crate::gauss_newton::{Certainty, Descent, Linear, Local, Problem};
+
+type Square = SMatrix<f64, N_PARAMETERS, N_PARAMETERS>;
+type Column = SVector<f64, N_PARAMETERS>;
+
+/// Smallest pivot of the normal equations with unit diagonal at which they are trusted: a column less than 1/300 of
+/// which is its own costs five digits, and the step keeps ten.
+const SMALLEST_PIVOT: f64 = 1e-5;
+
+/// The readings charged with their noise, the collapse of `S` a wall.
+pub(super) struct Direct<'a> {
+    pub charged: Charged<'a>,
+    pub at: At,
+    /// `|det S|` of the start, in standardised readings.
+    pub volume: f64,
+}
+
+impl Direct<'_> {
+    fn at(&self, x: &[f64]) -> At {
+        At {
+            model: unpack_standardised(x, self.at.settings.frame),
+            ..self.at
+        }
+    }
+
+    fn normal(&self, x: &[f64]) -> Result<sums::Normal> {
+        sums::normal(&self.charged, &self.at(x))
+            .ok_or_else(|| Error::bad_input("there are no still poses to fit"))
+    }
+
+    fn cost_at(&self, x: &[f64]) -> f64 {
+        let at = self.at(x);
+        if at.model.s.determinant().abs() < problem::SMALLEST_VOLUME * self.volume {
+            return f64::INFINITY;
+        }
+        sums::cost(&self.charged, &at)
+    }
+}
+
+/// The linear problem at one point, its Cholesky factor with unit diagonal at hand.
+pub(super) struct Equations {
+    normal: sums::Normal,
+    n: usize,
+    /// Norms of the columns, and the largest met so far.
+    norms: Column,
+    scale: Column,
+    scaled: Square,
+    factor: Cholesky<f64, Const<N_PARAMETERS>>,
+    size: f64,
+}
+
+impl Equations {
+    /// What the normal equations say about the parameters.
+    pub(super) fn certainty(&self, covariance_factor: f64) -> Certainty {
+        let own =
+            Square::from_fn(|i, j| self.normal.gram[(i, j)] / (self.norms[i] * self.norms[j]));
+        let eigen = own.symmetric_eigen();
+        let mut order: [usize; N_PARAMETERS] = std::array::from_fn(|k| k);
+        order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+        let mut covariance = Square::zeros();
+        for k in 0..N_PARAMETERS {
+            let direction = eigen.eigenvectors.column(k).component_div(&self.norms);
+            covariance += direction * direction.transpose() / eigen.eigenvalues[k];
+        }
+        covariance *= covariance_factor;
+        Certainty {
+            covariance: DMatrix::from_column_slice(
+                N_PARAMETERS,
+                N_PARAMETERS,
+                covariance.as_slice(),
+            ),
+            rank: N_PARAMETERS,
+            singular_values: DVector::from_fn(N_PARAMETERS, |k, _| {
+                eigen.eigenvalues[order[k]].max(0.0).sqrt()
+            }),
+            directions: DMatrix::from_fn(N_PARAMETERS, N_PARAMETERS, |i, k| {
+                eigen.eigenvectors[(i, order[k])]
+            }),
+        }
+    }
+}
+
+impl Descent for Direct<'_> {
+    type Point = Column;
+    type Local = Equations;
+
+    fn linearise(&self, x: &Column, previous: Option<&Equations>) -> Result<Equations> {
+        let normal = self.normal(x.as_slice())?;
+        let norms = Column::from_fn(|j, _| positive_or_one(normal.gram[(j, j)].sqrt()));
+        // Marquardt's scaling, never shrinking: a column that fades must not let its parameter run away.
+        let scale = previous.map_or(norms, |local| local.scale.zip_map(&norms, f64::max));
+        let scaled = Square::from_fn(|i, j| normal.gram[(i, j)] / (scale[i] * scale[j]));
+        let factor = scaled
+            .cholesky()
+            .filter(|factor| {
+                (0..N_PARAMETERS).all(|k| {
+                    let pivot = factor.l_dirty()[(k, k)].powi(2);
+                    pivot >= SMALLEST_PIVOT * scaled[(k, k)]
+                })
+            })
+            .ok_or_else(|| Error::not_determined("the normal equations are too weak"))?;
+        Ok(Equations {
+            size: scale.component_mul(x).norm(),
+            normal,
+            n: self.charged.values.len(),
+            norms,
+            scale,
+            scaled,
+            factor,
+        })
+    }
+
+    fn cost(&self, x: &Column) -> Result<f64> {
+        Ok(self.cost_at(x.as_slice()))
+    }
+
+    fn moved(&self, x: &Column, step: &DVector<f64>) -> Column {
+        Column::from_fn(|k, _| x[k] + step[k])
+    }
+}
+
+impl Local for Equations {
+    fn cost(&self) -> f64 {
+        self.normal.cost
+    }
+
+    fn n_residuals(&self) -> usize {
+        self.n
+    }
+
+    fn is_finite(&self) -> bool {
+        self.normal.slope.iter().all(|value| value.is_finite())
+    }
+
+    fn gradient_cosine(&self) -> f64 {
+        let size = (2.0 * self.normal.cost).sqrt();
+        self.normal
+            .slope
+            .iter()
+            .zip(self.norms.iter())
+            .map(|(g, n)| g.abs() / n / size)
+            .fold(0.0, f64::max)
+    }
+
+    fn step(&self, lambda: f64) -> Result<DVector<f64>> {
+        let slope = self.normal.slope.component_div(&self.scale);
+        let scaled = if lambda == 0.0 {
+            self.factor.solve(&slope)
+        } else {
+            let largest = self.scaled.symmetric_eigenvalues().max();
+            (self.scaled + Square::identity() * (lambda * largest))
+                .cholesky()
+                .ok_or_else(|| Error::not_determined("the normal equations are too weak"))?
+                .solve(&slope)
+        };
+        Ok(DVector::from_fn(N_PARAMETERS, |k, _| {
+            -scaled[k] / self.scale[k]
+        }))
+    }
+
+    fn predicted(&self, step: &DVector<f64>) -> f64 {
+        let step = Column::from_fn(|k, _| step[k]);
+        -(self.normal.slope.dot(&step) + 0.5 * step.dot(&(self.normal.gram * step)))
+    }
+
+    fn length(&self, step: &DVector<f64>) -> f64 {
+        if self.size > 0.0 {
+            let scaled: f64 = (0..N_PARAMETERS)
+                .map(|k| (self.scale[k] * step[k]).powi(2))
+                .sum();
+            scaled.sqrt() / self.size
+        } else {
+            f64::INFINITY
+        }
+    }
+}
+
+/// The same sums for the general solver, which finds its way where the normal equations are weak.
+impl Problem for Direct<'_> {
+    fn linearise(&self, x: &DVector<f64>) -> Result<Linear> {
+        let normal = self.normal(x.as_slice())?;
+        Ok(Linear::from_normal_equations(
+            &DMatrix::from_column_slice(N_PARAMETERS, N_PARAMETERS, normal.gram.as_slice()),
+            &DVector::from_column_slice(normal.slope.as_slice()),
+            normal.cost,
+            normal.chi2,
+            self.charged.values.len(),
+        ))
+    }
+
+    fn cost(&self, x: &DVector<f64>) -> Result<f64> {
+        Ok(self.cost_at(x.as_slice()))
+    }
+}
+
+fn positive_or_one(value: f64) -> f64 {
+    if value > 0.0 { value } else { 1.0 }
+}

@@ -1,0 +1,316 @@
+//! Poisson's equation `B' = −[ω]× B`: the rotation of a move and its sensitivities in one pass.
+//!
+//! `B` takes a vector from the body frame at the start of the move to the body frame at its end: `f_after = B f_before`.
+//! The rate is `ω(t) = S w'(t) + b(t)`; `w'` are raw readings and `b` runs linearly between two anchor instants, the
+//! middles of the still poses before and after. Over one step the rate is a polynomial through the neighbouring
+//! samples; with its zeroth and first moments `φ₀ = ∫ω dτ`, `φ₁ = (1/h)∫τω dτ` about the middle of the step the rotation
+//! vector is `φ = φ₀ + φ₀ × φ₁` (fourth-order Magnus), and the step is the exact exponential `B ← exp(−[φ]×) B`.
+//! Equations (5.1)-(5.6) of docs/model-gyroscope.md.
+
+mod lanes;
+mod steps;
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::rotation::skew;
+use crate::simd::Instructions;
+use lanes::{Rate, Step, Steps};
+pub use steps::{StepWeights, step_weights};
+
+/// 3 × 9 sensitivity of a rotation vector to `S`, column `3 i + j` for `S_ij`.
+pub type WrtScale = SMatrix<f64, 3, 9>;
+
+/// How the rate runs between two samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RateModel {
+    /// The sample holds until the next one: first order.
+    Constant,
+    /// A straight line from sample to sample, with the commutator of that line: second order.
+    Linear,
+    /// A cubic through four samples, so that coning inside a step is integrated: fourth order.
+    Coning,
+}
+
+impl RateModel {
+    /// The model whose rate polynomial has this degree (0, 1 or 3).
+    ///
+    /// # Errors
+    /// When no model has that degree.
+    pub fn of_degree(degree: u8) -> Result<Self> {
+        match degree {
+            0 => Ok(Self::Constant),
+            1 => Ok(Self::Linear),
+            3 => Ok(Self::Coning),
+            _ => Err(Error::bad_input(format!(
+                "the rate model has degree 0 (constant), 1 (linear) or 3 (coning), got {degree}"
+            ))),
+        }
+    }
+}
+
+/// A move to be integrated: samples `[start, stop)`, and the instants between which the zero reading is interpolated.
+#[derive(Debug, Clone, Copy)]
+pub struct MoveRange {
+    /// First sample.
+    pub start: usize,
+    /// One past the last sample.
+    pub stop: usize,
+    /// Middle of the still pose before, s.
+    pub anchor_before_s: f64,
+    /// Middle of the still pose after, s.
+    pub anchor_after_s: f64,
+}
+
+/// What the samples contribute to the uncertainty of a rotation.
+#[derive(Debug, Clone, Copy)]
+pub struct RateNoise {
+    /// Angle random walk of each raw axis, raw unit · √s (white density `N`).
+    pub density: Vector3<f64>,
+    /// Standard deviation of a time stamp, s.
+    pub sigma_time_s: f64,
+    /// A step longer than one and a half of these has lost samples, s.
+    pub nominal_step_s: f64,
+}
+
+/// A move prepared for repeated integration: the moments of its raw readings.
+#[derive(Debug, Clone)]
+pub struct PreparedMove {
+    steps: Steps,
+    span_s: f64,
+}
+
+/// The rotation of one move and how it answers to everything it was computed from.
+///
+/// Sensitivities are rotation vectors `θ` in the frame at the start of the move: `B(p + δp) ≈ B exp(−[θ]×)`, `θ = G δp`.
+#[derive(Debug, Clone)]
+pub struct Turn {
+    /// `B`, body at the start → body at the end.
+    pub rotation: Matrix3<f64>,
+    /// `G` with respect to `S`, row by row.
+    pub wrt_scale: WrtScale,
+    /// `G` with respect to the rate bias at the anchor before, s.
+    pub wrt_bias_before: Matrix3<f64>,
+    /// `G` with respect to the rate bias at the anchor after, s.
+    pub wrt_bias_after: Matrix3<f64>,
+    /// Covariance of `θ` from rate noise, time stamps and lost samples, rad².
+    pub cov_noise: Matrix3<f64>,
+    /// Integrated time, s.
+    pub duration_s: f64,
+}
+
+impl Turn {
+    /// `∂B/∂p` for the parameter whose column of `G` is `theta`: `−B [θ]×`.
+    #[must_use]
+    pub fn derivative(&self, theta: &Vector3<f64>) -> Matrix3<f64> {
+        -self.rotation * skew(theta)
+    }
+}
+
+/// Reduces the samples of a move to moments; non-finite rows and repeated stamps are bridged.
+///
+/// `var_extra`, as long as `raw` where given, is the variance of single readings beyond the rate noise: readings that
+/// were reconstructed where the gyro met its limit.
+///
+/// # Errors
+/// When the range leaves the record, the anchors coincide or time runs backward.
+pub fn prepare(
+    time_s: &[f64],
+    raw: &[Vector3<f64>],
+    var_extra: Option<&[Vector3<f64>]>,
+    range: &MoveRange,
+    model: RateModel,
+) -> Result<PreparedMove> {
+    if var_extra.is_some_and(|var| var.len() != raw.len()) {
+        return Err(Error::bad_input(
+            "the extra variance must have one row per reading",
+        ));
+    }
+    if range.start >= range.stop || range.stop > time_s.len() || time_s.len() != raw.len() {
+        return Err(Error::bad_input(format!(
+            "a move covers samples {}..{} of {}: it must hold at least one sample and stay inside the record",
+            range.start,
+            range.stop,
+            time_s.len().min(raw.len())
+        )));
+    }
+    let span_s = range.anchor_after_s - range.anchor_before_s;
+    if !(span_s > 0.0 && span_s.is_finite()) {
+        return Err(Error::bad_input(format!(
+            "the still pose after the move at sample {} must be later than the one before it",
+            range.start
+        )));
+    }
+    let mut used: Vec<usize> = Vec::with_capacity(range.stop - range.start);
+    for k in range.start..range.stop {
+        if !(raw[k].iter().all(|x| x.is_finite()) && time_s[k].is_finite()) {
+            continue;
+        }
+        if let Some(&last) = used.last() {
+            if time_s[k] < time_s[last] {
+                return Err(Error::bad_input(format!(
+                    "time runs backward at sample {k}: sort the record first"
+                )));
+            }
+            if time_s[k] <= time_s[last] {
+                continue;
+            }
+        }
+        used.push(k);
+    }
+    let n = used.len();
+    let mut steps = Steps::new(n.saturating_sub(1));
+    for i in 0..n.saturating_sub(1) {
+        let step = StepWeights::at(time_s, |k| used[k], n, i, model);
+        let (moment0, moment1) = step.moments(|k| raw[k]);
+        let (p, q) = (step.from, step.to);
+        steps.set(
+            i,
+            &Step {
+                moment0,
+                moment1,
+                change: raw[q] - raw[p],
+                h: step.h,
+                fraction: (0.5 * (time_s[p] + time_s[q]) - range.anchor_before_s) / span_s,
+                var_extra: var_extra.map_or_else(Vector3::zeros, |var| var[p]),
+            },
+        );
+    }
+    Ok(PreparedMove { steps, span_s })
+}
+
+impl PreparedMove {
+    /// Number of integration steps.
+    #[must_use]
+    pub fn n_steps(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Time between the anchors, s.
+    #[must_use]
+    pub fn span_s(&self) -> f64 {
+        self.span_s
+    }
+
+    /// `∫ w' dt` over the move, raw unit · s: the turn as the gyro saw it when its axis stays fixed.
+    #[must_use]
+    pub fn raw_angle(&self) -> Vector3<f64> {
+        self.steps.raw_angle()
+    }
+
+    /// Integrated time, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.steps.duration_s()
+    }
+
+    /// Rotation and sensitivities for `ω = S w' + b`, `b` from `bias_before` to `bias_after` (rad/s) between the anchors.
+    #[must_use]
+    pub fn integrate(
+        &self,
+        scale: &Matrix3<f64>,
+        bias_before: &Vector3<f64>,
+        bias_after: &Vector3<f64>,
+        noise: &RateNoise,
+    ) -> Turn {
+        self.integrate_with(
+            Instructions::detect(),
+            scale,
+            bias_before,
+            bias_after,
+            noise,
+        )
+    }
+
+    /// As [`integrate`](Self::integrate), by instructions of the caller's choice; the results differ by rounding.
+    #[must_use]
+    pub fn integrate_with(
+        &self,
+        instructions: Instructions,
+        scale: &Matrix3<f64>,
+        bias_before: &Vector3<f64>,
+        bias_after: &Vector3<f64>,
+        noise: &RateNoise,
+    ) -> Turn {
+        let at = Rate {
+            scale: *scale,
+            bias: *bias_before,
+            change: bias_after - bias_before,
+            span_s: self.span_s,
+            variance: noise.density.component_mul(&noise.density),
+            var_time: noise.sigma_time_s * noise.sigma_time_s,
+            gap_s: 1.5 * noise.nominal_step_s,
+        };
+        self.steps.integrate(instructions, &at)
+    }
+}
+
+/// Prepares every move, in parallel.
+///
+/// # Errors
+/// As [`prepare`], for the first move that fails.
+pub fn prepare_all(
+    time_s: &[f64],
+    raw: &[Vector3<f64>],
+    var_extra: Option<&[Vector3<f64>]>,
+    ranges: &[MoveRange],
+    model: RateModel,
+) -> Result<Vec<PreparedMove>> {
+    ranges
+        .par_iter()
+        .map(|range| prepare(time_s, raw, var_extra, range, model))
+        .collect()
+}
+
+/// Prepares and integrates every move, in parallel; for an integration that is not repeated: nothing is kept in between.
+///
+/// # Errors
+/// As [`prepare`], for the first move that fails, and when there are not as many biases as moves.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "what is prepared and what is integrated"
+)]
+pub fn integrate_once(
+    time_s: &[f64],
+    raw: &[Vector3<f64>],
+    ranges: &[MoveRange],
+    model: RateModel,
+    scale: &Matrix3<f64>,
+    bias_before: &[Vector3<f64>],
+    bias_after: &[Vector3<f64>],
+    noise: &RateNoise,
+) -> Result<Vec<Turn>> {
+    if bias_before.len() != ranges.len() || bias_after.len() != ranges.len() {
+        return Err(Error::bad_input(format!(
+            "there are {} moves but {} biases before and {} after them",
+            ranges.len(),
+            bias_before.len(),
+            bias_after.len()
+        )));
+    }
+    ranges
+        .par_iter()
+        .zip(bias_before.par_iter().zip(bias_after))
+        .map(|(range, (before, after))| {
+            let prepared = prepare(time_s, raw, None, range, model)?;
+            Ok(prepared.integrate(scale, before, after, noise))
+        })
+        .collect()
+}
+
+/// Integrates every move, in parallel; biases are per move.
+#[must_use]
+pub fn integrate_all(
+    moves: &[PreparedMove],
+    scale: &Matrix3<f64>,
+    bias_before: &[Vector3<f64>],
+    bias_after: &[Vector3<f64>],
+    noise: &RateNoise,
+) -> Vec<Turn> {
+    moves
+        .par_iter()
+        .zip(bias_before.par_iter().zip(bias_after))
+        .map(|(prepared, (before, after))| prepared.integrate(scale, before, after, noise))
+        .collect()
+}
