@@ -103,8 +103,10 @@ def as_row(name, d, why, seconds):
     for e in d.effects:
         also = f" (or {', '.join(e.confounded_with)})" if e.confounded_with else ""
         ids.append(e.id + also)
-        big = max(e.parameters, key=lambda p: abs(p.value) / max(p.std, 1e-300), default=None)
-        sizes.append("–" if big is None else f"{big.name} {big.value:.3g} ± {big.std:.1g} {big.unit}")
+        told = [p for p in e.parameters if p.std > 0.0] or list(e.parameters)
+        big = max(told, key=lambda p: abs(p.value) / max(p.std, 1e-300), default=None)
+        codes = "".join(f", {p.name} {p.value:.9g}" for p in e.parameters if p.name.startswith("raw_"))
+        sizes.append("–" if big is None else f"{big.name} {big.value:.3g} ± {big.std:.1g} {big.unit}{codes}")
         h = e.held_out[0] if e.held_out else None
         held.append("–" if h is None else f"{h.domain} {h.chi2_per_dof_before:.2g} → {h.chi2_per_dof_after:.2g}")
     left = ", ".join(f"{t.domain} {t.chi2_per_dof:.2g}" for t in d.remaining if t.disagrees)

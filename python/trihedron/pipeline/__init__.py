@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from trihedron.pipeline.converting import convert
     from trihedron.pipeline.curves import allan_deviation
     from trihedron.pipeline.demonstrating import demo
-    from trihedron.pipeline.diagnosing import diagnose, extend
+    from trihedron.pipeline.diagnosing import diagnose
     from trihedron.pipeline.exporting import export
+    from trihedron.pipeline.extending import extend
     from trihedron.pipeline.filtering import KalmanResult, kalman
     from trihedron.pipeline.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
     from trihedron.pipeline.improving import driven, improve
@@ -87,7 +88,7 @@ _HOME = {
     "convert": "trihedron.pipeline.converting",
     "settle_gravity": "trihedron.pipeline.choices",
     "diagnose": "trihedron.pipeline.diagnosing",
-    "extend": "trihedron.pipeline.diagnosing",
+    "extend": "trihedron.pipeline.extending",
     "export": "trihedron.pipeline.exporting",
     "KalmanResult": "trihedron.pipeline.filtering",
     "kalman": "trihedron.pipeline.filtering",

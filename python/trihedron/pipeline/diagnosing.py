@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.pipeline.asking import WrongTypeError
-from trihedron.pipeline.beside import beside
+from trihedron.pipeline.beside import beside, shared_log
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
@@ -26,8 +23,8 @@ from trihedron.pipeline.diagnosing_rest import at_rest, diagnosed_at_rest
 from trihedron.pipeline.improving import driven
 from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segments_of
 from trihedron.pipeline.referring import AnyReference
-from trihedron.pipeline.results import CalibrationResult, DiagnosisResult
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration, Severity
+from trihedron.pipeline.results import DiagnosisResult
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, Severity
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
@@ -82,14 +79,29 @@ def diagnose(
         raise ValueError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
     tell = progress or (lambda _fraction, _text: None)
     recording = recording_of(recording)
-    if reference is not None:
-        ordinary = partial(
-            diagnose, recording, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m,
-            segments=segments, calibration=calibration, against=against, alpha=alpha, progress=progress,
-        )  # fmt: skip
-        given = None if calibration is None else calibration_of(calibration)
-        place = (gravity_m_s2, latitude_deg, height_m)
-        return beside(recording, reference, reference_columns, given, place, alpha, ordinary)
+    ordinary = partial(
+        _of_poses, recording, (gravity_m_s2, latitude_deg, height_m), segments, calibration, against, alpha, tell
+    )
+    if reference is None and against is not None:
+        reference = shared_log(recording, against, gravity_m_s2)
+    if reference is None:
+        return ordinary()
+    given = None if calibration is None else calibration_of(calibration)
+    place = (gravity_m_s2, latitude_deg, height_m)
+    return beside(recording, reference, reference_columns, given, place, alpha, ordinary)
+
+
+def _of_poses(
+    recording: Recording,
+    place: tuple[float | None, float | None, float | None],
+    segments: Segments | None,
+    calibration: AnyCalibration | None,
+    against: GivenModel | None,
+    alpha: float,
+    tell: Progress,
+) -> DiagnosisResult:
+    """What still poses and the moves between them say."""
+    gravity_m_s2, latitude_deg, height_m = place
     known = None if calibration is None else calibration_of(calibration)
     said: tuple[Finding, ...] = ()
     if known is not None and gravity_m_s2 is None and latitude_deg is None and height_m is None:
@@ -236,107 +248,3 @@ def _gyroscope_left_out() -> Finding:
 def _accelerometer_only(recording: Recording, segments: Segments) -> tuple[Recording, Segments]:
     bare = replace(segments, gyroscope_sigma=None, gyroscope_mean=None, gyroscope_sigma_mean=None)
     return replace(recording, gyroscope=None), bare
-
-
-def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress | None = None) -> CalibrationResult:
-    """A calibration with the effects that its own recording demands: S, b fitted with them, effects in ``extensions``.
-
-    Frame ``lower``: effects are stated along the sensor's axes and in this trihedron.
-
-    Raises
-    ------
-    ValueError
-        When the calibration is in another frame than ``lower``.
-    """
-    if not isinstance(result, CalibrationResult):
-        raise WrongTypeError(f"trihedron.extend takes what trihedron.calibrate gave, not {type(result).__name__}.")
-    base = result.calibration
-    if base.frame != "lower":
-        raise ValueError(
-            f"an extended calibration is made in frame lower, not {base.frame}: "
-            "use method joint or separate and leave the frame out."
-        )
-    diagnosis = diagnose(
-        result.recording,
-        gravity_m_s2=base.gravity_m_s2,
-        segments=result.segments,
-        alpha=alpha,
-        progress=progress,
-    )
-    finding = _modelled(diagnosis)
-    if not diagnosis.effects:
-        return replace(result, calibration=replace(base, findings=(*base.findings, finding)))
-    return replace(result, calibration=_extended(base, diagnosis, finding))
-
-
-def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Calibration:
-    model = diagnosis.extended
-    assert model.covariance is not None
-    covariance = model.covariance
-    return replace(
-        base,
-        accelerometer=_sensor(base.accelerometer, model.accelerometer, covariance[:12, :12]),
-        gyroscope=None
-        if base.gyroscope is None or model.gyroscope is None
-        else _sensor(base.gyroscope, model.gyroscope, covariance[12:, 12:]),
-        covariance=covariance,
-        findings=(*_still_true(base, diagnosis), finding),
-        extensions=MappingProxyType(
-            {
-                "effects": [effect.to_dict() for effect in diagnosis.effects],
-                "references": dict(diagnosis.references),
-                "verdict": diagnosis.verdict,
-                "remaining": [d.domain for d in diagnosis.remaining if d.disagrees],
-            }
-        ),
-    )
-
-
-_OF_THE_LINEAR_FIT = (
-    FindingCode.RESIDUAL_ABOVE_NOISE,
-    FindingCode.HELD_OUT_WORSE,
-    FindingCode.JOINT_FIT_LEFT,
-    FindingCode.GYRO_G_SENSITIVITY,
-    FindingCode.GYRO_BIAS_DRIFT,
-)
-
-
-def _still_true(base: Calibration, diagnosis: Diagnosis) -> tuple[Finding, ...]:
-    """Findings without those about the linear fit's residuals, where the effects account for all of them."""
-    if any(d.disagrees for d in diagnosis.remaining):
-        return base.findings
-    return tuple(f for f in base.findings if f.code not in _OF_THE_LINEAR_FIT)
-
-
-def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.ndarray) -> SensorCalibration:
-    # Residuals and observability were those of the fit without the effects: they do not belong to these numbers.
-    return replace(
-        base,
-        S=np.array(model["S"]),
-        b=np.array(model["b"]),
-        covariance=covariance,
-        method=f"{base.method}, extended by diagnosis",
-        quality=None,
-        observability=None,
-    )
-
-
-def _modelled(diagnosis: Diagnosis) -> Finding:
-    left = [d.domain for d in diagnosis.remaining if d.disagrees]
-    numbers = MappingProxyType({"n_effects": float(len(diagnosis.effects)), "n_domains_left": float(len(left))})
-    if not diagnosis.effects:
-        seen = "The diagnosis accepted no effect: the linear model stands as it was"
-        seen += f", and {', '.join(left)} still disagree with it." if left else "."
-        severity = Severity.WARNING if left else Severity.NOTE
-        return Finding(FindingCode.EFFECTS_MODELLED, severity, seen, numbers=numbers)
-    named = ", ".join(effect.id for effect in diagnosis.effects)
-    return Finding(
-        FindingCode.EFFECTS_MODELLED,
-        Severity.WARNING if left else Severity.NOTE,
-        f"S and b were fitted together with {named}" + (f"; {', '.join(left)} still disagree." if left else "."),
-        "The linear model alone does not reproduce this recording: "
-        + "; ".join(effect.statement.rstrip(".") for effect in diagnosis.effects)
-        + ".",
-        "`trihedron apply` takes off what belongs to the sensor; S and b alone are only half of this model.",
-        numbers,
-    )

@@ -15,7 +15,7 @@ def held_out_stages(bare: StepwiseModel, model: StepwiseModel) -> tuple[Stage, .
 
 def _domains(model: StepwiseModel) -> tuple[StageDomain, ...]:
     prediction = model.prediction
-    rms, unit = physical_rms(model.fitted, prediction.residual)
+    rms, unit = physical_rms(model.fitted, prediction.innovation)
     return tuple(
         StageDomain(name, rms[d], float(prediction.chi2[d] / prediction.n_rows[d]), unit[d])
         for d, name in ROW_DOMAINS.items()

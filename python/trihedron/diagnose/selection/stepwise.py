@@ -12,6 +12,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.compare import Refit, refined, refit
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel
 from trihedron.diagnose.selection.score import Scored, score_all
+from trihedron.diagnose.session.observations import FloatArray
 from trihedron.records.diagnosis import Candidate
 
 MAX_EFFECTS = 4
@@ -62,6 +63,7 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     # Rivals are compared against one rest, that of the best explained: else its small differences weigh large gains.
     rest = np.min([r.against.stays for r in sound], axis=0)
     best = max(sound, key=lambda r: r.against.bic_gain_at(rest))
+    best = _logged_first(best, sound, rest)
     # What another mechanism explains as well: by its joint fit, or, for all of its shapes, by the score test.
     enough = best.against.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
     close = [r.scored.effect.id for r in refits if r is not best and r.against.bic_gain_at(rest) > enough]
@@ -82,6 +84,19 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
         prediction=best.against.prediction,
         accepted=(*model.accepted, one),
     )
+
+
+def _logged_first(best: Refit, sound: list[Refit], rest: FloatArray) -> Refit:
+    """A drift in time gives way to a logged temperature that explains as much: then something logged explains it."""
+    sensor, _, kind = best.scored.effect.id.partition("-")
+    if kind != "hidden-drift":
+        return best
+    enough = best.against.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
+    thermal = [
+        r for r in sound
+        if r.scored.effect.id.startswith(f"{sensor}-thermal") and r.against.bic_gain_at(rest) > enough
+    ]  # fmt: skip
+    return max(thermal, key=lambda r: r.against.bic_gain_at(rest), default=best)
 
 
 def is_sound(one: Refit) -> bool:

@@ -1,0 +1,86 @@
+"""What must not be swallowed, and what is no answer."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from trihedron.diagnose.effects.plateaus import plateaus, shared_levels
+from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
+from trihedron.diagnose.selection import verdict
+from trihedron.pipeline import extending
+from trihedron.records import Hold
+from trihedron.records.diagnosis import DomainTest, Stage, StageDomain
+
+RATE_HZ = 100.0
+
+
+class Poses:
+    """What the test of halves looks at: 30 poses of 5 s at 100 Hz."""
+
+    def __init__(self, force, rate):
+        self.raw_force, self.raw_rate = force, rate
+        self.force_density = np.full(3, 0.1)
+        self.rate_density = np.full(3, 0.1)
+        holds = tuple(Hold(k, 500 * k, 500 * (k + 1), 500 * k, 500 * (k + 1)) for k in range(30))
+        self.segments = SimpleNamespace(holds=holds)
+        self.recording = SimpleNamespace(rate_hz=RATE_HZ)
+
+
+def white(rng):
+    return rng.normal(0.0, 0.1 * np.sqrt(RATE_HZ), (15000, 3))
+
+
+def test_white_and_slow_noise_are_not_called_jumps():
+    called = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        walk = np.cumsum(rng.normal(0.0, 0.01, (15000, 3)), axis=0)
+        called += min(jumps_in_poses(Poses(white(rng), white(rng) + walk)).p_value) < JUMPS
+    assert called <= 1  # 80 looks at one in a thousand
+
+
+def test_a_zero_that_jumps_in_a_few_poses_is_found_and_a_pose_that_turns_is_not():
+    rng = np.random.default_rng(51)
+    force, rate = white(rng), white(rng)
+    turning = rate.copy()
+    for k in (3, 9, 14, 22, 27):
+        rate[500 * k + 250 : 500 * k + 500, 1] += 1.0
+        turning[500 * k + 250 : 500 * k + 500, 1] += 1.0
+        force[500 * k + 250 : 500 * k + 500, 0] += 0.0
+    found = jumps_in_poses(Poses(force, rate))
+    assert found.p_value[1] < JUMPS
+    assert set(found.holds[1]) <= {3, 9, 14, 22, 27}
+    moved = force.copy()
+    for k in (3, 9, 14, 22, 27):
+        moved[500 * k + 250 : 500 * k + 500, 0] += 1.0
+    assert min(jumps_in_poses(Poses(moved, turning)).p_value) > JUMPS
+
+
+def test_footnotes_are_no_answer_while_something_else_disagrees(monkeypatch):
+    left = DomainTest("static-gyro", 9.0, 30.0, 1e-9, True)
+    model = SimpleNamespace(accepted=("a bump",))
+    monkeypatch.setattr(verdict, "are_footnotes", lambda _model: True)
+    assert verdict.verdict_of(model, (left,), (left,)) == "unexplained"
+    assert verdict.verdict_of(model, (left,), ()) == "missing-physics"
+    monkeypatch.setattr(verdict, "are_footnotes", lambda _model: False)
+    assert verdict.verdict_of(model, (left,), (left,)) == "missing-physics"
+
+
+def test_channels_of_one_part_share_one_exact_limit():
+    rng = np.random.default_rng(52)
+    n = 4000
+    t = np.arange(n) / 100.0
+    turns = 40000.0 * np.sin(2.0 * np.pi * np.array([0.9, 1.1, 0.7]) * t[:, None])
+    codes = np.clip(np.round(turns + rng.normal(0.0, 3.0, (n, 3))), -32768, 32767)
+    runs = plateaus(codes, np.full(3, 3.0), ((0, n),))
+    levels = shared_levels(runs, np.zeros(3), np.full(3, 3.0))
+    assert set(levels) == {(axis, sign) for axis in range(3) for sign in (1, -1)}
+    assert {value for value, exact in levels.values() if exact} == {32767.0, -32768.0}
+
+
+@pytest.mark.parametrize(("after", "stays"), [(0.004, False), (0.006, True)])
+def test_an_extension_that_predicts_worse_stays_linear(after, stays):
+    domain = [StageDomain("static-accel", rms, 1.0, "m/s^2") for rms in (0.0035, after)]
+    diagnosis = SimpleNamespace(stages=(Stage("numbers", (domain[0],)), Stage("effects", (domain[1],))))
+    assert (extending._spoilt(diagnosis) is not None) == stays
