@@ -206,6 +206,15 @@ def test_a_foreign_format_is_named_with_the_way_in(tmp_path, content, complaint)
     assert "\n" not in str(caught.value)
 
 
+def test_a_remark_behind_a_row_that_was_passed_over_is_counted(tmp_path):
+    rows = readings(20)
+    lines = [",".join(map(str, rows[0])), "# restarted", *(",".join(map(str, row[:6])) for row in rows[1:])]
+    path = tmp_path / "log.csv"
+    path.write_text("t,ax,ay,az,gx,gy,gz\n" + "\n".join(lines) + "\n")
+    recording = read_recording(path)
+    assert recording.rows_in_file == recording.rows_read + recording.rows_reported == len(lines)
+
+
 def test_two_rows_glued_by_a_lone_carriage_return_are_two_rows(tmp_path):
     rows = [",".join(f"{v:.4f}" for v in row) for row in readings(60)]
     for first, last in ((0, 1), (30, 31)):

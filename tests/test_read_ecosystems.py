@@ -1,5 +1,6 @@
 """Bags, ULog, DataFlash, HDF5 and MATLAB files, written by their ecosystem or byte by byte after its specification."""
 
+import contextlib
 import struct
 import sys
 
@@ -336,3 +337,58 @@ def test_real_files_are_read_whole(real_data, name):
     assert recording.rows_in_file == recording.rows_read + recording.rows_reported
     assert recording.rate_hz == pytest.approx(rate, rel=0.01)
     assert recording.accelerometer_unit is AccelerationUnit.M_S2
+
+
+def test_what_matlab_writes_passes_the_walk_and_damage_does_not_reach_scipy(tmp_path):
+    from scipy.io import savemat
+    from scipy.sparse import eye
+
+    from trihedron.read.matlab_check import DamagedError, check_matlab
+
+    rng = np.random.default_rng(8)
+    content = {
+        "t": TABLE[:, 0],
+        "acc": TABLE[:, 1:4].astype(np.float32),
+        "log": {"gyr": TABLE[:, 4:7], "name": "board", "nested": {"empty": np.zeros((0, 3)), "z": 1 + 2j}},
+        "cells": np.array([1.0, "two", np.arange(3, dtype=np.int16)], dtype=object),
+        "sparse": eye(5).tocsc(),
+        "flags": np.array([True, False]),
+        "words": np.array(["a", "bcd"]),
+    }
+    for compressed in (False, True):
+        savemat(tmp_path / "log.mat", content, do_compression=compressed)
+        check_matlab((tmp_path / "log.mat").read_bytes())
+    savemat(tmp_path / "log.mat", content)
+    whole = (tmp_path / "log.mat").read_bytes()
+    n_refused = 0
+    for _ in range(400):
+        damaged = bytearray(whole)
+        for at in rng.integers(128, len(whole), 3):
+            damaged[at] = rng.integers(256)
+        path = tmp_path / "damaged.mat"
+        path.write_bytes(damaged)
+        try:
+            check_matlab(bytes(damaged))
+        except DamagedError:
+            n_refused += 1
+        # SciPy alone ends the process over one such file in a few hundred.
+        with contextlib.suppress(ReadError):
+            read_recording(path)
+    assert n_refused > 20
+
+
+def test_a_panic_over_damaged_parquet_prints_nothing(tmp_path, capfd):
+    import polars as pl
+
+    rng = np.random.default_rng(0)
+    path = tmp_path / "log.parquet"
+    pl.DataFrame(TABLE, schema=["t", "ax", "ay", "az", "gx", "gy", "gz"]).write_parquet(path)
+    whole = path.read_bytes()
+    for _ in range(300):
+        damaged = bytearray(whole)
+        for at in rng.integers(2 * len(whole) // 3, len(whole), 2):
+            damaged[at] = rng.integers(256)
+        path.write_bytes(damaged)
+        with contextlib.suppress(ReadError):
+            read_recording(path)
+    assert capfd.readouterr().err == ""

@@ -22,6 +22,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -35,6 +36,8 @@ from trihedron.read import ReadError, read_recording
 
 ROWS = 40
 HANGS_S = 60
+SHARE = 500
+"""Files of one seed."""
 COUNTED = ("euroc", "kalibr", "px4_ulog2csv", "ximu3", "witmotion", "st_mems", "mars_logger", "physics_toolbox")
 COUNTED += ("excel_europe", "american_clock", "plotjuggler", "adis_evaluation")
 OTHERS = ("gnsslogger", "arduino_monitor", "arduino_plotter", "adafruit", "movella_dot", "shimmer_consensys", "axivity")
@@ -236,17 +239,25 @@ def main() -> int:
     count = int(float(sys.argv[1])) if len(sys.argv) > 1 else 2000
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
     processes = int(sys.argv[3]) if len(sys.argv) > 3 else 1
-    shares = [(len(range(k, count, processes)), seed + 1000 * k) for k in range(processes)]
+    shares = [(min(SHARE, count - first), 1000 * seed + first // SHARE) for first in range(0, count, SHARE)]
+    done = []
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        done = list(pool.map(damaged_and_read, *zip(*shares, strict=True)))
+        for k, one in enumerate(pool.map(damaged_and_read, *zip(*shares, strict=True))):
+            done.append(one)
+            print(f"{sum(n for n, _ in shares[: k + 1])} files, {sum(len(f) for _, f, _ in done)} failures", flush=True)
     tally = sum((tally for tally, _, _ in done), Counter())
     failures = [failure for _, found, _ in done for failure in found]
-    seeds = ", ".join(str(of) for _, of in shares)
-    print(f"{count} damaged files, seed {seeds}, {sum(s for _, _, s in done):.0f} s of CPU: {dict(tally)}")
+    print(f"{count} damaged files, seed {seed}, {sum(s for _, _, s in done):.0f} s of CPU: {dict(tally)}")
     print(f"{len(failures)} failures")
     for failure in failures[:25]:
         print("  ", failure)
     return int(bool(failures))
+
+
+@cache
+def whole_texts() -> dict[str, tuple[bytes, dict[str, object]]]:
+    """Every layout before its damage, with its options."""
+    return {name: shortened(name) for name in (*COUNTED, *OTHERS)}
 
 
 def damaged_and_read(count: int, seed: int) -> tuple[Counter[str], list[str], float]:
@@ -255,7 +266,7 @@ def damaged_and_read(count: int, seed: int) -> tuple[Counter[str], list[str], fl
     printed = tempfile.TemporaryFile()  # noqa: SIM115 -- for as long as this process lives
     os.dup2(printed.fileno(), 2)
     rng = np.random.default_rng(seed)
-    texts = {name: shortened(name) for name in (*COUNTED, *OTHERS)}
+    texts = whole_texts()
     tally: Counter[str] = Counter()
     failures: list[str] = []
     began = time.process_time()

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from trihedron.read.columns import find_columns
 from trihedron.read.devices import Choice
-from trihedron.read.errors import ReadError
+from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.matlab_check import DamagedError, check_matlab
 from trihedron.read.matlab_objects import read_objects
 from trihedron.read.memory import columns_table
 from trihedron.read.table import Table, file_sha256
@@ -66,6 +67,12 @@ def read_matlab(path: Path, choice: Choice) -> tuple[Table, ...]:
     """
     from scipy.io import loadmat
 
+    try:
+        check_matlab(path.read_bytes())
+    except DamagedError as error:
+        raise ReadError(f"{path}: this MATLAB file is damaged ({error}); save it again.") from None
+    except OSError as error:
+        raise from_os_error(path, error) from None
     try:
         with warnings.catch_warnings():
             # Of objects SciPy finds the bookkeeping only, and says so.

@@ -96,6 +96,8 @@ def detect(text: str) -> Layout | None:
     n_kept = n_fields - trailing
     header = _header(lines[:first], separator, n_kept)
     stray = () if rate else _stray(lines[:first], header, decimal_comma)
+    # Remarks count from the names on, or from the first line that may have been a row.
+    above = min(max(header.used, default=first), stray[0] - 1 if stray else first)
     return Layout(
         separator,
         decimal_comma,
@@ -107,7 +109,7 @@ def detect(text: str) -> Layout | None:
         header.ignored,
         stray,
         sum(_looks_like_row(lines[i - 1], decimal_comma, 4) for i in stray),
-        tuple(i + 1 for i in range(max(header.used, default=first) + 1, first) if is_comment(lines[i].strip())),
+        tuple(i + 1 for i in range(above + 1, first) if is_comment(lines[i].strip())),
     )
 
 
