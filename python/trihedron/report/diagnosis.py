@@ -348,7 +348,7 @@ def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
     blocks: list[Block] = []
     for name in ("accelerometer", "gyroscope"):
         before, after = getattr(diagnosis.baseline, name), getattr(diagnosis.extended, name)
-        if before is None or after is None:
+        if before is None or after is None or before["raw_unit"] == "none":
             continue
         rows = [
             (f"S{i + 1}{j + 1}", _both(before, "S", (i, j)), _both(after, "S", (i, j)))

@@ -57,7 +57,9 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
 
 def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     """What differs for one sentence: every number while they are few, else the groups with their largest."""
-    numbers, noise = differing_numbers(diagnosis), differing_noise(diagnosis)
+    # Sentences of noise become clauses of one.
+    noise = [word[0].lower() + word[1:].rstrip(".") for word in differing_noise(diagnosis)]
+    numbers = differing_numbers(diagnosis)
     if len(numbers) <= MOST_NAMED:
         return [*numbers, *noise]
     largest: dict[str, ParameterDifference] = {}
@@ -92,11 +94,11 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     rows = tuple(
         (
             f"{_sensor(n)} {n.axis}".strip(),
-            n.term,
+            _term(n),
             _plain(n.model),
             _plain(n.recording),
             _ratio(n),
-            unit_in_print(n.unit),
+            unit_in_print(n.unit.partition(", ")[0]).replace("sqrt(Hz)", "√Hz"),
             "differs" if n.significant else "",
         )
         for n in diagnosis.noise_compared
@@ -106,6 +108,11 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if remarks:
         blocks.append(Facts(tuple(dict.fromkeys(remarks))))
     return tuple(blocks)
+
+
+def _term(n: NoiseDifference) -> str:
+    """The term, or the band of an octave."""
+    return n.unit.partition(", ")[2] if n.term == "octave" else n.term
 
 
 def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ...]:
