@@ -61,9 +61,9 @@ def main():
         print(f"{kind}: {given.each} runs, {time.process_time() - start:.0f} s CPU")
         for name in runs[0][0]:
             z = np.concatenate([r[0][name] for r in runs])
-            one, two = (100 * np.mean(np.abs(z) < k) for k in (1, 2))
+            inside, wide = (100 * np.mean(np.abs(z) < k) for k in (1, 2))
             rms = np.sqrt(np.mean(z**2))
-            print(f"  {name:16} within 1 sigma {one:5.1f} %, 2 sigma {two:5.1f} %, rms z {rms:.2f}, n {len(z)}")
+            print(f"  {name:16} within 1 sigma {inside:5.1f} %, 2 sigma {wide:5.1f} %, rms z {rms:.2f}, n {len(z)}")
         for name in runs[0][1]:
             p = np.array([r[1].get(name, 1.0) for r in runs])
             print(f"  {name:26} p < 0.01 in {np.sum(p < 0.01)} of {len(p)} without it")

@@ -129,7 +129,7 @@ def test_json_alone_goes_to_stdout_and_nothing_else_does(folder, capsys):
         (["{healthy}", "--alpha", "2"], "alpha"),
         (["{healthy}", "--calibration", "c.json", "--against", "{simulated}"], "either"),
         (["{healthy}", "--report", "report.pdf"], ".html"),
-        (["{healthy}", "--json", "{healthy}"], "exists"),
+        (["{healthy}", "--json", "{healthy}"], "is the input"),
         (["{healthy}", "--against", "nowhere.csv"], "nowhere.csv"),
     ],
 )

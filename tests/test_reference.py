@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import trihedron
-from reference_rig import G, commanded_table, measured_table, tracked
+from reference_rig import G, commanded_table, forces, hand, measured_table, rates_of, times, tracked, unit
 from trihedron.estimate.reference import fit_reference
 from trihedron.files.diagnosis import diagnosis_document
+from trihedron.pipeline.beside import shared_log
 from trihedron.records import FindingCode
 from trihedron.records.reference import ReferenceMotion
 
@@ -56,6 +57,16 @@ def test_commands_of_a_rate_table_are_enough():
     assert any(f.code is FindingCode.ACCELEROMETER_NOMINAL for f in result.findings)
 
 
+def test_a_log_of_a_gyro_alone_is_diagnosed_and_its_calibration_refused_in_one_sentence():
+    trial = measured_table(5, 45)
+    result = trihedron.diagnose(trial.log, reference=trial.motion, gravity_m_s2=G)
+    assert result.verdict == "consistent"
+    assert "Against the reference" in str(result)
+    assert diagnosis_document(result)["reference"]["accelerometer"] is None
+    with pytest.raises(ValueError, match="has none"):
+        trihedron.calibrate(trial.log, reference=trial.motion, gravity_m_s2=G)
+
+
 def test_g_sensitivity_and_cubic_scale_are_told_from_the_linear_numbers():
     G_true = np.array([[3e-3, 0, 0], [0, -2e-3, 1e-3], [0, 0, 2e-3]])
     trial = tracked(21, seconds=40, g_sensitivity=G_true)
@@ -76,28 +87,30 @@ def test_attitude_carried_by_the_gyro_is_better_by_the_reference_on_a_part_it_di
     assert "held out" in str(result)
 
 
-def test_two_rigidly_joined_units_show_how_they_are_joined():
-    """The second unit's log, in SI, is the reference: rotation and lever arm between them."""
-    trial = tracked(41, seconds=40, has_path=True)
-    from reference_rig import FINE_HZ, forces, hand, rates_of, times
-
-    rng = np.random.default_rng(41)
-    from reference_rig import unit
-
+def neighbour(seed, seconds):
+    """Another unit, in SI, at the origin of the body of this seed's tracked one, on a clock of its own."""
+    rng = np.random.default_rng(seed)
     unit(rng)
-    _, C, path = hand(rng, 40)
+    _, C, path = hand(rng, seconds)
     w, f = rates_of(C), forces(C, path)
     n = len(w) // 8
-    other = trihedron.Recording.from_arrays(
+    return trihedron.Recording.from_arrays(
         times(n, 8) + 0.0123,
         f[: n * 8].reshape(n, 8, 3).mean(1) + 0.01 * rng.normal(size=(n, 3)),
         w[: n * 8].reshape(n, 8, 3).mean(1) + 1e-3 * rng.normal(size=(n, 3)),
     )
-    assert FINE_HZ == 1000
+
+
+def test_two_rigidly_joined_units_show_how_they_are_joined():
+    """Rotation and lever arm between them; and without being told, each notices the other."""
+    trial, other = tracked(41, seconds=40, has_path=True), neighbour(41, 40)
     found = trihedron.diagnose(trial.log, reference=other, gravity_m_s2=G).reference
     assert found.kind == "the log of another unit"
     assert np.all(np.abs(found.lever_arm.value - trial.arm) < np.maximum(4.5 * found.lever_arm.std, 1e-3))
-    assert abs(np.linalg.norm(z_of(found, trial)[:9])) < 4.5 * 3.0
+    # Nine numbers of S whose zero, unlike the tracker's, is the other unit's too.
+    assert np.linalg.norm(z_of(found, trial)[:9]) < 4.5 * 3.0
+    assert shared_log(trial.log, other, G) is not None
+    assert shared_log(trial.log, neighbour(42, 40), G) is None
 
 
 def test_attitudes_from_world_to_body_are_read_so_and_it_is_said(posed):

@@ -1,10 +1,19 @@
 """Reports fit the terminal that shows them."""
 
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
-from trihedron.cli import main
+from trihedron.cli import COMMANDS, main
+from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report import Document, to_text
-from trihedron.report.document import Facts, Paragraph, Section, Table
+from trihedron.report.document import Code, Facts, Paragraph, Section, Table
+from trihedron.report.findings import findings_block, verdict_of
+from trihedron.report.text import Style
 
 HEAD = ("what", "domain", "residual", "χ²/dof", "p", "model", "with the effects")
 ROW = ("gravity after a move", "static-accel", "5.49 mm/s²", "7.92", "9.0e−19", "disagrees", "1.02 agrees")
@@ -35,3 +44,130 @@ def test_a_table_that_is_cut_begins_every_part_with_its_first_column():
 def test_the_version_is_said_without_a_command(capsys):
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("trihedron 0.")
+
+
+# The whole of a report, as it was looked at and found good. After a change that is meant: TRIHEDRON_GOLDEN=write.
+
+
+def coloured():
+    """The same of three axes, and a note."""
+    cause, action = "A low-pass filter in the sensor.", "All terms are quoted from below."
+    findings = [
+        Finding(
+            FindingCode.SPECTRUM_COLOURED, Severity.WARNING, f"{axis}: Above {hz} Hz the spectrum falls.", cause, action
+        )
+        for axis, hz in (("gyro x", 8.84), ("gyro y", 12.5), ("accel x", 8.84))
+    ]
+    findings.append(Finding(FindingCode.UNIT_DETECTED, Severity.NOTE, "the gyro's unit is rad/s."))
+    return findings
+
+
+def whole():
+    """A report with a block of every kind."""
+    matrix = Table(
+        ("", "a′1 × 10⁻³", "a′2 × 10⁻³", "a′3 × 10⁻³", "b [m/s²]"),
+        (
+            ("f1 =", "2.412814 ± 0.000083", "0", "0", "−79.9221 ± 0.0025"),
+            ("f2 =", "−0.00874 ± 0.00016", "2.426470 ± 0.000043", "0", "−80.4527 ± 0.0057"),
+        ),
+        "Accelerometer: f = S a′ + b, with a′ in counts and S in m/s² per count",
+    )
+    facts = Facts(
+        (("recording", "512 s at 100.0 Hz"), ("residual", "1.35 mm/s² rms in sample; noise alone 0.975 mm/s²"))
+    )
+    sections = (
+        Section("Result", (facts, matrix)),
+        Section("Findings", (findings_block(coloured()),)),
+        Section("Kalibr", (Code("gyroscope_noise_density: 0.0003181  # rad/s/√Hz"), Paragraph("σ of a mean, in µg."))),
+    )
+    return Document("Calibration", "log.csv", "Usable, with 1 warning.", True, sections)
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_a_report_looks_as_it_was_found_good(width):
+    kept = Path(__file__).parent / "golden" / f"terminal_{width}.txt"
+    text = to_text(whole(), width=width) + "\n" + to_text(whole(), style=Style(width, is_ascii=True))
+    if os.environ.get("TRIHEDRON_GOLDEN") == "write":
+        kept.write_text(text, encoding="utf-8")
+    assert text == kept.read_text(encoding="utf-8")
+
+
+def test_colour_changes_no_character_and_says_the_verdict_in_its_own():
+    coloured, plain = to_text(whole(), style=Style(80, has_colour=True)), to_text(whole(), width=80)
+    assert re.sub(r"\x1b\[[\d;]*m", "", coloured) == plain
+    assert "\x1b[1;33mUsable, with 1 warning.\x1b[0m" in coloured
+
+
+def test_names_from_a_log_cannot_steer_a_terminal():
+    hostile = Document("t", "log\x1b[2J.csv", "v", True, (Section("S", (Paragraph("a\x9bb"),)),))
+    assert not re.search("[\x00-\x09\x0b-\x1f\x7f-\x9f]", to_text(hostile, style=Style(80)))
+
+
+def test_what_several_axes_share_is_said_once_and_named_for_all():
+    (warning,) = [f for f in findings_block(coloured()).findings if f.severity is Severity.WARNING]
+    assert warning.seen == "Gyro x and y; accel x: above 8.84 to 12.5 Hz the spectrum falls."
+    assert verdict_of(coloured(), "good", "Usable", "bad") == "Usable, with 1 warning."
+
+
+def test_moves_that_were_left_out_are_listed_in_one_sentence():
+    found = [
+        Finding(
+            FindingCode.OUTLIER_MOVE,
+            Severity.WARNING,
+            f"Move {k} (hold {k} to hold {k + 1}) misses gravity by {miss} m/s², and is left out.",
+        )
+        for k, miss in ((7, 0.113), (9, 0.362), (22, 0.0986))
+    ]
+    (told,) = findings_block(found).findings
+    assert told.seen == "Moves 7, 9 and 22: each misses gravity by 0.0986 to 0.362 m/s², and is left out."
+
+
+def run(*words, **environment):
+    known = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "NO_COLOR", "PYTHONUTF8", "LC_ALL")}
+    program = [sys.executable, "-m", "trihedron", *words]
+    return subprocess.run(program, env=known | environment, capture_output=True, check=True).stdout
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
+def test_a_terminal_without_utf_8_gets_ascii_and_no_failure(encoding):
+    out = run("plan", PYTHONIOENCODING=encoding).decode("ascii")
+    assert "deg/s/sqrt(Hz)" in out
+    assert "?" not in out
+
+
+def test_a_pipe_gets_no_colour_and_columns_are_obeyed():
+    out = run("plan", COLUMNS="64", PYTHONIOENCODING="utf-8").decode()
+    assert "\x1b" not in out
+    assert max(map(len, out.splitlines())) <= 64
+
+
+@pytest.mark.parametrize("command", [None, *(c.__name__ for c in COMMANDS)])
+@pytest.mark.parametrize("columns", ["60", "80", "120"])
+def test_help_fits_the_terminal_and_its_examples_name_real_options(command, columns, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", columns)
+    assert main([*([] if command is None else [command]), "--help"]) == 0
+    out = capsys.readouterr().out
+    if command is None:
+        # Whole sentences, none cut off.
+        assert "..." not in out.split("\n", 1)[1]
+    # Examples are there to be copied and are not wrapped.
+    prose = [line for line in out.splitlines() if not line.lstrip().startswith(("$", "trihedron"))]
+    assert max(map(len, prose)) <= int(columns)
+    for line in [line for line in out.splitlines() if line.lstrip().startswith("$ trihedron")]:
+        used = line.split()[2]
+        main([used, "--help"])
+        known = capsys.readouterr().out
+        for option in re.findall(r" (--?[a-z][a-z-]*)", line):
+            assert option in known, (line, option)
+
+
+@pytest.mark.parametrize(
+    ("shell", "words"),
+    [
+        ("bash", {"COMP_WORDS": "trihedron cal", "COMP_CWORD": "1"}),
+        ("zsh", {"_TYPER_COMPLETE_ARGS": "trihedron cal"}),
+        ("fish", {"_TYPER_COMPLETE_ARGS": "trihedron cal", "_TYPER_COMPLETE_FISH_ACTION": "get-args"}),
+    ],
+)
+def test_shells_complete_a_command(shell, words):
+    assert b"calibrate" in run(_TRIHEDRON_COMPLETE=f"complete_{shell}", **words)

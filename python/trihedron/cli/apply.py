@@ -9,6 +9,7 @@ import typer
 
 from trihedron.cli.options import Force, Json, LogSource, with_options
 from trihedron.cli.output import check_outputs, leave, say, write_json
+from trihedron.cli.streamed import Stream, apply_stream
 
 
 @with_options(source=LogSource)
@@ -18,14 +19,23 @@ def apply(
     output: Annotated[
         Path,
         typer.Option(
-            "-o", "--output", metavar="FILE", help="Where to write: .csv, .parquet, or '-' for CSV on stdout."
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="Where to write: .csv, .parquet, '-' (CSV on stdout); with --stream .npy.",
         ),
     ] = Path("-"),
+    stream: Stream = False,
     json: Json = None,
     force: Force = False,
 ) -> None:
     """Apply a calibration to a log: time [s], specific force [m/s^2], angular rate [rad/s]."""
     check_outputs(output, json, force=force, inputs=(*source.files, calibration))
+    if stream:
+        if str(output) == "-" or json is not None:
+            raise typer.BadParameter("--stream writes one file: give -o FILE.npy, and no --json")
+        apply_stream(calibration, source, output, force=force)
+        return
     from trihedron.files.calibration import read_calibration
     from trihedron.files.recording import check_format, write_recording
 

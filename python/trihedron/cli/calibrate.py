@@ -10,6 +10,7 @@ import typer
 from trihedron.cli.calibrate_sessions import By, Labels, calibrate_many
 from trihedron.cli.options import Force, GravitySource, Json, LogsSource, Report, progress, with_options
 from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+from trihedron.cli.streamed import Stream, calibrate_stream
 
 FIRST_SCREEN = 2
 
@@ -63,6 +64,7 @@ def calibrate(
     extended: Annotated[
         bool, typer.Option("--extended", help="Diagnose the log too, and store the effects it demands; for apply.")
     ] = False,
+    stream: Stream = False,
     by: By = None,
     labels: Labels = None,
     output: Annotated[
@@ -88,6 +90,13 @@ def calibrate(
         if method != "joint" or loss != "linear":
             raise typer.BadParameter("several logs are calibrated with --method joint and --loss linear")
         calibrate_many(sources, place, by, labels, choices["frame"], output, json, report, full=full, force=force)
+        return
+    if stream:
+        if extended:
+            raise typer.BadParameter("--extended needs the whole log; leave out --stream")
+        options = {**choices, "gyroscope_nominal": gyro_nominal}
+        sections = None if full else FIRST_SCREEN
+        calibrate_stream(sources.one(), place, options, output, json, report, sections, force=force)
         return
     if labels is not None:
         raise typer.BadParameter("--labels belong to several logs")

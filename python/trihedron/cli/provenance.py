@@ -22,7 +22,21 @@ _options: ContextVar[Mapping[str, Any]] = ContextVar("options", default=MappingP
 _inputs: ContextVar[tuple[tuple[str, str], ...]] = ContextVar("inputs", default=())
 
 # What says where results go, and not what they are.
-_NOT_OPTIONS = {"json", "report", "output", "force", "full", "csv", "plot", "updated", "improved", "log", "calibration"}
+_NOT_OPTIONS = {
+    "json",
+    "report",
+    "output",
+    "force",
+    "full",
+    "csv",
+    "plot",
+    "updated",
+    "improved",
+    "log",
+    "accel",
+    "gyro",
+    "calibration",
+}
 
 
 def begin(words: Sequence[str]) -> None:
@@ -59,4 +73,6 @@ def _is_said(value: Any) -> bool:
 
 
 def _word(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return " ".join(map(_word, value))
     return "yes" if value is True else str(value)

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from trihedron.cli.options import Force, Json, LogSource, Report, progress, with_options
 from trihedron.cli.output import check_outputs, leave, show, write_json, write_report
+from trihedron.cli.streamed import Stream, segment_stream
 
 
 @with_options(source=LogSource)
-def segment(source: LogSource, report: Report = None, json: Json = None, force: Force = False) -> None:
+def segment(
+    source: LogSource, stream: Stream = False, report: Report = None, json: Json = None, force: Force = False
+) -> None:
     """Find the still poses and the moves between them."""
     check_outputs(json, force=force, report=report, inputs=source.files)
+    if stream:
+        segment_stream(source, report, json, force=force)
+        return
     recording = source.read()
     from trihedron import pipeline
     from trihedron.report import segments_report

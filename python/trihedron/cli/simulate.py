@@ -7,7 +7,8 @@ from typing import Annotated, Any, Optional
 
 import typer
 
-from trihedron.cli.options import Force
+from trihedron.cli.options import Force, Report
+from trihedron.cli.output import check_outputs, write_report
 
 
 def simulate(
@@ -57,6 +58,7 @@ def simulate(
         typer.Option("--link", metavar="PATH", help="With --serve PTY: a name that outlives disconnections."),
     ] = None,
     list_them: Annotated[bool, typer.Option("--list", help="List the ready-made scenarios.")] = False,
+    report: Report = None,
     force: Force = False,
 ) -> None:
     """Simulate an instrument: a scenario, or the twin of a recording; the truth is kept apart from the log."""
@@ -75,7 +77,7 @@ def simulate(
     if output is None and serve is None:
         raise typer.BadParameter("say where the log goes with -o LOG, or send it with --serve PTY")
     from trihedron.files.log import LOG_SUFFIXES, write_recording
-    from trihedron.files.output import OutputError, check_free
+    from trihedron.files.output import OutputError
     from trihedron.files.truth import write_truth
     from trihedron.pipeline import read, twin
     from trihedron.pipeline import simulate as run
@@ -85,7 +87,7 @@ def simulate(
     if truth is not None and truth.suffix.lower() not in (".npz", ".json"):
         raise OutputError(f"{truth}: truth is written as .npz (everything) or .json (no samples).")
     read_from = (None if scenario is None else Path(scenario), like, calibration, with_effects)
-    check_free([output, truth], overwrite=force, inputs=read_from)
+    check_outputs(output, truth, force=force, report=report, inputs=read_from)
     if like is not None and calibration is not None:
         from trihedron.files.calibration import read_calibration
 
@@ -96,6 +98,11 @@ def simulate(
         write_recording(recording, output, overwrite=force)
     if truth is not None:
         write_truth(known, truth, overwrite=force)
+    if report is not None:
+        from trihedron.files.truth import truth_document
+        from trihedron.report.simulation import simulation_report
+
+        write_report(simulation_report(recording, known), truth_document(known), report, force=force)
     if serve is not None:
         from trihedron.cli.serve import serve_recording
 

@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.estimate.accelerometer.verdict import covariance_scale
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align_screened
 from trihedron.estimate.gyroscope.findings import findings_of
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
@@ -25,6 +26,7 @@ from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.sensor_model import in_frame, reframing
+from trihedron.units import mm_s2_from_m_s2
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -131,7 +133,29 @@ def _by_session(
         gravity_source=gravity_source,
         recording_source=recording.source,
         recording_sha256=recording.sha256,
-        findings=_findings(aligned, measured, solution),
+        findings=(*_poses_above_noise(quality, solution), *_findings(aligned, measured, solution)),
+    )
+
+
+def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[Finding, ...]:
+    """Gravity at rest, missed by more than the noise of the means: what the session fit makes of that."""
+    if covariance_scale(quality.chi2, quality.dof) == 1.0:
+        return ()
+    chi2_per_dof = quality.chi2 / quality.dof
+    numbers = {"chi2_per_dof": chi2_per_dof, "dof": float(quality.dof), "rms_m_s2": quality.rms}
+    numbers |= {"floor_m_s2": quality.floor, "zero_scatter_m_s2": solution.accel_zero_rms}
+    return (
+        Finding(
+            FindingCode.RESIDUAL_ABOVE_NOISE,
+            Severity.WARNING,
+            f"The residual of the still poses is {mm_s2_from_m_s2(quality.rms):.3g} mm/s² rms, the noise of their "
+            f"means explains only {mm_s2_from_m_s2(quality.floor):.3g} mm/s² (χ² per degree of freedom "
+            f"{chi2_per_dof:.3g}, {quality.dof} degrees); the fit lets the zero differ from pose to pose, here by "
+            f"{mm_s2_from_m_s2(solution.accel_zero_rms):.2g} mm/s² rms, and the standard errors contain that.",
+            "Poses not quite still, a zero that drifts between poses, nonlinearity, or noise of the means underrated.",
+            "Look at the residual per pose; `trihedron diagnose` names the effect.",
+            MappingProxyType(numbers),
+        ),
     )
 
 
@@ -261,5 +285,10 @@ def _norm_quality(
     if alone is None:
         return quality
     return replace(
-        quality, held_out=alone.held_out, held_out_sigma=alone.held_out_sigma, held_out_rms=alone.held_out_rms
+        quality,
+        held_out=alone.held_out,
+        held_out_sigma=alone.held_out_sigma,
+        held_out_rms=alone.held_out_rms,
+        # The noise of the poses was widened by it before the fit.
+        covariance_scale=alone.covariance_scale,
     )

@@ -28,6 +28,19 @@ _ARRAYS = (
 _MATRICES = ("accelerometer_S", "accelerometer_b", "gyroscope_S", "gyroscope_b")
 
 
+def truth_document(truth: Truth) -> dict[str, Any]:
+    """The truth without its samples, as plain JSON types (SI)."""
+    return {
+        "scenario": truth.scenario,
+        "seed": truth.seed,
+        "gravity_m_s2": truth.gravity_m_s2,
+        **{name: getattr(truth, name).tolist() for name in _MATRICES},
+        "effects": {name: dict(values) for name, values in truth.effects.items()},
+        "noise": {name: dict(values) for name, values in truth.noise.items()},
+        "segments": [asdict(segment) for segment in truth.segments],
+    }
+
+
 def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write the truth; ``.npz`` holds everything, ``.json`` all but the arrays per sample.
 
@@ -37,16 +50,7 @@ def write_truth(truth: Truth, path: str | os.PathLike[str], *, overwrite: bool =
         When the ending is neither, or the file exists and may not be replaced.
     """
     target = Path(path)
-    header: dict[str, Any] = {
-        "scenario": truth.scenario,
-        "seed": truth.seed,
-        "gravity_m_s2": truth.gravity_m_s2,
-        **{name: getattr(truth, name).tolist() for name in _MATRICES},
-        "effects": {name: dict(values) for name, values in truth.effects.items()},
-        "noise": {name: dict(values) for name, values in truth.noise.items()},
-        "segments": [asdict(segment) for segment in truth.segments],
-    }
-    text = json.dumps(header, indent=1)
+    text = json.dumps(truth_document(truth), indent=1)
     if target.suffix.lower() == ".json":
         write_whole(target, text + "\n", overwrite=overwrite)
     elif target.suffix.lower() == ".npz":

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
+from trihedron.estimate.reference import moves_along
+from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
-from trihedron.pipeline.reading import segment
-from trihedron.pipeline.referring import AnyReference, calibration_by, diagnosis_by, effects_of, held_against
+from trihedron.pipeline.reading import read, segment
+from trihedron.pipeline.referring import (
+    AnyReference,
+    calibration_by,
+    diagnosis_by,
+    effects_of,
+    held_against,
+)
 from trihedron.pipeline.results import DiagnosisResult
+from trihedron.read.reference import of_recording
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Severity
+from trihedron.records.reference import AgainstReference
+from trihedron.sensor_model import correct
+from trihedron.units import AccelerationUnit, RateUnit, degrees_from_radians, mm_s2_from_m_s2, rate_to_si
 
+ANOTHER_UNIT = "the log of another unit"
 FEWEST_POSES = 9
 """Nine numbers of an accelerometer need nine poses: with fewer the poses have no model to hold against anything."""
 
@@ -43,6 +60,9 @@ def beside(
             raise ValueError(f"{segments.n_holds} still poses are too few for a model of their own")
         result = ordinary()
     except ValueError as error:
+        if found.kind == ANOTHER_UNIT:
+            # What two gyros tell apart may be either's: with no poses nobody says whose.
+            found = replace(found, findings=(*found.findings, _shared(found)))
         values = diagnosis_by(found, recording, gravity, given, alpha)
         calibration = (
             calibration_by(found, recording, gravity, source, None) if recording.accelerometer is not None else given
@@ -62,6 +82,8 @@ def beside(
             segments=segments,
             recording=recording,
         )
+    if found.kind == ANOTHER_UNIT:
+        return replace(result, reference=found, findings=(*result.findings, *found.findings, _shared(found)))
     # What the poses found stands; the reference adds what it alone sees, and never takes away.
     effects = (*result.effects, *(e for e in effects_of(found, alpha) if e.id not in {o.id for o in result.effects}))
     verdict = result.verdict
@@ -69,4 +91,61 @@ def beside(
         verdict = "missing-physics"
     return replace(
         result, verdict=verdict, effects=effects, reference=found, findings=(*result.findings, *found.findings)
+    )
+
+
+def in_si(log: Recording, gravity: float | None) -> Recording:
+    """A log whose gyro reads rad/s or deg/s as it is; one in counts by its own calibration.
+
+    Raises
+    ------
+    ValueError
+        When it is in counts and its poses do not carry a calibration.
+    """
+    if rate_to_si(log.gyroscope_unit) is not None:
+        return log
+    own = calibrate(log, gravity_m_s2=gravity).calibration
+    if own.gyroscope is None or log.gyroscope is None or log.accelerometer is None:
+        raise ValueError(f"{log.source}: counts whose scale nothing tells.")
+    return replace(
+        log,
+        gyroscope=correct(log.gyroscope, own.gyroscope.S, own.gyroscope.b),
+        gyroscope_unit=RateUnit.RAD_S,
+        accelerometer=correct(log.accelerometer, own.accelerometer.S, own.accelerometer.b),
+        accelerometer_unit=AccelerationUnit.M_S2,
+    )
+
+
+def shared_log(recording: Recording, other: Any, gravity: float | None) -> Recording | None:
+    """The given log in SI where it moved as this one did (a replay, two units on one beam), else ``None``.
+
+    Two sessions of one protocol share no motion sample by sample: their turning rates do not correlate beyond what
+    unrelated hands do.
+    """
+    if isinstance(other, str | os.PathLike):
+        if Path(other).suffix.lower() == ".toml":
+            return None
+        other = read(other)
+    if not isinstance(other, Recording) or other.gyroscope is None or recording.gyroscope is None:
+        return None
+    try:
+        known = in_si(other, gravity)
+        moves_along(recording, of_recording(known))
+    except ValueError:
+        return None
+    return known
+
+
+def _shared(found: AgainstReference) -> Finding:
+    offset, sigma = found.clock_offset_s
+    rate = degrees_from_radians(found.gyroscope.rms)
+    force = "" if found.accelerometer is None else f" and {mm_s2_from_m_s2(found.accelerometer.rms):.3g} mm/s²"
+    return Finding(
+        FindingCode.SHARED_MOTION,
+        Severity.NOTE,
+        f"Both logs hold the same motion (correlation {found.correlation:.3f}, the other clock {offset:+.5g} s): "
+        f"compared sample by sample they differ by {rate:.3g} °/s{force} rms.",
+        "A motion that was replayed, or two units on one body.",
+        "",
+        MappingProxyType({"offset_s": offset, "offset_std_s": sigma, "rate_rms": found.gyroscope.rms}),
     )

@@ -180,12 +180,19 @@ def _by_poses(
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
             pull = _pull_on_accelerometer(accelerometer, both.accelerometer)
             if pull <= _pull_allowed(accelerometer):
-                return replace(both, findings=(*found, *both.findings))
+                return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
             alone = replace(alone, findings=(*found, _joint_fit_left(pull)))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
     except ValueError as error:
         return _without_gyroscope(alone, str(error))
     return _together(alone, gyroscope, more)
+
+
+def _still_said(found: Found, joint: SensorCalibration) -> Found:
+    """Findings of the accelerometer alone that hold for the joint fit: not its residual, where both count another."""
+    if joint.quality is None or joint.quality.covariance_scale > 1.0:
+        return found
+    return tuple(finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE)
 
 
 def _pull_allowed(alone: SensorCalibration) -> float:

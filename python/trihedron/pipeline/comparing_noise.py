@@ -36,6 +36,8 @@ SAME_ON_ALL_AXES = 1.03
 UNLIKE_AXES = 1.25
 RESEMBLES = 1.06
 """A ratio this near to √rate, or to its inverse, is taken for it."""
+SHOWS = 0.5
+"""Noise of half a converter step moves its last digit in every third reading: it cannot be overlooked."""
 NORMAL_EXCESS, UNIFORM_EXCESS = 0.0, -0.6
 """Excess kurtosis of differences of two normal and of two uniform numbers."""
 
@@ -74,7 +76,7 @@ def sampled(recording: Recording, segments: Segments, model: FittedModel) -> Sam
         differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in holds if b - a > 2])
         differences = differences[np.isfinite(differences).all(axis=1)]
         centred = differences - differences.mean(axis=0)
-        power = np.maximum((centred**2).mean(axis=0), 1e-300)
+        power = np.maximum((centred**2).mean(axis=0), 1e-150)
         excess[sensor] = (centred**4).mean(axis=0) / power**2 - 3.0
         count[sensor] = len(differences)
     steps = np.diff(recording.time_s)
@@ -127,11 +129,22 @@ def _white(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) 
     if m.white is None or r.white is None or not (m.white.value > 0.0 and r.white.value > 0.0):
         if (m.white is None) == (r.white is None):
             return None
-        quiet = "model" if m.white is None else "recording"
-        values = _value(m.white), _value(r.white)
-        remark = f"The converter of the {quiet} hides its noise."
-        return NoiseDifference(sensor, axis, "N", *values, None, None, unit, None, False, remark)
+        return _hidden(sensor, axis, m, r, unit)
     return _measured(sensor, axis, "N", (m.white, r.white), unit, LEAST_RATIO, alpha)
+
+
+def _hidden(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, unit: str) -> NoiseDifference:
+    """One side shows no noise: hidden by its converter, or, where noise like the other's would show, not there."""
+    quiet, loud = (m, r) if m.white is None or not m.white.value > 0.0 else (r, m)
+    side, other = ("model", "recording") if quiet is m else ("recording", "model")
+    assert loud.white is not None
+    would_show = loud.white.value * math.sqrt(loud.rate_hz) > SHOWS * quiet.step
+    name = "accelerometer" if sensor == "accelerometer" else "gyro"
+    remark = f"The converter of the {side} hides the noise of its {name}."
+    if would_show:
+        remark = f"The {side} has no noise on the {name}; the {other} has."
+    values = _value(m.white), _value(r.white)
+    return NoiseDifference(sensor, axis, "N", *values, None, None, unit, None, would_show, remark)
 
 
 def _resembling(

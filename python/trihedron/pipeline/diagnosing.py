@@ -14,7 +14,7 @@ from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.diagnose.session.starting_point import is_open
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, without_effects
 from trihedron.pipeline.asking import WrongTypeError
-from trihedron.pipeline.beside import beside
+from trihedron.pipeline.beside import beside, shared_log
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
@@ -79,14 +79,29 @@ def diagnose(
         raise ValueError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
     tell = progress or (lambda _fraction, _text: None)
     recording = recording_of(recording)
-    if reference is not None:
-        ordinary = partial(
-            diagnose, recording, gravity_m_s2=gravity_m_s2, latitude_deg=latitude_deg, height_m=height_m,
-            segments=segments, calibration=calibration, against=against, alpha=alpha, progress=progress,
-        )  # fmt: skip
-        given = None if calibration is None else calibration_of(calibration)
-        place = (gravity_m_s2, latitude_deg, height_m)
-        return beside(recording, reference, reference_columns, given, place, alpha, ordinary)
+    ordinary = partial(
+        _of_poses, recording, (gravity_m_s2, latitude_deg, height_m), segments, calibration, against, alpha, tell
+    )
+    if reference is None and against is not None:
+        reference = shared_log(recording, against, gravity_m_s2)
+    if reference is None:
+        return ordinary()
+    given = None if calibration is None else calibration_of(calibration)
+    place = (gravity_m_s2, latitude_deg, height_m)
+    return beside(recording, reference, reference_columns, given, place, alpha, ordinary)
+
+
+def _of_poses(
+    recording: Recording,
+    place: tuple[float | None, float | None, float | None],
+    segments: Segments | None,
+    calibration: AnyCalibration | None,
+    against: GivenModel | None,
+    alpha: float,
+    tell: Progress,
+) -> DiagnosisResult:
+    """What still poses and the moves between them say."""
+    gravity_m_s2, latitude_deg, height_m = place
     known = None if calibration is None else calibration_of(calibration)
     said: tuple[Finding, ...] = ()
     if known is not None and gravity_m_s2 is None and latitude_deg is None and height_m is None:

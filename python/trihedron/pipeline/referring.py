@@ -308,6 +308,7 @@ def _linear(found: AgainstReference, recording: Recording) -> LinearModel:
 
     gyro = sensor(found.gyroscope, recording.gyroscope_unit.value, "rad/s")
     if found.accelerometer is None:
-        nothing = {"S": np.zeros((3, 3)).tolist(), "b": [0.0] * 3, "sigma_S": None, "sigma_b": None}
+        nothing: dict[str, Any] = {name: np.zeros((3, 3)).tolist() for name in ("S", "sigma_S")}
+        nothing |= {"b": [0.0] * 3, "sigma_b": [0.0] * 3}
         return LinearModel(MappingProxyType({**nothing, "raw_unit": "none", "si_unit": "m/s^2"}), gyro)
     return LinearModel(sensor(found.accelerometer, recording.accelerometer_unit.value, "m/s^2"), gyro)

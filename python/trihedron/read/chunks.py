@@ -42,6 +42,19 @@ class ChunkedLog:
         for start in range(0, self.n_rows, rows):
             yield np.ascontiguousarray(wanted.slice(start, rows).collect().to_numpy())
 
+    def rows(self, start: int, stop: int) -> npt.NDArray[np.float64]:
+        """Rows ``[start, stop)`` as float64 (stop - start, columns)."""
+        if stop <= start:
+            return np.empty((0, len(self.columns)))
+        if self.array is not None:
+            return np.array(self.array[start:stop][:, list(self.columns)], dtype=np.float64)
+        import polars
+
+        table = polars.scan_parquet(self.path)
+        names = table.collect_schema().names()
+        part = table.select([names[c] for c in self.columns]).slice(start, stop - start).collect()
+        return np.asarray(part.to_numpy(), dtype=np.float64)
+
     def whole(self) -> npt.NDArray[np.float64]:
         """All rows (n, columns): the mapped array itself where its columns are all wanted."""
         if self.array is not None and list(self.columns) == list(range(self.array.shape[1])):

@@ -158,7 +158,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
             plain_number(d.chi2_per_dof),
             _probability(d.p_value),
             "disagrees" if d.disagrees else "agrees",
-            _after(after.get(d.domain)) if diagnosis.effects else "",
+            _after(d, after.get(d.domain)) if diagnosis.effects else "",
         )
         for d in diagnosis.domains
     )
@@ -175,9 +175,12 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _after(test: DomainTest | None) -> str:
+def _after(before: DomainTest, test: DomainTest | None) -> str:
     if test is None:
         return "–"
+    if before.disagrees and not test.disagrees and test.chi2_per_dof == before.chi2_per_dof:
+        # An effect explains it without changing the residual: poses that were not still, a line of interference.
+        return "accounted for"
     return f"{plain_number(test.chi2_per_dof)} {'disagrees' if test.disagrees else 'agrees'}"
 
 
@@ -284,6 +287,10 @@ def _evidence(effect: AcceptedEffect) -> str:
 
 
 def _improvement(held: HeldOut) -> str:
+    if held.rms_before == held.rms_after == 0.0:
+        return (
+            f"{held.domain} χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)}"
+        )
     return (
         f"{held.domain} from {_size(held.rms_before, held.unit)} to {_size(held.rms_after, held.unit)} rms "
         f"(χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)})"
@@ -307,8 +314,7 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
         (
             effect.id,
             held.domain,
-            _size(held.rms_before, held.unit),
-            _size(held.rms_after, held.unit),
+            *("–" if held.rms_before == held.rms_after == 0.0 else _size(v, held.unit) for v in _both_rms(held)),
             plain_number(held.chi2_per_dof_before),
             plain_number(held.chi2_per_dof_after),
         )
@@ -320,6 +326,10 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
     head = ("effect", "domain", "rms before", "rms after", "χ²/dof before", "after")
     caption = "Poses and moves predicted by fits that did not see them; noise alone gives χ²/dof 1"
     return (Table(head, rows, caption),)
+
+
+def _both_rms(held: HeldOut) -> tuple[float, float]:
+    return held.rms_before, held.rms_after
 
 
 def _candidates(diagnosis: Diagnosis) -> Block:
@@ -338,7 +348,7 @@ def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
     blocks: list[Block] = []
     for name in ("accelerometer", "gyroscope"):
         before, after = getattr(diagnosis.baseline, name), getattr(diagnosis.extended, name)
-        if before is None or after is None:
+        if before is None or after is None or before["raw_unit"] == "none":
             continue
         rows = [
             (f"S{i + 1}{j + 1}", _both(before, "S", (i, j)), _both(after, "S", (i, j)))

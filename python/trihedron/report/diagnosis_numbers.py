@@ -57,7 +57,9 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
 
 def differing_in_short(diagnosis: Diagnosis) -> list[str]:
     """What differs for one sentence: every number while they are few, else the groups with their largest."""
-    numbers, noise = differing_numbers(diagnosis), differing_noise(diagnosis)
+    # Sentences of noise become clauses of one.
+    noise = [word[0].lower() + word[1:].rstrip(".") for word in differing_noise(diagnosis)]
+    numbers = differing_numbers(diagnosis)
     if len(numbers) <= MOST_NAMED:
         return [*numbers, *noise]
     largest: dict[str, ParameterDifference] = {}
@@ -92,11 +94,11 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     rows = tuple(
         (
             f"{_sensor(n)} {n.axis}".strip(),
-            n.term,
+            _term(n),
             _plain(n.model),
             _plain(n.recording),
             _ratio(n),
-            unit_in_print(n.unit),
+            unit_in_print(n.unit.partition(", ")[0]).replace("sqrt(Hz)", "√Hz"),
             "differs" if n.significant else "",
         )
         for n in diagnosis.noise_compared
@@ -108,6 +110,11 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
+def _term(n: NoiseDifference) -> str:
+    """The term, or the band of an octave."""
+    return n.unit.partition(", ")[2] if n.term == "octave" else n.term
+
+
 def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ...]:
     """Stage by stage how well the recording is predicted; ``size`` names the domains."""
     domains = list(dict.fromkeys(d.domain for stage in diagnosis.stages for d in stage.domains))
@@ -115,7 +122,8 @@ def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ..
     head = ("stage", *(size.get(d, d) for d in domains))
     if not rows:
         return (Paragraph("No stages: the model was fitted to this recording."),)
-    return (Table(head, rows, "Rms in physical units"),)
+    caption = "Rms, and χ² per degree of freedom, on poses and moves that the fit of each stage did not see"
+    return (Table(head, rows, caption),)
 
 
 def _stage(stage: Stage, domain: str) -> str:

@@ -59,7 +59,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict += f" {how_many(len(moved), 'device')} changed between sessions."
     return Document(
         title="Fleet",
-        subtitle=f"{how_many(n, 'log')}, {how_many(len({log.serial for log in summary.logs}), 'device')}",
+        subtitle=f"{how_many(n, 'log')}, {how_many(len(devices), 'device')}",
         verdict=verdict,
         is_trustworthy=n_done > 0,
         sections=tuple(sections),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.records import Recording, Segments, Verification
+from trihedron.records import Recording, Segments, Truth, Verification
 from trihedron.report.calibration_charts import LIMIT_SIGMAS, mm_s2
 from trihedron.report.chart import AXIS_COLOURS, Band, Bars, Chart, Level, Line, Panel, Points, Scale, Span
 from trihedron.report.drawn import envelope, said
@@ -13,16 +13,25 @@ from trihedron.report.numbers import unit_in_print
 
 def signals_chart(recording: Recording, segments: Segments) -> Chart:
     """Both sensors over time, holds shaded, bumps marked."""
-    spans = [
-        Span(float(recording.time_s[h.start]), float(recording.time_s[h.stop - 1]), "still pose")
-        for h in segments.holds
-    ]
+    time_s = recording.time_s
+    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "still pose") for h in segments.holds]
     last = recording.n_samples - 1
     bumps = [
-        Span(float(recording.time_s[a]), float(recording.time_s[min(b, last)]), "disturbed, left out", "warn")
+        Span(float(time_s[a]), float(time_s[min(b, last)]), "disturbed, left out", "warn")
         for hold in segments.holds
         for a, b in hold.disturbed
     ]
+    return _signals(recording, (*spans, *bumps))
+
+
+def truth_chart(recording: Recording, truth: Truth) -> Chart:
+    """Both sensors of a simulation over time, shaded where the body truly stood still."""
+    time_s, last = recording.time_s, recording.n_samples - 1
+    spans = [Span(float(time_s[min(h.start, last)]), float(time_s[min(h.stop - 1, last)]), "hold") for h in truth.holds]
+    return _signals(recording, tuple(spans))
+
+
+def _signals(recording: Recording, spans: tuple[Span, ...]) -> Chart:
     panels = []
     limits = (float(recording.time_s[0]), float(recording.time_s[-1]) or 1.0)
     for readings, name, unit in (
@@ -37,7 +46,7 @@ def signals_chart(recording: Recording, segments: Segments) -> Chart:
         ]
         printed = unit_in_print(unit)
         y = Scale(f"{name}  [{printed}]", printed)
-        panels.append(Panel(Scale("time [s]", "s", limits=limits), y, (*spans, *bumps, *lines), height_px=190))
+        panels.append(Panel(Scale("time [s]", "s", limits=limits), y, (*spans, *lines), height_px=190))
     return Chart(tuple(panels), is_linked=True)
 
 

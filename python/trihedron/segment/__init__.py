@@ -1,6 +1,7 @@
 """Still poses and moves, told apart by the sensor's own noise."""
 
-from trihedron.segment.recording import segment_recording
+from trihedron.segment.channels import BlockSums
+from trihedron.segment.recording import segment_blocks, segment_recording
 from trihedron.segment.resegmentation import resegment
 
-__all__ = ["resegment", "segment_recording"]
+__all__ = ["BlockSums", "resegment", "segment_blocks", "segment_recording"]

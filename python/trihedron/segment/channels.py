@@ -20,6 +20,8 @@ BLOCK_SAMPLES = 5
 WINDOW_BLOCKS = 5
 """Stillness is judged over five blocks (half a second): long enough to see a turn of 1 deg/s in gravity, and shorter
 than the shortest hold by half."""
+PROBED = 20000
+"""Readings, evenly spread over a log, from which a converter's step is read off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +56,56 @@ class Channels:
         return max(1, round(duration_s / self.step_s))
 
 
-def split_into_blocks(recording: Recording) -> Channels:
-    """Block means and variances of every channel."""
-    length = max(BLOCK_SAMPLES, round(BLOCK_S * recording.rate_hz))
-    triads = [a for a in (recording.accelerometer, recording.gyroscope) if a is not None]
+class BlockSums:
+    """Blocks of an evenly sampled log that comes in pieces of whole blocks: what :func:`split_into_blocks` makes of
+    the whole of it."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.length = block_length(recording.rate_hz)
+        self.rate_hz = recording.rate_hz
+        self.is_gyroscope = [recording.accelerometer is None] if recording.gyroscope is None else [True]
+        if recording.accelerometer is not None:
+            self.is_gyroscope = [False, True] if recording.gyroscope is not None else [False]
+        self.stride = max(1, recording.n_samples // PROBED)
+        self.n = 0
+        self.parts: list[tuple[FloatArray, FloatArray, BoolArray]] = []
+        self.probes: list[list[FloatArray]] = [[] for _ in self.is_gyroscope]
+
+    def add(self, triads: list[FloatArray]) -> None:
+        """The next rows, (k, 3) a sensor; k is a multiple of ``length`` but in the last piece."""
+        self.parts.append(_blocks(triads, self.length))
+        first = -self.n % self.stride
+        for probe, triad in zip(self.probes, triads, strict=True):
+            probe.append(triad[first :: self.stride].copy())
+        self.n += len(triads[0])
+
+    def channels(self) -> Channels:
+        """All blocks so far."""
+        mean, variance, is_valid = (np.concatenate([part[k] for part in self.parts]) for k in range(3))
+        quantum = np.concatenate([_step(np.concatenate(probe)) for probe in self.probes])
+        gyroscope = np.repeat(self.is_gyroscope, 3)
+        return Channels(self.length, self.length / self.rate_hz, mean, variance, is_valid, quantum, gyroscope)
+
+
+def block_length(rate_hz: float) -> int:
+    """Samples in a block."""
+    return max(BLOCK_SAMPLES, round(BLOCK_S * rate_hz))
+
+
+def _blocks(triads: list[FloatArray], length: int) -> tuple[FloatArray, FloatArray, BoolArray]:
     parts = [_core.block_statistics(a, length) for a in triads]
     mean = np.hstack([p[0] for p in parts])
     variance = np.hstack([p[1] for p in parts])
     # Half of the readings must be there for a block to speak for its whole length.
     is_valid = np.logical_and.reduce([2 * p[2] > length for p in parts]) & np.isfinite(variance).all(axis=1)
+    return mean, variance, is_valid
+
+
+def split_into_blocks(recording: Recording) -> Channels:
+    """Block means and variances of every channel."""
+    length = block_length(recording.rate_hz)
+    triads = [a for a in (recording.accelerometer, recording.gyroscope) if a is not None]
+    mean, variance, is_valid = _blocks(triads, length)
     step_s = length / recording.rate_hz
     if len(mean):
         gap = np.diff(recording.time_s, prepend=recording.time_s[0]) > step_s
@@ -72,8 +115,11 @@ def split_into_blocks(recording: Recording) -> Channels:
 
 
 def _quantum(readings: FloatArray) -> FloatArray:
-    """(3,) smallest step between different readings of each axis, from at most 20000 readings."""
-    probe = readings[:: max(1, len(readings) // 20000)]
+    """(3,) smallest step between different readings of each axis, from some 20000 readings."""
+    return _step(readings[:: max(1, len(readings) // PROBED)])
+
+
+def _step(probe: FloatArray) -> FloatArray:
     out = np.zeros(3)
     for axis in range(3):
         values = np.unique(probe[np.isfinite(probe[:, axis]), axis])

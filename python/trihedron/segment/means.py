@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from trihedron.records import Hold, Recording
-from trihedron.segment.channels import BoolArray, Channels, FloatArray
+from trihedron.segment.channels import Channels, FloatArray
 from trihedron.segment.noise import MeanNoise, split_by_halves
 from trihedron.segment.runs import Run
 
+PIECE = 1 << 18
+"""Rows of a hold that are read at a time."""
 OCTAVES = 4
 """A hold's own excess noise is judged on stretches from a half down to a sixteenth of it: the four octaves that weigh
 in the error of its mean."""
@@ -39,11 +42,15 @@ def average_holds(
     n_averaged = np.empty(len(holds), dtype=np.int64)
     triads = [a for a in (recording.accelerometer, recording.gyroscope) if a is not None]
     for k, hold in enumerate(holds):
-        rows = hold.samples() if hold.disturbed else slice(hold.start, hold.stop)
-        readings = [a[rows] for a in triads]
-        finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
-        n_averaged[k] = int(np.logical_and.reduce(finite).sum())
-        mean[k] = np.concatenate([_mean(r, f) for r, f in zip(readings, finite, strict=True)])
+        sums = [_Sum() for _ in triads]
+        n_averaged[k] = 0
+        for a, b in _stretches(hold):
+            readings = [triad[a:b] for triad in triads]
+            finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
+            n_averaged[k] += int(np.logical_and.reduce(finite).sum())
+            for sum_, r, f in zip(sums, readings, finite, strict=True):
+                sum_.add(r if f.all() else r[f])
+        mean[k] = np.concatenate([sum_.mean() for sum_ in sums])
     ratio, freedom = _excess(channels, runs, noise)
     steady = np.array([not run.is_unsteady for run in runs], dtype=bool)
     shrunk = ratio.copy()
@@ -61,11 +68,33 @@ def average_holds(
     return HoldMeans(mean, np.sqrt(variance), n_averaged)
 
 
-def _mean(readings: FloatArray, finite: BoolArray) -> FloatArray:
-    rows = readings if finite.all() else readings[finite]
-    # About the first row: a large offset costs no digits.
-    out: FloatArray = rows[0] + (rows - rows[0]).mean(axis=0)
-    return out
+def _stretches(hold: Hold) -> Iterator[tuple[int, int]]:
+    """The rows of a hold without what disturbed it, in pieces: a hold of hours is not copied as a whole."""
+    first = hold.start
+    for begin, end in (*sorted(hold.disturbed), (hold.stop, hold.stop)):
+        for a in range(first, min(begin, hold.stop), PIECE):
+            yield a, min(a + PIECE, begin, hold.stop)
+        first = max(first, end)
+
+
+class _Sum:
+    """A mean about the first row: a large offset costs no digits."""
+
+    def __init__(self) -> None:
+        self.about: FloatArray | None = None
+        self.total: FloatArray = np.zeros(3)
+        self.n = 0
+
+    def add(self, rows: FloatArray) -> None:
+        if not len(rows):
+            return
+        if self.about is None:
+            self.about = np.array(rows[0])
+        self.total = self.total + (rows - self.about).sum(axis=0)
+        self.n += len(rows)
+
+    def mean(self) -> FloatArray:
+        return np.full(3, np.nan) if self.about is None else np.asarray(self.about + self.total / self.n)
 
 
 def _excess(channels: Channels, runs: list[Run], noise: MeanNoise) -> tuple[FloatArray, FloatArray]:

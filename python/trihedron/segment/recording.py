@@ -57,7 +57,12 @@ def segment_recording(recording: Recording, *, progress: Progress | None = None)
     """
     report = progress or (lambda _done, _text: None)
     report(0.0, "noise of short blocks")
-    channels = split_into_blocks(recording)
+    return segment_blocks(recording, split_into_blocks(recording), progress=progress)
+
+
+def segment_blocks(recording: Recording, channels: Channels, *, progress: Progress | None = None) -> Segments:
+    """The same from blocks that were made already; of the recording itself only rows of holds are read."""
+    report = progress or (lambda _done, _text: None)
     if channels.is_valid.sum() < WINDOW_BLOCKS:
         return _nothing_found(recording, channels)
     activity = measure_activity(channels)

@@ -180,7 +180,7 @@ class DisturbedPose(DirectEffect):
         strength = 10.0 * (len(bumped) + len(restless))
         parts = []
         if bumped:
-            parts.append("bumped at " + ", ".join(f"{a:.1f} s" for a, _ in bumped[:4]))
+            parts.append("bumped at " + ", ".join(f"{0.5 * (a + b):.2f} s" for a, b in bumped[:4]))
         if restless:
             parts.append("restless: pose " + ", ".join(str(i) for i in restless[:4]))
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])

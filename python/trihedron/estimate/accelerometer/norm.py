@@ -254,7 +254,7 @@ def _assemble(
             design, relative_sigma, observability.advice, is_anchored=fit.is_anchored, anchor=_core.ANCHOR
         ),
         *verdict.model_findings(S, unit, signs_are_known=signs_are_known),
-        *verdict.residual_findings(chi2, dof, rms_dof, floor),
+        *verdict.residual_findings(chi2, dof, rms, floor),
         *verdict.held_out_findings(unseen, apart[:, 1], apart[:, 2], dof),
     ]
     sensor = SensorCalibration(

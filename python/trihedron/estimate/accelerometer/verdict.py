@@ -27,7 +27,7 @@ def covariance_scale(chi2: float, dof: int) -> float:
     return chi2 / dof
 
 
-def residual_findings(chi2: float, dof: int, rms_dof: float, floor: float) -> list[Finding]:
+def residual_findings(chi2: float, dof: int, rms: float, floor: float) -> list[Finding]:
     """Residuals that the stated noise does not explain."""
     scale = covariance_scale(chi2, dof)
     if scale == 1.0:
@@ -36,12 +36,12 @@ def residual_findings(chi2: float, dof: int, rms_dof: float, floor: float) -> li
         Finding(
             FindingCode.RESIDUAL_ABOVE_NOISE,
             Severity.WARNING,
-            f"The residual of the still poses is {1e3 * rms_dof:.3g} mm/s² rms, the noise of their means explains only "
+            f"The residual of the still poses is {1e3 * rms:.3g} mm/s² rms, the noise of their means explains only "
             f"{1e3 * floor:.3g} mm/s² (χ² per degree of freedom {scale:.3g}, {dof} degrees); all standard errors of "
             f"the accelerometer are multiplied by {np.sqrt(scale):.3g}.",
             "Poses not quite still, a zero that drifts between poses, nonlinearity, or noise of the means underrated.",
             "Look at the residual per pose; `trihedron diagnose` names the effect.",
-            MappingProxyType({"chi2_per_dof": scale, "dof": float(dof), "rms_m_s2": rms_dof, "floor_m_s2": floor}),
+            MappingProxyType({"chi2_per_dof": scale, "dof": float(dof), "rms_m_s2": rms, "floor_m_s2": floor}),
         )
     ]
 

@@ -1,5 +1,5 @@
 """Both sensors held against motion that is known beside the log (docs/reference.md)."""
 
-from trihedron.estimate.reference.fit import fit_reference
+from trihedron.estimate.reference.fit import fit_reference, moves_along
 
-__all__ = ["fit_reference"]
+__all__ = ["fit_reference", "moves_along"]

@@ -20,6 +20,8 @@ BLOCK_S = 8.0
 """Stretches whose own lag is found: long enough for several turns of a hand."""
 JUMP_S = 0.05
 """A lag that changes by more from one stretch to the next is a jump: those of stretches scatter by milliseconds."""
+LOCKED = 0.9
+"""Correlation of a stretch that is believed: unrelated turns of 8 s reach 0.8 at some lag within six seconds."""
 SEARCH_S = 6.0
 ALIKE = 0.01
 """Peaks whose correlation is this near the best are not told apart by it: the stamps then decide."""
@@ -159,7 +161,7 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
         if not np.any(is_near):
             continue
         k = int(np.flatnonzero(is_near)[np.argmax(correlation[is_near])])
-        if correlation[k] > 0.8:
+        if correlation[k] > LOCKED:
             lags.append((lag[k] - search) * grid.step_s)
             middles.append(float(grid.time_s[start] + 0.5 * length * grid.step_s))
     if len(lags) < 3:

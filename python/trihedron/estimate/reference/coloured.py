@@ -23,6 +23,8 @@ OUTLIER = 7.0
 """Residuals beyond 7 robust sigmas, and their neighbours, are left out: a normal one is that far once in 4e11."""
 BLOCKS = 16
 """Blocks of time that are left out in turn. With 16 the pooled ratio of 12 parameters scatters by a tenth."""
+MOST_STRETCHES = 100
+"""More stretches than this are gaps of a bad log, not plateaus of a table."""
 MOST_OUT = 0.2
 """Where more than this share would be left out the scale is wrong, not the rows."""
 
@@ -108,7 +110,7 @@ def _solve(
     left = y - Z @ theta
     variance = float(left @ left) / max(len(left) - p - 3 * model.order, 1)
     inverse = np.linalg.pinv(Z.T @ Z, hermitian=True)
-    jackknife, held_out = _by_blocks(X, target, used, Z, y, at, theta)
+    jackknife, held_out = _by_blocks(X, target, index, used, Z, y, at, theta)
     predicted = variance * np.diag(inverse)
     is_known = (predicted > 0.0) & (jackknife > 0.0)
     # Each number by its own blocks and by those of all: sixteen blocks tell a variance to a third.
@@ -183,15 +185,24 @@ def _whitened(
     return np.concatenate(Z), np.concatenate(z), np.concatenate(rows_of)
 
 
+def _blocks(index: IntArray) -> IntArray:
+    """(k,) number of each row's block of time: the stretches between gaps (a table's plateaus), or equal parts."""
+    k = len(index)
+    stretch = np.concatenate([[0], np.cumsum(np.diff(index) > 1)])
+    if BLOCKS // 2 <= stretch[-1] < MOST_STRETCHES:
+        return np.asarray(stretch, dtype=np.int64)
+    return np.minimum(np.arange(k) * BLOCKS // k, BLOCKS - 1)
+
+
 def _by_blocks(
-    X: FloatArray, target: FloatArray, used: Mask, Z: FloatArray, y: FloatArray, rows: IntArray, theta: FloatArray
-) -> tuple[FloatArray, float]:
+    X: FloatArray, target: FloatArray, index: IntArray, used: Mask, Z: FloatArray, y: FloatArray, rows: IntArray,
+    theta: FloatArray,
+) -> tuple[FloatArray, float]:  # fmt: skip
     """Jackknife variances (p,) of the answers without each block of time; rms of what is left out, as it was."""
-    k = len(X)
-    block = np.minimum(np.arange(k) * BLOCKS // k, BLOCKS - 1)
+    block = _blocks(index)
     normal, moment = Z.T @ Z, Z.T @ y
     moved, error, n = [], 0.0, 0
-    for one in range(BLOCKS):
+    for one in range(int(block[-1]) + 1):
         out = block[rows] == one
         if not np.any(out):
             continue

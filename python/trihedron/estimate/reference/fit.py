@@ -105,6 +105,22 @@ def fit_reference(
     return replace(result, findings=(*motion.findings, *remarks(result, found, is_turned)))
 
 
+def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
+    """Correlation of the turning rates where a log and a reference hold one motion.
+
+    Raises
+    ------
+    ValueError
+        When they do not, or the clock jumps.
+    """
+    grid, reference = grid_of(recording), Reference(motion)
+    found = align(grid, reference, _stamped(recording, motion))
+    time = grid.time_s * (1.0 + found.rate) + found.offset_s
+    windows = _windows(grid, reference, grid.is_valid & reference.covers(time))
+    _refuse_strangers(fit_gyroscope(grid, reference, windows, found.offset_s, found.rate, clock=1), motion)
+    return found.correlation
+
+
 def _right_way_round(
     grid: Grid, reference: Reference, windows: Windows, gyro: GyroFit, clock: int
 ) -> tuple[Reference, GyroFit, bool]:

@@ -19,9 +19,11 @@ from trihedron.records.sessions import PARAMETERS, Change, ChangeKind, Session
 
 FloatArray = npt.NDArray[np.float64]
 
-SPREAD_DOF, WANDER_DOF = 50.0, 5.0
-"""Degrees of freedom a session that its covariance and its wander bring: half of those of a pair of sessions, as
-measured for :mod:`trihedron.diagnose.against.numbers`."""
+SPREAD_DOF, WANDER_DOF = 25.0, 5.0
+"""Degrees of freedom a session that its covariance and its wander bring: some 25 poses, and half of what was measured
+for the wander of a pair of sessions (:mod:`trihedron.diagnose.against.numbers`). An inverse of an estimate is too large
+by ν/(ν - 2) on average; the weights of sessions are taken back by it, or ten sessions would be called changed by chance
+in 3.5 % of units instead of 1 (benches/many_recordings.py)."""
 RIDGE = 1e-9
 """Variance, relative to its group's largest, below which a covariance is not told from zero."""
 
@@ -90,7 +92,8 @@ MIN_REST_P = 0.01
 def _weight(session: Session, picked: list[int], wander: FloatArray) -> FloatArray:
     covariance = session.covariance[np.ix_(picked, picked)] + np.diag(wander)
     ridge = RIDGE * max(float(np.trace(covariance)) / len(picked), 1e-300)
-    return np.asarray(np.linalg.inv(covariance + ridge * np.eye(len(picked))), dtype=np.float64)
+    shrunk = (SPREAD_DOF - 2.0) / SPREAD_DOF
+    return np.asarray(shrunk * np.linalg.inv(covariance + ridge * np.eye(len(picked))), dtype=np.float64)
 
 
 def _dof(name: str, n_sessions: int) -> float:

@@ -1,0 +1,109 @@
+"""``--stream`` of ``segment``, ``calibrate`` and ``apply``: logs larger than memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from trihedron.cli.options import GravitySource, LogSource, progress
+from trihedron.cli.output import leave, say, show, write_json, write_report
+
+if TYPE_CHECKING:
+    from trihedron.pipeline.streaming import LogOnDisk
+
+Stream = Annotated[
+    bool,
+    typer.Option(
+        "--stream",
+        help="A .npy or Parquet log larger than memory, in pieces and without audit: --columns, --rate and the units "
+        "say what it holds.",
+    ),
+]
+
+
+def opened(source: LogSource) -> LogOnDisk:
+    """The log on disk.
+
+    Raises
+    ------
+    typer.BadParameter
+        When what a log in pieces needs was not said.
+    """
+    if source.log is None or source.columns is None or source.rate is None:
+        raise typer.BadParameter("--stream needs LOG, --columns (as in ax,ay,az,gx,gy,gz) and --rate")
+    from trihedron.pipeline.streaming import log_on_disk
+
+    return log_on_disk(
+        source.log,
+        columns=source.columns,
+        rate_hz=source.rate,
+        accelerometer_unit=source.accel_unit,
+        gyroscope_unit=source.gyro_unit,
+    )
+
+
+def segment_stream(source: LogSource, report: Path | None, json: Path | None, *, force: bool) -> None:
+    """Still poses of a log on disk."""
+    log = opened(source)
+    from trihedron.pipeline.streaming import condensed, segment_file
+    from trihedron.report import segments_report
+    from trihedron.report.machine import segments_record
+
+    with progress("segmenting") as tell:
+        segments = segment_file(log, progress=tell)
+    # Figures and times come from the rows of moves and of the ends of holds.
+    recording, shown = condensed(log, segments)
+    document, machine = segments_report(recording, shown), segments_record(recording, shown)
+    show(document, json, sections=None)
+    write_json(machine, json, force=force)
+    write_report(document, machine, report, force=force)
+    leave(segments.findings)
+
+
+def calibrate_stream(
+    source: LogSource,
+    place: GravitySource,
+    options: dict[str, Any],
+    output: Path | None,
+    json: Path | None,
+    report: Path | None,
+    sections: int | None,
+    *,
+    force: bool,
+) -> None:
+    """A calibration from a log on disk."""
+    log = opened(source)
+    from trihedron.files.calibration import write_calibration
+    from trihedron.pipeline.streaming import calibrate_file
+    from trihedron.report import calibration_report
+    from trihedron.report.machine import calibration_record
+
+    where = {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
+    with progress("calibrating") as tell:
+        result = calibrate_file(log, progress=tell, **where, **options)
+    document = calibration_report(result.calibration, result.segments, result.recording)
+    machine = calibration_record(result.calibration, result.segments, result.recording)
+    show(document, json, sections=sections)
+    if output is not None:
+        write_calibration(result.calibration, output, overwrite=force)
+        say(f"calibration: {output}")
+    write_json(machine, json, force=force)
+    write_report(document, machine, report, force=force)
+    leave(result.findings)
+
+
+def apply_stream(calibration: Path, source: LogSource, output: Path, *, force: bool) -> None:
+    """Corrected readings of a log on disk, as .npy."""
+    log = opened(source)
+    from trihedron.files.calibration import read_calibration
+    from trihedron.pipeline.applying import doubted
+    from trihedron.pipeline.streaming import apply_file
+
+    known = read_calibration(calibration)
+    with progress("applying") as tell:
+        written = apply_file(known, log, output, overwrite=force, progress=tell)
+    went_on = "" if written == log.n_samples else f", {log.n_samples - written} of them by an earlier run"
+    say(f"{log.n_samples} samples{went_on}: {output}")
+    leave(doubted(known))

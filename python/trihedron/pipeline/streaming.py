@@ -1,0 +1,301 @@
+"""Logs larger than memory: still poses, calibration and corrected readings, a piece of the log at a time.
+
+What stays in memory are the statistics of blocks of a tenth of a second (:func:`segment_file`), the rows of moves and
+of the ends of holds (:func:`calibrate_file`), or one piece (:func:`apply_file`). See docs/larger-than-memory.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.files.calibration import calibration_text
+from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units
+from trihedron.pipeline.calibrating import calibrate
+from trihedron.pipeline.reading import Progress
+from trihedron.pipeline.results import CalibrationResult
+from trihedron.read import ChunkedLog, open_chunks
+from trihedron.records import Hold, Move, Recording, Segments
+from trihedron.segment import BlockSums, segment_blocks
+from trihedron.sensor_model import correct
+from trihedron.units import AccelerationUnit, RateUnit
+
+FloatArray = npt.NDArray[np.float64]
+
+PIECE_ROWS = 1 << 18
+KEPT_S = 60.0
+"""Of a hold longer than twice this, a minute at either end goes into the fit: the mean and its error are those of the
+whole hold, and the zero next to a move is read off the readings next to it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Triad:
+    """Three columns of a log on disk, read when rows are asked for: stands for an array (n, 3)."""
+
+    log: ChunkedLog
+    first: int
+
+    def __len__(self) -> int:
+        return self.log.n_rows
+
+    def __getitem__(self, rows: Any) -> FloatArray:
+        if isinstance(rows, slice):
+            start, stop, step = rows.indices(self.log.n_rows)
+            part = self.log.rows(start, stop)[::step]
+        else:
+            index = np.asarray(rows)
+            part = self.log.rows(int(index[0]), int(index[-1]) + 1)[index - index[0]]
+        # Row by row, as a recording holds them: sums come out the same to the last bit.
+        return np.ascontiguousarray(part[:, self.first : self.first + 3])
+
+
+@dataclass(frozen=True)
+class EvenTime:
+    """Stamps of an even clock, made when they are asked for: stands for an array (n,)."""
+
+    n: int
+    rate_hz: float
+
+    def __len__(self) -> int:
+        return self.n
+
+    def __getitem__(self, rows: Any) -> Any:
+        if isinstance(rows, slice):
+            return np.arange(*rows.indices(self.n)) / self.rate_hz
+        return np.asarray(rows) / self.rate_hz if np.ndim(rows) else float(rows) / self.rate_hz
+
+
+@dataclass(frozen=True, eq=False)
+class LogOnDisk:
+    """A log as the segmentation needs it: the attributes of a recording, without its arrays in memory."""
+
+    time_s: EvenTime
+    accelerometer: Triad | None
+    gyroscope: Triad | None
+    rate_hz: float
+    accelerometer_unit: AccelerationUnit
+    gyroscope_unit: RateUnit
+    source: str
+    log: ChunkedLog
+
+    @property
+    def n_samples(self) -> int:
+        """Rows of the log."""
+        return self.log.n_rows
+
+    @property
+    def duration_s(self) -> float:
+        """As of a recording: from the first to the last row, and one step."""
+        return (self.n_samples - 1) / self.rate_hz + 1.0 / self.rate_hz
+
+
+def log_on_disk(
+    path: str | os.PathLike[str],
+    *,
+    columns: str,
+    rate_hz: float,
+    accelerometer_unit: str | AccelerationUnit | None = None,
+    gyroscope_unit: str | RateUnit | None = None,
+) -> LogOnDisk:
+    """A .npy or Parquet log whose columns, rate and units are said, not judged.
+
+    Raises
+    ------
+    ValueError
+        When the file is neither, columns do not fit, or a sensor has not all its axes in the order x y z.
+    """
+    if not (np.isfinite(rate_hz) and rate_hz > 0.0):
+        raise ValueError(f"--rate is a positive number of samples per second, not {rate_hz}.")
+    log = open_chunks(Path(path), columns)
+    triads: dict[str, Triad | None] = {"a": None, "g": None}
+    for sensor in triads:
+        if any(role[0] == sensor for role in log.roles):
+            wanted = (f"{sensor}x", f"{sensor}y", f"{sensor}z")
+            first = log.roles.index(wanted[0]) if wanted[0] in log.roles else 0
+            if log.roles[first : first + 3] != wanted:
+                raise ValueError(f"{path}: --columns must name {' '.join(wanted)}, one after the other.")
+            triads[sensor] = Triad(log, first)
+    return LogOnDisk(
+        EvenTime(log.n_rows, rate_hz),
+        triads["a"],
+        triads["g"],
+        rate_hz,
+        AccelerationUnit(accelerometer_unit or "counts"),
+        RateUnit(gyroscope_unit or "counts"),
+        str(path),
+        log,
+    )
+
+
+def segment_file(log: LogOnDisk, *, progress: Progress | None = None) -> Segments:
+    """Still poses and moves of a log on disk: the same as :func:`trihedron.segment` finds in the whole of it."""
+    tell = progress or (lambda _fraction, _text: None)
+    # Types that only read rows: the segmentation asks for no more of a recording.
+    view = cast("Recording", log)
+    sums = BlockSums(view)
+    width = sums.length * max(1, PIECE_ROWS // sums.length)
+    done = 0
+    for part in log.log.chunks(width):
+        triads = [part[:, t.first : t.first + 3] for t in (log.accelerometer, log.gyroscope) if t is not None]
+        sums.add([np.ascontiguousarray(t, dtype=np.float64) for t in triads])
+        done += len(part)
+        tell(0.8 * done / log.n_samples, f"{done} of {log.n_samples} rows")
+    return segment_blocks(view, sums.channels(), progress=lambda f, text: tell(0.8 + 0.2 * f, text))
+
+
+def calibrate_file(log: LogOnDisk, *, progress: Progress | None = None, **options: Any) -> CalibrationResult:
+    """Calibrate a log on disk from the statistics of its holds and the rows of its moves; options as for ``calibrate``.
+
+    The same as :func:`trihedron.calibrate` of the whole, where no hold is longer than two minutes.
+    """
+    tell = progress or (lambda _fraction, _text: None)
+    segments = segment_file(log, progress=lambda f, text: tell(0.7 * f, text))
+    recording, shown = condensed(log, segments)
+    tell(0.8, f"fitting {recording.n_samples} of {log.n_samples} rows")
+    return calibrate(recording, segments=shown, **options)
+
+
+def condensed(log: LogOnDisk, segments: Segments) -> tuple[Recording, Segments]:
+    """The rows of moves and of the ends of holds, at their own times, and the segments counted in them.
+
+    Means, errors and durations remain those of whole holds.
+    """
+    kept = max(round(KEPT_S * log.rate_hz), 1)
+    ranges: list[tuple[int, int]] = []
+    for hold in segments.holds:
+        if hold.stop - hold.start <= 2 * kept:
+            ranges.append((hold.outer_start, hold.outer_stop))
+        else:
+            ranges += [(hold.outer_start, hold.start + kept), (hold.stop - kept, hold.outer_stop)]
+    ranges += [(move.start, move.stop) for move in segments.moves]
+    edges = [0, log.n_samples] if not ranges else None
+    joined = _joined([(edges[0], edges[1])] if edges else ranges)
+    starts = np.array([a for a, _ in joined])
+    offsets = np.concatenate([[0], np.cumsum([b - a for a, b in joined])])
+
+    def place(row: int) -> int:
+        k = int(np.searchsorted(starts, row, side="right")) - 1
+        return int(offsets[k] + min(row - joined[k][0], joined[k][1] - joined[k][0]))
+
+    def stack(triad: Triad | None) -> FloatArray | None:
+        return None if triad is None else np.concatenate([triad[a:b] for a, b in joined])
+
+    recording = Recording(
+        np.concatenate([log.time_s[a:b] for a, b in joined]),
+        stack(log.accelerometer),
+        stack(log.gyroscope),
+        log.rate_hz,
+        log.accelerometer_unit,
+        log.gyroscope_unit,
+        source=log.source,
+    )
+    holds = tuple(_moved_hold(hold, place, kept) for hold in segments.holds)
+    moves = tuple(Move(m.index, m.hold_before, m.hold_after, place(m.start), place(m.stop)) for m in segments.moves)
+    return recording, replace(segments, holds=holds, moves=moves)
+
+
+def _moved_hold(hold: Hold, place: Any, kept: int) -> Hold:
+    disturbed = tuple(
+        (place(a), place(b))
+        for a, b in hold.disturbed
+        if hold.stop - hold.start <= 2 * kept or b <= hold.start + kept or a >= hold.stop - kept
+    )
+    stop = place(hold.stop - 1) + 1
+    return Hold(
+        hold.index,
+        place(hold.start),
+        stop,
+        place(hold.outer_start),
+        max(place(hold.outer_stop - 1) + 1, stop),
+        disturbed,
+        hold.is_unsteady,
+    )
+
+
+def _joined(ranges: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    out: list[tuple[int, int]] = []
+    for a, b in sorted(ranges):
+        if out and a <= out[-1][1]:
+            out[-1] = (out[-1][0], max(out[-1][1], b))
+        else:
+            out.append((a, b))
+    return out
+
+
+def apply_file(
+    calibration: AnyCalibration,
+    log: LogOnDisk,
+    output: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> int:
+    """Correct a log on disk piece by piece into a .npy file (n, 4 or 7): time [s], specific force, angular rate.
+
+    A run that was stopped goes on where it was: ``OUTPUT.part`` grows, ``OUTPUT.part.json`` says how far it is and of
+    what it is made. Returns the rows that were written in this run.
+
+    Raises
+    ------
+    ValueError
+        When the calibration needs a temperature or effects taken off, which this does not; when units differ; when the
+        output exists.
+    """
+    target = Path(output)
+    known = calibration_of(calibration)
+    if target.suffix.lower() != ".npy":
+        raise ValueError(f"{target}: a log that is corrected in pieces is written as .npy; give this ending.")
+    if target.exists() and not overwrite:
+        raise ValueError(f"{target}: this exists and was left alone; choose another name or add --force.")
+    if known.extensions.get("effects") or known.extensions.get("thermal"):
+        raise ValueError("this calibration follows temperature or takes effects off: apply it to the log as a whole.")
+    check_units(known, cast("Recording", log))
+    sensors = [(log.accelerometer, known.accelerometer), (log.gyroscope, known.gyroscope)]
+    used = [(triad, sensor) for triad, sensor in sensors if triad is not None and sensor is not None]
+    if not used:
+        raise ValueError(f"{log.source}: the calibration holds none of its sensors.")
+    shape = (log.n_samples, 1 + 3 * len(used))
+    part, note = Path(f"{target}.part"), Path(f"{target}.part.json")
+    made_of = _made_of(log, calibration_text(known), shape)
+    done = _rows_done(part, note, made_of)
+    if done == 0:
+        np.lib.format.open_memmap(part, mode="w+", dtype=np.float64, shape=shape).flush()
+    header = part.stat().st_size - 8 * shape[0] * shape[1]
+    written = 0
+    with part.open("r+b") as stream:
+        for start in range(done, log.n_samples, PIECE_ROWS):
+            rows = slice(start, min(start + PIECE_ROWS, log.n_samples))
+            columns = [log.time_s[rows][:, None], *(correct(t[rows], s.S, s.b) for t, s in used)]
+            stream.seek(header + 8 * start * shape[1])
+            stream.write(np.hstack(columns).tobytes())
+            stream.flush()
+            written += rows.stop - start
+            note.write_text(json.dumps({"made_of": made_of, "rows": rows.stop}))
+            if progress is not None:
+                progress(rows.stop / log.n_samples, f"{rows.stop} of {log.n_samples} rows")
+        os.fsync(stream.fileno())
+    part.replace(target)
+    note.unlink(missing_ok=True)
+    return written
+
+
+def _made_of(log: LogOnDisk, calibration: str, shape: tuple[int, int]) -> str:
+    """What a half-written output must have been made of to be gone on with; the log by its size and time of change."""
+    status = os.stat(log.log.path)
+    said = [str(log.log.path.resolve()), status.st_size, status.st_mtime_ns, log.rate_hz, log.log.roles, shape]
+    return hashlib.sha256((json.dumps(said) + calibration).encode()).hexdigest()
+
+
+def _rows_done(part: Path, note: Path, made_of: str) -> int:
+    try:
+        said = json.loads(note.read_text())
+    except (OSError, ValueError):
+        return 0
+    return int(said["rows"]) if said.get("made_of") == made_of and part.exists() else 0

@@ -1,0 +1,152 @@
+"""Logs larger than memory: the same segments and calibration as of the whole, in bounded memory, gone on with."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import trihedron
+from hand_made_sessions import G, Instrument, recorded
+from trihedron.cli import main
+from trihedron.pipeline import streaming
+
+COLUMNS = "ax,ay,az,gx,gy,gz"
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return recorded(Instrument(), 5, rate_hz=100.0)
+
+
+@pytest.fixture(scope="module", params=["npy", "parquet"])
+def path(whole, request, tmp_path_factory):
+    table = np.hstack([whole.accelerometer, whole.gyroscope])
+    out = tmp_path_factory.mktemp("large") / f"log.{request.param}"
+    if request.param == "npy":
+        np.save(out, table)
+    else:
+        import polars
+
+        polars.DataFrame(table, schema=COLUMNS.split(",")).write_parquet(out)
+    return out
+
+
+def opened(path):
+    return streaming.log_on_disk(
+        path, columns=COLUMNS, rate_hz=100.0, accelerometer_unit="m/s^2", gyroscope_unit="rad/s"
+    )
+
+
+@pytest.mark.parametrize("piece", [250, 1000, 1 << 18])
+def test_segments_of_pieces_are_those_of_the_whole_to_the_last_bit(whole, path, piece, monkeypatch):
+    monkeypatch.setattr(streaming, "PIECE_ROWS", piece)
+    found, wanted = streaming.segment_file(opened(path)), trihedron.segment(whole)
+    assert found.holds == wanted.holds
+    assert found.moves == wanted.moves
+    for name in ("accelerometer_mean", "gyroscope_mean", "accelerometer_sigma_mean", "gyroscope_sigma_mean"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
+    np.testing.assert_array_equal(found.n_averaged, wanted.n_averaged)
+
+
+def test_a_log_on_disk_is_calibrated_as_the_whole_is(whole, path):
+    found = streaming.calibrate_file(opened(path), gravity_m_s2=G).calibration
+    wanted = trihedron.calibrate(whole, gravity_m_s2=G).calibration
+    # The same rows but those between the edges of holds and moves: none here.
+    np.testing.assert_allclose(found.accelerometer.S, wanted.accelerometer.S, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.gyroscope.S, wanted.gyroscope.S, rtol=0, atol=1e-9)
+
+
+def test_long_holds_keep_their_means_and_give_up_their_middles(monkeypatch):
+    log = recorded(Instrument(), 6, rate_hz=50.0, hold_s=8.0)
+    monkeypatch.setattr(streaming, "KEPT_S", 2.0)
+    on_disk = FakeLog(log)
+    segments = trihedron.segment(log)
+    recording, shown = streaming.condensed(on_disk, segments)
+    assert recording.n_samples < 0.75 * log.n_samples
+    np.testing.assert_array_equal(shown.accelerometer_mean, segments.accelerometer_mean)
+    found = trihedron.calibrate(recording, segments=shown, gravity_m_s2=G).calibration
+    wanted = trihedron.calibrate(log, gravity_m_s2=G).calibration
+    off = (found.gyroscope.S - wanted.gyroscope.S) / wanted.gyroscope.sigma_S
+    # Less of the zero beside each move is seen: the answer stays well inside its error bars.
+    assert np.abs(off).max() < 1.0
+    # The accelerometer is fitted to the means of whole holds; the moves pull it a little.
+    away = (found.accelerometer.S - wanted.accelerometer.S)[np.tril_indices(3)]
+    assert np.abs(away / wanted.accelerometer.sigma_S[np.tril_indices(3)]).max() < 1.0
+
+
+class FakeLog:
+    """A recording in memory with the attributes of a log on disk."""
+
+    def __init__(self, recording):
+        for name in ("time_s", "accelerometer", "gyroscope", "rate_hz", "accelerometer_unit", "gyroscope_unit"):
+            setattr(self, name, getattr(recording, name))
+        self.source, self.n_samples = recording.source, recording.n_samples
+
+
+def test_corrected_readings_are_those_of_the_whole_and_a_stopped_run_goes_on(whole, path, tmp_path, monkeypatch):
+    monkeypatch.setattr(streaming, "PIECE_ROWS", 1000)
+    calibration = trihedron.calibrate(whole, gravity_m_s2=G)
+    out = tmp_path / "si.npy"
+
+    class Stopped(Exception):
+        pass
+
+    def stop(fraction, _text):
+        if fraction > 0.5:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        streaming.apply_file(calibration, opened(path), out, progress=stop)
+    assert not out.exists()
+    assert 0 < json.loads((tmp_path / "si.npy.part.json").read_text())["rows"] < whole.n_samples
+    written = streaming.apply_file(calibration, opened(path), out)
+    assert written < 0.5 * whole.n_samples
+    si = np.load(out)
+    wanted = trihedron.apply(calibration, whole)
+    np.testing.assert_array_equal(si[:, 1:4], wanted.accelerometer)
+    np.testing.assert_array_equal(si[:, 4:7], wanted.gyroscope)
+    with pytest.raises(ValueError, match="exists"):
+        streaming.apply_file(calibration, opened(path), out)
+
+
+def test_memory_stays_bounded(tmp_path):
+    """20 MB of counts, 1.7 million rows at 1 kHz: 80 MB as float64, of which no more than the blocks may stay."""
+    rng = np.random.default_rng(1)
+    n = 1_700_000
+    mapped = np.lib.format.open_memmap(tmp_path / "long.npy", mode="w+", dtype=np.int16, shape=(n, 6))
+    for start in range(0, n, 100_000):
+        mapped[start : start + 100_000] = np.round(rng.normal([0, 0, 2048, 0, 0, 0], 5.0, (100_000, 6)))
+    mapped.flush()
+    del mapped
+    script = (
+        "import resource, sys\n"
+        "from trihedron.pipeline import streaming\n"
+        "import trihedron.segment\n"
+        "low = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "log = streaming.log_on_disk(sys.argv[1], columns='ax,ay,az,gx,gy,gz', rate_hz=1000.0)\n"
+        "segments = streaming.segment_file(log)\n"
+        "print(segments.n_holds, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - low) / 1024)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path / "long.npy")], capture_output=True, text=True, check=True
+    )
+    holds, megabytes = done.stdout.split()
+    assert int(holds) == 1
+    # A piece is 2^18 rows: 12 MB as float64, twice; 17 000 blocks of 1 kB: 17 MB; what arithmetic needs beside them.
+    assert float(megabytes) < 75.0
+
+
+def test_the_command_streams_and_says_what_it_needs(whole, path, tmp_path, capsys):
+    said = ["--stream", "--columns", COLUMNS, "--rate", "100", "--accel-unit", "m/s^2", "--gyro-unit", "rad/s"]
+    out = tmp_path / "c.json"
+    assert main(["calibrate", str(path), *said, "--gravity", str(G), "-o", str(out)]) == 0
+    assert main(["segment", str(path), *said, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out.split("\n{", 1)[1].join(["{", ""]))
+    assert len(document["holds"]) == 20
+    assert main(["apply", str(out), str(path), *said, "-o", str(tmp_path / "si.npy")]) == 0
+    assert np.load(tmp_path / "si.npy", mmap_mode="r").shape == (whole.n_samples, 7)
+    capsys.readouterr()
+    assert main(["segment", str(path), "--stream"]) == 1
+    assert "--columns" in capsys.readouterr().err
