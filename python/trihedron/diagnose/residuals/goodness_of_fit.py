@@ -165,9 +165,10 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
         error = np.linalg.solve(line.gyro_white, r[rows].reshape(h, 3, 1))[:, :, 0]
         out[STATIC_GYRO] = float(np.sqrt(np.mean(error**2)))
     angle, speed = [], []
-    for m in range(line.obs.n_moves):
-        rows = np.flatnonzero(np.isin(system.domain, (MOVES, DYNAMICS)) & (system.segment == m) & direct)
-        error = np.linalg.solve(line.move_white[m], r[rows])
+    of_moves = np.flatnonzero(np.isin(system.domain, (MOVES, DYNAMICS)) & direct)
+    # Five rows a move, in order: gravity after it (2), velocity over it (3).
+    for white, own in zip(line.move_white, r[of_moves].reshape(-1, 5), strict=True):
+        error = np.linalg.solve(white, own)
         angle.append(float((error[:2] ** 2).sum()) / line.twin.gravity**2)
         speed.append(float((error[2:] ** 2).mean()))
     if angle:
