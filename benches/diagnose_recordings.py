@@ -121,7 +121,7 @@ def main():
     parser.add_argument("folder", type=Path)
     parser.add_argument("wanted", nargs="*")
     parser.add_argument("--table", action="store_true")
-    options = parser.parse_args()
+    options = parser.parse_intermixed_args()
     if options.table:
         print("| set | poses | verdict: effects in order | parameter | held out, χ² per row | remains | CPU |")
         print("|---|---|---|---|---|---|---|")

@@ -19,12 +19,14 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import rival_paths  # noqa: F401
 
 # numba looks for a package `coverage` and would find our bench of that name.
 sys.path.remove(str(Path(__file__).parent))
 
+ROOT = Path(__file__).parents[1]
 FACTORIES = ("ours", "numba_chain", "sensitivities", "parser")
 """Functions that make the function to be timed, so that imports and compilation stay outside."""
 
@@ -147,11 +149,12 @@ def measure(subject: Subject, rounds: int) -> dict[str, dict[str, float]]:
     }
 
 
-def table(subject: Subject, found: dict[str, dict[str, float]]) -> str:
+def table(subject: Subject, result: dict[str, Any]) -> str:
     """One Markdown table, ours first, with the ratio to it."""
+    found = result["found"]
     clock = "wall" if subject.on_both else "cpu"
     mine = next(iter(found.values()))[clock]
-    lines = [f"| {subject.title} | {subject.unit} | times ours | peak MiB |", "|---|---:|---:|---:|"]
+    lines = [f"| {result['title']} | {subject.unit} | times ours | peak MiB |", "|---|---:|---:|---:|"]
     for name, one in found.items():
         value = one[clock] / subject.per
         lines.append(f"| {name} | {value:.3g} | {one[clock] / mine:.3g} | {one['peak']:.0f} |")
@@ -165,14 +168,15 @@ def put(path: Path, mark: str, text: str) -> None:
     path.write_text(f"{before}<!-- {mark} -->\n{text}\n<!-- /{mark} -->{after}")
 
 
-def short(results: dict[str, tuple[Subject, dict[str, dict[str, float]]]]) -> str:
+def short(results: list[tuple[Subject, dict[str, Any]]]) -> str:
     """One line a path: ours, and how many times as long the others take."""
     lines = ["| path | trihedron | times as long |", "|---|---:|---|"]
-    for subject, found in results.values():
+    for subject, result in results:
+        found = result["found"]
         clock = "wall" if subject.on_both else "cpu"
         mine = next(iter(found.values()))[clock]
         others = [f"{name} {one[clock] / mine:.2g}" for name, one in found.items() if not name.startswith("trihedron")]
-        lines.append(f"| {subject.title} | {mine / subject.per:.3g} {subject.unit} | {', '.join(others)} |")
+        lines.append(f"| {result['title']} | {mine / subject.per:.3g} {subject.unit} | {'; '.join(others)} |")
     return "\n".join(lines)
 
 
@@ -189,18 +193,29 @@ def main() -> None:
     if options.worker:
         worker(next(s for s in subjects(rows) if s.key == options.worker), options.method)
         return
-    results = {}
+    # Kept beside the tables, so that `--only` renews one of them and leaves the others as they were measured.
+    kept = ROOT / "docs/figures/rivals.json"
+    results = json.loads(kept.read_text()) if kept.exists() else {}
     for subject in subjects(rows):
         if options.only in subject.key:
-            results[subject.key] = (subject, measure(subject, options.rounds))
-            print(table(*results[subject.key]) + "\n", flush=True)
+            results[subject.key] = {"title": subject.title, "found": measure(subject, options.rounds)}
+            print(table(subject, results[subject.key]) + "\n", flush=True)
+            if options.write:
+                kept.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n")
     if options.write:
-        from rival_paths.growth import draw
+        measured = [(subject, results[subject.key]) for subject in subjects(rows) if subject.key in results]
+        picture = ROOT / "docs/figures/speed.png"
+        if not options.only:
+            from rival_paths.growth import draw
 
-        root = Path(__file__).parents[1]
-        put(root / "docs/speed.md", "rivals", "\n\n".join(table(*pair) for pair in results.values()))
-        put(root / "README.md", "rivals", short(results))
-        draw(root / "docs/figures/speed.png")
+            draw(picture)
+        # A reader must know how far to trust a median.
+        how = f"Rounds: {options.rounds}; other work on the machine: load average {os.getloadavg()[0]:.0f}."
+        parts = [*(table(*pair) for pair in measured), how]
+        if picture.exists():
+            parts.append(f"![Time against length and number of poses, both cores](figures/{picture.name})")
+        put(ROOT / "docs/speed.md", "rivals", "\n\n".join(parts))
+        put(ROOT / "README.md", "rivals", short(measured))
 
 
 if __name__ == "__main__":

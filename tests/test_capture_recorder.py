@@ -300,7 +300,8 @@ def test_a_port_without_permission_names_the_group_to_join(monkeypatch):
     def refuse(*_args, **_options):
         raise PermissionError(errno.EACCES, "Permission denied", name)
 
-    monkeypatch.setattr("trihedron.capture.sources.import_serial", lambda: refuse)
+    # The module itself: as an attribute `trihedron.capture` is the verb.
+    monkeypatch.setattr(sys.modules[open_source.__module__], "import_serial", lambda: refuse)
     with pytest.raises(CaptureError, match=r"no permission to open .*usermod -aG \w+"):
         open_source(name)
     os.close(master)

@@ -215,6 +215,14 @@ def test_a_remark_behind_a_row_that_was_passed_over_is_counted(tmp_path):
     assert recording.rows_in_file == recording.rows_read + recording.rows_reported == len(lines)
 
 
+def test_a_row_made_a_remark_below_names_that_do_not_fit_is_counted(tmp_path):
+    lines = [",".join(map(str, row)) for row in readings(20)]
+    path = tmp_path / "log.csv"
+    path.write_text("t,ax,ay,az,gx,gy,gz,unix\n%" + "\n".join(lines) + "\n")
+    recording = read_recording(path)
+    assert (recording.rows_read, recording.rows_reported, recording.rows_in_file) == (19, 1, 20)
+
+
 def test_two_rows_glued_by_a_lone_carriage_return_are_two_rows(tmp_path):
     rows = [",".join(f"{v:.4f}" for v in row) for row in readings(60)]
     for first, last in ((0, 1), (30, 31)):

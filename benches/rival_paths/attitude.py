@@ -99,6 +99,19 @@ def pyins(t, w):
     return attitude
 
 
+def pyins_called(t, w):
+    """PyPI `python-ins` as one calls it: data frames in, data frame out."""
+    import pandas
+    from pyins import strapdown
+    from pyins.util import ACCEL_COLS, GYRO_COLS, LLA_COLS, RPH_COLS, VEL_COLS
+
+    force = np.tile([0.0, 0.0, -9.81], (len(t), 1))
+    imu = pandas.DataFrame(np.hstack([w, force]), index=t, columns=[*GYRO_COLS, *ACCEL_COLS])
+    start = pandas.Series([50.0, 40.0, 100.0, *[0.0] * 6], index=[*LLA_COLS, *VEL_COLS, *RPH_COLS], name=t[0])
+    increments = strapdown.compute_increments_from_imu(imu, "rate")
+    return strapdown.Integrator(start, with_altitude=False).integrate(increments)
+
+
 def tuned(function, width):
     def call(t, w):
         n = len(t) - 1
@@ -130,6 +143,7 @@ def sensitivities():
 LAST = {
     "trihedron": ours(last_only=True),
     "NumPy, pairwise products": numpy_tree,
+    "pyins, as one calls it": pyins_called,
     "pyins, its kernel": pyins,
     "C, one step after the other": tuned("p_final", 45),
     "C, SIMD": tuned("p_final_simd", 45),
@@ -139,6 +153,7 @@ TRAJECTORY = {
     "trihedron, quaternions": ours(form="quaternions"),
     "SciPy steps, loop of products": numpy_chain,
     "numba": numba_chain,
+    "pyins, as one calls it": pyins_called,
     "pyins, its kernel": pyins,
     "C, one step after the other": tuned("p_traj", 9),
     "C, SIMD": tuned("p_traj_simd", 9),

@@ -99,7 +99,7 @@ proptest! {
             loss: Loss::Linear,
         };
         let noise = vec![Matrix3::identity() * spread; v.len()];
-        let _ = norm_invariant::fit(Readings { values: &v, noise: &noise }, &settings, None);
+        let _ = norm_invariant::fit(Readings { values: &v, noise: &noise, pose: &[] }, &settings, None);
     }
 
     #[test]

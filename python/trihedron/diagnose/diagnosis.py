@@ -9,6 +9,8 @@ from types import MappingProxyType
 import numpy as np
 
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.diagnose.laws.find import laws_of_rest
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
 from trihedron.diagnose.residuals.goodness_of_fit import hidden_zeros, test_rows
@@ -142,7 +144,10 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
         judged = judged_again(_grown(judged, scored, alpha, lambda _part: None))
     judged, candidates = _with_late(judged, candidates, alpha)
     tell(0.9, "checking what remains")
-    remaining = _all_domains(judged.context, alpha, judged.refused)
+    # Time errors were looked for twice: what was not accepted then mends nothing.
+    named = {one.effect.id for one in judged.accepted}
+    sought = {one.id for one in catalogue() if isinstance(one, DirectEffect) and one.is_sought_again}
+    remaining = _all_domains(judged.context, alpha, judged.refused | (sought - named))
     return _Run(bare, judged, domains, accounted_for(judged, remaining), candidates)
 
 

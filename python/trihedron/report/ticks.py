@@ -53,5 +53,7 @@ def _log_word(mantissa: int, n: int) -> str:
 
 def _word(value: float, places: int) -> str:
     if value != 0.0 and (abs(value) >= 1e6 or places > 5):
-        return f"{value:.1e}".replace("e-0", "e-").replace("e+0", "e").replace("-", MINUS)
+        # As many digits as tell one tick from the next.
+        digits = max(1, places + math.floor(math.log10(abs(value)))) if value else 1
+        return f"{value:.{digits}e}".replace("e-0", "e-").replace("e+0", "e").replace("-", MINUS)
     return f"{value if round(value, places) else 0.0:.{places}f}".replace("-", MINUS)

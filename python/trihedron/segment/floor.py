@@ -12,6 +12,8 @@ from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, Float
 SEED_FRACTION = 0.02
 SEED_S = 1.0
 """The quietest 2 % of a log, and no less than one second of it, is taken for still to begin with."""
+ROUNDING = 1e-7
+"""Of a channel's rms: running sums round at a tenth of this; no sensor's noise is so small beside its motion."""
 FALSE_ALARM = 1e-4
 """Chance that a still window is called moving: once in minutes of windows, and so short a gap is closed again."""
 _MAX_ROUNDS = 60
@@ -70,7 +72,8 @@ def measure_activity(channels: Channels) -> Activity:
     if not alive.any():
         nothing = np.zeros(channels.n_blocks)
         return Activity(nothing, nothing, 0.0, 0.0, whole, rounding, rounding / channels.length)
-    tiny = 1e-12 * np.median(inside[whole], axis=0)[alive]
+    # Running sums round at 1e-8 of the signal: a simulation without noise must not take that for its noise.
+    tiny = np.maximum(1e-12 * np.median(inside[whole], axis=0), ROUNDING**2 * np.mean(mean**2, axis=0))[alive]
     inside_alive, between_alive = inside[:, alive] + tiny, between[:, alive] + tiny / channels.length
     total = np.log(inside_alive + between_alive).mean(axis=1)
     total[~whole] = np.inf

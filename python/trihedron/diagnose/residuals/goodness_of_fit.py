@@ -98,8 +98,8 @@ def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
 
 @dataclass(frozen=True)
 class HiddenZero:
-    """What the model's walk of a sensor's zero absorbed, SI: ``rms`` about its mean, the median error of a pose's mean
-    ``noise``, and whether the walk is as strong as the model allows."""
+    """What the model's walk of a sensor's zero absorbed, SI: ``rms`` about its mean, ``noise`` the median error of a
+    pose's mean, with scatter where that was named, and whether the walk is as strong as the model allows."""
 
     rms: float
     noise: float
@@ -112,8 +112,8 @@ def hidden_zeros(fitted: Fit) -> tuple[HiddenZero, HiddenZero | None]:
     edge = fitted.line.core.is_walk_at_edge
     out: list[HiddenZero | None] = []
     sides = (
-        (twin.accel_bias, twin.accel_S, obs.hold_force_sigma, edge[0]),
-        (twin.gyro_bias, twin.gyro_S, obs.hold_rate_sigma, edge[1]),
+        (twin.accel_bias, twin.accel_S, obs.hold_force_spread, edge[0]),
+        (twin.gyro_bias, twin.gyro_S, obs.hold_rate_spread, edge[1]),
     )
     for zero, S, sigma, is_at_edge in sides:
         if sigma is None:

@@ -163,7 +163,9 @@ def _zeros(
         if drift is not None and p * n_effects < alpha and (drift.rms * size > least).any():
             effect = _drifting(sensor, drift, raw, size, unit, p, n_effects)
             at = np.stack([np.interp(pieces.time_s, drift.time_s, v) for v in drift.values], axis=1) * size
-            left = raw - (at - at.mean(axis=0))
+            left = raw - (
+                at - np.array([at[pieces.pose == k].mean(axis=0) for k in range(pieces.n_poses)])[pieces.pose]
+            )
     tests = [_domain(DOMAIN[sensor], x, own, unit, is_named=effect is not None, alpha=alpha) for x in (raw, left)]
     return tests[0], tests[1], [] if effect is None else [effect], candidates
 

@@ -96,8 +96,9 @@ def detect(text: str) -> Layout | None:
     n_kept = n_fields - trailing
     header = _header(lines[:first], separator, n_kept)
     stray = () if rate else _stray(lines[:first], header, decimal_comma)
-    # Remarks count from the names on, or from the first line that may have been a row.
-    above = min(max(header.used, default=first), stray[0] - 1 if stray else first)
+    # Remarks count from the names on, fitting or not, or from the first line that may have been a row.
+    named = [i for i in range(first) if header.ignored and lines[i].strip() == header.ignored]
+    above = min(max(header.used, default=first), stray[0] - 1 if stray else first, *named)
     return Layout(
         separator,
         decimal_comma,
