@@ -37,6 +37,8 @@ impl Tile {
     /// Steps in a tile.
     pub(super) const STEPS: usize = LANES * ROWS;
 
+    // Of 19 kB, and moved to the heap as it is made: the stack holds it for a moment at most.
+    #[allow(clippy::large_stack_arrays)]
     pub(super) fn boxed() -> Box<Self> {
         Box::new(Self {
             time: [[0.0; LANES]; ROWS + 1],

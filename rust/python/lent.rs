@@ -1,4 +1,4 @@
-//! NumPy arrays as the kernels want them: lent where they lie in one piece, copied where they do not.
+//! Arrays of `NumPy` as the kernels want them: lent where they lie in one piece, copied where they do not.
 
 use std::borrow::Cow;
 

@@ -43,56 +43,7 @@ impl Fit {
         });
         let parts: Vec<Result<FoldPart>> = folds
             .par_iter()
-            .map(|fold| {
-                let held = Chain::of(layout, fold.iter().map(|&g| &self.groups[g].rows));
-                let mut train = self.chain.clone();
-                train.add_scaled(&held, -1.0);
-                let factor = train.factor(TRAINING_RIDGE, Some(&scale))?;
-                let n: usize = fold.iter().map(|&g| self.groups[g].rows.len()).sum();
-                let mut jacobian_t = DMatrix::zeros(layout.n(), n);
-                let mut residual = DVector::zeros(n);
-                let mut at = 0;
-                for &g in fold {
-                    let rows = &self.groups[g].rows;
-                    let r = rows.len();
-                    let mut part = DMatrix::zeros(layout.n(), r);
-                    rows.add_transposed(layout, &DMatrix::identity(r, r), &mut part);
-                    jacobian_t.columns_mut(at, r).copy_from(&part);
-                    residual.rows_mut(at, r).copy_from(&rows.residual);
-                    at += r;
-                }
-                // The training optimum is one linear step from that of all rows.
-                let others = &side - &jacobian_t * &residual;
-                let solved = factor.solve(&jacobian_t);
-                let mut spread = jacobian_t.tr_mul(&solved);
-                for i in 0..n {
-                    spread[(i, i)] += 1.0;
-                }
-                let innovation = &residual - solved.tr_mul(&others).column(0);
-                let spread = (&spread + spread.transpose()) * 0.5;
-                let eigen = spread.symmetric_eigen();
-                let along = eigen.eigenvectors.tr_mul(&innovation);
-                let mut whitened = DVector::zeros(n);
-                let mut plain = DVector::zeros(n);
-                let mut share = DVector::zeros(n);
-                let mut log_det = 0.0;
-                for k in 0..n {
-                    let value = eigen.eigenvalues[k];
-                    if value < OPEN {
-                        let vector = eigen.eigenvectors.column(k);
-                        whitened.axpy(along[k] / value.sqrt(), &vector, 1.0);
-                        plain.axpy(along[k], &vector, 1.0);
-                        share += vector.component_mul(&vector);
-                        log_det += value.ln();
-                    }
-                }
-                Ok(FoldPart {
-                    whitened,
-                    plain,
-                    share,
-                    log_det,
-                })
-            })
+            .map(|fold| self.predicted(fold, &side, &scale))
             .collect();
         let mut out = HeldOut {
             chi2: Vec::with_capacity(folds.len()),
@@ -122,6 +73,64 @@ impl Fit {
             out.log_det.push(part.log_det);
         }
         Ok(out)
+    }
+
+    /// One fold's rows predicted from the others.
+    fn predicted(
+        &self,
+        fold: &[usize],
+        side: &DMatrix<f64>,
+        scale: &DVector<f64>,
+    ) -> Result<FoldPart> {
+        let layout = self.layout();
+        let held = Chain::of(layout, fold.iter().map(|&g| &self.groups[g].rows));
+        let mut train = self.chain.clone();
+        train.add_scaled(&held, -1.0);
+        let factor = train.factor(TRAINING_RIDGE, Some(scale))?;
+        let n: usize = fold.iter().map(|&g| self.groups[g].rows.len()).sum();
+        let mut jacobian_t = DMatrix::zeros(layout.n(), n);
+        let mut residual = DVector::zeros(n);
+        let mut at = 0;
+        for &g in fold {
+            let rows = &self.groups[g].rows;
+            let r = rows.len();
+            let mut part = DMatrix::zeros(layout.n(), r);
+            rows.add_transposed(layout, &DMatrix::identity(r, r), &mut part);
+            jacobian_t.columns_mut(at, r).copy_from(&part);
+            residual.rows_mut(at, r).copy_from(&rows.residual);
+            at += r;
+        }
+        // The training optimum is one linear step from that of all rows.
+        let others = side - &jacobian_t * &residual;
+        let solved = factor.solve(&jacobian_t);
+        let mut spread = jacobian_t.tr_mul(&solved);
+        for i in 0..n {
+            spread[(i, i)] += 1.0;
+        }
+        let innovation = &residual - solved.tr_mul(&others).column(0);
+        let spread = (&spread + spread.transpose()) * 0.5;
+        let eigen = spread.symmetric_eigen();
+        let along = eigen.eigenvectors.tr_mul(&innovation);
+        let mut whitened = DVector::zeros(n);
+        let mut plain = DVector::zeros(n);
+        let mut share = DVector::zeros(n);
+        let mut log_det = 0.0;
+        for k in 0..n {
+            let value = eigen.eigenvalues[k];
+            if value < OPEN {
+                let vector = eigen.eigenvectors.column(k);
+                whitened.axpy(along[k] / value.sqrt(), &vector, 1.0);
+                plain.axpy(along[k], &vector, 1.0);
+                share += vector.component_mul(&vector);
+                log_det += value.ln();
+            }
+        }
+        Ok(FoldPart {
+            whitened,
+            plain,
+            share,
+            log_det,
+        })
     }
 }
 

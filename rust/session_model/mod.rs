@@ -11,6 +11,7 @@ pub mod fit;
 pub mod held_out;
 pub mod move_rows;
 pub mod moves;
+mod possible;
 pub mod predict;
 pub mod response;
 mod rest_rows;

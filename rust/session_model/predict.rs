@@ -5,8 +5,9 @@ use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
 use super::chain::{Chain, Layout};
 use super::fit::{Fit, gradient};
+use super::possible::possible_scatters;
 use super::rows::{Domain, Group};
-use super::strengths::possible_scatters;
+
 use super::{LOWER, Session, State};
 use crate::error::Result;
 

@@ -16,8 +16,6 @@ impl Session {
         layout: Layout,
         out: &mut Vec<Group>,
     ) -> Result<()> {
-        let collapsed =
-            || Error::not_determined("a sensor's triad has collapsed: its S cannot be inverted");
         let inverse = state.force_scale.try_inverse().ok_or_else(collapsed)?;
         for i in 0..layout.n_poses {
             let mut asked = state.up[i] * self.gravity - state.force_bias;
@@ -63,6 +61,17 @@ impl Session {
             group.domain = Domain::StaticForce;
             out.push(group);
         }
+        self.rates_at_rest(state, distortion, layout, out)
+    }
+
+    /// (11.2).
+    fn rates_at_rest(
+        &self,
+        state: &State,
+        distortion: &Distortion,
+        layout: Layout,
+        out: &mut Vec<Group>,
+    ) -> Result<()> {
         let Some(rate) = &self.rate else {
             return Ok(());
         };
@@ -103,6 +112,10 @@ impl Session {
         }
         Ok(())
     }
+}
+
+fn collapsed() -> Error {
+    Error::not_determined("a sensor's triad has collapsed: its S cannot be inverted")
 }
 
 pub(super) fn weight_of(sensor: &AtRest, pose: usize) -> Vector3<f64> {

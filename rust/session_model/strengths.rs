@@ -1,9 +1,8 @@
 //! Strengths of the processes behind the zeros, by marginal likelihood (docs/model-session.md, 11.12).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::chain::Chain;
-use super::factor::Factor;
 use super::fit::{Fit, RIDGE, chi2_of, fit, gradient};
 use super::move_rows::{Weights, Whitening};
 use super::moves::N_MOVE;
@@ -18,7 +17,7 @@ pub const NO_SCATTER: f64 = 1e-3;
 /// Scatters tried beyond none: a factor of 1.5 apart, up to a thousand times the reference.
 const N_SCATTER: i32 = 26;
 /// Every so many of them are tried first, then the neighbours of the best.
-const COARSE: usize = 4;
+const COARSE: i32 = 4;
 const SCATTER_FROM: f64 = 0.05;
 const SCATTER_RATIO: f64 = 1.5;
 /// Scatter below the usual standard error of a pose is left out of the answer, as `diagnose` does not name it (flicker
@@ -31,12 +30,6 @@ const SCATTER_GATE: f64 = 5.41;
 /// How far a zero leaves the line between its poses, tried in units of its scatter: a leap at an instant that may be any
 /// is √(1/12) of a leap of √2 (0.4), a leap at either end of the move √2/2 (0.7), a third zero √(3/2) (1.2).
 const BETWEEN: [f64; 8] = [0.15, 0.3, 0.42, 0.6, 0.85, 1.2, 1.7, 2.4];
-/// Scatters of the accelerometer's zero that its error bars allow for, in units of the reference, together as likely
-/// beforehand as none; and corner times of its walk beside them, s.
-const POSSIBLE_SCATTER: [f64; 8] = [0.35, 0.55, 0.85, 1.3, 2.0, 3.2, 5.0, 10.0];
-const POSSIBLE_CORNER_S: [f64; 4] = [20.0, 80.0, 320.0, 2560.0];
-/// Possibilities less likely than this beside the best change no error bar.
-const LEAST_WEIGHT: f64 = 1e-2;
 /// Rows of moves count this much less while strengths of walk and scatter are chosen.
 const DEAF: f64 = 1e-3;
 
@@ -67,13 +60,13 @@ pub fn tune(
         return Ok(found);
     }
     let between = Evidence::of(&found).search_between(&found);
-    if between == found.strengths.between {
-        return Ok(found);
-    }
     let best = Strengths {
         between,
         ..found.strengths
     };
+    if best == found.strengths {
+        return Ok(found);
+    }
     let likely_scatter = found.likely_scatter;
     let found = fit(session, found.state, best, distortion)?;
     Ok(Fit {
@@ -83,7 +76,7 @@ pub fn tune(
 }
 
 /// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.
-struct Part {
+pub(super) struct Part {
     chain: Chain,
     side: DMatrix<f64>,
     sum: f64,
@@ -91,7 +84,7 @@ struct Part {
 }
 
 /// Normal equations by process, ready to be weighed anew.
-struct Evidence {
+pub(super) struct Evidence {
     at: Strengths,
     /// Readings of the poses, and priors.
     rest: Part,
@@ -101,7 +94,7 @@ struct Evidence {
 }
 
 impl Evidence {
-    fn of(fit: &Fit) -> Self {
+    pub(super) fn of(fit: &Fit) -> Self {
         let layout = fit.layout();
         let part = |is_in: &dyn Fn(&Group) -> bool, is_bordered: bool| {
             let groups: Vec<Group> = fit.groups.iter().filter(|g| is_in(g)).cloned().collect();
@@ -130,7 +123,7 @@ impl Evidence {
     }
 
     /// Normal equations, `Jᵀr`, `Σ r²` and normalisation at other strengths, with the rows of the moves as given.
-    fn combined(
+    pub(super) fn combined(
         &self,
         strengths: &Strengths,
         moves: &Part,
@@ -167,7 +160,7 @@ impl Evidence {
         -0.5 * chi2 - 0.5 * factor.log_det() + weight
     }
 
-    fn at(&self, strengths: &Strengths) -> f64 {
+    pub(super) fn at(&self, strengths: &Strengths) -> f64 {
         self.with(strengths, &self.moves, DEAF)
     }
 
@@ -213,7 +206,7 @@ impl Evidence {
                 *scatter = NO_SCATTER;
             }
         }
-        if best.scatter != likely.scatter {
+        if best != *likely {
             self.search_corners(&mut best, session.rate.is_some());
         }
         best
@@ -248,8 +241,8 @@ impl Evidence {
                 .max_by(|a, b| a.0.total_cmp(&b.0))
                 .map_or(0, |(_, k)| k)
         };
-        let coarse = best_of(&mut (0..N_SCATTER).step_by(COARSE));
-        let reach = COARSE as i32 - 1;
+        let coarse = best_of(&mut (0..=N_SCATTER / COARSE).map(|k| k * COARSE));
+        let reach = COARSE - 1;
         let fine = best_of(&mut ((coarse - reach).max(0)..(coarse + reach + 1).min(N_SCATTER)));
         let shift = peak([fine - 1, fine, fine + 1].map(|k| value(k).0));
         best.scatter[sensor] = SCATTER_FROM * SCATTER_RATIO.powf(f64::from(fine) + shift);
@@ -289,63 +282,8 @@ fn peak([before, here, after]: [f64; 3]) -> f64 {
     }
 }
 
-/// One way the accelerometer's zeros may scatter: how likely, the step that the fit would make, its normal equations.
-pub(super) struct Possible {
-    pub weight: f64,
-    pub step: DVector<f64>,
-    pub factor: Factor,
-}
-
-/// Ways the accelerometer's zeros may scatter and walk, weighed by their evidence (11.12b); nothing where that is not
-/// asked, or known.
-///
-/// Some twenty lengths of gravity less nine unknowns tell a scatter as large as their noise in half of all sessions
-/// only: error bars that take the one best answer for true cover too little there.
-pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Possible>> {
-    if session.scatter.is_none() || session.is_scatter_given {
-        return Ok(Vec::new());
-    }
-    let evidence = Evidence::of(fit);
-    let n_some = POSSIBLE_SCATTER.len() as f64;
-    let mut tried = Vec::new();
-    let some = POSSIBLE_SCATTER.map(|scatter| (scatter, -n_some.ln()));
-    for (scatter, prior) in std::iter::once((NO_SCATTER, 0.0)).chain(some) {
-        for corner in POSSIBLE_CORNER_S {
-            let mut at = fit.strengths;
-            at.scatter = [scatter, fit.likely_scatter[1]];
-            at.corner_s[0] = corner;
-            tried.push((evidence.at(&at) + prior, at));
-        }
-    }
-    let best = tried
-        .iter()
-        .map(|(v, _)| *v)
-        .fold(f64::NEG_INFINITY, f64::max);
-    let mut out = Vec::new();
-    for (value, at) in tried {
-        let weight = (value - best).exp();
-        if weight < LEAST_WEIGHT {
-            continue;
-        }
-        let (moves, _) = reweighed(fit, &at)?;
-        let (chain, side, _, _) = evidence.combined(&at, &moves, 1.0);
-        let factor = chain.factor(RIDGE, None)?;
-        let step = -factor.solve(&side).column(0).into_owned();
-        out.push(Possible {
-            weight,
-            step,
-            factor,
-        });
-    }
-    let total: f64 = out.iter().map(|one| one.weight).sum();
-    for one in &mut out {
-        one.weight /= total;
-    }
-    Ok(out)
-}
-
 /// The rows of the moves at other strengths, and the logarithm of their normalisation.
-fn reweighed(fit: &Fit, strengths: &Strengths) -> Result<(Part, f64)> {
+pub(super) fn reweighed(fit: &Fit, strengths: &Strengths) -> Result<(Part, f64)> {
     let layout = fit.layout();
     let weights = Weights::of(&fit.passed, strengths)?;
     let mut weight = 0.0;

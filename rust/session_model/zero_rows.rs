@@ -37,19 +37,7 @@ impl Session {
         for (s, (sensor, zero, column, walk, scatter)) in sensors.into_iter().enumerate() {
             let domain = [Domain::StaticForce, Domain::StaticRate][s];
             let Some(sensor) = sensor else {
-                // No gyro: its unknowns are pinned so that the system stays regular.
-                for i in 0..layout.n_poses {
-                    let mut group =
-                        Group::of(DVector::zeros(3), layout, i, Domain::Prior, Kind::Prior);
-                    pin(&mut group.rows, column, 1.0);
-                    if layout.pose == N_POSE_SCATTER {
-                        let mut own =
-                            Group::of(DVector::zeros(3), layout, i, Domain::Prior, Kind::Prior);
-                        pin(&mut own.rows, 8, 1.0);
-                        out.push(own);
-                    }
-                    out.push(group);
-                }
+                pin_missing_gyro(layout, column, out);
                 continue;
             };
             let own_column = [11, 8][s];
@@ -92,11 +80,11 @@ impl Session {
                 out.push(group);
             }
             if let Some(reference) = &self.scatter {
-                for i in 0..layout.n_poses {
+                for (i, share) in own.iter().enumerate() {
                     let mut group = Group::of(DVector::zeros(3), layout, i, domain, scatter);
                     for c in 0..3 {
                         let inverse = 1.0 / (reference[s][c] * strengths.scatter[s]);
-                        group.rows.residual[c] = own[i][c] * inverse;
+                        group.rows.residual[c] = share[c] * inverse;
                         group.rows.here[(c, own_column + c)] = inverse;
                         group.log_weight += inverse.ln();
                     }
@@ -104,6 +92,20 @@ impl Session {
                 }
             }
         }
+    }
+}
+
+/// No gyro: its unknowns are pinned so that the system stays regular.
+fn pin_missing_gyro(layout: Layout, column: usize, out: &mut Vec<Group>) {
+    for i in 0..layout.n_poses {
+        let mut group = Group::of(DVector::zeros(3), layout, i, Domain::Prior, Kind::Prior);
+        pin(&mut group.rows, column, 1.0);
+        if layout.pose == N_POSE_SCATTER {
+            let mut own = Group::of(DVector::zeros(3), layout, i, Domain::Prior, Kind::Prior);
+            pin(&mut own.rows, 8, 1.0);
+            out.push(own);
+        }
+        out.push(group);
     }
 }
 

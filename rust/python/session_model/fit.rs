@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::DMatrix;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
@@ -10,14 +10,13 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::read_out::{Blocks, Rows, labels, moves, path};
 use super::{Corners, distortion};
 use crate::python::arrays::{dmatrix, matrix, of3, vectors};
 use crate::python::poisson::vector3;
 use crate::python::{run, run_long};
 use crate::session_model::Session;
 use crate::session_model::fit::Fit;
-use crate::session_model::predict::domain_of;
-use crate::session_model::rows::Domain;
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
@@ -143,59 +142,13 @@ impl SessionFit {
     /// `(rows, 4)` domain, segment, channel and process of every row.
     #[getter]
     fn labels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
-        let mut flat: Vec<i64> = Vec::new();
-        for group in &self.fit.groups {
-            for r in 0..group.rows.len() {
-                let domain = domain_of(group, r);
-                let channel = match domain {
-                    Domain::Dynamics => r - 2,
-                    _ => r % 3,
-                };
-                flat.extend([
-                    domain as i64,
-                    i64::try_from(group.segment).unwrap_or(i64::MAX),
-                    i64::try_from(channel).unwrap_or(i64::MAX),
-                    group.kind as i64,
-                ]);
-            }
-        }
-        let n = flat.len() / 4;
-        flat.to_pyarray(py).reshape([n, 4])
+        labels(py, &self.fit)
     }
 
     /// `(points, 3)` corrected rate and force, `(move samples, 3, 3)` attitude since each move began.
     #[allow(clippy::type_complexity)]
-    fn path<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(
-        Bound<'py, PyArray2<f64>>,
-        Bound<'py, PyArray2<f64>>,
-        Bound<'py, PyArray3<f64>>,
-    )> {
-        let h = self.session.n_poses();
-        let mut rate = vec![Vector3::zeros(); h];
-        let mut force: Vec<Vector3<f64>> = self
-            .fit
-            .state
-            .up
-            .iter()
-            .map(|up| up * self.session.gravity)
-            .collect();
-        let mut attitude: Vec<f64> = Vec::new();
-        for one in &self.fit.passed {
-            rate.extend_from_slice(&one.carried.rate);
-            force.extend_from_slice(&one.carried.force);
-            for turn in &one.carried.attitude {
-                attitude.extend_from_slice(turn.transpose().as_slice());
-            }
-        }
-        let n = attitude.len() / 9;
-        Ok((
-            vectors(py, &rate)?,
-            vectors(py, &force)?,
-            attitude.to_pyarray(py).reshape([n, 3, 3])?,
-        ))
+    fn path<'py>(&self, py: Python<'py>) -> PyResult<(Rows<'py>, Rows<'py>, Blocks<'py>)> {
+        path(py, &self.session, &self.fit)
     }
 
     /// `(moves, 5)` residuals of moves in SI and `(moves, 5, 5)` their noise.
@@ -204,23 +157,7 @@ impl SessionFit {
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
-        let m = self.fit.passed.len();
-        let residual: Vec<f64> = self
-            .fit
-            .passed
-            .iter()
-            .flat_map(|one| one.carried.residual.as_slice().to_vec())
-            .collect();
-        let covariance: Vec<f64> = self
-            .fit
-            .move_covariance()
-            .iter()
-            .flat_map(|cov| cov.as_slice().to_vec())
-            .collect();
-        Ok((
-            residual.to_pyarray(py).reshape([m, 5])?,
-            covariance.to_pyarray(py).reshape([m, 5, 5])?,
-        ))
+        moves(py, &self.fit)
     }
 
     /// `(moves, 5, 5)` whitening of the moves' residuals.

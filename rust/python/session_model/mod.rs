@@ -2,6 +2,7 @@
 
 mod fit;
 mod poses;
+mod read_out;
 
 use std::sync::Arc;
 

@@ -1,0 +1,80 @@
+//! Rows and motion of a fitted session as arrays.
+
+use nalgebra::Vector3;
+use numpy::{PyArray2, PyArray3, PyArrayMethods, ToPyArray};
+use pyo3::prelude::*;
+
+use crate::python::arrays::vectors;
+use crate::session_model::Session;
+use crate::session_model::fit::Fit;
+use crate::session_model::predict::domain_of;
+use crate::session_model::rows::Domain;
+
+pub(super) type Rows<'py> = Bound<'py, PyArray2<f64>>;
+pub(super) type Blocks<'py> = Bound<'py, PyArray3<f64>>;
+
+/// `(rows, 4)` domain, segment, channel and process of every row.
+pub(super) fn labels<'py>(py: Python<'py>, fit: &Fit) -> PyResult<Bound<'py, PyArray2<i64>>> {
+    let mut flat: Vec<i64> = Vec::new();
+    for group in &fit.groups {
+        for r in 0..group.rows.len() {
+            let domain = domain_of(group, r);
+            let channel = match domain {
+                Domain::Dynamics => r - 2,
+                _ => r % 3,
+            };
+            flat.extend([
+                domain as i64,
+                i64::try_from(group.segment).unwrap_or(i64::MAX),
+                i64::try_from(channel).unwrap_or(i64::MAX),
+                group.kind as i64,
+            ]);
+        }
+    }
+    let n = flat.len() / 4;
+    flat.to_pyarray(py).reshape([n, 4])
+}
+
+/// `(points, 3)` corrected rate and force, `(move samples, 3, 3)` attitude since each move began.
+pub(super) fn path<'py>(
+    py: Python<'py>,
+    session: &Session,
+    fit: &Fit,
+) -> PyResult<(Rows<'py>, Rows<'py>, Blocks<'py>)> {
+    let h = session.n_poses();
+    let mut rate = vec![Vector3::zeros(); h];
+    let mut force: Vec<Vector3<f64>> = fit.state.up.iter().map(|up| up * session.gravity).collect();
+    let mut attitude: Vec<f64> = Vec::new();
+    for one in &fit.passed {
+        rate.extend_from_slice(&one.carried.rate);
+        force.extend_from_slice(&one.carried.force);
+        for turn in &one.carried.attitude {
+            attitude.extend_from_slice(turn.transpose().as_slice());
+        }
+    }
+    let n = attitude.len() / 9;
+    Ok((
+        vectors(py, &rate)?,
+        vectors(py, &force)?,
+        attitude.to_pyarray(py).reshape([n, 3, 3])?,
+    ))
+}
+
+/// `(moves, 5)` residuals of moves in SI and `(moves, 5, 5)` their noise.
+pub(super) fn moves<'py>(py: Python<'py>, fit: &Fit) -> PyResult<(Rows<'py>, Blocks<'py>)> {
+    let m = fit.passed.len();
+    let residual: Vec<f64> = fit
+        .passed
+        .iter()
+        .flat_map(|one| one.carried.residual.as_slice().to_vec())
+        .collect();
+    let covariance: Vec<f64> = fit
+        .move_covariance()
+        .iter()
+        .flat_map(|cov| cov.as_slice().to_vec())
+        .collect();
+    Ok((
+        residual.to_pyarray(py).reshape([m, 5])?,
+        covariance.to_pyarray(py).reshape([m, 5, 5])?,
+    ))
+}
