@@ -1,4 +1,4 @@
-"""Figures of docs/gallery.md from public recordings: ``python benches/gallery.py FOLDER`` (they are not part of the repository).
+"""Figures of docs/gallery.md: ``python benches/gallery.py FOLDER`` (the recordings are not part of the repository).
 
 Results only: residuals of poses and moves, nothing of the readings themselves.
 """
@@ -6,9 +6,8 @@ Results only: residuals of poses and moves, nothing of the readings themselves.
 import sys
 from pathlib import Path
 
-from recordings import sessions
-
 import trihedron
+from recordings import sessions
 
 OUTPUT = Path(__file__).parents[1] / "docs" / "figures"
 SHOWN = {
