@@ -237,7 +237,7 @@ REFUSALS = [
     (["capture", "EMPTY", "-o", "LOG"], "it is empty"),
     (["capture", "NOISE", "-o", "LOG"], "no known protocol"),
     (["capture", "NOISE", "--protocol", "morse", "-o", "LOG"], "there is no protocol 'morse'"),
-    (["capture", "NOISE", "--protocol", "none.toml", "-o", "LOG"], "no such protocol file"),
+    (["capture", "NOISE", "--protocol", "none.toml", "-o", "LOG"], "there is no such file"),
     (["capture", "NOISE", "-o", "EXISTS"], "the file exists and was left alone"),
     (["capture", "NOISE", "-o", "missing/log.csv"], "there is no folder"),
     (["capture", "NOISE"], "say where the log goes"),

@@ -19,6 +19,7 @@ def blocks(kind):
 
 def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")  # as the page shows it
     for name, text in blocks("toml"):
         Path(name).write_text(text, encoding="utf-8")
     said = []
