@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from functools import partial
 
 from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import Change, Repeated
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
+from trihedron.report.many_charts import fleet_chart
 from trihedron.report.numbers import how_many, plain_number, with_sigma
 from trihedron.report.sessions import shown
 
@@ -43,6 +45,7 @@ def fleet_report(summary: FleetSummary) -> Document:
             "numbers",
             "Every number by device, one point a log with its own error; the line is the median of devices.",
             later("fleet_figures", "draw_numbers", summary),
+            partial(fleet_chart, summary),
         )
         sections.append(Section("Distributions", (picture,)))
     sections.append(Section("Every log", (_logs(summary),)))

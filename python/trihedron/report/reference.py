@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference
 from trihedron.report.document import Block, Facts, Picture, Table
 from trihedron.report.drawing import later
+from trihedron.report.many_charts import residual_chart
 from trihedron.report.numbers import engineering_exponent, plain_number, power_of_ten, with_sigma
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
@@ -45,6 +48,7 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
             "reference",
             "What is left of the rate, window by window.",
             later("reference_figures", "draw_residual", found),
+            partial(residual_chart, found),
         )
     )
     return tuple(blocks)

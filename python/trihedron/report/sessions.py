@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
+from trihedron.report.chart import Chart
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
@@ -210,10 +212,17 @@ def _sessions(model: SessionsModel) -> Table:
 def _picture(model: SessionsModel) -> Picture:
     return Picture(
         "sessions",
-        "Every number in every recording with its own error (bars), about the common value; the band is one standard "
-        "deviation from recording to recording.",
+        "Every number in every recording with its own error (bars), about the common value.",
         later("sessions_figures", "draw_sessions", model),
+        partial(_chart, model),
     )
+
+
+def _chart(model: SessionsModel) -> Chart:
+    # The drawing's units are this module's, so that it loads after it.
+    from trihedron.report.many_charts import sessions_chart
+
+    return sessions_chart(model)
 
 
 def sessions_columns(model: SessionsModel) -> Columns:

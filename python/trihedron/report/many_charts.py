@@ -1,0 +1,88 @@
+"""What a page draws of many recordings of one unit, of a fleet, and of a comparison with known motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.records.fleet import FleetSummary
+from trihedron.records.reference import AgainstReference
+from trihedron.records.sessions import PARAMETERS, SessionsModel
+from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Line, Panel, Points, Scale
+from trihedron.report.drawn import envelope, said
+from trihedron.report.sessions import shown
+from trihedron.units import degrees_from_radians
+
+
+def sessions_chart(model: SessionsModel) -> Chart:
+    """One panel an id: departures from the common value, along temperature where it is modelled."""
+    thermal = model.thermal
+    place = np.arange(1.0, len(model.sessions) + 1.0)
+    if thermal is not None:
+        place = np.array([session.temperature_degc for session in model.sessions])
+    step = 0.12 * max(float(np.ptp(place)) / max(len(place) - 1, 1), 1e-9)
+    panels = []
+    for name in dict.fromkeys(one.parameter.id for one in model.repeated):
+        picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == name]
+        factor, unit = shown(PARAMETERS[picked[0]].unit)
+        marks: list[Level | Line | Points] = [Level(y=0.0)]
+        for colour, k in zip(AXIS_COLOURS, picked, strict=True):
+            centre = model.repeated[k].value
+            if thermal is not None:
+                term = next(term for term in thermal.terms if term.id == name)
+                column = term.coefficients[:, k - picked[0]]
+                centre = float(column[0])
+                along = np.linspace(place.min(), place.max(), 80)
+                curve = (along - thermal.reference_degc)[:, None] ** np.arange(len(column)) @ column - centre
+                marks.append(Line(along, curve * factor, "", colour, is_thin=True))
+            values = np.array([session.numbers[k] - centre for session in model.sessions]) * factor
+            error = np.array([np.sqrt(max(session.covariance[k, k], 0.0)) for session in model.sessions]) * factor
+            told = [
+                said(f"{session.name}, {PARAMETERS[k].name}", "", v, f"± {e:.2g} {unit}")
+                for session, v, e in zip(model.sessions, values, error, strict=True)
+            ]
+            axis = f"axis {'xyz'[k - picked[0]]}"
+            marks.append(Points(place + (k - picked[0] - 1) * step, values, told, error, axis, colour))
+        x = Scale("temperature [°C]", "°C") if thermal is not None else Scale("recording", whole=True)
+        panels.append(Panel(x, Scale(f"{name}  [{unit}]", unit), tuple(marks), height_px=170))
+    return Chart(tuple(panels), is_linked=True)
+
+
+def fleet_chart(summary: FleetSummary) -> Chart:
+    """One panel a number: devices along the axis, one point a log with its error, about the median of devices."""
+    logs = [log for log in summary.logs if log.numbers is not None and log.std is not None]
+    n = min((len(log.numbers) for log in logs if log.numbers is not None), default=0)
+    serials = list(dict.fromkeys(log.serial for log in logs))
+    strays = {(one.serial, one.parameter) for one in summary.outliers}
+    serial_of = np.array([serials.index(log.serial) for log in logs])
+    order = np.array([int(np.sum(serial_of[:k] == serial_of[k])) for k in range(len(logs))])
+    count = np.bincount(serial_of, minlength=len(serials))[serial_of]
+    across = 1.0 + serial_of + 0.5 * ((order + 0.5) / count - 0.5)
+    numbers = np.array([log.numbers[:n] for log in logs if log.numbers is not None])
+    errors = np.array([log.std[:n] for log in logs if log.std is not None])
+    panels = []
+    for k in range(n):
+        parameter = PARAMETERS[k]
+        factor, unit = shown(parameter.unit)
+        centre = float(np.median([numbers[serial_of == s, k].mean() for s in range(len(serials))]))
+        values, error = (numbers[:, k] - centre) * factor, errors[:, k] * factor
+        is_stray = np.array([(log.serial, parameter) in strays for log in logs])
+        marks: list[Level | Points] = [Level(y=0.0)]
+        for part, colour, name in ((~is_stray, AXIS_COLOURS[0], "a log"), (is_stray, "accent", "unlike the others")):
+            if part.any():
+                told = [said(logs[i].serial, "", values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
+                marks.append(Points(across[part], values[part], told, error[part], name, colour))
+        y = Scale(f"{parameter.id} {parameter.name}  [{unit}]", unit)
+        panels.append(Panel(Scale("device, in the order of the table", whole=True), y, tuple(marks), height_px=150))
+    return Chart(tuple(panels), columns=3)
+
+
+def residual_chart(found: AgainstReference) -> Chart:
+    """What is left of the rate over time, one panel an axis."""
+    left = degrees_from_radians(1.0) * found.residual_rate
+    reach = 1.3 * float(np.percentile(np.abs(left), 99.5))
+    panels = []
+    for k in range(3):
+        marks = (Level(y=0.0), Line(*envelope(found.residual_time_s, left[:, k]), "", AXIS_COLOURS[k], is_thin=True))
+        y = Scale(f"{'xyz'[k]}  [°/s]", "°/s", limits=(-reach, reach))
+        panels.append(Panel(Scale("time of the log [s]", "s"), y, marks, height_px=150))
+    return Chart(tuple(panels), is_linked=True, legend=False)
