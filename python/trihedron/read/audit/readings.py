@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from trihedron.read.audit.clipping import AXES, audit_clipping, find_walls, quantum, short
-from trihedron.read.audit.repeats import CHUNK, Repeats, longest_by_chance
+from trihedron.read.audit.repeats import Repeats, longest_by_chance
 from trihedron.read.rest import Windows
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Severity
@@ -17,11 +17,11 @@ Place = Callable[[int], str]
 
 
 def audit_readings(sensor: str, readings: FloatArray, windows: Windows | None, place: Place) -> list[Finding]:
-    """Findings on one triad (n, 3). ``place(i)`` names sample i for people; memory is bounded by ``CHUNK``."""
-    findings = _non_finite(sensor, readings, place)
+    """Findings on one triad (n, 3). ``place(i)`` names sample i for people; one pass for the usual log."""
+    repeats = Repeats(readings)
+    findings = _non_finite(sensor, repeats, place)
     if len(readings) < 8:
         return findings
-    repeats = Repeats(readings)
     findings += _repeated(sensor, repeats, place)
     walls = find_walls(readings, windows.quiet_noise(sensor) if windows is not None else np.zeros(3))
     findings += audit_clipping(sensor, walls, place)
@@ -33,23 +33,14 @@ def audit_readings(sensor: str, readings: FloatArray, windows: Windows | None, p
     return findings
 
 
-def _non_finite(sensor: str, readings: FloatArray, place: Place) -> list[Finding]:
-    count, first = 0, -1
-    for start in range(0, len(readings), CHUNK):
-        finite = np.isfinite(readings[start : start + CHUNK])
-        if finite.all():
-            continue
-        bad = ~finite.all(axis=1)
-        here = int(np.count_nonzero(bad))
-        if here and first < 0:
-            first = start + int(np.argmax(bad))
-        count += here
-    if not count:
+def _non_finite(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
+    count, first = repeats.n_missing, repeats.first_missing
+    if first is None:
         return []
     return [
         Finding(
             FindingCode.NON_FINITE,
-            Severity.WARNING if count < 0.05 * len(readings) else Severity.SERIOUS,
+            Severity.WARNING if count < 0.05 * repeats.n else Severity.SERIOUS,
             f"The {short(sensor)} has {count} rows without a finite reading (first: {place(first)}).",
             "Lost samples, or a logger that writes NaN.",
             "These rows are left out; nothing is made up in their place.",

@@ -8,7 +8,9 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from trihedron import _core
 from trihedron.read.clock.rate import usual_step
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Sampling, Severity, StampKind
 from trihedron.records.sampling import UNJUDGED
@@ -40,33 +42,34 @@ def audit_timing(
     usual = usual_step(time_s)
     if not usual > 0:
         return []
-    step = np.diff(time_s)
-    findings = _duplicates(step if stamps_s is None else np.diff(stamps_s), place, is_mended=stamps_s is not None)
+    findings: list[Finding] = []
+    if steps_of(time_s if stamps_s is None else stamps_s).same:
+        findings += _duplicates(np.diff(time_s if stamps_s is None else stamps_s), place, is_mended=stamps_s is not None)
     if lost_behind is not None:
-        findings += _lost(step, lost_behind, place)
+        findings += _lost(np.diff(time_s), lost_behind, place) if lost_behind.any() else []
     elif sampling.kind in (StampKind.LATE, StampKind.SCATTERED):
         pass  # a late stamp looks like a loss: how many are lost is not told
     else:
-        batched = bool(findings) and np.count_nonzero(step == 0) > 0.2 * len(step)
-        gaps = np.flatnonzero(step > (5.0 if batched else GAP_STEPS) * usual)
-        lost = np.zeros(len(step), dtype=np.int64)
-        lost[gaps] = np.maximum(np.rint(step[gaps] / usual) - 1, 0)
-        findings += _gap(step, gaps, lost, place) if len(gaps) else []
+        batched = bool(findings) and steps_of(time_s).same > 0.2 * (len(time_s) - 1)
+        gaps = _core.steps_above(time_s, (5.0 if batched else GAP_STEPS) * usual)
+        if len(gaps):
+            step = np.diff(time_s)
+            lost = np.zeros(len(step), dtype=np.int64)
+            lost[gaps] = np.maximum(np.rint(step[gaps] / usual) - 1, 0)
+            findings += _gap(step, gaps, lost, place)
+    stamps = time_s
     if stamps_s is not None:
-        usual = usual_step(stamps_s)
-        step = np.diff(stamps_s)
-    is_inside = (step <= GAP_STEPS * usual) & (step > 0)
-    inside = step if is_inside.all() else step[is_inside]
-    jitter = float(inside.std())
-    mean = float(inside.mean())
+        usual, stamps = usual_step(stamps_s), stamps_s
+    count, total, jitter, least, most = _core.inside_steps(stamps, 0.0, GAP_STEPS * usual)
+    mean = total / count
     if jitter > JITTER_STEPS * mean:
         findings.append(
             Finding(
                 FindingCode.TIME_JITTER,
                 Severity.NOTE if jitter < 0.2 * mean or stamps_s is not None else Severity.WARNING,
                 f"Steps between stamps vary by {1e3 * jitter:.3g} ms rms (median {1e3 * usual:.5g} ms = "
-                f"{1 / usual:.5g} Hz, mean {1e3 * mean:.5g} ms = {1 / mean:.5g} Hz, {1e3 * float(inside.min()):.3g} to "
-                f"{1e3 * float(inside.max()):.3g} ms)"
+                f"{1 / usual:.5g} Hz, mean {1e3 * mean:.5g} ms = {1 / mean:.5g} Hz, {1e3 * least:.3g} to "
+                f"{1e3 * most:.3g} ms)"
                 + (", and no even clock lies behind them" if sampling.kind is StampKind.IRREGULAR else "")
                 + f"; the rate used is {rate_hz:.5g} Hz.",
                 "Stamps taken when the data arrived, or rounded."

@@ -65,7 +65,10 @@ def find_period(time_s: FloatArray) -> Period:
     cell = mean_step / (2.0 * GRID_HIGHEST)
     size = max(float(w[-1]) for w in windows) / cell
     length = int(fft.next_fast_len(int(4 * size) + 16, real=True))
+    # Sharing stamps linearly between neighbouring cells lowers a frequency by sinc², undone here.
+    damped = np.sinc(np.arange(length // 2 + 1) / length) ** 2
     power = np.average([_phase_sum(w / cell, length) for w in windows], axis=0, weights=[len(w) for w in windows])
+    power /= damped**2
     threshold = float(stats.gamma.isf(CHANCE, len(windows)) / stats.gamma.median(len(windows)))
     spectrum = _Spectrum(np.asarray(power), mean_step / (length * cell), int(2 * length / size) + 1, threshold)
     line = _first_line(windows, mean_step, spectrum)
@@ -162,9 +165,7 @@ def _phase_sum(position: FloatArray, length: int) -> FloatArray:
     taper = np.sin(np.pi * (np.arange(len(position)) + 0.5) / len(position)) ** 2
     weight = np.bincount(cell, (1.0 - share) * taper, length) + np.bincount(cell + 1, share * taper, length)
     spectrum = fft.rfft(weight[:length])
-    # Sharing stamps linearly between neighbouring cells lowers a frequency by sinc², undone here.
-    damped = np.sinc(np.arange(len(spectrum)) / length) ** 2
-    return np.asarray((np.abs(spectrum) / damped / taper.sum()) ** 2)
+    return np.asarray((np.abs(spectrum) / taper.sum()) ** 2)
 
 
 def _poll(spectrum: _Spectrum) -> float:

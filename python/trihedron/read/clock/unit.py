@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from trihedron.read.clock.rate import usual_step
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.errors import ReadError
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Severity
@@ -64,7 +65,7 @@ def time_unit(
         return parse_time_unit(given)
     if named:
         return named
-    n_steps, n_forward = len(raw) - 1, int(np.count_nonzero(raw[1:] > raw[:-1]))
+    n_steps, n_forward = len(raw) - 1, steps_of(raw).forward
     if not n_forward:
         return "s"
     # Stamps that several rows share: a row lasts the span over the rows, not the step between stamps.
@@ -137,7 +138,7 @@ def _quickest_turns(accelerometer: FloatArray | None) -> tuple[int | None, int |
     rows, any_turn = 1, None
     while rows + _SIDE < len(mean):
         lag = rows + _SIDE - 1
-        has_turned = (mean[:-lag] * mean[lag:]).sum(axis=1) < math.cos(turn)
+        has_turned = np.einsum("ij,ij->i", mean[:-lag], mean[lag:]) < math.cos(turn)
         if np.any(has_turned):
             any_turn = any_turn or rows + 1
             quiet = spread <= 0.1 * turn * _SIDE / (rows + 1)

@@ -84,7 +84,10 @@ def detect(text: str) -> Layout | None:
     body = [line.strip(" ") for line in lines if line.strip() and not is_comment(line.strip())]
     tail = body[len(body) // 2 :][-200:]
     candidates = [(",", False), ("\t", False), (";", False), (" ", False), (";", True), ("\t", True), (" ", True)]
-    judged = [(_judge(tail, sep, comma), -i, sep, comma) for i, (sep, comma) in enumerate(candidates)]
+    # Separators that no line holds all explain the lines alike.
+    found = {(sep, comma): sep if any(sep in line for line in tail) else "\0" for sep, comma in candidates}
+    scores = {key: _judge(tail, *key) for key in {(found[key], key[1]) for key in candidates}}
+    judged = [(scores[found[key], key[1]], -i, *key) for i, key in enumerate(candidates)]
     (score, n_fields), _, separator, decimal_comma = max(judged, key=lambda j: (j[0][0], j[1]))
     if score <= 0.0:
         return None
