@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
 
@@ -55,7 +55,7 @@ def missing_samples(recording: Recording, segments: Segments) -> list[Finding]:
     low, high = WHOLE
     n_long = int(np.count_nonzero(usable & (extra > low) & (extra < high)))
     n_short = int(np.count_nonzero(usable & (extra < -low) & (extra > -high)))
-    if n_long < FEWEST or float(binom.sf(n_long - 1, n_long + n_short, 0.5)) > CHANCE:
+    if n_long < FEWEST or float(bdtrc(n_long - 1, n_long + n_short, 0.5)) > CHANCE:
         return []
     n = int(np.count_nonzero(sharp))
     share, error = (n_long - n_short) / n, float(np.sqrt(n_long + n_short)) / n

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc, chdtri
 
 from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
 
@@ -204,7 +204,7 @@ def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) ->
         distances = _distances(_with_scatter(system, used, sigma_turn_rad), used)
         if not distances:
             break
-        limit = float(chi2_distribution.isf(FALSE_ALARM / len(distances), 3))
+        limit = float(chdtri(3, FALSE_ALARM / len(distances)))
         worst = max(distances, key=lambda index: distances[index])
         if distances[worst] <= limit:
             break
@@ -248,7 +248,7 @@ def _matching_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
     """Scatter along and across the turns by moments; none where the rate noise explains the residuals."""
     system = replace(system, sigma_turn=0.0, sigma_tilt=0.0)
     fit = solve(system, used)
-    if fit.dof < 1 or chi2_distribution.sf(fit.chi2, fit.dof) > FALSE_ALARM:
+    if fit.dof < 1 or chdtrc(fit.dof, fit.chi2) > FALSE_ALARM:
         return system
     k = int(np.count_nonzero(used))
     for _ in range(3):
@@ -262,7 +262,7 @@ def _matching_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
     return system
 
 
-MEDIAN_1, MEDIAN_2 = (float(chi2_distribution.median(n)) for n in (1, 2))
+MEDIAN_1, MEDIAN_2 = (float(chdtri(n, 0.5)) for n in (1, 2))
 
 
 def _components(system: TurnSystem, raw: FloatArray) -> tuple[FloatArray, FloatArray, float]:

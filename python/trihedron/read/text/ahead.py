@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.errors import ReadError, from_os_error
-from trihedron.read.text.blocks import BLOCK_BYTES, Cursor
+from trihedron.read.text import blocks
+from trihedron.read.text.blocks import Cursor
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -29,23 +30,24 @@ def blocks_ahead(path: Path, cursor: Cursor, digest: hashlib._Hash) -> Generator
     ReadError
         When the file cannot be read, or has no line ends.
     """
+    most = blocks.BLOCK_BYTES
     try:
         with path.open("rb", buffering=0) as stream, ThreadPoolExecutor(1) as reader:
 
             def fill(buffer: Bytes) -> int:
                 view, size = memoryview(buffer)[_ROOM:], 0
-                while size < BLOCK_BYTES and (count := stream.readinto(view[size:])):
+                while size < most and (count := stream.readinto(view[size:])):
                     size += count
                 digest.update(view[:size])
                 return size
 
-            buffers = [np.empty(_ROOM + BLOCK_BYTES, dtype=np.uint8) for _ in range(2)]
+            buffers = [np.empty(_ROOM + most, dtype=np.uint8) for _ in range(2)]
             filling = reader.submit(fill, buffers[0])
             rest = np.empty(0, dtype=np.uint8)
             while True:
                 size, buffer = filling.result(), buffers[0]
                 block = _joined(rest, buffer, size)
-                cursor.is_last = size < BLOCK_BYTES
+                cursor.is_last = size < most
                 if cursor.is_last:
                     if len(block):
                         yield block

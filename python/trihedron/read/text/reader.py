@@ -11,7 +11,6 @@ from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
-import polars as pl
 
 from trihedron import _core
 from trihedron.read.columns import find_columns
@@ -267,6 +266,8 @@ class TextReader:
         return found.number[:-1], found.text[: found.text.rfind(b"\n", 0, -1) + 1]
 
     def _parse(self, data: bytes, lines: npt.NDArray[np.int64], layout: Layout) -> None:
+        import polars as pl
+
         schema: dict[str, type[pl.DataType]] = {
             str(i): pl.String if i in self.text_columns else pl.Float64 for i in range(layout.n_fields)
         }
