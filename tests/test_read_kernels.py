@@ -11,7 +11,9 @@ LENGTHS = (2, 3, 7, 64, 65, 66, 129, 65536, 65537, 200_003)
 def stamps(n: int, seed: int) -> np.ndarray:
     """Steps of every kind: usual ones that differ by rounding, none, long ones, some back."""
     rng = np.random.default_rng(seed)
-    step = rng.choice([0.005, 0.005, 0.005, 0.0, 0.01, 0.3, -0.002, 7e-9], n, p=[0.3, 0.3, 0.3, 0.02, 0.04, 0.02, 0.01, 0.01])
+    step = rng.choice(
+        [0.005, 0.005, 0.005, 0.0, 0.01, 0.3, -0.002, 7e-9], n, p=[0.3, 0.3, 0.3, 0.02, 0.04, 0.02, 0.01, 0.01]
+    )
     return np.cumsum(step)
 
 
@@ -136,7 +138,10 @@ def test_readings_that_are_no_numbers_have_no_extremes():
 
 
 def test_numbers_short_and_long_stand_where_they_belong():
-    cells = [["-0.5", "12345678", "+7.", ".25", "1234567.1234567"], ["1e3", "-123456789.5", "0.12345678", "00", "9"]] * 50
+    cells = [
+        ["-0.5", "12345678", "+7.", ".25", "1234567.1234567"],
+        ["1e3", "-123456789.5", "0.12345678", "00", "9"],
+    ] * 50
     text = "\n".join(",".join(row) for row in cells).encode()
     blocks = [np.full((120, 2), np.nan), np.full((120, 3), np.nan)]
     places = [(1, 2), (0, 0), (1, 0), (0, 1), (1, 1)]

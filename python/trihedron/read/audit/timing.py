@@ -44,7 +44,9 @@ def audit_timing(
         return []
     findings: list[Finding] = []
     if steps_of(time_s if stamps_s is None else stamps_s).same:
-        findings += _duplicates(np.diff(time_s if stamps_s is None else stamps_s), place, is_mended=stamps_s is not None)
+        findings += _duplicates(
+            np.diff(time_s if stamps_s is None else stamps_s), place, is_mended=stamps_s is not None
+        )
     if lost_behind is not None:
         findings += _lost(np.diff(time_s), lost_behind, place) if lost_behind.any() else []
     elif sampling.kind in (StampKind.LATE, StampKind.SCATTERED):

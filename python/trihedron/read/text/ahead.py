@@ -35,7 +35,7 @@ def blocks_ahead(path: Path, cursor: Cursor, digest: hashlib._Hash) -> Generator
         with path.open("rb", buffering=0) as stream, ThreadPoolExecutor(1) as reader:
 
             def fill(buffer: Bytes) -> int:
-                view, size = memoryview(buffer)[_ROOM:], 0
+                view, size = buffer.data[_ROOM:], 0
                 while size < most and (count := stream.readinto(view[size:])):
                     size += count
                 digest.update(view[:size])
