@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
-from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.observations import FloatArray, Observations
 
 BAND_SIGMA = 4.0
 """A plateau is a run of samples within four standard deviations of the limit."""
@@ -44,6 +45,15 @@ class Plateau:
     stop: int
     level: float
     is_rail: bool = False
+
+
+@lru_cache(maxsize=16)
+def plateaus_of(obs: Observations, *, is_gyro: bool) -> list[Plateau]:
+    """Runs on a common limit of one sensor as it is now observed, found once."""
+    raw, density = (obs.raw_rate, obs.rate_density) if is_gyro else (obs.raw_force, obs.force_density)
+    if raw is None or density is None:
+        return []
+    return plateaus(raw, density * np.sqrt(obs.recording.rate_hz), obs.move_ranges)
 
 
 def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int], ...]) -> list[Plateau]:
