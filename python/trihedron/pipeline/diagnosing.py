@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,7 +19,7 @@ from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
-from trihedron.pipeline.diagnosing_rest import at_rest, diagnosed_at_rest
+from trihedron.pipeline.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
 from trihedron.pipeline.improving import driven
 from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segments_of
 from trihedron.pipeline.referring import AnyReference
@@ -117,7 +117,8 @@ def _of_poses(
     tell(0.02, "finding still poses")
     segments = segments_of(segments, recording)
     findings += segments.findings
-    resting = None if against is not None else at_rest(recording, segments, known, gravity)
+    calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
+    resting = None if against is not None else at_rest(recording, segments, known, gravity, calibrated)
     if resting is not None:
         tell(0.1, "looking at zeros and lines")
         return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
@@ -130,7 +131,7 @@ def _of_poses(
         findings += _protocol(simulated.segments, segments)
     begun = 0.05 if simulated is None else 0.45
     tell(begun, "calibrating")
-    used, free = _start(recording, segments, gravity, known)
+    used, free = _start(calibrated, gravity, known)
     recording_used, segments_used = recording, segments
     # Where the poses leave the model open the twin starts from nominal values, for the gyro too.
     if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
@@ -178,18 +179,16 @@ class _Free:
     sampled: Sampled
 
 
-def _start(
-    recording: Recording, segments: Segments, gravity: float, known: Calibration | None
-) -> tuple[Calibration, bool]:
+def _start(calibrated: Calibrated, gravity: float, known: Calibration | None) -> tuple[Calibration, bool]:
     """The model that the search begins from, and whether it is the recording's own.
 
     A given model is compared with what the recording says of itself. Where its poses are too few to say it, the given
     numbers stay, with their error bars as knowledge.
     """
     if known is None:
-        return calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration, True
+        return calibrated(), True
     try:
-        own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+        own = calibrated()
     except ValueError:
         return replace(known, gravity_m_s2=gravity), False
     is_poor = is_open(own) or (known.gyroscope is not None and own.gyroscope is None)
