@@ -21,7 +21,7 @@ from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import FloatArray, Progress, Table
-from trihedron.records import Finding, FindingCode, Recording, Severity
+from trihedron.records import Finding, FindingCode, Recording
 from trihedron.units import AccelerationUnit, RateUnit
 
 STAMPS = "stamps as logged [s]"
@@ -130,14 +130,12 @@ def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
     missing = sensors.rows_in_file - sensors.rows_read - reported
     if missing:
         findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.ROWS_UNACCOUNTED,
-                Severity.SERIOUS,
-                f"The file holds {sensors.rows_in_file} rows, {sensors.rows_read} were read and {reported} reported as "
-                f"left out: {missing} are not accounted for.",
-                "A fault of the reader.",
-                "Report it with the file; until then convert the log to CSV with another program.",
-                MappingProxyType({"count": float(missing)}),
+                in_file=sensors.rows_in_file,
+                read=sensors.rows_read,
+                reported=reported,
+                count=missing,
             )
         )
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
-
 import numpy as np
 import numpy.typing as npt
 from scipy.stats import binom
@@ -61,25 +59,16 @@ def missing_samples(recording: Recording, segments: Segments) -> list[Finding]:
     share, error = (n_long - n_short) / n, float(np.sqrt(n_long + n_short)) / n
     first = float(recording.time_s[index[usable & (extra > low) & (extra < high)][0]])
     return [
-        Finding(
+        Finding.of(
             FindingCode.SAMPLES_LOST,
-            Severity.SERIOUS if share > SERIOUS_SHARE else Severity.WARNING,
-            f"Samples are missing though the stamps run on evenly: {n_long} of {n} steps in motion are one sample too "
-            f"long, {n_short} too short (first at {first:.2f} s): about {100 * share:.2g} ± {100 * error:.1g} % of the "
-            "samples, and of every turn, are lost. The gyro's scale factors are too large by about that.",
-            "A link or a logger that drops samples and stamps, or numbers, what is left anew.",
-            "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
-            "`trihedron diagnose` puts single losses back.",
-            MappingProxyType(
-                {
-                    "long_steps": float(n_long),
-                    "short_steps": float(n_short),
-                    "steps": float(n),
-                    "lost_share": share,
-                    "sigma_lost_share": error,
-                    "first_s": first,
-                }
-            ),
+            "seen-in-motion",
+            severity=Severity.SERIOUS if share > SERIOUS_SHARE else Severity.WARNING,
+            long_steps=n_long,
+            short_steps=n_short,
+            steps=n,
+            lost_share=share,
+            sigma_lost_share=error,
+            first_s=first,
         )
     ]
 
