@@ -51,7 +51,7 @@ def poses(n, rng):
     """Joint angles (n, 7) whose verticals tell nine numbers: the best next one of thirty, over and over."""
     tried = rng.uniform(-1.5, 1.5, (400, 7)) * [2.0, 1.0, 2.0, 0.8, 1.6, 1.0, 1.6]
     up = np.array([matrix(attitude(row[None])[0])[2] for row in tried])
-    rows = np.concatenate([(up[:, :, None] * up[:, None, :])[:, *np.tril_indices(3)], up], axis=1)
+    rows = np.concatenate([(up[:, :, None] * up[:, None, :])[(slice(None), *np.tril_indices(3))], up], axis=1)
     chosen = [int(rng.integers(400))]
     information = 1e-3 * np.eye(9) + np.outer(rows[chosen[0]], rows[chosen[0]])
     while len(chosen) < n:

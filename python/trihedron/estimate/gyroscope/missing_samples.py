@@ -84,8 +84,8 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
             FindingCode.SAMPLES_LOST,
             Severity.SERIOUS if share > min(SERIOUS_SHARE, sigma_scale) else Severity.WARNING,
             f"Samples are missing though the stamps run on evenly: {n_long} of {n} steps in motion are one sample "
-            f"too long, {n_short} too short (first at {first_s:.2f} s): about {100 * share:.2g} ± {100 * error:.1g} % of the "
-            "samples, and of every turn, are lost. The gyro's scale factors are too large by about that.",
+            f"too long, {n_short} too short (first at {first_s:.2f} s): about {100 * share:.2g} ± {100 * error:.1g} % "
+            "of the samples, and of every turn, are lost. The gyro's scale factors are too large by about that.",
             "A link or a logger that drops samples and stamps, or numbers, what is left anew.",
             "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
             "`trihedron diagnose` puts single losses back.",
