@@ -2,7 +2,7 @@
 
 Every joint follows a ramp behind three lags (a muscle pulls, the limb follows), starts when it likes, and the move ends
 where the support stops it: with a speed left, a knock, and a soft settling. Attitude and position come from the same
-joint angles, so that what the accelerometer feels is what the arm does. Rates are averages of the true attitude's change.
+joint angles, so that what the accelerometer feels is what the arm does. Rates are averages of the attitude's change.
 Noise is made by sums of first-order processes. Nothing is shared with ``motion.py`` but quaternion products.
 """
 
