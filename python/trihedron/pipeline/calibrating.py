@@ -122,7 +122,11 @@ def calibrate(
         )
     calibration = in_frame(calibration, wanted)
     scale = [] if calibration.gyroscope is None else scale_findings(calibration.gyroscope.S, recording.gyroscope_unit)
-    missing = [] if calibration.gyroscope is None else missing_samples(recording, segments)
+    missing = []
+    if calibration.gyroscope is not None:
+        gyro = calibration.gyroscope
+        relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
+        missing = missing_samples(recording, segments, float(np.median(relative)))
     findings = (*said, *recording.findings, *segments.findings, *calibration.findings, *scale, *missing)
     return CalibrationResult(replace(calibration, findings=findings), segments, recording)
 
