@@ -14,7 +14,7 @@ from trihedron.read.audit import audit_counter, audit_readings, audit_steps, aud
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
 from trihedron.read.devices import Choice, by_sensor
-from trihedron.read.errors import ReadError
+from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.memory import table_of
 from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
@@ -111,7 +111,12 @@ def read_recording(
 
 
 def _of_file(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
-    return of_tables(read_tables(path, options.choice, options.progress), sensor, options)
+    try:
+        tables = read_tables(path, options.choice, options.progress)
+    except OSError as error:
+        # A name too long, a folder that may not be entered: what the readers of formats did not meet.
+        raise from_os_error(path, error) from None
+    return of_tables(tables, sensor, options)
 
 
 def of_tables(tables: tuple[Table, ...], sensor: Sensor | None, options: Options) -> Sensors:

@@ -10,6 +10,9 @@ from numbers import Real
 from types import MappingProxyType
 from typing import Any
 
+from trihedron.records.checked import kind_of, word_of
+from trihedron.records.frozen import Frozen, freeze
+
 
 class Severity(str, Enum):
     """How far a finding reaches.
@@ -135,7 +138,7 @@ class FindingCode(str, Enum):
 
 
 @dataclass(frozen=True)
-class Finding:
+class Finding(Frozen):
     """One thing noticed.
 
     ``seen`` is one sentence with the number and the place; ``cause`` the likely reason; ``action`` what to do next.
@@ -148,6 +151,14 @@ class Finding:
     cause: str = ""
     action: str = ""
     numbers: MappingProxyType[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "code", word_of("code", self.code, FindingCode))
+        object.__setattr__(self, "severity", word_of("severity", self.severity, Severity))
+        for name in ("seen", "cause", "action"):
+            kind_of(name, getattr(self, name), str)
+        kind_of("numbers", self.numbers, dict, MappingProxyType)
+        freeze(self)
 
     @classmethod
     def of(
