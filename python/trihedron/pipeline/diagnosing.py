@@ -6,7 +6,6 @@ import os
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from trihedron.diagnose import diagnose_recording
@@ -27,7 +26,7 @@ from trihedron.pipeline.improving import driven
 from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segment, segments_of
 from trihedron.pipeline.referring import AnyReference
 from trihedron.pipeline.results import DiagnosisResult
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, Severity
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
@@ -253,25 +252,12 @@ def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
     n, m = simulated.n_holds, segments.n_holds
     if n == m:
         return ()
-    finding = Finding(
-        FindingCode.PROTOCOL_DIFFERS,
-        Severity.NOTE,
-        f"The simulated recording has {n} still poses and the real one {m}.",
-        "They do not follow the same protocol, or a pose was not still.",
-        "Numbers, noise and physics are compared all the same, each from its own poses; only their error bars differ.",
-        MappingProxyType({"n_simulated": float(n), "n_real": float(m)}),
-    )
+    finding = Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m)
     return (finding,)
 
 
 def _gyroscope_left_out() -> Finding:
-    return Finding(
-        FindingCode.GYROSCOPE_LEFT_OUT,
-        Severity.WARNING,
-        "The gyro was left out: the model has none.",
-        "It was made without gyro readings, or they did not suffice.",
-        "Give a calibration of both sensors.",
-    )
+    return Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "model-has-none")
 
 
 def _accelerometer_only(recording: Recording, segments: Segments) -> tuple[Recording, Segments]:

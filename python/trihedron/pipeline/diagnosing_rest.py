@@ -18,7 +18,7 @@ from trihedron.diagnose.session.starting_point import (
 )
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.results import DiagnosisResult
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, Severity
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, LinearModel
 from trihedron.units import acceleration_to_si, rate_to_si
 
@@ -158,11 +158,4 @@ def _calibration(model: LinearModel, gravity_m_s2: float, source: str) -> Calibr
 
 def _too_few(recording: Recording, segments: Segments) -> Finding:
     lasts = float(recording.time_s[-1] - recording.time_s[0])
-    return Finding(
-        FindingCode.NOT_FIT,
-        Severity.NOTE,
-        f"One or two orientations in {lasts:.0f} s: scales, angles between axes and moves are not tested.",
-        "A static log, a chamber log or a table that stands still.",
-        "To test those too, hold 18 or more poses of 3 to 5 s in different directions (docs/procedure.md).",
-        MappingProxyType({"n_holds": float(segments.n_holds)}),
-    )
+    return Finding.of(FindingCode.NOT_FIT, "few-orientations", duration_s=lasts, n_holds=segments.n_holds)

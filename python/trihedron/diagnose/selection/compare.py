@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms, weighted_rms
 from trihedron.diagnose.selection.model import StepwiseModel, held_out
 from trihedron.diagnose.selection.score import Scored, dispersion
 from trihedron.diagnose.session.observations import FloatArray
@@ -145,10 +145,17 @@ class Comparison:
 
     @property
     def falls(self) -> bool:
-        """Whether held-out rms in physical units falls visibly in a domain of the effect's own sensor."""
+        """Whether held-out rms in physical units falls visibly in a domain of the effect's own sensor.
+
+        At rest plain, or with every reading weighted by what the base knows of its noise and scatter.
+        """
         before, _ = physical_rms(self.base, self.base_prediction.innovation)
         after, _ = physical_rms(self.fitted, self.prediction.innovation)
         own = own_domains(self.variant.distortion)
+        if any(after[d] < VISIBLE * before[d] for d in own if d in after and d in before):
+            return True
+        before = weighted_rms(self.base, self.base_prediction.innovation, self.base)
+        after = weighted_rms(self.fitted, self.prediction.innovation, self.base)
         return any(after[d] < VISIBLE * before[d] for d in own if d in after and d in before)
 
     @property

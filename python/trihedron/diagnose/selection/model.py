@@ -16,13 +16,22 @@ from trihedron.records.diagnosis import HeldOut
 
 
 @dataclass(frozen=True, eq=False)
+class Alternative:
+    """An effect that might stand in another's place, its columns, and how many directions of them are seen."""
+
+    effect: Effect
+    variant: Variant
+    rank: int
+
+
+@dataclass(frozen=True, eq=False)
 class Accepted:
     """One effect in the model, before it is put into words.
 
     ``variant`` are its columns in the fit, ``evidence`` what its own test found; one of the two may be ``None``.
     ``gain`` is what it wins in 2 log-likelihood (or in chi-square, where it changes the observations) beside all the
     others, ``rivals`` are ids of effects that explain the recording as well, ``rank`` counts the directions of its
-    columns that the calibration does not imitate.
+    columns that the calibration does not imitate, ``alternatives`` are variants that explained much when it was chosen.
     """
 
     effect: Effect
@@ -34,6 +43,7 @@ class Accepted:
     held_out: tuple[HeldOut, ...]
     rivals: tuple[str, ...] = ()
     rank: int = 0
+    alternatives: tuple[Alternative, ...] = ()
 
     @property
     def reobserves(self) -> bool:
