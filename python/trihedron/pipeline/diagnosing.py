@@ -17,10 +17,13 @@ from trihedron.pipeline.beside import beside, shared_log
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
+from trihedron.pipeline.comparing_frames import rates_of_world, sign_of_gravity
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
+from trihedron.pipeline.comparing_slow import slow_noise
+from trihedron.pipeline.comparing_stages import with_noise_stage
 from trihedron.pipeline.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
 from trihedron.pipeline.improving import driven
-from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segments_of
+from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segment, segments_of
 from trihedron.pipeline.referring import AnyReference
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
@@ -149,10 +152,23 @@ def _of_poses(
         given = replace(known, gravity_m_s2=gravity)
         noise: tuple[NoiseDifference, ...] = ()
         if simulated is not None:
-            ours = sampled(recording_used, segments_used, model_of_diagnosis(found))
-            noise = compare_noise(simulated.sampled, ours, alpha=alpha)
+            ours = sampled(recording_used, segments_used.holds, model_of_diagnosis(found))
+            noise = (
+                *simulated.frames,
+                *_frames((simulated.segments, simulated.calibration), (segments, used)),
+                *compare_noise(simulated.sampled, ours, alpha=alpha),
+                *slow_noise(
+                    (simulated.diagnosis, simulated.recording, simulated.segments),
+                    (found, recording_used, segments_used),
+                    alpha=alpha,
+                ),
+            )
         free_simulation = None if simulated is None else simulated.diagnosis
+        fit = model_of_diagnosis(found)
         found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
+        if simulated is not None:
+            stages = with_noise_stage(found.stages, simulated.sampled, recording_used, segments_used, fit)
+            found = replace(found, stages=stages)
         updated, used = used, given
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(
@@ -176,6 +192,8 @@ class _Free:
     segments: Segments
     diagnosis: Diagnosis
     sampled: Sampled
+    recording: Recording
+    frames: tuple[NoiseDifference, ...] = ()
 
 
 def _start(calibrated: Calibrated, gravity: float, known: Calibration | None) -> tuple[Calibration, bool]:
@@ -209,13 +227,24 @@ def _simulated_log(against: GivenModel, recording: Recording, segments: Segments
 
 
 def _simulation(recording: Recording, gravity: float, alpha: float, tell: Progress) -> _Free:
+    of_world = rates_of_world(recording, segment(recording))
+    if of_world is not None:
+        recording = replace(recording, gyroscope=None)
     try:
         result = calibrate(recording, gravity_m_s2=gravity)
     except ValueError as error:
         raise ValueError(f"the simulated recording cannot be calibrated: {error}") from None
     diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=tell)
-    noise = sampled(recording, result.segments, model_of_diagnosis(diagnosis))
-    return _Free(result.calibration, result.segments, diagnosis, noise)
+    noise = sampled(recording, result.segments.holds, model_of_diagnosis(diagnosis))
+    frames = () if of_world is None else (of_world,)
+    return _Free(result.calibration, result.segments, diagnosis, noise, recording, frames)
+
+
+def _frames(
+    simulated: tuple[Segments, Calibration], recording: tuple[Segments, Calibration]
+) -> tuple[NoiseDifference, ...]:
+    turned = sign_of_gravity(simulated, recording)
+    return () if turned is None else (turned,)
 
 
 def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
