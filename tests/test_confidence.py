@@ -8,11 +8,18 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
+from confidence.arm import carried
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import hand, manual, table
 from trihedron import calibrate
 from trihedron.records import FindingCode, Recording
+
+
+def with_losses(f, w, seed, share=0.03):
+    """Readings of a link that drops packets, numbered anew."""
+    kept = np.random.default_rng([14, seed]).random(len(f)) >= share
+    return f[kept], w[kept]
 
 
 def recording_of(f, w, rate):
@@ -101,3 +108,23 @@ def test_a_coarse_gyro_has_the_error_bars_of_its_rounding(bits):
     # At most 27 scores: none beyond four, nor larger together than chance allows once in a thousand.
     assert np.abs(z).max() < 4.0
     assert np.sum(np.square(z)) < 56.0
+
+
+@pytest.mark.parametrize(("make", "move_s"), [(hand, 2.0), (carried, 2.0), (carried, 10.0)])
+def test_lost_samples_with_stamps_remade_are_seen_through_tremor_and_soft_moves(make, move_s):
+    for seed in (41, 42):
+        f, w, rate, _, _ = make(seed, n_poses=12, move_s=move_s)
+        result = calibrate(recording_of(*with_losses(f, w, seed), rate), gravity_m_s2=G)
+        lost = [finding for finding in result.findings if finding.code is FindingCode.SAMPLES_LOST]
+        assert lost
+        assert not result.is_trustworthy
+        # Of some hundred steps that tell, 3 % were lost: within five of its own standard errors and what hides.
+        assert 0.01 < lost[0].numbers["lost_share"] < 0.045
+
+
+@pytest.mark.parametrize("move_s", [0.5, 10.0])
+def test_a_healthy_log_carried_by_an_arm_has_lost_nothing(move_s):
+    for seed in (43, 44, 45):
+        f, w, rate, _, _ = carried(seed, n_poses=12, move_s=move_s)
+        result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
+        assert FindingCode.SAMPLES_LOST not in {finding.code for finding in result.findings}

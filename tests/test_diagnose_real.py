@@ -48,6 +48,17 @@ def test_a_session_with_wild_rotation_at_its_end_is_healthy_but_for_the_range(re
     assert {"static-accel", "static-gyro", "moves", "dynamics"} <= set(agree)
 
 
+def test_two_runs_of_one_unit_give_one_g_sensitivity_and_scatter_under_restless_poses(real_data: Path) -> None:
+    sizes = []
+    for run in (2, 3):
+        d = diagnosed(9.79871, path=real_data / f"kim/kim_imu_good{run}.txt")
+        assert {"gyro-g-sensitivity", "gyro-zero-scatter"} <= {e.id for e in d.effects}
+        matrix = next(e for e in d.effects if e.id == "gyro-g-sensitivity")
+        sizes.append(next((p.value, p.std) for p in matrix.parameters if p.name == "G_xx"))
+    (a, sigma_a), (b, sigma_b) = sizes
+    assert abs(a - b) < 3.0 * np.hypot(sigma_a, sigma_b) < 0.5 * abs(a)
+
+
 def test_stamps_on_a_coarse_grid_are_not_when_the_samples_were_taken(real_data: Path) -> None:
     recording = read_recording(real_data / "kim/kim_imu_good1.txt")
     # Reading has taken the even clock behind them already; here the stamps are put back as they were logged.

@@ -1,16 +1,20 @@
 """What must not be swallowed, and what is no answer."""
 
+import itertools
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import trihedron
 from trihedron.diagnose.effects.plateaus import plateaus, shared_levels
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
 from trihedron.diagnose.selection import verdict
 from trihedron.pipeline import extending
 from trihedron.records import Hold
 from trihedron.records.diagnosis import DomainTest, Stage, StageDomain
+from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
 RATE_HZ = 100.0
 
@@ -84,3 +88,28 @@ def test_an_extension_that_predicts_worse_stays_linear(after, stays):
     domain = [StageDomain("static-accel", rms, 1.0, "m/s^2") for rms in (0.0035, after)]
     diagnosis = SimpleNamespace(stages=(Stage("numbers", (domain[0],)), Stage("effects", (domain[1],))))
     assert (extending._spoilt(diagnosis) is not None) == stays
+
+
+def test_restless_poses_hide_neither_a_scatter_nor_the_g_sensitivity_beside_it():
+    # One axis scatters, another follows gravity, three poses sway: means over poses and axes show only the swaying.
+    rng = np.random.default_rng(77)
+    profile = profile_by_name("mpu")
+    accelerometer, gyroscope = profile.unit(7)
+    motion = hand_session(22, hold_s=4.0, move_s=2.0, first_hold_s=8.0, layout=7)
+    recording, truth = simulate(Scenario(motion, "session", accelerometer, gyroscope, profile.clock), 7)
+    holds = trihedron.segment(recording).holds
+    scale = np.radians(1.0) / np.diag(np.asarray(gyroscope.S))  # one degree a second, in counts
+    gyro = recording.gyroscope.copy()
+    force = recording.accelerometer[:, 0] * accelerometer.S[0][0]
+    gyro[:, 0] += 0.004 * force * scale[0]
+    starts = [h.start for h in holds] + [len(gyro)]
+    for k, (a, b) in enumerate(itertools.pairwise(starts)):
+        gyro[a:b, 2] += rng.normal(0.0, 0.06) * scale[2]
+        if k in (4, 11, 17):
+            sway = np.sin(2.0 * np.pi * 0.7 * np.arange(holds[k].stop - a) / recording.rate_hz)
+            gyro[a : holds[k].stop, 1] += 1.0 * sway * scale[1]
+    found = trihedron.diagnose(replace(recording, gyroscope=gyro), gravity_m_s2=truth.gravity_m_s2)
+    assert {"gyro-zero-scatter", "gyro-g-sensitivity"} <= {one.id for one in found.effects}
+    G = next(one for one in found.effects if one.id == "gyro-g-sensitivity")
+    xx = next(p for p in G.parameters if p.name == "G_xx")
+    assert abs(xx.value - np.radians(0.004)) < 4.0 * xx.std + 0.02 * np.radians(0.004)

@@ -6,102 +6,134 @@ error of the gyro's scale in per cent of it, and the largest of them in σ.
 """
 
 import argparse
+import json
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from confidence.arm import carried
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import hand, manual, table
 
+STRONG = {"gyro_flicker": np.radians(20.0 / 3600.0), "accel_flicker": 0.3e-3 * G}
+WEAK = {"gyro_flicker": np.radians(0.2 / 3600.0), "accel_flicker": 2e-5}
+THERE_AND_BACK = {90.0: (90.0, -90.0), 180.0: (180.0, -180.0), 360.0: (360.0, -360.0)}
+
 SETTINGS = {
     **{f"moves of {s:g} s": (hand, {"move_s": s}) for s in (0.25, 2.0, 30.0, 60.0)},
     **{f"gyro of {b} bit": (hand, {"gyro_bits": b}) for b in (8, 10, 12)},
+    **{f"both of {b} bit": (hand, {"gyro_bits": b, "accel_bits": b}) for b in (8, 10, 12)},
     **{f"{hz:g} Hz": (hand, {"rate_hz": hz}) for hz in (10.0, 1000.0)},
     **{f"{n} poses": (hand, {"n_poses": n}) for n in (9, 12, 40)},
+    "1/f strong": (hand, STRONG),
+    "1/f weak": (hand, WEAK),
+    **{f"lost {100 * p:g} %, stamps true": (hand, {"lost": p}) for p in (0.001, 0.03)},
+    **{f"lost {100 * p:g} %, stamps remade": (hand, {"lost": p, "is_remade": True}) for p in (0.001, 0.03)},
     **{
         f"table turns, {r:g} deg/s": (table, {"rate_deg_s": r, "turns": (180.0, -180.0)})
         for r in (0.5, 1.0, 3.0, 10.0, 50.0, 500.0)
     },
-    "table turns of 180": (table, {"turns": (180.0, -180.0), "method": "faces"}),
-    "table turns of 360": (table, {"turns": (360.0, -360.0), "method": "faces"}),
-    "table turns of 180, stated": (table, {"turns": (180.0, -180.0), "method": "faces", "is_stated": True}),
-    "table turns of 90": (table, {"turns": (90.0, -90.0), "method": "faces"}),
+    **{f"faces, turns of {a:g}": (table, {"turns": t, "method": "faces"}) for a, t in THERE_AND_BACK.items()},
+    **{
+        f"faces, stated {a:g}": (table, {"turns": t, "method": "faces", "is_stated": True})
+        for a, t in THERE_AND_BACK.items()
+    },
+    **{f"arm, moves of {s:g} s": (carried, {"move_s": s}) for s in (0.5, 2.0, 10.0, 30.0)},
+    "arm, soft settling": (carried, {"settle_deg": 1.0, "settle_s": 0.8}),
+    "arm, held in the hand": (carried, {"rest": "in hand"}),
+    "arm, 50 Hz": (carried, {"rate_hz": 50.0}),
+    "arm, 12 bit": (carried, {"gyro_bits": 12, "accel_bits": 12}),
     "manual's session, moves": (manual, {}),
     "manual's session, stated turns": (manual, {"is_stated": True}),
 }
 
 
 def answer(make, options, seed):
-    """Calibration of one session through the public front, and its truth in the same frame."""
+    """Calibration of one session through the public front, its truth in the same frame, CPU seconds."""
     from trihedron import pipeline
     from trihedron.records import Recording
 
     options = dict(options)
     method, is_stated = options.pop("method", "joint"), options.pop("is_stated", False)
+    lost, is_remade = options.pop("lost", 0.0), options.pop("is_remade", False)
     f, w, rate, truth, motion = make(seed, **options)
-    recording = Recording(np.arange(len(f)) / rate, f, w, rate, accelerometer_unit="counts", gyroscope_unit="counts")
+    t = np.arange(len(f)) / rate
+    if lost:
+        kept = np.random.default_rng([14, seed]).random(len(t)) >= lost
+        f, w, t = f[kept], w[kept], t[kept]
+        if is_remade:
+            t = np.arange(len(f)) / rate
+    recording = Recording(t, f, w, rate, accelerometer_unit="counts", gyroscope_unit="counts")
     more = {}
     if is_stated:
         more["turns_deg"] = [angle for _, _, angle in motion.turns]
-    if method == "faces" and is_stated:
-        # Stated about the axis that points up, as a person reads it off.
-        pass
+    began = time.process_time()
     result = pipeline.calibrate(recording, gravity_m_s2=G, method=method, **more)
-    return result, (truth if method == "faces" else lower(truth)), motion
+    return result, (truth if method == "faces" else lower(truth)), motion, time.process_time() - began
 
 
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--sessions", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0, help="seed of the first session")
+    parser.add_argument("--rows", type=Path, help="file to which every session is written, a line of JSON each")
     parser.add_argument("names", nargs="*")
     given = parser.parse_args()
     print("setting                        trusted marked none holds  acc in  S_w in  b_w in  rms z   error of S_w, %")
     for name, (make, options) in SETTINGS.items():
         if given.names and not any(word in name for word in given.names):
             continue
-        print(line(name, make, options, given.sessions), flush=True)
+        rows = [session(name, make, options, given.first + k) for k in range(given.sessions)]
+        if given.rows:
+            with given.rows.open("a") as file:
+                file.writelines(json.dumps(row) + "\n" for row in rows)
+        print(line(name, rows), flush=True)
 
 
-def line(name, make, options, n):
+def session(name, make, options, seed):
+    """One session: what was answered and how far from the truth, in standard errors and in the unit of the scale."""
+    row = {"setting": name, "seed": seed, "answer": "none", "codes": [], "cpu_s": 0.0}
+    try:
+        result, truth, motion, row["cpu_s"] = answer(make, options, seed)
+    except ValueError as error:
+        row["codes"] = [str(error)[:60]]
+        return row
+    row["holds"] = result.segments.n_holds == len(motion.rests)
+    row["codes"] = sorted({f.code.value for f in result.findings if f.severity.value != "note"})
+    if result.gyroscope is None:
+        return row
+    row["answer"] = "trusted" if result.is_trustworthy else "marked"
+    low = np.nonzero(np.tril(np.ones((3, 3))) if options.get("method") != "faces" else np.ones((3, 3)))
+    a, g = result.accelerometer, result.gyroscope
+    row["a"] = [*((a.S - truth.S_f)[low] / a.sigma_S[low]), *((a.b - truth.b_f) / a.sigma_b)]
+    row["S"] = [*((g.S - truth.S_w) / g.sigma_S).ravel()]
+    row["b"] = [*((g.b - truth.b_w) / g.sigma_b)]
+    row["error"] = 100.0 * np.abs(g.S - truth.S_w).max() / np.abs(np.diag(truth.S_w)).mean()
+    return row
+
+
+def line(name, rows):
     """One row of the table."""
-    counts = {"trusted": 0, "marked": 0, "none": 0}
-    z = {"a": [], "S": [], "b": []}
-    errors, right, why = [], 0, {}
-    for seed in range(n):
-        try:
-            result, truth, motion = answer(make, options, seed)
-        except ValueError as error:
-            counts["none"] += 1
-            why[str(error)[:60]] = why.get(str(error)[:60], 0) + 1
-            continue
-        right += result.segments.n_holds == len(motion.rests)
-        for code in {f.code.value for f in result.findings if f.severity.value != "note"}:
-            why[code] = why.get(code, 0) + 1
-        if result.gyroscope is None:
-            counts["none"] += 1
-            continue
-        if not result.is_trustworthy:
-            counts["marked"] += 1
-            continue
-        counts["trusted"] += 1
-        low = np.tril_indices(3) if options.get("method") != "faces" else np.nonzero(np.ones((3, 3)))
-        a, g = result.accelerometer, result.gyroscope
-        z["a"] += [*((a.S - truth.S_f) / a.sigma_S)[low], *((a.b - truth.b_f) / a.sigma_b)]
-        z["S"].append(((g.S - truth.S_w) / g.sigma_S).ravel())
-        z["b"].append((g.b - truth.b_w) / g.sigma_b)
-        errors.append(100.0 * np.abs(g.S - truth.S_w).max() / np.abs(np.diag(truth.S_w)).mean())
-    row = f"{name:30s} {counts['trusted']:7d} {counts['marked']:6d} {counts['none']:4d} {right:5d}"
-    if errors:
-        share = {key: 100.0 * np.mean(np.abs(np.array(values)) < 1.96) for key, values in z.items()}
-        every = np.array(z["S"])
-        row += f" {share['a']:6.1f} {share['S']:7.1f} {share['b']:7.1f} {np.sqrt(np.mean(every**2)):6.2f}"
-        row += f"   {np.median(errors):.4f} median, {max(errors):.3f} worst, {np.abs(every).max():.1f} σ"
-    return row + f"   {why}"
+    counts = {kind: sum(row["answer"] == kind for row in rows) for kind in ("trusted", "marked", "none")}
+    why = {}
+    for code in (code for row in rows for code in row["codes"]):
+        why[code] = why.get(code, 0) + 1
+    right = sum(row.get("holds", False) for row in rows)
+    text = f"{name:30s} {counts['trusted']:7d} {counts['marked']:6d} {counts['none']:4d} {right:5d}"
+    trusted = [row for row in rows if row["answer"] == "trusted"]
+    if trusted:
+        share = {key: 100.0 * np.mean([np.abs(row[key]) < 1.96 for row in trusted]) for key in ("a", "S", "b")}
+        every, errors = np.array([row["S"] for row in trusted]), [row["error"] for row in trusted]
+        text += f" {share['a']:6.1f} {share['S']:7.1f} {share['b']:7.1f} {np.sqrt(np.mean(every**2)):6.2f}"
+        text += f"   {np.median(errors):.4f} median, {max(errors):.3f} worst, {np.abs(every).max():.1f} σ"
+    seconds = sum(row["cpu_s"] for row in rows) / len(rows)
+    return text + f"   {seconds:.2f} s of CPU a session   {why}"
 
 
 if __name__ == "__main__":

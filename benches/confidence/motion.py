@@ -78,6 +78,26 @@ def vector_of(R):
     return axis / size * 2.0 * np.arctan2(size, w) if size > 0 else np.zeros(3)
 
 
+def product(q):
+    """The product q_1 q_2 ... q_n, pair by pair."""
+    while len(q) > 1:
+        even = multiply(q[: len(q) // 2 * 2 : 2], q[1::2])
+        q = np.concatenate([even, q[len(q) // 2 * 2 :]])
+    return q[0]
+
+
+def running_product(vectors):
+    """Quaternions e_1, e_1 e_2, ... of rotation vectors (n, 3), by doubling."""
+    products = exponential(vectors)
+    if not np.any(vectors):
+        return products
+    reach = 1
+    while reach < len(products):
+        products[reach:] = multiply(products[:-reach], products[reach:])
+        reach *= 2
+    return products
+
+
 def attitude(up, heading):
     """A body-to-room matrix with the room's vertical along ``up`` of the body."""
     up = np.asarray(up, dtype=float) / np.linalg.norm(up)
@@ -129,9 +149,8 @@ def move(steps, start, rng, rate_hz, tremor=0.0, tilt=0.0, push=0.3):
             for _ in range(8):
                 # The sway turns the axis on the way: aim so that the case arrives where it should.
                 w = wanted * envelope + sway
-                end = exponential(vector_of(matrix(q)))
-                for small in exponential(w[coarse] * (n * dt / len(w[coarse]))):
-                    end = multiply(end, small)
+                small = exponential(w[coarse] * (n * dt / len(w[coarse])))
+                end = multiply(exponential(vector_of(matrix(q))), product(small))
                 aim = aim @ matrix(end).T @ step.to
                 new = vector_of(matrix(q).T @ aim)
                 if np.linalg.norm(new - wanted) > np.pi:
@@ -145,13 +164,7 @@ def move(steps, start, rng, rate_hz, tremor=0.0, tilt=0.0, push=0.3):
             a = push * rng.normal(size=3) * (np.sin(2 * np.pi * u) * shake)[:, None] * min(1.0, 4.0 / step.seconds**2)
         else:
             rests.append((clock, clock + n * dt))
-        # Running product by doubling: q_k = q_0 e_1 ... e_k.
-        product = exponential(w * dt)
-        reach = 1
-        while reach < n:
-            product[reach:] = multiply(product[:-reach], product[reach:])
-            reach *= 2
-        path = multiply(np.broadcast_to(q, product.shape), product)
+        path = multiply(np.broadcast_to(q, (n, 4)), running_product(w * dt))
         path /= np.linalg.norm(path, axis=1, keepdims=True)
         q = path[-1]
         rates.append(w)

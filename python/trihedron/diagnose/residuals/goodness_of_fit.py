@@ -175,3 +175,26 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
         out[MOVES] = float(np.degrees(np.sqrt(np.mean(angle))))
         out[DYNAMICS] = float(np.sqrt(np.mean(speed)))
     return out, {STATIC_ACCEL: "m/s^2", STATIC_GYRO: "rad/s", MOVES: "deg", DYNAMICS: "m/s"}
+
+
+def weighted_rms(fitted: Fit, rows_residual: FloatArray, base: Fit) -> dict[int, float]:
+    """Rms at rest in physical units, every reading weighted by the precision that ``base`` gives it.
+
+    One pose that was not still, or an axis whose zero scatters, has no more to say here than it knows. The weights are
+    the same for both models that are compared: only errors that fall make it fall.
+    """
+    line, system, obs = fitted.line, fitted.system, base.line.obs
+    twin, h = base.line.twin, base.line.obs.n_holds
+    direct = system.walk == 0
+    rows = np.flatnonzero((system.domain == STATIC_ACCEL) & direct)
+    error = np.linalg.solve(line.accel_white, rows_residual[rows].reshape(h, 3, 1))[:, :, 0]
+    along = np.einsum("ni,ni->n", error, line.twin.up)
+    weight = 1.0 / ((twin.up @ twin.accel_S) ** 2 * obs.hold_force_spread**2).sum(axis=1)
+    out = {STATIC_ACCEL: float(np.sqrt((weight * along**2).sum() / weight.sum()))}
+    spread = obs.hold_rate_spread
+    if line.gyro_white is not None and spread is not None:
+        rows = np.flatnonzero((system.domain == STATIC_GYRO) & direct)
+        error = np.linalg.solve(line.gyro_white, rows_residual[rows].reshape(h, 3, 1))[:, :, 0]
+        weight = 1.0 / (spread**2 @ (twin.gyro_S**2).T)
+        out[STATIC_GYRO] = float(np.sqrt((weight * error**2).sum() / weight.sum()))
+    return out

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms, weighted_rms
 from trihedron.diagnose.selection.model import StepwiseModel, held_out
 from trihedron.diagnose.selection.score import Scored, dispersion
 from trihedron.diagnose.session.observations import FloatArray
@@ -100,9 +100,14 @@ class Comparison:
     base: Fit
     base_prediction: Prediction
     fitted: Fit
-    prediction: Prediction
     cost: float
     first: int
+    known_prediction: Prediction | None = None
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """Held-out prediction of the model with the effect, made when first asked for."""
+        return held_out(self.fitted) if self.known_prediction is None else self.known_prediction
 
     @property
     def n_new(self) -> int:
@@ -145,10 +150,17 @@ class Comparison:
 
     @property
     def falls(self) -> bool:
-        """Whether held-out rms in physical units falls visibly in a domain of the effect's own sensor."""
+        """Whether held-out rms in physical units falls visibly in a domain of the effect's own sensor.
+
+        At rest plain, or with every reading weighted by what the base knows of its noise and scatter.
+        """
         before, _ = physical_rms(self.base, self.base_prediction.innovation)
         after, _ = physical_rms(self.fitted, self.prediction.innovation)
         own = own_domains(self.variant.distortion)
+        if any(after[d] < VISIBLE * before[d] for d in own if d in after and d in before):
+            return True
+        before = weighted_rms(self.base, self.base_prediction.innovation, self.base)
+        after = weighted_rms(self.fitted, self.prediction.innovation, self.base)
         return any(after[d] < VISIBLE * before[d] for d in own if d in after and d in before)
 
     @property
@@ -197,8 +209,7 @@ def refit(model: StepwiseModel, scored: Scored) -> Refit:
     return Refit(
         scored,
         Comparison(
-            scored.variant, scored.effect.is_local, base, model.prediction, fitted, held_out(fitted), cost,
-            base.n_effect,
+            scored.variant, scored.effect.is_local, base, model.prediction, fitted, cost, base.n_effect
         ),
     )  # fmt: skip
 

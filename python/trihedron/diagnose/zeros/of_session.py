@@ -69,8 +69,11 @@ def scatter_parameters(found: SessionEvidence, unit: str) -> tuple[EffectParamet
 
 
 def exceeds_noise(found: SessionEvidence) -> bool:
-    """Whether the scatter is at least as large as the errors of the poses' means."""
-    noise = float(np.mean(found.zeros.readings.sigma**2)) / 2.0
+    """Whether the scatter is at least as large as the errors of the poses' means.
+
+    Of the pose in the middle: a mean over poses is that of the worst, and two restless ones would hide any scatter.
+    """
+    noise = float(np.median((found.zeros.readings.sigma**2).mean(axis=0))) / 2.0
     return float(np.mean(found.evidence.scatter**2)) > LEAST_OVER_NOISE * noise
 
 
