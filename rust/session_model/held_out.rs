@@ -18,7 +18,7 @@ const OPEN: f64 = 1e4;
 pub struct HeldOut {
     /// `(folds, domains)` innovation χ².
     pub chi2: Vec<[f64; N_DOMAINS]>,
-    /// `(folds)` log-determinant of the predicted covariance.
+    /// `(folds)` log-determinant of the predicted covariance, up to a constant of the readings.
     pub log_det: Vec<f64>,
     /// `(domains)` directions predicted.
     pub n_rows: [f64; N_DOMAINS],
@@ -114,7 +114,8 @@ impl Fit {
         let mut whitened = DVector::zeros(n);
         let mut plain = DVector::zeros(n);
         let mut share = DVector::zeros(n);
-        let mut log_det = 0.0;
+        // Rows are whitened by noise that two models need not share: predictions are compared in the rows' own units.
+        let mut log_det = -2.0 * fold.iter().map(|&g| self.groups[g].log_weight).sum::<f64>();
         for k in 0..n {
             let value = eigen.eigenvalues[k];
             if value < OPEN {

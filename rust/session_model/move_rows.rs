@@ -207,7 +207,8 @@ impl Session {
             domain: Domain::Moves,
             kind: Kind::Reading,
             segment: index,
-            log_weight: 0.0,
+            // Models that loosen the moves differently are compared: what is believed less costs its normalisation.
+            log_weight: white.diagonal().map(f64::ln).sum(),
         }
     }
 

@@ -21,6 +21,7 @@ from trihedron.diagnose.selection.evidence import with_evidence
 from trihedron.diagnose.selection.model import StepwiseModel, begin
 from trihedron.diagnose.selection.numbers import final_numbers
 from trihedron.diagnose.selection.prune import judged_again
+from trihedron.diagnose.selection.rivals import chosen_again
 from trihedron.diagnose.selection.score import Scored
 from trihedron.diagnose.selection.stages import held_out_stages
 from trihedron.diagnose.selection.stepwise import MAX_EFFECTS, candidates_of, scores, with_next
@@ -141,8 +142,11 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
     if len(judged.accepted) < len(model.accepted):
         # What was needless stood where another may belong.
         scored, _ = scores(judged, exclude=judged.refused)
-        judged = judged_again(_grown(judged, scored, alpha, lambda _part: None))
+        grown = _grown(judged, scored, alpha, lambda _part: None)
+        judged = judged if grown is judged else judged_again(grown)
     judged, candidates = _with_late(judged, candidates, alpha)
+    chosen = chosen_again(judged)
+    judged = judged if chosen is judged else judged_again(chosen)
     tell(0.9, "checking what remains")
     # Time errors were looked for twice: what was not accepted then mends nothing.
     named = {one.effect.id for one in judged.accepted}
@@ -162,8 +166,15 @@ def _with_late(
             candidates = candidates | {key: one}
     if len(late.accepted) == len(model.accepted):
         return late, candidates  # the same model, which remembers what was looked for in vain
+    # What was needless, or too little, in the noise of a model without them may stand beside them.
+    late = replace(late, refused=frozenset(one for one in late.refused if _is_direct(one)))
     scored, _ = scores(late, exclude=late.refused)
     return judged_again(_grown(late, scored, alpha, lambda _part: None)), candidates
+
+
+def _is_direct(effect_id: str) -> bool:
+    """Whether an effect brings evidence of its own: refused, it is not looked for again."""
+    return any(one.id == effect_id and isinstance(one, DirectEffect) for one in catalogue())
 
 
 def _grown(model: StepwiseModel, scored: list[Scored], alpha: float, tell: Callable[[float], None]) -> StepwiseModel:

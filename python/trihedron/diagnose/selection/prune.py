@@ -20,6 +20,8 @@ LEAST_SHARE = 0.5
 """Of the misfit in the domain that it helps most an effect must remove this share, all else being in the model: what
 removes less is the least bad guess at a mechanism that is not in the catalogue. Set where wrong answers of
 benches/blind.py --foreign 15 --seed 5 and right ones of benches/blind_nuisances.py part; those seeds are no test."""
+COMPARABLE = 0.25
+"""Share of the largest fall of chi-square from which another domain may speak for the effect."""
 AGREES = 1.5
 """Chi-square per degree of freedom at which a domain holds so little misfit that no share of it is asked for."""
 
@@ -57,8 +59,8 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
     assert one.variant is not None
     first = sum(o.variant.distortion.n_parameters for o in model.accepted[:k] if o.variant is not None)
     against = Comparison(
-        one.variant, one.effect.is_local, without.fitted, without.prediction, model.fitted, model.prediction,
-        cost_of(model.fitted, one.rank, len(one.variant.shape)), first,
+        one.variant, one.effect.is_local, without.fitted, without.prediction, model.fitted,
+        cost_of(model.fitted, one.rank, len(one.variant.shape)), first, model.prediction,
     )  # fmt: skip
     bic = against.bic_gain
     gain = max(excess(without.fitted) - excess(model.fitted), 0.0)
@@ -75,14 +77,19 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
 
 
 def explains(against: Comparison) -> bool:
-    """Whether the effect removes its share of the misfit in the domain of its own sensor where it removes most.
+    """Whether the effect removes its share of the misfit in a domain of its own sensor where it removes much.
 
     Not of all domains together: another fault may spoil the others, and that is not this effect's to explain.
     """
     before, after = domain_chi2(against.base), domain_chi2(against.fitted)
     own = own_domains(against.variant.distortion)
-    helped = max(own, key=lambda d: before[d][0] - after[d][0])
-    (chi2, dof), (left, left_dof) = before[helped], after[helped]
+    most = max(before[d][0] - after[d][0] for d in own)
+    return any(_explained(before[d], after[d]) for d in own if before[d][0] - after[d][0] >= COMPARABLE * most)
+
+
+def _explained(before: tuple[float, float], after: tuple[float, float]) -> bool:
+    """Whether a domain's excess of chi-square (chi-square, degrees of freedom) is gone by the share asked for."""
+    (chi2, dof), (left, left_dof) = before, after
     if chi2 <= AGREES * dof or left <= AGREES * left_dof:
         return True
-    return bool(1.0 - (left - left_dof) / (chi2 - dof) > LEAST_SHARE)
+    return 1.0 - (left - left_dof) / (chi2 - dof) > LEAST_SHARE

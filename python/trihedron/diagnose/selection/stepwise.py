@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtrc
 
+from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.compare import Refit, refined, refit
-from trihedron.diagnose.selection.model import Accepted, StepwiseModel
+from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel
 from trihedron.diagnose.selection.score import Scored, score_all
 from trihedron.diagnose.session.observations import FloatArray
 from trihedron.records.diagnosis import Candidate
@@ -72,15 +73,20 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
         for s in scored
         if s.effect is not best.scored.effect and max(s.merits) > best.scored.merit - CONFOUNDED_DELTA_BIC
     ]
+    alternatives = tuple(
+        Alternative(r.scored.effect, r.against.variant, r.scored.rank)
+        for r in sorted(refits, key=lambda r: -r.against.bic_gain_at(rest))
+        if r is not best and r.against.bic_gain > MIN_DELTA_BIC
+    )
     best = refined(model, best)
     one = Accepted(
         best.scored.effect, best.scored.variant, None, _p_adjusted(best, n_effects), best.against.bic_gain,
         best.against.gain_at(best.against.stays), best.against.held_out(), tuple(dict.fromkeys(close)),
-        best.scored.rank,
+        best.scored.rank, alternatives,
     )  # fmt: skip
     return replace(
         model,
-        fitted=best.against.fitted,
+        context=Context(model.obs, best.against.fitted),
         prediction=best.against.prediction,
         accepted=(*model.accepted, one),
     )
@@ -88,15 +94,18 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
 
 def _logged_first(best: Refit, sound: list[Refit], rest: FloatArray) -> Refit:
     """A drift in time gives way to a logged temperature that explains as much: then something logged explains it."""
-    sensor, _, kind = best.scored.effect.id.partition("-")
-    if kind != "hidden-drift":
-        return best
     enough = best.against.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
     thermal = [
         r for r in sound
-        if r.scored.effect.id.startswith(f"{sensor}-thermal") and r.against.bic_gain_at(rest) > enough
+        if gives_way(best.scored.effect.id, r.scored.effect.id) and r.against.bic_gain_at(rest) > enough
     ]  # fmt: skip
     return max(thermal, key=lambda r: r.against.bic_gain_at(rest), default=best)
+
+
+def gives_way(one: str, other: str) -> bool:
+    """Whether an effect is a drift in time and the other a logged temperature's work on the same sensor."""
+    sensor, _, kind = one.partition("-")
+    return kind == "hidden-drift" and other.startswith(f"{sensor}-thermal")
 
 
 def is_sound(one: Refit) -> bool:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -16,7 +15,7 @@ from trihedron.estimate.accelerometer.face_placements import placements
 from trihedron.estimate.accelerometer.face_poses import IntArray
 from trihedron.estimate.accelerometer.norm import norm_residual
 from trihedron.records.calibration import FitQuality, FloatArray, Frame, Observability, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.sensor_model import other_form, other_form_jacobian, reframing
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
@@ -299,16 +298,13 @@ def _left_out(faces: IntArray, values: FloatArray) -> list[Finding]:
     left = np.flatnonzero(faces == 0)
     if len(left) == 0:
         return []
-    poses = ", ".join(str(i) for i in left)
     return [
-        Finding(
+        Finding.of(
             FindingCode.POSE_NOT_A_FACE,
-            Severity.NOTE,
-            f"{len(left)} of {len(values)} still poses have no axis within {face_poses.LARGEST_TILT_DEG:.0f}° of the "
-            f"vertical and are not used by method 1 (poses {poses}).",
-            "They are edges, corners or leaning poses.",
-            "Method 2 uses them all.",
-            MappingProxyType({"n_left_out": float(len(left))}),
+            n_left_out=len(left),
+            n_poses=len(values),
+            largest_tilt_deg=face_poses.LARGEST_TILT_DEG,
+            poses=left.tolist(),
         )
     ]
 
@@ -320,24 +316,13 @@ def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: In
     horizontal = estimate.residual @ S.T
     horizontal[np.arange(len(faces)), np.abs(faces) - 1] = 0.0
     worst = int(np.argmax(np.linalg.norm(horizontal, axis=1)))
-    tilt_deg = degrees_from_radians(estimate.tilt_rad)
-    chi2_per_dof = estimate.chi2_noise / estimate.dof
     return [
-        Finding(
+        Finding.of(
             FindingCode.TABLE_TILT,
-            Severity.WARNING,
-            f"The faces contradict each other (χ² per degree of freedom {chi2_per_dof:.3g}) as if "
-            f"each pose were tilted by {tilt_deg:.2g}° rms; most in pose {int(used[worst])} "
-            f"({face_poses.face_in_words(int(faces[worst]))}). The standard errors include this tilt.",
-            "The table is not level, the case is not square or did not lie flat; a drifting zero looks the same.",
-            "Level the table, press the case flat, or use method 2, which needs neither.",
-            MappingProxyType(
-                {
-                    "tilt_deg": tilt_deg,
-                    "chi2_per_dof": chi2_per_dof,
-                    "pose": float(used[worst]),
-                }
-            ),
+            chi2_per_dof=estimate.chi2_noise / estimate.dof,
+            tilt_deg=degrees_from_radians(estimate.tilt_rad),
+            pose=int(used[worst]),
+            face=face_poses.face_in_words(int(faces[worst])),
         )
     ]
 
