@@ -187,7 +187,7 @@ def test_malformed_turns_are_refused():
 
 
 def test_errors_that_all_turns_share_pull_the_scale_as_a_whole_and_are_not_averaged_by_more_turns():
-    # All axes turned by one small rotation e change every turn by e x phi: the scale by S_w [e]x, whatever their number.
+    # All axes turned by one small rotation e change every turn by e x phi: the scale by S_w [e]x, however many.
     S_w = np.diag([1.0, 0.9, 1.1]) + 0.02
     e = np.array([2e-4, -1e-4, 3e-4])
     for repeats in (1, 10):
