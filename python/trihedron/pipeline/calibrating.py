@@ -18,6 +18,7 @@ from trihedron.estimate.gyroscope import (
     calibrate_moves,
     calibrate_turns,
     scale_by_gravity,
+    shared_errors,
     stated_turns,
 )
 from trihedron.estimate.gyroscope.findings import scale_findings
@@ -180,7 +181,8 @@ def _by_poses(
         return alone
     if turns_deg is not None:
         turns = stated_turns(recording, segments, accelerometer, gravity, turns_deg)
-        return _together(alone, *calibrate_turns(recording, turns, _zero_turns(segments)))
+        shared = shared_errors(turns, accelerometer, gravity)
+        return _together(alone, *calibrate_turns(recording, turns, _zero_turns(segments), shared_errors=shared))
     try:
         # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's error bars.
         if method == "joint" and alone.is_trustworthy:
