@@ -17,6 +17,7 @@ from trihedron.files.calibration import (
 )
 from trihedron.files.output import OutputError
 from trihedron.pipeline import apply
+from trihedron.records.frozen import thawed
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import AccelerationUnit
 
@@ -172,4 +173,4 @@ def test_unknown_extensions_survive(session):
         session[1].calibration, extensions={"temperature": {"at_degc": 21.5, "rows": [[1, 2], [3, 4]]}}
     )
     back = calibration_from_document(json.loads(json.dumps(calibration_document(calibration))))
-    assert back.extensions["temperature"] == {"at_degc": 21.5, "rows": [[1, 2], [3, 4]]}
+    assert thawed(back.extensions["temperature"]) == {"at_degc": 21.5, "rows": [[1, 2], [3, 4]]}

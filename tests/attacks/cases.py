@@ -27,6 +27,8 @@ from trihedron.cli import COMMANDS, build_app, main
 
 LONGEST_S = 10
 """Of the processor's time; a loaded machine may take ``PATIENCE`` times as long by the clock."""
+LONGEST_WORK_S = 60
+"""Of ``HEAVY`` commands, where they do their work: a demonstration, a diagnosis of every log of a folder."""
 PATIENCE = 6
 Files = dict[str, str]
 CONTROL = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]")
@@ -57,6 +59,10 @@ class Attack(ABC):
     def run(self, number: int) -> str:
         """``taken``, ``refused`` or ``FAILED: why``."""
 
+    def longest_s(self, _number: int) -> int:
+        """Seconds of the processor that a case may take."""
+        return LONGEST_S
+
     def run_forked(self, numbers: Sequence[int]) -> Iterator[tuple[int, str]]:
         """Outcomes of cases in a child of this process; a case that ends its process, or outlives it, has failed."""
         todo = list(numbers)
@@ -82,13 +88,14 @@ class Attack(ABC):
         os.dup2(noise, 2)
         for number in todo:
             os.ftruncate(noise, 0)
-            signal.alarm(PATIENCE * LONGEST_S)
+            longest = self.longest_s(number)
+            signal.alarm(PATIENCE * longest)
             # A library that holds the interpreter gets no exception: the process itself is ended.
-            signal.setitimer(signal.ITIMER_VIRTUAL, 3 * LONGEST_S)
+            signal.setitimer(signal.ITIMER_VIRTUAL, 3 * longest)
             try:
                 outcome = self.run(number)
             except TooLong:
-                outcome = f"FAILED: longer than {PATIENCE * LONGEST_S} s"
+                outcome = f"FAILED: longer than {PATIENCE * longest} s"
             except BaseException as error:
                 outcome = f"FAILED: {type(error).__name__}: {str(error)[:200]!r}"
             signal.alarm(0)
@@ -210,7 +217,8 @@ class Inputs(Attack):
         return "taken"
 
 
-HEAVY = {"demo", "diagnose"}
+HEAVY = {"demo", "diagnose", "fleet"}
+RARE = {"demo", "diagnose"}
 NEVER = {"--serve", "--browser", "--guide", "--link", "--help", "--version", "--bell"}
 WORDS = ["", "x", "nan", "inf", "-1", "0", "1", "1e300", "1e-300", "9" * 400, "\x1b[31m", "é", "0.5", "100", "--", "-"]
 SPECIAL = ["missing", "/dev/null", "/dev/zero", "/dev/full", ".", "loop", "fifo", "a\x1b[2Jb", "n" * 300, "sub/x", "-"]
@@ -238,9 +246,12 @@ class Commands(Attack):
         self.commands = {name: command.params for name, command in group.commands.items()}  # type: ignore[attr-defined]
         assert len(self.commands) == len(COMMANDS)
 
+    def longest_s(self, number: int) -> int:
+        return LONGEST_WORK_S if self.words(number)[0] in HEAVY else LONGEST_S
+
     def words(self, number: int) -> list[str]:
         rng = self.rng(number)
-        names = [name for name in self.commands if name not in HEAVY or rng.random() < 0.15]
+        names = [name for name in self.commands if name not in RARE or rng.random() < 0.15]
         name = str(rng.choice(names))
         words: list[str] = [name]
         is_tame = rng.random() < 0.5
@@ -368,7 +379,7 @@ class Commands(Attack):
             return f"FAILED: no sentence; {said}"
         if status == 2 and not err.strip():
             return f"FAILED: no reason; {said}"
-        if took > LONGEST_S:
+        if took > (LONGEST_WORK_S if words[0] in HEAVY and status != 1 else LONGEST_S):
             return f"FAILED: {took:.0f} s; {said}"
         named = set(words)
         for name, digest in before.items():

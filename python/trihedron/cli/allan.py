@@ -65,7 +65,7 @@ def allan(
         bool,
         typer.Option(
             "--stream",
-            help="Map or read a .npy or Parquet log in pieces, in bounded memory and without audit: --columns, "
+            help="Read a .npy or Parquet log in pieces, in bounded memory and without audit: --columns, "
             "--rate and the units say what it holds.",
         ),
     ] = False,

@@ -3,8 +3,6 @@ moves."""
 
 from __future__ import annotations
 
-from types import MappingProxyType
-
 import numpy as np
 import numpy.typing as npt
 from scipy import stats
@@ -21,7 +19,7 @@ from trihedron.records import (
     Severity,
     Verification,
 )
-from trihedron.units import degrees_from_radians, mg_from_m_s2
+from trihedron.units import degrees_from_radians
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -125,15 +123,13 @@ def _norm_findings(error: FloatArray, sigma: FloatArray) -> list[Finding]:
     rms = float(np.sqrt(np.mean(error**2)))
     times = float(np.sqrt(np.mean(z2)))
     return [
-        Finding(
+        Finding.of(
             FindingCode.RESIDUAL_ABOVE_NOISE,
-            Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
-            f"Gravity at rest is missed by {rms:.3g} m/s² rms ({mg_from_m_s2(rms):.2g} mg), "
-            f"{times:.1f} times what noise and the stated errors of the calibration allow.",
-            "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were "
-            "not still.",
-            "Calibrate again near the conditions of use; compare the two calibrations.",
-            MappingProxyType({"norm_rms_m_s2": rms, "chi2_per_pose": times**2, "times_expected": times}),
+            "verify-rest",
+            severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
+            norm_rms_m_s2=rms,
+            chi2_per_pose=times**2,
+            times_expected=times,
         )
     ]
 
@@ -149,14 +145,14 @@ def _angle_findings(angle_deg: FloatArray, sigma_deg: FloatArray) -> list[Findin
     worst = int(np.argmax(angle_deg))
     times = float(np.sqrt(np.mean(z2) / 2.0))
     return [
-        Finding(
+        Finding.of(
             FindingCode.HELD_OUT_WORSE,
-            Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
-            f"Gravity carried through the moves by the gyro is missed by {rms:.3g}° rms (worst move {worst}: "
-            f"{angle_deg[worst]:.3g}°), {times:.1f} times what noise and the stated errors allow.",
-            "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not still.",
-            "Look at the worst moves; calibrate again near the conditions of use.",
-            MappingProxyType({"angle_rms_deg": rms, "worst_move": float(worst), "times_expected": times}),
+            "verify-moves",
+            severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
+            angle_rms_deg=rms,
+            worst_move=worst,
+            worst_deg=angle_deg[worst],
+            times_expected=times,
         )
     ]
 

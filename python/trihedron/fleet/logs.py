@@ -84,7 +84,17 @@ def find_jobs(
 def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> list[Path]:
     if not isinstance(source, str | os.PathLike):
         return [path for one in source for path in _paths(one)]
+    if not os.fspath(source):
+        # What a shell makes of a variable that is not set would be every log below here.
+        raise ValueError("the name of the logs is empty; name a folder, a file or a pattern ('.' for the folder here).")
     path = Path(source)
+    try:
+        os.stat(source)
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise ValueError(f"{source}: this cannot be opened ({why}); check the name.") from None
     if path.is_dir():
         found = (p for p in path.rglob("*") if p.suffix.lower() in ENDINGS and not p.name.startswith("."))
         return sorted(p for p in found if p.is_file())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Literal, get_args
 
 import numpy as np
@@ -19,6 +18,7 @@ from trihedron.estimate.gyroscope import (
     calibrate_moves,
     calibrate_turns,
     scale_by_gravity,
+    shared_errors,
     stated_turns,
 )
 from trihedron.estimate.gyroscope.findings import scale_findings
@@ -177,7 +177,8 @@ def _by_poses(
         return alone
     if turns_deg is not None:
         turns = stated_turns(recording, segments, accelerometer, gravity, turns_deg)
-        return _together(alone, *calibrate_turns(recording, turns, _zero_turns(segments)))
+        shared = shared_errors(turns, accelerometer, gravity)
+        return _together(alone, *calibrate_turns(recording, turns, _zero_turns(segments), shared_errors=shared))
     try:
         # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's error bars.
         if method == "joint" and alone.is_trustworthy:
@@ -216,17 +217,7 @@ def _pull_on_accelerometer(alone: SensorCalibration, joint: SensorCalibration) -
 
 def _joint_fit_left(pull: float) -> Finding:
     """Moves that contradict the still poses must not pull the accelerometer, which the poses show without them."""
-    return Finding(
-        FindingCode.JOINT_FIT_LEFT,
-        Severity.NOTE,
-        f"The moves contradict the still poses (one fit of both raises χ² of the poses by {pull:.3g}; noise "
-        "explains 28); the accelerometer was therefore taken from the still poses alone, and the gyro from "
-        "the moves by it.",
-        "An effect in the moves that the model does not have, which one fit of both would spread over the "
-        "accelerometer.",
-        "Say --method separate to choose this from the start.",
-        MappingProxyType({"chi2_increase": pull}),
-    )
+    return Finding.of(FindingCode.JOINT_FIT_LEFT, chi2_increase=pull)
 
 
 def _by_faces(
@@ -325,21 +316,7 @@ def _together(alone: Calibration, gyroscope: SensorCalibration, found: Found) ->
 
 def _without_gyroscope(alone: Calibration, why: str) -> Calibration:
     if why == AMBIGUOUS:
-        finding = Finding(
-            FindingCode.TURN_ANGLE_UNKNOWN,
-            Severity.SERIOUS,
-            "The gyro was not calibrated: its readings are counts, and its turns would fit 90°, 180° and 360° alike. "
-            "90, 180 or 360°? say --turns",
-            "Nothing in the log tells the gyro's scale: no unit, no nominal scale, and no moves that turn gravity well "
-            "enough to exclude half and twice.",
-            "Say --turns 180,-180,... (one angle a turn, 0 leaves it out), or --gyro-nominal.",
-        )
+        finding = Finding.of(FindingCode.TURN_ANGLE_UNKNOWN)
     else:
-        finding = Finding(
-            FindingCode.GYROSCOPE_LEFT_OUT,
-            Severity.WARNING,
-            f"The gyro was not calibrated: {why.rstrip('.')}.",
-            "The recording does not hold what the gyro needs.",
-            "Turn the sensor about all three axes between still poses; docs/procedure.md shows how.",
-        )
+        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "not-calibrated", why=why.rstrip("."))
     return replace(alone, findings=(*alone.findings, finding))

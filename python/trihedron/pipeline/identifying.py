@@ -85,7 +85,7 @@ def noise_of_file(
 ) -> Noise:
     """Noise of a .npy or Parquet log of any size in bounded memory; what its columns are is said, not judged.
 
-    Up to half a gigabyte the log is mapped whole; beyond, it is read in one pass (:func:`stream_noise`), which leaves
+    Up to half a gigabyte the log is read whole; beyond, it is read in one pass (:func:`stream_noise`), which leaves
     nothing out.
 
     Raises

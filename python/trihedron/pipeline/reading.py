@@ -12,6 +12,7 @@ import numpy.typing as npt
 from trihedron.pipeline.wording import finding_in_python, in_python
 from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording, Segments
+from trihedron.records.checked import WrongTypeError, number_of
 from trihedron.units import AccelerationUnit, RateUnit
 
 Progress = Callable[[float, str], None]
@@ -94,6 +95,13 @@ def of_arrays(
         raise ReadError("from_arrays needs accelerometer (n, 3) or gyroscope (n, 3).")
     import numpy as np
 
+    for name, given in (
+        *(("time_s", time_s), ("accelerometer", accelerometer), ("gyroscope", gyroscope)),
+        *(("temperature_degc", temperature_degc), ("supply_v", supply_v)),
+    ):
+        _check_even(name, given)
+    if rate_hz is not None:
+        number_of("rate_hz", rate_hz)
     if time_s is not None and np.ndim(time_s) != 1:
         raise ReadError(f"time_s must have shape (n,), got {np.shape(time_s)}.")
     columns: dict[str, Any] = {} if time_s is None else {"time [s]": time_s}
@@ -117,6 +125,15 @@ def of_arrays(
         accelerometer_unit=None if accelerometer is None else accelerometer_unit,
         gyroscope_unit=None if gyroscope is None else gyroscope_unit,
     )
+
+
+def _check_even(name: str, given: Any) -> None:
+    import numpy as np
+
+    try:
+        np.ma.asanyarray(given)
+    except (TypeError, ValueError):
+        raise WrongTypeError(f"{name} is an array of numbers, and its rows have different lengths.") from None
 
 
 def recording_of(given: AnyRecording) -> Recording:

@@ -1,4 +1,4 @@
-"""NumPy files: ``.npz`` archives and memory-mapped ``.npy`` arrays."""
+"""NumPy files: ``.npz`` archives and ``.npy`` arrays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from trihedron.read.table import FloatArray, Table, file_sha256
 
 _BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
 # NumPy evaluates a header as Python text, so a damaged one fails in the ways of a parser.
-_DAMAGE = (
+DAMAGE = (
     *(ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, OverflowError, MemoryError),
     *(SyntaxError, tokenize.TokenError, RecursionError, NotImplementedError),
     *(zipfile.BadZipFile, zlib.error, struct.error),
@@ -27,10 +27,10 @@ _DAMAGE = (
 
 
 def read_npy(path: Path) -> Table:
-    """An array (n, k) or a structured array (n,), memory-mapped while it is taken apart."""
+    """An array (n, k) or a structured array (n,)."""
     try:
         with path.open("rb") as stream:
-            shape, dtype = _header(stream)
+            shape, _, dtype = header(stream)
             cells = math.prod(shape)
             if min(shape, default=1) < 0 or dtype.itemsize * cells != path.stat().st_size - stream.tell():
                 raise ValueError(f"its header says {dtype} of shape {shape}, and it has another length")
@@ -40,21 +40,21 @@ def read_npy(path: Path) -> Table:
             array = np.load(stream, allow_pickle=False)
     except OSError as error:
         raise from_os_error(path, error) from None
-    except _DAMAGE as error:
+    except DAMAGE as error:
         if isinstance(error, ReadError):
             raise
         raise ReadError(f"{path}: this .npy file is damaged or holds Python objects ({_first(error)}).") from None
     return _from_arrays(path, {"data": array}, None)
 
 
-def _header(stream: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Shape and type of the array that follows; the stream stands behind them."""
+def header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, whether column after column, and type of the array that follows; the stream stands behind them."""
     version = np.lib.format.read_magic(stream)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read(stream)
+    shape, by_columns, dtype = read(stream)
     if dtype.hasobject:
         raise ValueError("objects of Python are not read")
-    return shape, dtype
+    return shape, bool(by_columns), dtype
 
 
 def read_npz(path: Path, device: int | None) -> Table:
@@ -65,7 +65,7 @@ def read_npz(path: Path, device: int | None) -> Table:
             arrays = {name: archive[name] for name in archive.files}
     except OSError as error:
         raise from_os_error(path, error) from None
-    except _DAMAGE as error:
+    except DAMAGE as error:
         if isinstance(error, ReadError):
             raise
         raise ReadError(f"{path}: this .npz archive is damaged or holds Python objects ({_first(error)}).") from None
@@ -79,7 +79,7 @@ def _check_members(path: Path, archive: Any) -> None:
         packed, said = packed + info.compress_size, info.file_size
         with archive.zip.open(info) as member:
             if member.peek(6)[:6] == b"\x93NUMPY":
-                shape, dtype = _header(member)
+                shape, _, dtype = header(member)
                 if min(shape, default=1) < 0 or dtype.itemsize * math.prod(shape) > info.file_size:
                     raise ValueError(f"{info.filename} says {dtype} of shape {shape} and is shorter")
         unpacked += said

@@ -1,16 +1,18 @@
-"""Logs larger than memory: rows in pieces, from a memory-mapped NumPy array or a Parquet table."""
+"""Logs larger than memory: rows in pieces, from a NumPy array or a Parquet table."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.errors import ReadError, check_readable, from_os_error, refuse_after_fork
 from trihedron.read.panics import panics_unprinted
+from trihedron.read.rows_on_disk import RowsOnDisk, rows_on_disk
 
 ROWS = 1 << 18
 ROLES = ("ax", "ay", "az", "gx", "gy", "gz")
@@ -24,59 +26,47 @@ class ChunkedLog:
     n_rows: int
     roles: tuple[str, ...]
     columns: tuple[int, ...]
-    array: npt.NDArray[np.float64] | None = None
+    on_disk: RowsOnDisk | None = None
 
     def chunks(self, rows: int = ROWS) -> Iterator[npt.NDArray[np.float64]]:
         """Arrays (k, columns) in order, in the type of the file."""
-        picked = list(self.columns)
-        if self.array is not None:
-            everything = picked == list(range(self.array.shape[1]))
-            for part in _pieces(self.path, self.array, rows):
-                yield np.ascontiguousarray(part if everything else part[:, picked])
-            return
-        import polars
-
-        table = polars.scan_parquet(self.path)
-        names = table.collect_schema().names()
-        wanted = table.select([names[c] for c in picked])
         for start in range(0, self.n_rows, rows):
-            yield np.ascontiguousarray(wanted.slice(start, rows).collect().to_numpy())
+            yield self._part(start, min(start + rows, self.n_rows))
 
     def rows(self, start: int, stop: int) -> npt.NDArray[np.float64]:
         """Rows ``[start, stop)`` as float64 (stop - start, columns)."""
         if stop <= start:
             return np.empty((0, len(self.columns)))
-        if self.array is not None:
-            return np.array(self.array[start:stop][:, list(self.columns)], dtype=np.float64)
-        import polars
-
-        table = polars.scan_parquet(self.path)
-        names = table.collect_schema().names()
-        part = table.select([names[c] for c in self.columns]).slice(start, stop - start).collect()
-        return np.asarray(part.to_numpy(), dtype=np.float64)
+        return np.asarray(self._part(start, stop), dtype=np.float64)
 
     def whole(self) -> npt.NDArray[np.float64]:
-        """All rows (n, columns): the mapped array itself where its columns are all wanted."""
-        if self.array is not None and list(self.columns) == list(range(self.array.shape[1])):
-            return self.array
-        return np.concatenate(list(self.chunks()))
+        """All rows (n, columns)."""
+        return self._part(0, self.n_rows)
 
+    def _part(self, start: int, stop: int) -> npt.NDArray[Any]:
+        if self.on_disk is not None:
+            part = self.on_disk.read(start, stop)
+            picked = list(self.columns)
+            return part if picked == list(range(part.shape[1])) else np.ascontiguousarray(part[:, picked])
+        import polars
 
-def _pieces(path: Path, array: npt.NDArray[np.float64], rows: int) -> Iterator[npt.NDArray[np.float64]]:
-    """Rows of a mapped array, read rather than mapped: pages once mapped would count as memory until the end."""
-    if not (isinstance(array, np.memmap) and array.flags.c_contiguous):
-        for start in range(0, len(array), rows):
-            yield array[start : start + rows]
-        return
-    width = array.shape[1]
-    with path.open("rb") as stream:
-        stream.seek(array.offset)
-        for start in range(0, len(array), rows):
-            count = min(rows, len(array) - start)
-            part = np.fromfile(stream, dtype=array.dtype, count=count * width)
-            if len(part) < count * width:
-                raise ReadError(f"{path}: the file became shorter while it was read; copy it again.")
-            yield part.reshape(count, width)
+        try:
+            with panics_unprinted():
+                table = polars.scan_parquet(self.path)
+                names = table.collect_schema().names()
+                wanted = table.select([names[c] for c in self.columns])
+                part = np.ascontiguousarray(wanted.slice(start, stop - start).collect().to_numpy())
+        except polars.exceptions.PanicException:
+            raise ReadError(f"{self.path}: this Parquet file is damaged.") from None
+        except polars.exceptions.PolarsError as error:
+            raise ReadError(f"{self.path}: this Parquet file is damaged ({str(error).splitlines()[0]}).") from None
+        except OSError as error:
+            raise from_os_error(self.path, error) from None
+        if len(part) < stop - start or part.dtype.kind not in "iuf":
+            raise ReadError(
+                f"{self.path}: rows {start} to {stop} of this Parquet file are not all numbers; write it again."
+            )
+        return part
 
 
 def open_chunks(path: Path, columns: str) -> ChunkedLog:
@@ -93,15 +83,10 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
             magic = stream.read(6)
     except OSError as error:
         raise from_os_error(path, error) from None
-    array = None
+    on_disk = None
     if magic == b"\x93NUMPY":
-        try:
-            array = np.load(path, mmap_mode="r", allow_pickle=False)
-        except (OSError, ValueError, EOFError, SyntaxError) as error:
-            raise ReadError(f"{path}: this .npy file is damaged ({error}); write it again.") from None
-        if array.ndim != 2 or array.dtype.kind not in "iuf":
-            raise ReadError(f"{path}: only arrays of numbers, rows x columns, are read in pieces; got {array.shape}.")
-        n_rows, n_columns = array.shape
+        on_disk = rows_on_disk(path)
+        n_rows, n_columns = on_disk.shape
     elif magic[:4] == b"PAR1":
         import polars
 
@@ -127,4 +112,4 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
     roles = tuple(words[i] for i in picked)
     if not picked or len(set(roles)) < len(roles):
         raise ReadError(f"--columns: give each of {' '.join(ROLES)} at most once, and one of them.")
-    return ChunkedLog(path, n_rows, roles, picked, array)
+    return ChunkedLog(path, n_rows, roles, picked, on_disk)

@@ -14,14 +14,14 @@ from trihedron.read.audit import audit_counter, audit_readings, audit_steps, aud
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
 from trihedron.read.devices import Choice, by_sensor
-from trihedron.read.errors import ReadError
+from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.memory import table_of
 from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import FloatArray, Progress, Table
-from trihedron.records import Finding, FindingCode, Recording, Severity
+from trihedron.records import Finding, FindingCode, Recording
 from trihedron.units import AccelerationUnit, RateUnit
 
 STAMPS = "stamps as logged [s]"
@@ -111,7 +111,12 @@ def read_recording(
 
 
 def _of_file(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
-    return of_tables(read_tables(path, options.choice, options.progress), sensor, options)
+    try:
+        tables = read_tables(path, options.choice, options.progress)
+    except OSError as error:
+        # A name too long, a folder that may not be entered: what the readers of formats did not meet.
+        raise from_os_error(path, error) from None
+    return of_tables(tables, sensor, options)
 
 
 def of_tables(tables: tuple[Table, ...], sensor: Sensor | None, options: Options) -> Sensors:
@@ -130,14 +135,12 @@ def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
     missing = sensors.rows_in_file - sensors.rows_read - reported
     if missing:
         findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.ROWS_UNACCOUNTED,
-                Severity.SERIOUS,
-                f"The file holds {sensors.rows_in_file} rows, {sensors.rows_read} were read and {reported} reported as "
-                f"left out: {missing} are not accounted for.",
-                "A fault of the reader.",
-                "Report it with the file; until then convert the log to CSV with another program.",
-                MappingProxyType({"count": float(missing)}),
+                in_file=sensors.rows_in_file,
+                read=sensors.rows_read,
+                reported=reported,
+                count=missing,
             )
         )
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
 from trihedron.records.finding import Finding, Severity
+from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
 
 FloatArray = npt.NDArray[np.float64]
@@ -22,7 +24,7 @@ PARAMETER_NAMES: tuple[str, ...] = (*(f"S{i}{j}" for i in (1, 2, 3) for j in (1,
 
 
 @dataclass(frozen=True, eq=False)
-class Observability:
+class Observability(Frozen):
     """How well the motion determines the parameters.
 
     ``singular_values`` of the whitened, column-scaled Jacobian (largest first), ``condition`` their ratio, ``rank`` the
@@ -40,7 +42,7 @@ class Observability:
 
 
 @dataclass(frozen=True, eq=False)
-class FitQuality:
+class FitQuality(Frozen):
     """Residuals of one sensor's fit, in sample and held out, next to the predicted noise.
 
     ``residual`` (m,) or (m, k) in ``unit`` per pose (accelerometer: norm minus |g|) or per move (gyro: predicted minus
@@ -72,7 +74,7 @@ class FitQuality:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SensorCalibration:
+class SensorCalibration(Frozen):
     """Direct model of one sensor: ``truth = S raw + b``, raw unit → SI.
 
     ``covariance`` (12, 12) in the order of :data:`PARAMETER_NAMES`; rows of parameters fixed by the choice of frame are
@@ -90,11 +92,16 @@ class SensorCalibration:
 
     def __post_init__(self) -> None:
         for name, shape in (("S", (3, 3)), ("b", (3,)), ("covariance", (12, 12))):
-            array = np.array(getattr(self, name), dtype=np.float64)
+            array = np.array(numbers_of(name, getattr(self, name)), dtype=np.float64)
             if array.shape != shape or not np.all(np.isfinite(array)):
                 raise ValueError(f"{name} must be finite with shape {shape}, got shape {array.shape}")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+        for name in ("raw_unit", "si_unit", "method"):
+            kind_of(name, getattr(self, name), str)
+        kind_of("quality", self.quality, FitQuality, type(None))
+        kind_of("observability", self.observability, Observability, type(None))
+        freeze(self)
 
     @property
     def sigma_S(self) -> FloatArray:
@@ -131,14 +138,23 @@ class Calibration(Presented):
     extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:
+        kind_of("accelerometer", self.accelerometer, SensorCalibration)
+        kind_of("gyroscope", self.gyroscope, SensorCalibration, type(None))
+        if not isinstance(self.frame, str) or self.frame not in get_args(Frame):
+            raise WrongTypeError(f"frame is {', '.join(get_args(Frame))}, not {said(self.frame)}.")
+        for name in ("gravity_source", "recording_source", "recording_sha256"):
+            kind_of(name, getattr(self, name), str)
+        all_of("findings", self.findings, Finding)
+        kind_of("extensions", self.extensions, dict, MappingProxyType)
         n = 12 if self.gyroscope is None else 24
-        covariance = np.array(self.covariance, dtype=np.float64)
+        covariance = np.array(numbers_of("covariance", self.covariance), dtype=np.float64)
         if covariance.shape != (n, n):
             raise ValueError(f"covariance must have shape ({n}, {n}), got {covariance.shape}")
         covariance.setflags(write=False)
         object.__setattr__(self, "covariance", covariance)
-        if not 1.0 < self.gravity_m_s2 < 100.0:
+        if not 1.0 < number_of("gravity_m_s2", self.gravity_m_s2) < 100.0:
             raise ValueError(f"gravity must be in m/s², got {self.gravity_m_s2}")
+        freeze(self)
 
     @property
     def is_trustworthy(self) -> bool:

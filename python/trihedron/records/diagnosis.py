@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
+
+from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, said
+from trihedron.records.frozen import Frozen, freeze, thawed
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -64,7 +67,7 @@ class DomainTest:
 
 
 @dataclass(frozen=True, eq=False)
-class DomainResiduals:
+class DomainResiduals(Frozen):
     """What one domain looks like before and after the accepted effects, pose by pose or move by move, SI or degrees.
 
     ``before`` (n, k) and ``after`` (m, k) at ``time_before_s`` (n,), ``time_after_s`` (m,) (middle of pose or move),
@@ -135,7 +138,7 @@ class HeldOut:
 
 
 @dataclass(frozen=True)
-class AcceptedEffect:
+class AcceptedEffect(Frozen):
     """An effect the recording demands, or, with ``side`` ``model``, one that only the given model has.
 
     ``share`` is the part of the misfit of the recording that it removes, 0 to 1; ``None`` where that was not computed.
@@ -167,7 +170,7 @@ class AcceptedEffect:
             "heldout_all": [h.to_dict() for h in self.held_out],
             "confounded_with": list(self.confounded_with),
             "separating_experiment": self.separating_experiment,
-            "model": dict(self.model),
+            "model": thawed(self.model),
         }
 
 
@@ -207,8 +210,9 @@ class ParameterDifference:
 
 
 NoiseTerm = Literal[
-    "N", "B", "K", "Q", "bandwidth", "line", "resolution", "range", "rate", "jitter", "octave", "distribution"
-]
+    "N", "B", "K", "Q", "bandwidth", "line", "resolution", "range", "rate", "jitter", "octave", "distribution",
+    "unit", "frame",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -216,7 +220,8 @@ class NoiseDifference:
     """One figure of noise or sampling of a given model against the recording's.
 
     ``ratio`` is model over recording with its 95 % ``interval``; ``axis`` is empty for what all axes share; ``remark``
-    says in words what the number resembles (a density scaled by the rate twice).
+    says in words what the number resembles (a density scaled by the rate twice). ``term`` ``unit`` is a reading written
+    in another unit than it says, ``frame`` one along other axes (gravity's sign, rates of the world).
     """
 
     sensor: Literal["accelerometer", "gyroscope", "both"]
@@ -318,7 +323,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class LinearModel:
+class LinearModel(Frozen):
     """S and b of both sensors with their standard errors (direct form, raw → SI), as plain nested tuples.
 
     ``covariance`` (24, 24), or (12, 12) without a gyro, in the order of a calibration file; ``None`` if not kept.
@@ -331,14 +336,14 @@ class LinearModel:
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types."""
         return {
-            "accelerometer": dict(self.accelerometer),
-            "gyroscope": None if self.gyroscope is None else dict(self.gyroscope),
+            "accelerometer": thawed(self.accelerometer),
+            "gyroscope": None if self.gyroscope is None else thawed(self.gyroscope),
             "covariance": None if self.covariance is None else self.covariance.tolist(),
         }
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Frozen):
     """What came out when the digital twin was held against the recording (schema version 2)."""
 
     verdict: Verdict
@@ -360,6 +365,28 @@ class Diagnosis:
     laws: tuple[Law, ...] = ()
     stages: tuple[Stage, ...] = ()
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.verdict, str) or self.verdict not in get_args(Verdict):
+            raise WrongTypeError(f"verdict is one of {', '.join(get_args(Verdict))}, not {said(self.verdict)}.")
+        for name in ("domains", "remaining"):
+            all_of(name, getattr(self, name), DomainTest)
+        all_of("effects", self.effects, AcceptedEffect)
+        all_of("candidates", self.candidates, Candidate)
+        for name in ("baseline", "extended"):
+            kind_of(name, getattr(self, name), LinearModel)
+        for name in ("noise", "references"):
+            kind_of(name, getattr(self, name), dict, MappingProxyType)
+        for name in ("gravity_m_s2", "alpha"):
+            number_of(name, getattr(self, name))
+        for name in ("recording_source", "recording_sha256"):
+            kind_of(name, getattr(self, name), str)
+        all_of("residuals", self.residuals, DomainResiduals)
+        all_of("parameters", self.parameters, ParameterDifference)
+        all_of("noise_compared", self.noise_compared, NoiseDifference)
+        all_of("laws", self.laws, Law)
+        all_of("stages", self.stages, Stage)
+        freeze(self)
+
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types, valid against the published schema."""
         return {
@@ -372,7 +399,7 @@ class Diagnosis:
             "calibration": {"baseline": self.baseline.to_dict(), "extended": self.extended.to_dict()},
             "parameters": [p.to_dict() for p in self.parameters],
             "noise": [n.to_dict() for n in self.noise_compared],
-            "noise_model": dict(self.noise),
+            "noise_model": thawed(self.noise),
             "laws": [law.to_dict() for law in self.laws],
             "stages": [stage.to_dict() for stage in self.stages],
             "gravity_m_s2": self.gravity_m_s2,

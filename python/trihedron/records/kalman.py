@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from trihedron.records.calibration import FloatArray, SensorCalibration
 from trihedron.records.finding import Finding, Severity
+from trihedron.records.frozen import Frozen
 from trihedron.units import radians_from_degrees
 
 CONSTANT_NAMES: tuple[str, ...] = ("kx", "ky", "kz", "U0")
@@ -205,7 +206,7 @@ class Consistency:
 
 
 @dataclass(frozen=True, eq=False)
-class KalmanCalibration:
+class KalmanCalibration(Frozen):
     """Calibration of a triad by Kalman filter.
 
     ``inverse_S`` (3, 3), ``inverse_b`` (3,): ``raw = inverse_S f + inverse_b``; ``accelerometer`` the direct form
@@ -244,7 +245,7 @@ class KalmanCalibration:
 
 
 @dataclass(frozen=True, eq=False)
-class LiveEstimate:
+class LiveEstimate(Frozen):
     """What is known after a pose: constants (3, 4) with standard errors, and how far the goal is.
 
     ``relative_sigma`` (3, 4) are the standard errors divided by the axis' own sensitivity: dimensionless for the three
@@ -263,7 +264,7 @@ class LiveEstimate:
 
 
 @dataclass(frozen=True, eq=False)
-class NormKalmanCalibration:
+class NormKalmanCalibration(Frozen):
     """Calibration of a triad by the filter that knows only the length of gravity.
 
     ``parameters``, ``sigma`` (n, 12) are S row by row, then b, after every pose, as they stood then; ``accelerometer``

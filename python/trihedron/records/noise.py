@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.records.finding import Finding, Severity
+from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
 
 FloatArray = npt.NDArray[np.float64]
@@ -66,6 +67,7 @@ class AllanCurve(Presented):
         for name in _PER_CHANNEL:
             if getattr(self, name).shape != shape:
                 raise ValueError(f"{name} must have shape {shape}, got {getattr(self, name).shape}")
+        freeze(self)
 
     @property
     def tau_s(self) -> FloatArray:
@@ -163,7 +165,7 @@ class SpectralLine:
 
 
 @dataclass(frozen=True)
-class NoiseAxis:
+class NoiseAxis(Frozen):
     """What one axis' noise is made of.
 
     All values are in ``unit`` (the SI unit, or the raw unit where the log does not tell the scale) and seconds: Q
@@ -195,6 +197,7 @@ class NoiseAxis:
         missing = [term.value for term in TermName if term not in self.terms]
         if missing:
             raise ValueError(f"the noise of axis {self.name} lacks the terms {', '.join(missing)}")
+        freeze(self)
 
     def value(self, symbol: TermName | str) -> float:
         """Value of a term, 0 when it is absent."""

@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Literal
 
+from trihedron.records.frozen import Frozen
+
 Library = Literal["polars", "pandas"]
 
 
-class Presented:
+class Presented(Frozen):
     """A record that can be shown. Words, tables and figures are made where they live, when they are asked for."""
 
     def to_dict(self) -> dict[str, Any]:

@@ -8,7 +8,9 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
 from trihedron.records.finding import Finding
+from trihedron.records.frozen import freeze
 from trihedron.records.presented import Presented
 from trihedron.records.sampling import UNJUDGED, Sampling
 from trihedron.units import AccelerationUnit, RateUnit
@@ -25,6 +27,7 @@ def _is_frozen(array: object) -> bool:
 
 def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:
     # An array that nobody can write to is shared, not copied: a log of 1e8 rows must not exist twice.
+    array = numbers_of(name, array)
     frozen = _is_frozen(array)
     out: FloatArray = np.array(array, dtype=np.float64, order="C", copy=None if frozen else True)
     if out.ndim != len(shape) or any(
@@ -133,10 +136,18 @@ class Recording(Presented):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, _readonly(value, name, (n,)))
-        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
+        if number_of("rate_hz", self.rate_hz) <= 0.0:
             raise ValueError(f"rate_hz must be a positive number, got {self.rate_hz}")
-        object.__setattr__(self, "accelerometer_unit", AccelerationUnit(self.accelerometer_unit))
-        object.__setattr__(self, "gyroscope_unit", RateUnit(self.gyroscope_unit))
+        number_of("start_epoch_s", self.start_epoch_s)
+        units = (("accelerometer_unit", AccelerationUnit), ("gyroscope_unit", RateUnit))
+        for name, kind in units:
+            object.__setattr__(self, name, word_of(name, getattr(self, name), kind))
+        all_of("findings", self.findings, Finding)
+        kind_of("sampling", self.sampling, Sampling)
+        kind_of("auxiliary", self.auxiliary, dict, MappingProxyType)
+        for name in ("source", "sha256"):
+            kind_of(name, getattr(self, name), str)
+        freeze(self)
 
     def with_distinct_stamps(self) -> Recording:
         """This recording with no two samples at one instant: stamps that are shared, spread (:func:`spread_stamps`)."""

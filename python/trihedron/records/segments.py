@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.records.checked import all_of, kind_of, numbers_of
 from trihedron.records.finding import Finding
+from trihedron.records.frozen import freeze
 from trihedron.records.presented import Presented
 
 FloatArray = npt.NDArray[np.float64]
@@ -86,6 +88,15 @@ class Segments(Presented):
     whole: Segments | None = None
 
     def __post_init__(self) -> None:
+        all_of("holds", self.holds, Hold)
+        all_of("moves", self.moves, Move)
+        all_of("findings", self.findings, Finding)
+        kind_of("whole", self.whole, Segments, type(None))
+        for field in fields(self):
+            value = getattr(self, field.name)
+            is_array = field.name not in ("holds", "moves", "findings", "whole")
+            if is_array and not (value is None and "None" in str(field.type)):
+                object.__setattr__(self, field.name, numbers_of(field.name, value))
         n = len(self.holds)
         for name in ("accelerometer_mean", "gyroscope_mean", "accelerometer_sigma_mean", "gyroscope_sigma_mean"):
             value = getattr(self, name)
@@ -94,6 +105,7 @@ class Segments(Presented):
         for move in self.moves:
             if not (0 <= move.hold_before < n and 0 <= move.hold_after < n and move.start <= move.stop):
                 raise ValueError(f"move {move.index} does not join two holds")
+        freeze(self)
 
     @property
     def n_holds(self) -> int:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from trihedron.records.calibration import Calibration
 from trihedron.records.finding import Finding, Severity
+from trihedron.records.frozen import Frozen
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -55,7 +56,7 @@ the natural logarithm of raw units per SI unit: differences of it are relative."
 
 
 @dataclass(frozen=True, eq=False)
-class Session:
+class Session(Frozen):
     """One calibrated recording as the comparison needs it.
 
     ``numbers`` (9,) or (21,) in the order of :data:`PARAMETERS`, ``covariance`` of the same size: the error of the
@@ -152,7 +153,7 @@ class ThermalModel:
 
 
 @dataclass(frozen=True, eq=False)
-class SessionsModel:
+class SessionsModel(Frozen):
     """Many recordings of one unit as one model: ``calibration`` is what is common, its covariance that of the *next*
     session (error of the common numbers and what a session differs by)."""
 

@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.records.frozen import Frozen
+
 FloatArray = npt.NDArray[np.float64]
 
 SegmentKind = Literal["hold", "move", "turn", "disturbance", "vibration", "oscillation", "table-turn"]
@@ -34,7 +36,7 @@ class TrueSegment:
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class Truth(Frozen):
     """What the instrument was really exposed to and made of.
 
     Parameters

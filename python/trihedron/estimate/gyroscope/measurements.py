@@ -18,7 +18,7 @@ from trihedron.estimate.gyroscope.rounding import (
     undithered_axes,
 )
 from trihedron.records.calibration import SensorCalibration
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 
@@ -247,35 +247,29 @@ def audit_moves(measured: MoveMeasurements) -> list[Finding]:
         which = [int(i) for i in np.flatnonzero(measured.clipped_s > 0.0)]
         lost = int(np.count_nonzero(measured.is_lost))
         findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.CLIPPING,
-                Severity.WARNING,
-                f"the gyro met its limit in {len(which)} of {measured.n_moves} moves ({_list(which)}), for "
-                f"{1000.0 * float(measured.clipped_s.max()):.0f} ms at most; {len(which) - lost} of them are "
-                f"bridged and "
-                f"weigh less, {lost} left out.",
-                "the sensor was turned faster than its range",
-                "Turn more slowly, or set a wider range.",
+                "moves",
+                moves=len(which),
+                n_moves=measured.n_moves,
+                which=which,
+                longest_s=measured.clipped_s.max(),
+                bridged=len(which) - lost,
+                left_out=lost,
             )
         )
     if np.any(measured.is_gapped):
         which = [int(i) for i in np.flatnonzero(measured.is_gapped)]
         findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.TIME_GAP,
-                Severity.WARNING,
-                f"samples are missing inside {len(which)} of {measured.n_moves} moves ({_list(which)}); "
-                "their rotation is uncertain and they weigh less.",
-                "the logger lost samples while the sensor moved",
-                "Record again, or log at a rate that the link sustains.",
+                "moves",
+                moves=len(which),
+                n_moves=measured.n_moves,
+                which=which,
             )
         )
     return findings
-
-
-def _list(indices: list[int]) -> str:
-    shown = ", ".join(str(i) for i in indices[:8])
-    return f"move {shown}" + (" ..." if len(indices) > 8 else "")
 
 
 def _required(readings: FloatArray | None, name: str) -> FloatArray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -80,25 +79,16 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
         return []
     first_s = float(recording.time_s[at[0]])
     return [
-        Finding(
+        Finding.of(
             FindingCode.SAMPLES_LOST,
-            Severity.SERIOUS if share > min(SERIOUS_SHARE, sigma_scale) else Severity.WARNING,
-            f"Samples are missing though the stamps run on evenly: {n_long} of {n} steps in motion are one sample "
-            f"too long, {n_short} too short (first at {first_s:.2f} s): about {100 * share:.2g} ± {100 * error:.1g} % "
-            "of the samples, and of every turn, are lost. The gyro's scale factors are too large by about that.",
-            "A link or a logger that drops samples and stamps, or numbers, what is left anew.",
-            "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
-            "`trihedron diagnose` puts single losses back.",
-            MappingProxyType(
-                {
-                    "long_steps": float(n_long),
-                    "short_steps": float(n_short),
-                    "steps": float(n),
-                    "lost_share": share,
-                    "sigma_lost_share": error,
-                    "first_s": first_s,
-                }
-            ),
+            "seen-in-motion",
+            severity=Severity.SERIOUS if share > min(SERIOUS_SHARE, sigma_scale) else Severity.WARNING,
+            long_steps=n_long,
+            short_steps=n_short,
+            steps=n,
+            lost_share=share,
+            sigma_lost_share=error,
+            first_s=first_s,
         )
     ]
 

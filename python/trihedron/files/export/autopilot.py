@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from trihedron.files.export.contract import (
@@ -85,7 +87,7 @@ def _px4(name: str, value: float) -> str:
 
 def _reference(calibration: Calibration) -> float:
     references = calibration.extensions.get("references", {})
-    return float(references.get("temperature_degc", 25.0)) if isinstance(references, dict) else 25.0
+    return float(references.get("temperature_degc", 25.0)) if isinstance(references, Mapping) else 25.0
 
 
 def _orders(values: dict[str, float]) -> list[list[float]]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.audit.repeats import CHUNK
 from trihedron.read.table import FloatArray
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 Place = Callable[[int], str]
 AXES = "xyz"
@@ -114,20 +113,17 @@ def audit_clipping(sensor: str, walls: list[Wall], place: Place) -> list[Finding
     """One finding per sensor that names every wall."""
     if not walls:
         return []
-    listed = ", ".join(
-        f"{AXES[w.axis]} at {w.value:.7g} ({w.count} samples in {w.stretches} stretch{'es' if w.stretches > 1 else ''})"
-        for w in walls
-    )
     first = min(w.sample for w in walls)
     numbers = {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_count": float(w.count) for w in walls}
     numbers |= {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_value": w.value for w in walls}
     return [
-        Finding(
+        Finding.of(
             FindingCode.CLIPPING,
-            Severity.WARNING,
-            f"The {short(sensor)} is clipped: {listed}; first at {place(first)}.",
-            "The motion left the measuring range.",
-            "Turn more slowly, or set a wider range; angles integrated over clipped moves are too small.",
-            MappingProxyType({"count": float(sum(w.count for w in walls)), "sample": float(first), **numbers}),
+            sensor=short(sensor),
+            walls=[(AXES[w.axis], w.value, w.count, w.stretches) for w in walls],
+            where=place(first),
+            count=sum(w.count for w in walls),
+            sample=first,
+            numbers=numbers,
         )
     ]

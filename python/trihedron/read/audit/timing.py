@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +19,8 @@ GAP_STEPS = 1.5
 JITTER_STEPS = 0.03
 """Jitter below three per cent of a step is the clock's rounding, not worth a sentence."""
 SERIOUS_LOSS = 0.05
+MUCH_JITTER = 0.2
+"""Jitter of a fifth of a step moves the ends of a short turn by as much as a reading's noise does."""
 
 
 def audit_timing(
@@ -61,27 +62,18 @@ def audit_timing(
     mean = float(inside.mean())
     if jitter > JITTER_STEPS * mean:
         findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.TIME_JITTER,
-                Severity.NOTE if jitter < 0.2 * mean or stamps_s is not None else Severity.WARNING,
-                f"Steps between stamps vary by {1e3 * jitter:.3g} ms rms (median {1e3 * usual:.5g} ms = "
-                f"{1 / usual:.5g} Hz, mean {1e3 * mean:.5g} ms = {1 / mean:.5g} Hz, {1e3 * float(inside.min()):.3g} to "
-                f"{1e3 * float(inside.max()):.3g} ms)"
-                + (", and no even clock lies behind them" if sampling.kind is StampKind.IRREGULAR else "")
-                + f"; the rate used is {rate_hz:.5g} Hz.",
-                "Stamps taken when the data arrived, or rounded."
-                if sampling.kind is not StampKind.IRREGULAR
-                else "A program that samples in its own time: its stamps were kept.",
-                "Stamp in the sensor's own interrupt if turns matter.",
-                MappingProxyType(
-                    {
-                        "jitter_s": jitter,
-                        "median_step_s": usual,
-                        "mean_step_s": mean,
-                        "median_rate_hz": 1 / usual,
-                        "rate_hz": rate_hz,
-                    }
-                ),
+                severity=Severity.NOTE if jitter < MUCH_JITTER * mean or stamps_s is not None else Severity.WARNING,
+                jitter_s=jitter,
+                median_step_s=usual,
+                median_rate_hz=1 / usual,
+                mean_step_s=mean,
+                mean_rate_hz=1 / mean,
+                least_s=inside.min(),
+                largest_s=inside.max(),
+                rate_hz=rate_hz,
+                is_irregular=sampling.kind is StampKind.IRREGULAR,
             )
         )
     return findings
@@ -98,14 +90,13 @@ def _duplicates(step: FloatArray, place: Place, *, is_mended: bool) -> list[Find
         return []
     fraction = len(same) / len(step)
     return [
-        Finding(
+        Finding.of(
             FindingCode.TIME_DUPLICATE,
-            Severity.NOTE if is_mended else Severity.WARNING,
-            f"{len(same)} samples ({100 * fraction:.3g} %) carry the same time as the one before "
-            f"(first: {place(int(same[0]) + 1)}).",
-            "Several samples stamped in one go, a stamp of too few digits, or rows written twice.",
-            "" if is_mended else "With samples stamped in batches, read with --columns time=none and --rate.",
-            MappingProxyType({"count": float(len(same)), "fraction": fraction, "sample": float(same[0] + 1)}),
+            "mended" if is_mended else "",
+            count=len(same),
+            fraction=fraction,
+            where=place(int(same[0]) + 1),
+            sample=same[0] + 1,
         )
     ]
 
@@ -115,24 +106,17 @@ def _gap(step: FloatArray, gaps: npt.NDArray[np.intp], lost: npt.NDArray[np.int6
     total = int(lost.sum())
     fraction = total / (len(step) + 1 + total)
     worst = sorted((int(g) for g in gaps[np.argsort(step[gaps])[::-1][:3]]), key=int)
-    listed = "; ".join(f"{step[g]:.4g} s before {place(g + 1)}" for g in worst)
     return [
-        Finding(
+        Finding.of(
             FindingCode.TIME_GAP,
-            Severity.SERIOUS if fraction > SERIOUS_LOSS else Severity.WARNING,
-            f"{len(gaps)} gaps, about {total} samples lost ({100 * fraction:.2g} %); the "
-            f"longest lasts {step[longest]:.4g} s. Where: {listed}{' ...' if len(gaps) > 3 else ''}.",
-            "Lost packets or a full buffer.",
-            "Turns that fall into a gap are integrated wrongly; repeat them.",
-            MappingProxyType(
-                {
-                    "count": float(len(gaps)),
-                    "longest_s": float(step[longest]),
-                    "sample": float(longest + 1),
-                    "lost_samples": float(total),
-                    "fraction": fraction,
-                }
-            ),
+            severity=Severity.SERIOUS if fraction > SERIOUS_LOSS else Severity.WARNING,
+            count=len(gaps),
+            lost_samples=total,
+            fraction=fraction,
+            longest_s=step[longest],
+            worst=[(step[g], place(g + 1)) for g in worst],
+            has_more=len(gaps) > len(worst),
+            sample=longest + 1,
         )
     ]
 
@@ -156,13 +140,14 @@ def audit_counter(counter: FloatArray, label: str, place: Place) -> list[Finding
         return []
     missing = int(np.sum(np.rint(step[lost] / usual) - 1))
     return [
-        Finding(
+        Finding.of(
             FindingCode.SAMPLES_LOST,
-            Severity.WARNING if missing <= SERIOUS_LOSS * len(counter) else Severity.SERIOUS,
-            f"The counter {label} skips at {len(lost)} places, {missing} samples are missing "
-            f"(first: {place(int(lost[0]) + 1)}).",
-            "Lost packets.",
-            "Turns that fall into a gap are integrated wrongly; repeat them.",
-            MappingProxyType({"count": float(len(lost)), "lost_samples": float(missing), "sample": float(lost[0] + 1)}),
+            "counter",
+            severity=Severity.WARNING if missing <= SERIOUS_LOSS * len(counter) else Severity.SERIOUS,
+            column=label,
+            count=len(lost),
+            lost_samples=missing,
+            where=place(int(lost[0]) + 1),
+            sample=lost[0] + 1,
         )
     ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +11,7 @@ from trihedron.read.clock.order import order_of_rows, unwrap
 from trihedron.read.clock.unit import SECONDS, Witness, time_unit
 from trihedron.read.errors import ReadError
 from trihedron.read.table import FloatArray, Table
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 _LONGEST_S = 3.2e9
 """A century."""
@@ -61,14 +60,7 @@ def build_clock(
         if finite.sum() < 2:
             raise ReadError(f"{table.path}: the time column {table.label(column)} holds no numbers; name another one.")
         findings.append(
-            Finding(
-                FindingCode.NON_FINITE,
-                Severity.WARNING,
-                f"{int((~finite).sum())} rows have no time (first: {table.place(bad)}) and were left out.",
-                "Damaged rows.",
-                "Check the logger.",
-                MappingProxyType({"count": float((~finite).sum()), "row": float(bad)}),
-            )
+            Finding.of(FindingCode.NON_FINITE, "time", count=np.count_nonzero(~finite), where=table.place(bad), row=bad)
         )
         rows = np.flatnonzero(finite)
         raw = raw[rows]

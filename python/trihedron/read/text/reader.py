@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -107,13 +106,11 @@ class TextReader:
             )
         if layout.header_ignored:
             self.findings.append(
-                Finding(
+                Finding.of(
                     FindingCode.COLUMNS_ASSUMED,
-                    Severity.WARNING,
-                    f"The line '{layout.header_ignored[:80]}' above the numbers does not name their "
-                    f"{layout.n_fields} columns, so it was passed over.",
-                    "A header with another number of names than there are columns.",
-                    "Name the columns with --columns.",
+                    "header-ignored",
+                    line=layout.header_ignored[:80],
+                    n_columns=layout.n_fields,
                 )
             )
         self._account_for_stray(layout)
@@ -128,25 +125,16 @@ class TextReader:
                 "the separator or the columns change inside the file; cut it there and read the parts one by one."
             )
         if layout.stray:
-            self._leave_out(
-                len(layout.stray),
-                f"{len(layout.stray)} lines above the first row of {layout.n_fields} numbers were passed over (first: "
-                f"line {self.line(layout.stray[0])}).",
-                "Rows of another layout, damaged rows, or numbers that belong to a preamble.",
+            self.n_left_out += len(layout.stray)
+            self.findings.append(
+                Finding.of(
+                    FindingCode.ROWS_LEFT_OUT,
+                    "above",
+                    rows_left_out=len(layout.stray),
+                    n_columns=layout.n_fields,
+                    line=self.line(layout.stray[0]),
+                )
             )
-
-    def _leave_out(self, count: int, seen: str, cause: str, severity: Severity = Severity.WARNING) -> None:
-        self.n_left_out += count
-        self.findings.append(
-            Finding(
-                FindingCode.ROWS_LEFT_OUT,
-                severity,
-                seen,
-                cause,
-                "Look at these lines; nothing else of the file was left out." if severity is Severity.WARNING else "",
-                MappingProxyType({"rows_left_out": float(count)}),
-            )
-        )
 
     def _first_block(self, data: bytes, layout: Layout) -> None:
         """Which columns hold words instead of numbers (labels, dates), judged on the first lines."""
@@ -224,13 +212,11 @@ class TextReader:
             )
         self.n_left_out += 1
         self.findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.LINE_INCOMPLETE,
-                Severity.NOTE if not ends_with_line_end else Severity.WARNING,
-                f"The last line ({line}) breaks off in the middle and was left out.",
-                "The logger was stopped while it wrote.",
-                "Nothing is lost but one sample.",
-                MappingProxyType({"rows_left_out": 1.0}),
+                severity=Severity.NOTE if not ends_with_line_end else Severity.WARNING,
+                line=line,
+                rows_left_out=1,
             )
         )
         return found.number[:-1], found.text[: found.text.rfind(b"\n", 0, -1) + 1]
@@ -270,12 +256,14 @@ class TextReader:
             raise ReadError(f"{self.path}: the file has a header but no row of numbers; record or copy it again.")
         remarks = np.concatenate(self.comments) if self.comments else np.zeros(0, dtype=np.int64)
         if len(remarks):
-            self._leave_out(
-                len(remarks),
-                f"{len(remarks)} lines between the rows begin like remarks and were passed over (first: line "
-                f"{self.line(int(remarks[0]))}).",
-                "Remarks of the logger, or rows that somebody took out.",
-                Severity.NOTE,
+            self.n_left_out += len(remarks)
+            self.findings.append(
+                Finding.of(
+                    FindingCode.ROWS_LEFT_OUT,
+                    "remarks",
+                    rows_left_out=len(remarks),
+                    line=self.line(int(remarks[0])),
+                )
             )
         columns: list[FloatArray] = []
         names: list[str] = []
