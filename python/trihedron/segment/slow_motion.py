@@ -16,7 +16,7 @@ short on either side of where it is cut."""
 FALSE_ALARM = 1e-5
 """Chance that the halves of a still window are called different; of a hundred overlapping ones, once in some hours."""
 MOST_FITTED = 30_000
-"""Windows that the gyro's share is fitted to, evenly spread: twelve numbers are known to a hundredth of the noise by them."""
+"""Windows that the gyro's share is fitted to, evenly spread: they tell twelve numbers to a hundredth of the noise."""
 FREE = 1e-13
 """Part of the largest eigenvalue of normal equations below which rounding could have made the eigenvalue."""
 FEWEST_WINDOWS = 24
@@ -26,7 +26,7 @@ FEWEST_WINDOWS = 24
 @dataclass(frozen=True, eq=False)
 class _Windows:
     """Windows ``[first, first + 2 half)`` of blocks: ``first`` (n,), ``change`` (n, 3) from half to half of the
-    accelerometer's reading, its ``mean`` (n, 3), and the gyro's ``rate`` (n, 3) as the change weighs it, if there is one."""
+    accelerometer's reading, its ``mean`` (n, 3), and the gyro's ``rate`` (n, 3), if any, as the change weighs it."""
 
     first: np.ndarray[tuple[int], np.dtype[np.int64]]
     change: FloatArray
@@ -40,7 +40,7 @@ class _Windows:
         return _Windows(self.first[::step], self.change[::step], self.mean[::step], rate)
 
     def design(self) -> FloatArray:
-        """(n, 3, 12) columns by which the gyro predicts the change: ``mean × (W rate + z)``, ``W`` row by row, then ``z``."""
+        """(n, 3, 12) columns by which the gyro predicts the change, ``mean × (W rate + z)``: ``W`` row by row, ``z``."""
         assert self.rate is not None
         mean = self.mean
         cross = np.zeros((len(self.first), 3, 3))
