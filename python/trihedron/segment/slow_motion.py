@@ -40,7 +40,7 @@ class _Windows:
         return _Windows(self.first[::step], self.change[::step], self.mean[::step], rate)
 
     def design(self) -> FloatArray:
-        """(n, 3, 12) columns by which the gyro predicts the change, ``mean × (W rate + z)``: ``W`` row by row, ``z``."""
+        """(n, 3, 12) columns that predict the change, ``mean × (W rate + z)``: ``W`` row by row, ``z``."""
         assert self.rate is not None
         mean = self.mean
         cross = np.zeros((len(self.first), 3, 3))
