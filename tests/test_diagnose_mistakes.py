@@ -13,6 +13,7 @@ from trihedron.estimate.noise.of_zeros import PoseZeros, compare_slow
 from trihedron.pipeline.comparing_frames import sign_of_gravity
 from trihedron.records import Hold, Segments
 from trihedron.records.diagnosis import Stage, StageDomain
+from trihedron.records.sampling import Sampling, StampKind
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 N, HOLD_S, GAP_S, POSES = 9e-5, 4.5, 2.0, 26
@@ -158,6 +159,25 @@ def test_the_noise_stage_falls_to_what_the_recordings_own_halves_differ_by():
     # Half of the figures are off by 6 dB: 4.3 rms; octaves of four holds are known to 1 dB.
     assert 3.5 < misfit["as-given"] == misfit["numbers"] < 5.5
     assert misfit["noise"] == misfit["effects"] < 1.5
+
+
+def test_stamps_that_reading_made_even_still_count_as_scattered():
+    from trihedron.pipeline.comparing_noise import compare_noise, sampled
+
+    rng = np.random.default_rng(4)
+    body, _, _ = session_with_world_rates(3)
+    readings = 1e-2 * rng.standard_normal((4000, 3))
+    clean = replace(body, time_s=np.arange(4000) / 100.0, accelerometer=readings, gyroscope=0.1 * readings[::-1],
+                    temperature_degc=None, supply_v=None, rate_hz=100.0)  # fmt: skip
+    late = replace(clean, sampling=Sampling(StampKind.LATE, 0.01, 0.0, 1.5e-3, is_even=True))
+    rounded = replace(clean, sampling=Sampling(StampKind.ROUNDED, 0.01, 0.0, 1.5e-3, is_even=True))
+    holds = tuple(Hold(k, 500 * k, 500 * k + 450, 500 * k, 500 * k + 450) for k in range(8))
+    given, fit = sampled(clean, holds, model(1.0, 1.0)), model(1.0, 1.0)
+    for log, expected in ((late, {"jitter"}), (rounded, set()), (clean, set())):
+        rows = compare_noise(given, sampled(log, holds, fit), alpha=0.01)
+        assert {n.term for n in rows if n.significant} == expected
+    jitter = next(n for n in compare_noise(given, sampled(late, holds, fit), alpha=0.01) if n.term == "jitter")
+    assert "1.5 ms" in jitter.remark
 
 
 def still(n):

@@ -15,6 +15,7 @@ from trihedron.estimate.noise import noise_of_holds, ratio_of
 from trihedron.records import Hold, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.hold_noise import HoldNoise, Measured
+from trihedron.records.sampling import StampKind
 
 FloatArray = npt.NDArray[np.float64]
 Sensor = Literal["accelerometer", "gyroscope"]
@@ -42,6 +43,7 @@ NORMAL_EXCESS, UNIFORM_EXCESS = 0.0, -0.6
 """Excess kurtosis of differences of two normal and of two uniform numbers."""
 
 _AXES = ("x", "y", "z")
+_SCATTERED = (StampKind.LATE, StampKind.SCATTERED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +85,10 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
     nominal = 1.0 / recording.rate_hz
     away = steps[np.abs(steps - nominal) < 0.9 * nominal] / nominal - 1.0
     jitter = float(np.std(away)) / math.sqrt(2.0) if len(away) else 0.0
+    clock = recording.sampling
+    if clock.is_even and clock.kind in _SCATTERED:
+        # Reading put the samples on the even clock behind their stamps: what these scattered by is in its report.
+        jitter = max(jitter, clock.stamp_error_s * recording.rate_hz)
     return Sampled(noise, excess, count, recording.rate_hz, jitter)
 
 
