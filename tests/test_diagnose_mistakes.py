@@ -133,6 +133,16 @@ def test_walks_of_two_sessions_of_one_unit_are_not_told_apart_and_a_walk_without
     assert sum(covered) >= 20
 
 
+def test_a_simulation_without_any_noise_has_less_walk_than_a_recording_and_no_number_fails():
+    silent = [replace(z, values=1e-18 * z.values, sigma=0.0 * z.sigma) for z in zeros(1, 0.0)]
+    exact = [replace(z, values=0.0 * z.values, sigma=0.0 * z.sigma) for z in silent]
+    for ideal in (silent, exact):
+        found = compare_slow(ideal, zeros(2, 1e-4))
+        assert found.p_value < 1e-3
+        assert all(np.isfinite([r.value for r in axis.values()]).all() for axis in found.ratio)
+        assert all(axis["K"].value < 1e-5 for axis in found.first)
+
+
 def test_slow_noise_is_not_compared_with_few_poses():
     short = [replace(z, values=z.values[:8], sigma=z.sigma[:8], time_s=z.time_s[:8], length_s=z.length_s[:8])
              for z in zeros(1, 1e-5)]  # fmt: skip

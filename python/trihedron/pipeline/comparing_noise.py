@@ -20,6 +20,9 @@ from trihedron.records.sampling import StampKind
 FloatArray = npt.NDArray[np.float64]
 Sensor = Literal["accelerometer", "gyroscope"]
 
+SHARE = 0.125
+"""Of alpha, for each kind of figure (white densities, corners, octaves of both sensors): half of alpha is spent on the
+numbers, a twelfth on slow noise."""
 LEAST_RATIO = 1.05
 """White noise of one part differs by 5 % over 30 K (its resistors' noise goes with the root of temperature)."""
 LEAST_STEP_RATIO = math.sqrt(2.0)
@@ -95,7 +98,7 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
 def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
     """Every figure that both logs have, ratio model over recording; significant beyond chance and beyond what parts do.
 
-    ``alpha``: chance that any white density of two logs of one unit is called different.
+    ``alpha``: chance that anything of two logs of one unit is called different; three eighths of it are spent here.
     """
     out: list[NoiseDifference] = []
     sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
@@ -103,13 +106,13 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
         if sensor not in model.noise or sensor not in recording.noise:
             continue
         pairs = list(zip(_AXES, model.noise[sensor], recording.noise[sensor], strict=True))
-        n_tests = 6 + 6 * sum(len(r.octaves) for _, _, r in pairs) // 3
-        white = [_white(sensor, axis, m, r, alpha / 12.0) for axis, m, r in pairs]
+        n_octaves = 2 * sum(len(r.octaves) for _, _, r in pairs)
+        white = [_white(sensor, axis, m, r, alpha * SHARE / 6.0) for axis, m, r in pairs]
         out += _resembling(sensor, [w for w in white if w is not None], recording.rate_hz)
         for axis, m, r in pairs:
             out += _step(sensor, axis, m, r)
-            out += _corner(sensor, axis, m, r, alpha / 12.0)
-            out += _octaves(sensor, axis, m, r, alpha / n_tests)
+            out += _corner(sensor, axis, m, r, alpha * SHARE / 6.0)
+            out += _octaves(sensor, axis, m, r, alpha * SHARE / max(n_octaves, 1))
         out += _distribution(sensor, model, recording)
     out += _sampling(model, recording)
     return tuple(out)
