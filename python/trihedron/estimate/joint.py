@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -22,11 +21,10 @@ from trihedron.estimate.session.figures import move_quality, norm_quality
 from trihedron.estimate.session.fit import SessionSolution, solve_session
 from trihedron.estimate.session.observed import arranged
 from trihedron.records.calibration import Calibration, FitQuality, Frame, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.sensor_model import in_frame, reframing
-from trihedron.units import mm_s2_from_m_s2
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -141,20 +139,15 @@ def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[
     """Gravity at rest, missed by more than the noise of the means: what the session fit makes of that."""
     if covariance_scale(quality.chi2, quality.dof) == 1.0:
         return ()
-    chi2_per_dof = quality.chi2 / quality.dof
-    numbers = {"chi2_per_dof": chi2_per_dof, "dof": float(quality.dof), "rms_m_s2": quality.rms}
-    numbers |= {"floor_m_s2": quality.floor, "zero_scatter_m_s2": solution.accel_zero_rms}
     return (
-        Finding(
+        Finding.of(
             FindingCode.RESIDUAL_ABOVE_NOISE,
-            Severity.WARNING,
-            f"The residual of the still poses is {mm_s2_from_m_s2(quality.rms):.3g} mm/s² rms, the noise of their "
-            f"means explains only {mm_s2_from_m_s2(quality.floor):.3g} mm/s² (χ² per degree of freedom "
-            f"{chi2_per_dof:.3g}, {quality.dof} degrees); the fit lets the zero differ from pose to pose, here by "
-            f"{mm_s2_from_m_s2(solution.accel_zero_rms):.2g} mm/s² rms, and the standard errors contain that.",
-            "Poses not quite still, a zero that drifts between poses, nonlinearity, or noise of the means underrated.",
-            "Look at the residual per pose; `trihedron diagnose` names the effect.",
-            MappingProxyType(numbers),
+            "poses-joint",
+            rms_m_s2=quality.rms,
+            floor_m_s2=quality.floor,
+            chi2_per_dof=quality.chi2 / quality.dof,
+            dof=quality.dof,
+            zero_scatter_m_s2=solution.accel_zero_rms,
         ),
     )
 
@@ -164,26 +157,14 @@ def _findings(aligned: Aligned, measured: MoveMeasurements, solution: SessionSol
     about_fit = (FindingCode.NOT_CONVERGED, FindingCode.RESIDUAL_ABOVE_NOISE)
     found = [one for one in findings_of(aligned, measured, None) if one.code not in about_fit]
     if not solution.is_converged:
-        found.append(
-            Finding(
-                FindingCode.NOT_CONVERGED,
-                Severity.SERIOUS,
-                f"the fit of the session did not settle ({solution.stopped_because}).",
-                "moves that contradict each other, or a start far from the truth",
-                "Look at the residual per move; give the nominal scale.",
-            )
-        )
+        found.append(Finding.of(FindingCode.NOT_CONVERGED, "session", stopped_because=solution.stopped_because))
     if solution.inflation[0] > 1.0:
-        chi2_per_dof = solution.moves_chi2 / max(solution.moves_dof, 1.0)
         found.append(
-            Finding(
+            Finding.of(
                 FindingCode.RESIDUAL_ABOVE_NOISE,
-                Severity.WARNING,
-                f"gravity after the moves is missed by more than the noise explains: χ²/dof = {chi2_per_dof:.1f} "
-                f"with {solution.moves_dof:.0f} degrees of freedom; the moves count with the noise that they show.",
-                "an effect outside the linear model: g-sensitivity, a time offset between the sensors, nonlinearity",
-                "Run trihedron diagnose to see which.",
-                MappingProxyType({"chi2_per_dof": chi2_per_dof, "dof": solution.moves_dof}),
+                "moves-joint",
+                chi2_per_dof=solution.moves_chi2 / max(solution.moves_dof, 1.0),
+                dof=solution.moves_dof,
             )
         )
     return tuple(found)

@@ -3,11 +3,9 @@ moves."""
 
 from __future__ import annotations
 
-from types import MappingProxyType
-
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried
@@ -21,7 +19,7 @@ from trihedron.records import (
     Severity,
     Verification,
 )
-from trihedron.units import degrees_from_radians, mg_from_m_s2
+from trihedron.units import degrees_from_radians
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -120,20 +118,18 @@ def _carried(
 
 def _norm_findings(error: FloatArray, sigma: FloatArray) -> list[Finding]:
     z2 = (error / sigma) ** 2
-    if stats.chi2.sf(float(z2.sum()), len(z2)) > FALSE_ALARM:
+    if special.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
         return []
     rms = float(np.sqrt(np.mean(error**2)))
     times = float(np.sqrt(np.mean(z2)))
     return [
-        Finding(
+        Finding.of(
             FindingCode.RESIDUAL_ABOVE_NOISE,
-            Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
-            f"Gravity at rest is missed by {rms:.3g} m/s² rms ({mg_from_m_s2(rms):.2g} mg), "
-            f"{times:.1f} times what noise and the stated errors of the calibration allow.",
-            "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were "
-            "not still.",
-            "Calibrate again near the conditions of use; compare the two calibrations.",
-            MappingProxyType({"norm_rms_m_s2": rms, "chi2_per_pose": times**2, "times_expected": times}),
+            "verify-rest",
+            severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
+            norm_rms_m_s2=rms,
+            chi2_per_pose=times**2,
+            times_expected=times,
         )
     ]
 
@@ -143,20 +139,20 @@ def _angle_findings(angle_deg: FloatArray, sigma_deg: FloatArray) -> list[Findin
         return []
     # Two components per move share the variance sigma², so the squared ratio has mean one and two degrees of freedom.
     z2 = 2.0 * (angle_deg / sigma_deg) ** 2
-    if stats.chi2.sf(float(z2.sum()), 2 * len(z2)) > FALSE_ALARM:
+    if special.chdtrc(2 * len(z2), float(z2.sum())) > FALSE_ALARM:
         return []
     rms = float(np.sqrt(np.mean(angle_deg**2)))
     worst = int(np.argmax(angle_deg))
     times = float(np.sqrt(np.mean(z2) / 2.0))
     return [
-        Finding(
+        Finding.of(
             FindingCode.HELD_OUT_WORSE,
-            Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
-            f"Gravity carried through the moves by the gyro is missed by {rms:.3g}° rms (worst move {worst}: "
-            f"{angle_deg[worst]:.3g}°), {times:.1f} times what noise and the stated errors allow.",
-            "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not still.",
-            "Look at the worst moves; calibrate again near the conditions of use.",
-            MappingProxyType({"angle_rms_deg": rms, "worst_move": float(worst), "times_expected": times}),
+            "verify-moves",
+            severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
+            angle_rms_deg=rms,
+            worst_move=worst,
+            worst_deg=angle_deg[worst],
+            times_expected=times,
         )
     ]
 

@@ -161,13 +161,7 @@ def _corrected(readings: FloatArray | None, sensor: SensorCalibration | None) ->
 
 
 def _left_out() -> Finding:
-    return Finding(
-        FindingCode.GYROSCOPE_LEFT_OUT,
-        Severity.WARNING,
-        "The gyro was left out: the calibration holds none.",
-        "It was made without gyro readings, or they did not suffice.",
-        "Calibrate both sensors in one recording.",
-    )
+    return Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "calibration-has-none")
 
 
 def doubted(calibration: Calibration) -> tuple[Finding, ...]:
@@ -175,23 +169,9 @@ def doubted(calibration: Calibration) -> tuple[Finding, ...]:
     grave = [finding for finding in calibration.findings if finding.severity is Severity.SERIOUS]
     if not grave:
         return ()
-    return (
-        Finding(
-            FindingCode.CALIBRATION_DOUBTED,
-            Severity.SERIOUS,
-            f"The calibration itself was not to be trusted: {grave[0].seen}",
-            "What it said when it was made holds for all that it is applied to.",
-            "Calibrate again as its findings say, or apply another calibration.",
-        ),
-    )
+    return (Finding.of(FindingCode.CALIBRATION_DOUBTED, seen=grave[0].seen),)
 
 
 def _not_applied(effect_id: str, why: str) -> Finding:
     is_of_session = "session" in why
-    return Finding(
-        FindingCode.EFFECT_NOT_APPLIED,
-        Severity.NOTE if is_of_session else Severity.WARNING,
-        f"{effect_id} of the extended calibration was not taken off: {why}.",
-        "It was in the recording that was calibrated; S and b were fitted beside it.",
-        "" if is_of_session else "Log that channel, or update the program that applies the calibration.",
-    )
+    return Finding.of(FindingCode.EFFECT_NOT_APPLIED, "of-session" if is_of_session else "", effect=effect_id, why=why)

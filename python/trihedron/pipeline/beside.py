@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from trihedron.estimate.reference import moves_along
@@ -22,10 +21,10 @@ from trihedron.pipeline.referring import (
 )
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.read.reference import of_recording
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Severity
+from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.reference import AgainstReference
 from trihedron.sensor_model import correct
-from trihedron.units import AccelerationUnit, RateUnit, degrees_from_radians, mm_s2_from_m_s2, rate_to_si
+from trihedron.units import AccelerationUnit, RateUnit, rate_to_si
 
 ANOTHER_UNIT = "the log of another unit"
 FEWEST_POSES = 9
@@ -67,10 +66,7 @@ def beside(
         calibration = (
             calibration_by(found, recording, gravity, source, None) if recording.accelerometer is not None else given
         )
-        why = Finding(
-            FindingCode.REFERENCE_ONLY, Severity.NOTE,
-            f"Only the reference was asked: {str(error).rstrip('.')}.", "The log holds no still poses to speak of.",
-        )  # fmt: skip
+        why = Finding.of(FindingCode.REFERENCE_ONLY, why=str(error).rstrip("."))  # fmt: skip
         return DiagnosisResult(
             **values,
             findings=(*said, *recording.findings, *found.findings, why),
@@ -138,14 +134,12 @@ def shared_log(recording: Recording, other: Any, gravity: float | None) -> Recor
 
 def _shared(found: AgainstReference) -> Finding:
     offset, sigma = found.clock_offset_s
-    rate = degrees_from_radians(found.gyroscope.rms)
-    force = "" if found.accelerometer is None else f" and {mm_s2_from_m_s2(found.accelerometer.rms):.3g} mm/s²"
-    return Finding(
+    return Finding.of(
         FindingCode.SHARED_MOTION,
-        Severity.NOTE,
-        f"Both logs hold the same motion (correlation {found.correlation:.3f}, the other clock {offset:+.5g} s): "
-        f"compared sample by sample they differ by {rate:.3g} °/s{force} rms.",
-        "A motion that was replayed, or two units on one body.",
-        "",
-        MappingProxyType({"offset_s": offset, "offset_std_s": sigma, "rate_rms": found.gyroscope.rms}),
+        correlation=found.correlation,
+        offset_s=offset,
+        offset_std_s=sigma,
+        rate_rms=found.gyroscope.rms,
+        has_force=found.accelerometer is not None,
+        force_rms=0.0 if found.accelerometer is None else found.accelerometer.rms,
     )

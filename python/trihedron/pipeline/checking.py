@@ -5,7 +5,7 @@ from __future__ import annotations
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segment
 from trihedron.pipeline.results import CheckResult
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
@@ -28,10 +28,4 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
 
 
 def _impossible(why: str) -> Finding:
-    return Finding(
-        FindingCode.NOT_FIT,
-        Severity.SERIOUS,
-        f"No calibration can be made from this log: {why}",
-        "The log does not hold what a calibration needs.",
-        "docs/procedure.md shows how to move the sensor.",
-    )
+    return Finding.of(FindingCode.NOT_FIT, "no-calibration", why=why)

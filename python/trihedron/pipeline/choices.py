@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
-
 from trihedron.gravity import normal_gravity
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
@@ -37,14 +35,10 @@ def settle_gravity(
 def _defaulted() -> Finding:
     low, high = normal_gravity(0.0, 3000.0), normal_gravity(90.0)
     wrong = 100.0 * max(STANDARD_GRAVITY_M_S2 - low, high - STANDARD_GRAVITY_M_S2) / STANDARD_GRAVITY_M_S2
-    return Finding(
+    return Finding.of(
         FindingCode.GRAVITY_DEFAULTED,
-        Severity.WARNING,
-        f"Gravity was not given; {STANDARD_GRAVITY_M_S2} m/s² was used. Where people live it lies between "
-        f"{low:.3f} and "
-        f"{high:.3f} m/s², and its error goes into every scale and zero of the accelerometer: up to {wrong:.1f} "
-        "% that no residual shows and no ± contains.",
-        "Neither --gravity nor --latitude was said.",
-        "Give --latitude DEG (and --height M), or --gravity M_S2.",
-        MappingProxyType({"gravity_m_s2": STANDARD_GRAVITY_M_S2, "possible_error_percent": wrong}),
+        gravity_m_s2=STANDARD_GRAVITY_M_S2,
+        low_m_s2=low,
+        high_m_s2=high,
+        possible_error_percent=wrong,
     )

@@ -13,7 +13,7 @@ from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.diagnosing import diagnose
 from trihedron.pipeline.reading import Progress
 from trihedron.pipeline.results import CalibrationResult
-from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
+from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis, Domain
 
 
@@ -68,15 +68,15 @@ def _spoilt(diagnosis: Diagnosis) -> tuple[str, float, float, str] | None:
 
 
 def _stays_linear(diagnosis: Diagnosis, domain: str, before: float, after: float, unit: str) -> Finding:
-    named = ", ".join(effect.id for effect in diagnosis.effects)
-    return Finding(
+    return Finding.of(
         FindingCode.EFFECTS_MODELLED,
-        Severity.WARNING,
-        f"The calibration stays linear: with {named} what was left out is predicted worse ({domain} from "
-        f"{before:.3g} to {after:.3g} {unit} rms).",
-        "The effects belong to this session more than to the sensor, or its poses are too few to tell their size.",
-        "`trihedron diagnose` shows them; record another session to see which of them return.",
-        MappingProxyType({"n_effects": float(len(diagnosis.effects)), "rms_before": before, "rms_after": after}),
+        "stays-linear",
+        effects=[effect.id for effect in diagnosis.effects],
+        n_effects=len(diagnosis.effects),
+        domain=domain,
+        rms_before=before,
+        rms_after=after,
+        unit=unit,
     )
 
 
@@ -134,20 +134,20 @@ def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.nd
 
 def _modelled(diagnosis: Diagnosis) -> Finding:
     left = [d.domain for d in diagnosis.remaining if d.disagrees]
-    numbers = MappingProxyType({"n_effects": float(len(diagnosis.effects)), "n_domains_left": float(len(left))})
     if not diagnosis.effects:
-        seen = "The diagnosis accepted no effect: the linear model stands as it was"
-        seen += f", and {', '.join(left)} still disagree with it." if left else "."
-        severity = Severity.WARNING if left else Severity.NOTE
-        return Finding(FindingCode.EFFECTS_MODELLED, severity, seen, numbers=numbers)
-    named = ", ".join(effect.id for effect in diagnosis.effects)
-    return Finding(
+        return Finding.of(
+            FindingCode.EFFECTS_MODELLED,
+            "none-but-disagree" if left else "none",
+            left=left,
+            n_effects=0,
+            n_domains_left=len(left),
+        )
+    return Finding.of(
         FindingCode.EFFECTS_MODELLED,
-        Severity.WARNING if left else Severity.NOTE,
-        f"S and b were fitted together with {named}" + (f"; {', '.join(left)} still disagree." if left else "."),
-        "The linear model alone does not reproduce this recording: "
-        + "; ".join(effect.statement.rstrip(".") for effect in diagnosis.effects)
-        + ".",
-        "`trihedron apply` takes off what belongs to the sensor; S and b alone are only half of this model.",
-        numbers,
+        "fitted-but-disagree" if left else "fitted",
+        effects=[effect.id for effect in diagnosis.effects],
+        statements=[effect.statement.rstrip(".") for effect in diagnosis.effects],
+        left=left,
+        n_effects=len(diagnosis.effects),
+        n_domains_left=len(left),
     )

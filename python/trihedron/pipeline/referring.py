@@ -15,7 +15,7 @@ from trihedron.estimate.reference import fit_reference
 from trihedron.pipeline.reading import read
 from trihedron.read import ReadError
 from trihedron.read.reference import of_recording, read_reference
-from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, SensorCalibration, Severity
+from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, SensorCalibration
 from trihedron.records.diagnosis import (
     AcceptedEffect,
     Candidate,
@@ -92,13 +92,7 @@ def held_against(
 
 
 def _own_file() -> Finding:
-    return Finding(
-        FindingCode.REFERENCE_OF_ITSELF,
-        Severity.WARNING,
-        "The reference stands in the log's own file.",
-        "An attitude that the unit computed from its own gyro agrees with that gyro by construction.",
-        "Believe it only if another instrument measured it.",
-    )
+    return Finding.of(FindingCode.REFERENCE_OF_ITSELF)
 
 
 def calibration_by(
@@ -159,14 +153,7 @@ def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, F
     if scale is None:
         scale = gravity / float(np.nanmedian(np.linalg.norm(raw, axis=1)))
     covariance = np.diag([*np.full(9, (NOMINAL_SCALE * scale) ** 2), *np.full(3, NOMINAL_ZERO_M_S2**2)])
-    finding = Finding(
-        FindingCode.ACCELEROMETER_NOMINAL,
-        Severity.WARNING,
-        "The accelerometer was not calibrated: the reference knows no force. Its numbers in the file are nominal.",
-        "A rate alone says nothing of gravity.",
-        "Calibrate it from still poses (`trihedron calibrate LOG`); the frame is the reference's body.",
-        MappingProxyType({"scale": scale}),
-    )
+    finding = Finding.of(FindingCode.ACCELEROMETER_NOMINAL, scale=scale)
     unit = recording.accelerometer_unit.value
     return SensorCalibration(scale * np.eye(3), np.zeros(3), covariance, unit, "m/s^2", "nominal"), finding
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.invariants import Anchor, model_vector, numbers_of
-from trihedron.records import Calibration, Finding, FindingCode, Recording, Severity
+from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.sessions import PARAMETERS
 from trihedron.sensor_model import in_frame, reframing
 
@@ -46,39 +45,22 @@ def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding
     outside = int(np.sum((known < low - TOLERANCE_DEGC) | (known > high + TOLERANCE_DEGC)))
     if outside == 0:
         return ()
-    least, largest = float(known.min()), float(known.max())
-    held = "S and b of the nearer end were used there." if "thermal" in calibration.extensions else ""
     return (
-        Finding(
+        Finding.of(
             FindingCode.OUTSIDE_VALID_RANGE,
-            Severity.SERIOUS,
-            f"{outside} of {len(known)} samples were recorded outside {low:.1f} to {high:.1f} °C, for which the "
-            f"calibration was made (the log: {least:.1f} to {largest:.1f} °C). {held}".rstrip(),
-            "The calibration saw no such temperature: a polynomial beyond its ends is no measurement.",
-            "Calibrate at these temperatures too, or leave those samples out.",
-            MappingProxyType(
-                {
-                    "n_outside": float(outside),
-                    "low_degc": low,
-                    "high_degc": high,
-                    "log_low_degc": least,
-                    "log_high_degc": largest,
-                }
-            ),
+            ends_are_held="thermal" in calibration.extensions,
+            n_outside=outside,
+            n_samples=len(known),
+            low_degc=low,
+            high_degc=high,
+            log_low_degc=known.min(),
+            log_high_degc=known.max(),
         ),
     )
 
 
 def _missing(low: float, high: float) -> Finding:
-    return Finding(
-        FindingCode.TEMPERATURE_MISSING,
-        Severity.SERIOUS,
-        f"The calibration follows temperature ({low:.1f} to {high:.1f} °C) and the log has none: S and b of its "
-        "reference temperature were used.",
-        "No temperature column was logged, or it was not recognised.",
-        "Log the sensor's temperature; name its column with --columns temperature=N.",
-        MappingProxyType({"low_degc": low, "high_degc": high}),
-    )
+    return Finding.of(FindingCode.TEMPERATURE_MISSING, low_degc=low, high_degc=high)
 
 
 def thermally_corrected(

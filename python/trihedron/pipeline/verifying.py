@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import MappingProxyType
 
 from trihedron.estimate.verification import verify_calibration
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
@@ -64,33 +63,16 @@ def verify(
 
 
 def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | None) -> tuple[Finding, ...]:
-    rows = (
-        (mg_from_m_s2(judged.norm_rms), limit_mg, "Gravity at rest is missed by", "mg"),
-        (judged.angle_rms_deg, limit_deg, "Gravity carried through moves is missed by", "deg"),
-    )
-    return tuple(
-        Finding(
-            FindingCode.LIMIT_EXCEEDED,
-            Severity.SERIOUS,
-            f"{words} {value:.3g} {unit} rms; the limit is {limit:g} {unit}.",
-            "The calibration does not hold here as well as was asked for.",
-            "Calibrate again, or accept a wider limit.",
-            MappingProxyType({f"rms_{unit}": value, f"limit_{unit}": limit}),
-        )
-        for value, limit, words, unit in rows
-        if limit is not None and not value <= limit
-    )
+    found = []
+    rms_mg, rms_deg = mg_from_m_s2(judged.norm_rms), judged.angle_rms_deg
+    if limit_mg is not None and not rms_mg <= limit_mg:
+        found.append(Finding.of(FindingCode.LIMIT_EXCEEDED, "rest", rms_mg=rms_mg, limit_mg=limit_mg))
+    if limit_deg is not None and not rms_deg <= limit_deg:
+        found.append(Finding.of(FindingCode.LIMIT_EXCEEDED, "moves", rms_deg=rms_deg, limit_deg=limit_deg))
+    return tuple(found)
 
 
 def _same_recording(made_from: str, tested_on: str) -> tuple[Finding, ...]:
     if not made_from or made_from != tested_on:
         return ()
-    return (
-        Finding(
-            FindingCode.SAME_RECORDING,
-            Severity.WARNING,
-            "This is the recording that the calibration was made from: what it says here proves nothing.",
-            "The same file was named twice.",
-            "Verify on another session; the calibration's own report already holds out poses and moves.",
-        ),
-    )
+    return (Finding.of(FindingCode.SAME_RECORDING),)

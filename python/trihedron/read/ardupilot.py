@@ -8,7 +8,6 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError
 from trihedron.read.table import StatedClock, Table, file_sha256
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 MAGIC = b"\xa3\x95"
 _TYPES = ["IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
@@ -94,16 +93,7 @@ def _skipped(said: str) -> tuple[Finding, ...]:
     skips = [int(n) for n in re.findall(r"Skipped (\d+) bad bytes", said)]
     if not skips:
         return ()
-    return (
-        Finding(
-            FindingCode.SAMPLES_LOST,
-            Severity.WARNING,
-            f"{sum(skips)} bytes at {len(skips)} places of the log are damaged and were skipped, readings among them.",
-            "A log that was cut off, or a memory card with errors.",
-            "Copy it again from the vehicle; gaps in time show where readings are missing.",
-            MappingProxyType({"count": float(len(skips)), "bytes": float(sum(skips))}),
-        ),
-    )
+    return (Finding.of(FindingCode.SAMPLES_LOST, "bytes-skipped", bytes=sum(skips), count=len(skips)),)
 
 
 def _keep(

@@ -9,7 +9,7 @@ from typing import Literal
 from trihedron.read.errors import ReadError
 from trihedron.read.names import ColumnName, parse_name
 from trihedron.read.table import Table
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 Sensor = Literal["accelerometer", "gyroscope"]
 Triad = tuple[int, int, int]
@@ -98,17 +98,21 @@ def _stated(table: Table, chosen: Columns, explicit: Columns | None) -> Columns:
 
 def statement(table: Table, columns: Columns, file_name: str = "") -> Finding:
     """Which column became what, and what was kept aside."""
-    parts = []
+    roles = []
     for role in ("time", "accelerometer", "gyroscope", "temperature", "supply"):
         value = getattr(columns, role)
         if value is not None:
             which = value if isinstance(value, tuple) else (value,)
-            parts.append(f"{role} from {' '.join(table.label(c) for c in which)}")
+            roles.append((role, " ".join(table.label(c) for c in which)))
     rest = [table.label(c) for c in range(len(table.columns)) if c not in columns.used() and len(table.columns[c])]
-    seen = f"Columns{file_name and ' of ' + file_name}: {', '.join(parts)}" + (
-        f"; kept aside: {' '.join(rest[:24])}." if rest else "."
+    return Finding.of(
+        FindingCode.COLUMNS_RECOGNISED,
+        has_file=bool(file_name),
+        file=file_name,
+        roles=roles,
+        has_rest=bool(rest),
+        rest=rest[:24],
     )
-    return Finding(FindingCode.COLUMNS_RECOGNISED, Severity.NOTE, seen)
 
 
 def _mapped(table: Table, mapping: str, sensor: Sensor | None) -> Columns:
@@ -185,7 +189,7 @@ def _positional(table: Table, sensor: Sensor | None) -> Columns:
         triad = (filled[-3], filled[-2], filled[-1])
         if sensor == "gyroscope":
             return Columns(time=time, gyroscope=triad, positional=True)
-        assumed = () if sensor else (_assumed(f"The {n} columns have no names and were taken as an accelerometer."),)
+        assumed = () if sensor else (Finding.of(FindingCode.COLUMNS_ASSUMED, "accelerometer", n_columns=n),)
         return Columns(time=time, accelerometer=triad, positional=True, findings=assumed)
     if n in (6, 7):
         at = n - 6
@@ -195,16 +199,6 @@ def _positional(table: Table, sensor: Sensor | None) -> Columns:
     raise ReadError(
         f"{table.path}: {n} columns without names could mean anything; "
         "say which is which, for example --columns time=1,ax=2,ay=3,az=4,gx=5,gy=6,gz=7."
-    )
-
-
-def _assumed(seen: str) -> Finding:
-    return Finding(
-        FindingCode.COLUMNS_ASSUMED,
-        Severity.WARNING,
-        seen,
-        "A log without a header.",
-        "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4.",
     )
 
 
@@ -241,7 +235,7 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         triads[guess] = bare[0]
         units[guess] = parsed[bare[0][0]].unit_for(guess)
         if told is None:
-            notes.append(_assumed("Columns x y z do not say which sensor they are and were taken as an accelerometer."))
+            notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "x-y-z"))
     times = [i for i, p in enumerate(parsed) if p.role == "time"]
     time = max(times, key=lambda i: (parsed[i].rank, -i)) if times else None
     if own_time is not None:
@@ -312,14 +306,6 @@ def _choose(
     others = [triad for triad in groups if triad != best]
     if others:
         taken = " ".join(table.label(c) for c in best)
-        listed = "; ".join(" ".join(table.label(c) for c in triad) for triad in others[:4])
-        notes.append(
-            Finding(
-                FindingCode.COLUMNS_ASSUMED,
-                Severity.WARNING,
-                f"More than one triad could be the {role}: {taken} was taken, {listed} kept aside.",
-                "The log holds raw and corrected readings, or several devices.",
-                "A calibration wants the uncorrected ones; choose with --columns if this is wrong.",
-            )
-        )
+        listed = [" ".join(table.label(c) for c in triad) for triad in others[:4]]
+        notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "one-of-several", sensor=role, taken=taken, others=listed))
     return best, parsed[best[0]].unit

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 MAX_DEVICES = 16
 _DEVICE_NAMES = frozenset(
@@ -82,11 +81,12 @@ def one_device(table: Table, choice: Choice, used: set[int]) -> Table:
 
 def chosen(where: str, what: str, listed: str, rows_left_out: int) -> Finding:
     """The statement that one of several was taken."""
-    return Finding(
+    return Finding.of(
         FindingCode.DEVICE_CHOSEN,
-        Severity.NOTE,
-        f"{where} offers {listed}; {what} was read.",
-        numbers=MappingProxyType({"rows_left_out": float(rows_left_out)} if rows_left_out else {}),
+        where=where,
+        listed=listed,
+        chosen=what,
+        numbers={"rows_left_out": float(rows_left_out)} if rows_left_out else {},
     )
 
 

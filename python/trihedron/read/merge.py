@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
@@ -17,6 +16,9 @@ SAME_TICK = 0.02
 NEIGHBOUR_STEPS = 1.5
 """Two readings further apart than this have a gap between them, and nothing is made up inside a gap."""
 FASTER = 1.2
+QUIETER, WHOLE = 0.9, 0.99
+"""Interpolation that leaves less of the white noise's variance shows in error bars (a tenth), or at least in an Allan
+curve (a hundredth)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,7 @@ def merge(
             f"{gyr_t[0]:.3f} to {gyr_t[-1]:.3f} s); log both sensors by one clock."
         )
     if len(acc_t) == len(gyr_t) and np.array_equal(acc_t, gyr_t):
-        note = Finding(FindingCode.CLOCKS_MERGED, Severity.NOTE, "Both sensors carry the same time stamps.")
+        note = Finding.of(FindingCode.CLOCKS_MERGED, "same-stamps")
         return Merged(
             accelerometer_s, accelerometer_start_s, accelerometer, gyroscope, "accelerometer", 0, len(acc_t), (note,)
         )
@@ -133,33 +135,21 @@ def _statement(
     same = float(np.mean(factor == 1.0))
     variance = float(np.nanmean(factor))
     own, brought_rate = (acc_rate, gyr_rate) if base == "accelerometer" else (gyr_rate, acc_rate)
-    coloured = variance < 0.99 or brought_rate < own / FASTER
-    seen = (
-        f"Two clocks merged: accelerometer {acc_rate:.5g} Hz, gyro {gyr_rate:.5g} Hz, gyro starts "
-        f"{1e3 * (gyr_t[0] - acc_t[0]):+.3g} ms after; the {base.replace('gyroscope', 'gyro')} keeps its samples, the "
-        f"{other} was taken at the same tick in {100 * same:.3g} % of rows and interpolated between neighbours in the "
-        f"rest, which leaves {100 * variance:.3g} % of its white-noise variance; {n_cut} rows outside the overlap were "
-        f"cut, and {n_beyond} of the {other}'s, {n_lost} rows in gaps of the {other} hold no reading."
-    )
-    return Finding(
+    coloured = variance < WHOLE or brought_rate < own / FASTER
+    return Finding.of(
         FindingCode.CLOCKS_MERGED,
-        Severity.WARNING if base == "gyroscope" or variance < 0.9 else Severity.NOTE,
-        seen,
-        "Each sensor was logged with its own time stamps.",
-        f"For the {other}'s noise (Allan variance) read its file alone, where nothing is interpolated."
-        if coloured
-        else "",
-        MappingProxyType(
-            {
-                "accelerometer_rate_hz": acc_rate,
-                "gyroscope_rate_hz": gyr_rate,
-                "offset_s": float(gyr_t[0] - acc_t[0]),
-                "rate_ratio": gyr_rate / acc_rate,
-                "variance_factor": variance,
-                "same_tick_fraction": same,
-                "cut_rows": float(n_cut),
-                "rows_left_out": float(n_cut + n_beyond),
-                "lost_rows": float(n_lost),
-            }
-        ),
+        severity=Severity.WARNING if base == "gyroscope" or variance < QUIETER else Severity.NOTE,
+        accelerometer_rate_hz=acc_rate,
+        gyroscope_rate_hz=gyr_rate,
+        offset_s=gyr_t[0] - acc_t[0],
+        base=base.replace("gyroscope", "gyro"),
+        other=other,
+        same_tick_fraction=same,
+        variance_factor=variance,
+        cut_rows=n_cut,
+        beyond_rows=n_beyond,
+        lost_rows=n_lost,
+        is_coloured=coloured,
+        rate_ratio=gyr_rate / acc_rate,
+        rows_left_out=n_cut + n_beyond,
     )

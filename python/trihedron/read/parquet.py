@@ -11,7 +11,7 @@ from trihedron.read.errors import ReadError, from_os_error, refuse_after_fork
 from trihedron.read.panics import panics_unprinted
 from trihedron.read.room import check_memory
 from trihedron.read.table import FloatArray, Table, file_sha256
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 
 def read_parquet(path: Path) -> Table:
@@ -44,13 +44,7 @@ def read_parquet(path: Path) -> Table:
             columns.append(np.asarray(series.cast(pl.Float64).to_numpy(), dtype=np.float64))
             names.append(name)
         else:
-            findings.append(
-                Finding(
-                    FindingCode.COLUMN_LEFT_OUT,
-                    Severity.NOTE,
-                    f"Column '{name}' holds {series.dtype}, not numbers, and was left out.",
-                )
-            )
+            findings.append(Finding.of(FindingCode.COLUMN_LEFT_OUT, "type", column=name, kind=str(series.dtype)))
     if not columns or n_rows == 0:
         raise ReadError(f"{path}: the table has no rows of numbers; write it again.")
     return Table(path, tuple(names), tuple(columns), file_sha256(path), findings=tuple(findings))

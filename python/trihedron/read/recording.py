@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
@@ -21,7 +22,7 @@ from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import FloatArray, Progress, Table
-from trihedron.records import Finding, FindingCode, Recording, Severity
+from trihedron.records import Finding, FindingCode, Recording
 from trihedron.units import AccelerationUnit, RateUnit
 
 STAMPS = "stamps as logged [s]"
@@ -135,14 +136,12 @@ def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
     missing = sensors.rows_in_file - sensors.rows_read - reported
     if missing:
         findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.ROWS_UNACCOUNTED,
-                Severity.SERIOUS,
-                f"The file holds {sensors.rows_in_file} rows, {sensors.rows_read} were read and {reported} reported as "
-                f"left out: {missing} are not accounted for.",
-                "A fault of the reader.",
-                "Report it with the file; until then convert the log to CSV with another program.",
-                MappingProxyType({"count": float(missing)}),
+                in_file=sensors.rows_in_file,
+                read=sensors.rows_read,
+                reported=reported,
+                count=missing,
             )
         )
 
@@ -168,7 +167,8 @@ def audited(
         if triad is not None
     }
     for triad in present.values():
-        triad[np.isinf(triad)] = np.nan
+        if any(np.isinf(value) for low, _, high, _ in _core.triad_extremes(triad) for value in (low, high)):
+            triad[np.isinf(triad)] = np.nan
     windows = look(present, rate)
     acc_unit, gyr_unit = AccelerationUnit.M_S2, RateUnit.RAD_S
     if sensors.accelerometer is not None:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz, settle_clock
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
@@ -19,11 +20,13 @@ from trihedron.read.rest import is_integer
 from trihedron.read.sensing import WHOLE, order_of_triads
 from trihedron.read.table import FloatArray, Progress, Table
 from trihedron.read.text.store import side_by_side
-from trihedron.records import Finding, FindingCode, Sampling, Severity
+from trihedron.records import Finding, FindingCode, Sampling
 from trihedron.records.sampling import UNJUDGED
 
 ASSUMED_RATE_HZ = 100.0
 WITNESS_ROWS = 200_000
+LONGEST_MTI_STEP = 5000.0
+"""Counts of 100 µs between samples at 2 Hz, below an MTi's usual rates; a DOT's are 8333 µs apart at least."""
 _RATE_KEYS = frozenset(
     f"{a}{b}"
     for a in ("fs", "rate", "sampling rate", "sample rate", "sampling frequency", "frequency", "update rate")
@@ -156,11 +159,7 @@ def _without_used(table: Table, chosen: Columns) -> Table:
 
 def _words_left_out(table: Table) -> list[Finding]:
     return [
-        Finding(
-            FindingCode.COLUMN_LEFT_OUT,
-            Severity.NOTE,
-            f"Column {table.label(i)} holds words (such as {example[:40]!r}) and was left out.",
-        )
+        Finding.of(FindingCode.COLUMN_LEFT_OUT, "words", column=table.label(i), example=example[:40])
         for i, example in table.words.items()
     ]
 
@@ -185,9 +184,9 @@ def _refuse_unread_time(table: Table, options: Options) -> None:
 
 def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:
     """Rows written twice (same stamp, same readings) once; they are no samples."""
-    again = np.flatnonzero(np.diff(clock.time_s) == 0) + 1
-    if chosen.time is None or not len(again):
+    if chosen.time is None or not steps_of(clock.time_s).same:
         return clock
+    again = np.flatnonzero(np.diff(clock.time_s) == 0) + 1
     rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
     copied = np.ones(len(again), dtype=bool)
     for column in (*(chosen.accelerometer or ()), *(chosen.gyroscope or ())):
@@ -198,16 +197,13 @@ def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[
         return clock
     drop = again[copied]
     findings.append(
-        Finding(
+        Finding.of(
             FindingCode.REPEATED_ROWS,
-            Severity.WARNING,
-            f"{len(drop)} rows are copies of the row before, time stamp included (first: "
-            f"{table.place(int(rows[drop[0]]))}); they were left out.",
-            "A logger that writes a row twice, or a stream joined with itself.",
-            "",
-            MappingProxyType(
-                {"count": float(len(drop)), "row": float(rows[drop[0]]), "rows_left_out": float(len(drop))}
-            ),
+            "copies",
+            rows_left_out=len(drop),
+            where=table.place(int(rows[drop[0]])),
+            count=len(drop),
+            row=rows[drop[0]],
         )
     )
     return Clock(np.delete(clock.time_s, drop), clock.start_s, np.delete(rows, drop), clock.findings)
@@ -231,26 +227,8 @@ def _refuse_constant(table: Table, name: str, triad: FloatArray, where: tuple[in
 def _is_gyro_first(first: FloatArray, second: FloatArray, rate_hz: float, findings: list[Finding]) -> bool:
     """Whether the first of two unnamed triads is the gyro; what was decided, and why, becomes a finding."""
     is_first, why = order_of_triads(first, second, rate_hz)
-    if is_first is None:
-        seen = f"Six columns without names were taken as ax ay az gx gy gz, but {why}."
-        severity = Severity.SERIOUS
-    elif is_first:
-        seen = f"Six columns without names: the first three are the accelerometer, because {why}."
-        severity = Severity.NOTE
-    else:
-        seen = (
-            f"Six columns without names: the first three are the gyro, the last three the accelerometer, because {why}."
-        )
-        severity = Severity.WARNING
-    findings.append(
-        Finding(
-            FindingCode.COLUMNS_ASSUMED,
-            severity,
-            seen,
-            "A log without a header.",
-            "Name them with --columns, for example --columns ax,ay,az,gx,gy,gz.",
-        )
-    )
+    order = why if is_first is None else f"{why}-{'accelerometer' if is_first else 'gyro'}"
+    findings.append(Finding.of(FindingCode.COLUMNS_ASSUMED, f"six-{order}"))
     return is_first is False
 
 
@@ -311,38 +289,19 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
         rate = mean_rate_hz(clock.time_s)
         told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)
         if told is not None and abs(rate / told - 1.0) > 0.01:
-            findings.append(
-                Finding(
-                    FindingCode.RATE_CONTRADICTED,
-                    Severity.WARNING,
-                    f"The rate was given as {told:.6g} Hz but the time column runs at {rate:.6g} Hz; "
-                    "the column was used.",
-                    "A nominal rate, or a clock that is wrong.",
-                    "To use the given rate, read with --columns time=none.",
-                    MappingProxyType({"given_hz": told, "clock_hz": rate}),
-                )
-            )
+            findings.append(Finding.of(FindingCode.RATE_CONTRADICTED, given_hz=told, clock_hz=rate))
         return clock, rate
     stated = _stated_rate(table)
     if options.rate_hz is not None:
         rate = float(options.rate_hz)
-        findings.append(_rate_stated(rate, "as you said"))
+        findings.append(_rate_stated(rate, is_given=True))
     elif stated is not None:
         rate = stated
-        findings.append(_rate_stated(rate, "as the file states above its numbers or beside them"))
+        findings.append(_rate_stated(rate, is_given=False))
     else:
         rate = ASSUMED_RATE_HZ
-        severe = chosen.gyroscope is not None
         findings.append(
-            Finding(
-                FindingCode.RATE_ASSUMED,
-                Severity.SERIOUS if severe else Severity.WARNING,
-                f"The log has no time column and no rate; {rate:g} Hz was assumed.",
-                "Only readings were logged.",
-                "Give --rate HZ."
-                + (" Gyro scale is inversely proportional to it: 1 % of rate is 1 % of scale." if severe else ""),
-                MappingProxyType({"rate_hz": rate}),
-            )
+            Finding.of(FindingCode.RATE_ASSUMED, "gyro" if chosen.gyroscope is not None else "", rate_hz=rate)
         )
     return Clock(np.arange(table.n_rows) / rate, 0.0, None, ()), rate
 
@@ -367,28 +326,19 @@ def _sample_time_fine(table: Table, column: int, findings: list[Finding]) -> str
     step = np.diff(table.columns[column])
     positive = step[step > 0]
     usual = float(np.median(positive)) if len(positive) else 0.0
-    unit, maker = (
-        ("us", "microseconds, as Movella DOT does") if usual >= 5000.0 else ("100us", "100 µs, as Xsens MTi does")
-    )
+    unit = "us" if usual >= LONGEST_MTI_STEP else "100us"
     findings.append(
-        Finding(
+        Finding.of(
             FindingCode.TIME_UNIT_DETECTED,
-            Severity.NOTE,
-            f"SampleTimeFine steps by {usual:.6g}, so it counts {maker}.",
-            action="Say it with --time-unit us if this is wrong." if unit == "100us" else "",
-            numbers=MappingProxyType({"step": usual}),
+            "sample-time-100us" if unit == "100us" else "sample-time-us",
+            step=usual,
         )
     )
     return unit
 
 
-def _rate_stated(rate: float, source: str) -> Finding:
-    return Finding(
-        FindingCode.RATE_STATED,
-        Severity.NOTE,
-        f"No time column; the rate is {rate:.6g} Hz {source}.",
-        numbers=MappingProxyType({"rate_hz": rate}),
-    )
+def _rate_stated(rate: float, *, is_given: bool) -> Finding:
+    return Finding.of(FindingCode.RATE_STATED, rate_hz=rate, is_given=is_given)
 
 
 def _unit_before(named: str, readings: FloatArray) -> str:

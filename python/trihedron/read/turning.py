@@ -9,6 +9,7 @@ unit, provided the two sensors' axes agree.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,16 +28,28 @@ _MAX_BLOCKS = 20_000
 _CANDIDATES = (RateUnit.RAD_S, RateUnit.DEG_S, RateUnit.MRAD_S, RateUnit.MDEG_S)
 
 
+@dataclass(frozen=True)
+class Turning:
+    """The gyro's unit by turning gravity: from ``n_turns`` turns between rests (``by_path``), or from ``slope`` and
+    ``correlation`` of the two rates while the body turns."""
+
+    unit: RateUnit
+    by_path: bool
+    n_turns: int = 0
+    slope: float = 0.0
+    correlation: float = 0.0
+
+
 def unit_by_turning(
     accelerometer: FloatArray, gyroscope: FloatArray, time_s: FloatArray, rate_hz: float, windows: Windows
-) -> tuple[RateUnit | None, str]:
+) -> Turning | None:
     """The one unit in which the gyro agrees with gravity, and the evidence; None where the log cannot tell."""
     ratio, n_turns = turn_ratio(gyroscope, time_s, windows)
     if n_turns >= 2 and math.isfinite(ratio):
         for unit in _CANDIDATES:
             scale = rate_to_si(unit) or 0.0
             if _RATIO_LOW * scale <= ratio <= _RATIO_HIGH * scale:
-                return unit, f"in {n_turns} turns between rests gravity moved as far as a gyro in {unit.value} says"
+                return Turning(unit, by_path=True, n_turns=n_turns)
     agreeing = [
         (unit, slope, correlation)
         for unit in _CANDIDATES
@@ -46,10 +59,8 @@ def unit_by_turning(
     ]
     if len(agreeing) == 1:
         unit, slope, correlation = agreeing[0]
-        return unit, (
-            f"gravity turns with {slope:.2f} times the rate of a gyro in {unit.value} (correlation {correlation:.2f})"
-        )
-    return None, ""
+        return Turning(unit, by_path=False, slope=slope, correlation=correlation)
+    return None
 
 
 def turn_ratio(gyroscope: FloatArray, time_s: FloatArray, windows: Windows) -> tuple[float, int]:

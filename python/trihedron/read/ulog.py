@@ -6,7 +6,6 @@ import contextlib
 import io
 import struct
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from trihedron.read.errors import ReadError
 from trihedron.read.table import StatedClock, Table, file_sha256
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.read.ulog_fifo import SUFFIX, expanded
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 _RAW = "sensor_accel"
 _COMBINED = "sensor_combined"
@@ -132,26 +131,11 @@ def _stamp(data: dict[str, Any]) -> str:
 def _losses(log: Any) -> tuple[Finding, ...]:
     damaged: tuple[Finding, ...] = ()
     if log.file_corruption:
-        damaged = (
-            Finding(
-                FindingCode.SAMPLES_LOST,
-                Severity.WARNING,
-                "The log is damaged inside; what could not be read of it was skipped, readings among it.",
-                "A log that was cut off, or a memory card with errors.",
-                "Copy it again from the vehicle; gaps in time show where readings are missing.",
-            ),
-        )
+        damaged = (Finding.of(FindingCode.SAMPLES_LOST, "damaged"),)
     if not log.dropouts:
         return damaged
     lost_s = sum(drop.duration for drop in log.dropouts) / 1e3
     return (
         *damaged,
-        Finding(
-            FindingCode.SAMPLES_LOST,
-            Severity.WARNING,
-            f"The logger itself reports {len(log.dropouts)} dropouts, {lost_s:.3g} s altogether.",
-            "A memory card that was too slow.",
-            "Turns that fall into a gap are integrated wrongly; repeat them.",
-            MappingProxyType({"count": float(len(log.dropouts)), "lost_s": lost_s}),
-        ),
+        Finding.of(FindingCode.SAMPLES_LOST, "dropouts", count=len(log.dropouts), lost_s=lost_s),
     )

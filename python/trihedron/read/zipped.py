@@ -13,7 +13,7 @@ from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.room import check_unpacked
 from trihedron.read.table import Progress, Table, file_sha256
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")
 _KINDS = {
@@ -59,12 +59,7 @@ def read_zip(path: Path, choice: Choice, progress: Progress | None = None) -> tu
         raise ReadError(f"{path}: this zip archive is damaged or locked ({first}); export it again.") from None
     others = [name for name in names if name not in picked]
     if others:
-        note = Finding(
-            FindingCode.DEVICE_CHOSEN,
-            Severity.NOTE,
-            f"Of the archive {' and '.join(picked)} {'were' if len(picked) > 1 else 'was'} read; not read: "
-            f"{', '.join(others[:12])}{' ...' if len(others) > 12 else ''}.",
-        )
+        note = Finding.of(FindingCode.DEVICE_CHOSEN, "archive", members=picked, n_members=len(picked), others=others)
         tables[0] = replace(tables[0], findings=(note, *tables[0].findings))
     return tuple(tables)
 

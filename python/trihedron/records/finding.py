@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+from importlib import import_module
+from numbers import Real
 from types import MappingProxyType
+from typing import Any
 
 from trihedron.records.checked import kind_of, word_of
 from trihedron.records.frozen import Frozen, freeze
@@ -155,6 +159,33 @@ class Finding(Frozen):
             kind_of(name, getattr(self, name), str)
         kind_of("numbers", self.numbers, dict, MappingProxyType)
         freeze(self)
+
+    @classmethod
+    def of(
+        cls,
+        code: FindingCode,
+        case: str = "",
+        /,
+        *,
+        severity: Severity | None = None,
+        numbers: Mapping[str, float] | None = None,
+        **values: Any,
+    ) -> Finding:
+        """A finding by code and values (SI); severity and sentences are the catalogue's (``report/findings``).
+
+        ``case`` tells occasions of one code apart, ``severity`` replaces the usual one where the catalogue allows two,
+        ``numbers`` are figures for machines whose names depend on the recording. A stage writes no sentences: this is
+        the one place where a record asks the catalogue for them.
+
+        Raises
+        ------
+        KeyError
+            When the catalogue does not know the case, or a place of its sentences has no value.
+        """
+        catalogue = import_module("trihedron.report.findings.catalogue")
+        severity, seen, cause, action = catalogue.words_of(code, case, severity, values)
+        told = {name: float(v) for name, v in values.items() if isinstance(v, Real) and not isinstance(v, bool)}
+        return cls(code, severity, seen, cause, action, MappingProxyType(told | dict(numbers or {})))
 
     def to_dict(self) -> dict[str, object]:
         """As plain JSON types."""

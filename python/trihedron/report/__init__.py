@@ -1,16 +1,22 @@
 """REPORT: numbers become words, tables and figures; laid out once, written as text or as a page."""
 
-from trihedron.report.calibration import calibration_report
-from trihedron.report.check import check_report
-from trihedron.report.demonstration import demonstration_report
-from trihedron.report.diagnosis import diagnosis_report
-from trihedron.report.disagreement import disagreement_report
-from trihedron.report.document import Document
-from trihedron.report.kalman import kalman_report
-from trihedron.report.segments import segments_report
-from trihedron.report.sessions import sessions_report
-from trihedron.report.text import to_text
-from trihedron.report.verification import verification_report
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from trihedron.report.calibration import calibration_report
+    from trihedron.report.check import check_report
+    from trihedron.report.demonstration import demonstration_report
+    from trihedron.report.diagnosis import diagnosis_report
+    from trihedron.report.disagreement import disagreement_report
+    from trihedron.report.document import Document
+    from trihedron.report.kalman import kalman_report
+    from trihedron.report.segments import segments_report
+    from trihedron.report.sessions import sessions_report
+    from trihedron.report.text import to_text
+    from trihedron.report.verification import verification_report
 
 __all__ = [
     "Document",
@@ -25,3 +31,12 @@ __all__ = [
     "to_text",
     "verification_report",
 ]
+
+_HOME = {"Document": "document", "to_text": "text"}
+
+
+def __getattr__(name: str) -> Any:
+    # Whoever wants one finding's words must not wait for every report (scipy's statistics take a second to load).
+    if name not in __all__:
+        raise AttributeError(f"module 'trihedron.report' has no attribute {name!r}")
+    return getattr(import_module(f"trihedron.report.{_HOME.get(name, name.removesuffix('_report'))}"), name)

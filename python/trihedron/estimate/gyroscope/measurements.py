@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc, chdtri
 
 from trihedron._core import Moves
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
@@ -18,7 +18,7 @@ from trihedron.estimate.gyroscope.rounding import (
     undithered_axes,
 )
 from trihedron.records.calibration import SensorCalibration
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 
@@ -247,35 +247,29 @@ def audit_moves(measured: MoveMeasurements) -> list[Finding]:
         which = [int(i) for i in np.flatnonzero(measured.clipped_s > 0.0)]
         lost = int(np.count_nonzero(measured.is_lost))
         findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.CLIPPING,
-                Severity.WARNING,
-                f"the gyro met its limit in {len(which)} of {measured.n_moves} moves ({_list(which)}), for "
-                f"{1000.0 * float(measured.clipped_s.max()):.0f} ms at most; {len(which) - lost} of them are "
-                f"bridged and "
-                f"weigh less, {lost} left out.",
-                "the sensor was turned faster than its range",
-                "Turn more slowly, or set a wider range.",
+                "moves",
+                moves=len(which),
+                n_moves=measured.n_moves,
+                which=which,
+                longest_s=measured.clipped_s.max(),
+                bridged=len(which) - lost,
+                left_out=lost,
             )
         )
     if np.any(measured.is_gapped):
         which = [int(i) for i in np.flatnonzero(measured.is_gapped)]
         findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.TIME_GAP,
-                Severity.WARNING,
-                f"samples are missing inside {len(which)} of {measured.n_moves} moves ({_list(which)}); "
-                "their rotation is uncertain and they weigh less.",
-                "the logger lost samples while the sensor moved",
-                "Record again, or log at a rate that the link sustains.",
+                "moves",
+                moves=len(which),
+                n_moves=measured.n_moves,
+                which=which,
             )
         )
     return findings
-
-
-def _list(indices: list[int]) -> str:
-    shown = ", ".join(str(i) for i in indices[:8])
-    return f"move {shown}" + (" ..." if len(indices) > 8 else "")
 
 
 def _required(readings: FloatArray | None, name: str) -> FloatArray:
@@ -308,7 +302,7 @@ def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArra
     if quality is None or not np.isfinite(quality.rms_dof) or not np.isfinite(quality.floor):
         return np.zeros(3)
     # Only beyond chance: half of all sound recordings scatter a little more than predicted.
-    if quality.dof < 1 or chi2_distribution.sf(quality.chi2, quality.dof) > 1e-3:
+    if quality.dof < 1 or chdtrc(quality.dof, quality.chi2) > 1e-3:
         return np.zeros(3)
     excess = max(quality.rms_dof**2 - quality.floor**2, 0.0)
     gains: FloatArray = np.sum(accelerometer.S**2, axis=0)
@@ -344,7 +338,7 @@ def excess_variance(values: FloatArray, noise: FloatArray) -> FloatArray:
 
     Solves ``median(x²/(v + τ²)) = median of χ²(1)`` for τ² of each column; zero where noise alone explains the median.
     """
-    target = float(chi2_distribution.median(1))
+    target = float(chdtri(1, 0.5))
     out = np.zeros(values.shape[1])
     for axis, (x2, v) in enumerate(zip((values**2).T, noise.T, strict=True)):
         low, high = 0.0, float(np.max(x2)) / target

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, median_filter
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
 
@@ -73,32 +72,23 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
         long_steps.append(first + np.flatnonzero(found.is_long & is_known))
     at = np.concatenate(long_steps) if long_steps else np.zeros(0, dtype=np.intp)
     n_long = len(at)
-    if n_long < FEWEST or float(binom.sf(n_long - 1, n_long + n_short, 0.5)) > CHANCE:
+    if n_long < FEWEST or float(bdtrc(n_long - 1, n_long + n_short, 0.5)) > CHANCE:
         return []
     share, error = (n_long - n_short) / n, float(np.sqrt(n_long + n_short)) / n
     if share < FALSE_SHARE:
         return []
     first_s = float(recording.time_s[at[0]])
     return [
-        Finding(
+        Finding.of(
             FindingCode.SAMPLES_LOST,
-            Severity.SERIOUS if share > min(SERIOUS_SHARE, sigma_scale) else Severity.WARNING,
-            f"Samples are missing though the stamps run on evenly: {n_long} of {n} steps in motion are one sample "
-            f"too long, {n_short} too short (first at {first_s:.2f} s): about {100 * share:.2g} ± {100 * error:.1g} % "
-            "of the samples, and of every turn, are lost. The gyro's scale factors are too large by about that.",
-            "A link or a logger that drops samples and stamps, or numbers, what is left anew.",
-            "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
-            "`trihedron diagnose` puts single losses back.",
-            MappingProxyType(
-                {
-                    "long_steps": float(n_long),
-                    "short_steps": float(n_short),
-                    "steps": float(n),
-                    "lost_share": share,
-                    "sigma_lost_share": error,
-                    "first_s": first_s,
-                }
-            ),
+            "seen-in-motion",
+            severity=Severity.SERIOUS if share > min(SERIOUS_SHARE, sigma_scale) else Severity.WARNING,
+            long_steps=n_long,
+            short_steps=n_short,
+            steps=n,
+            lost_share=share,
+            sigma_lost_share=error,
+            first_s=first_s,
         )
     ]
 

@@ -7,12 +7,14 @@ import numpy.typing as npt
 
 from trihedron._core import AlignmentFit
 from trihedron.records.calibration import PARAMETER_NAMES, Observability
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.finding import Finding, FindingCode
 
 FloatArray = npt.NDArray[np.float64]
 
 WEAK = 0.03
 """Relative standard error of a direction in ``S_ω`` above which it is called weak: data sheets promise this much."""
+HARDLY_SEEN = 10.0 * WEAK
+"""Beyond it the direction is known no better than its data sheet's nominal value."""
 
 
 def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_gyroscope: int) -> Observability:
@@ -78,31 +80,25 @@ def _advice(fit: AlignmentFit, covariance: FloatArray, size: float) -> list[str]
 
 def observability_findings(observability: Observability, covariance: FloatArray, S: FloatArray) -> list[Finding]:
     """NOT_OBSERVABLE or WEAKLY_OBSERVABLE with the moves to add, or nothing."""
-    action = " ".join(f"{line[0].upper()}{line[1:]}." for line in observability.advice)
-    cause = "turns about the vertical leave gravity where it was, and a whole turn brings it back"
+    advice = [f"{line[0].upper()}{line[1:]}." for line in observability.advice]
     missing = observability.n_parameters - observability.rank
     if missing > 0:
         return [
-            Finding(
+            Finding.of(
                 FindingCode.NOT_OBSERVABLE,
-                Severity.SERIOUS,
-                f"the moves determine {observability.rank} of {observability.n_parameters} gyro parameters; "
-                f"least known: {observability.weakest}.",
-                cause,
-                action,
+                "moves-rank",
+                rank=observability.rank,
+                n_parameters=observability.n_parameters,
+                weakest=observability.weakest,
+                advice=advice,
             )
         ]
     size = float(np.linalg.norm(S, 2))
     relative = float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0))) / size if size > 0 else float("inf")
     if relative > WEAK:
-        serious = relative > 10.0 * WEAK
         return [
-            Finding(
-                FindingCode.NOT_OBSERVABLE if serious else FindingCode.WEAKLY_OBSERVABLE,
-                Severity.SERIOUS if serious else Severity.WARNING,
-                f"the moves hardly show {observability.weakest}.",
-                cause,
-                action,
-            )
+            Finding.of(FindingCode.NOT_OBSERVABLE, "moves-weak", weakest=observability.weakest, advice=advice)
+            if relative > HARDLY_SEEN
+            else Finding.of(FindingCode.WEAKLY_OBSERVABLE, "moves", weakest=observability.weakest, advice=advice)
         ]
     return []

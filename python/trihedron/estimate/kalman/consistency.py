@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
-
 import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import Consistency
 
 FloatArray = npt.NDArray[np.float64]
@@ -52,43 +50,39 @@ def check_innovations(innovation: FloatArray, innovation_sigma: FloatArray) -> C
 def consistency_findings(axis: int | None, seen: Consistency) -> list[Finding]:
     """What an inconsistent filter tells about the noise it was given; ``axis`` None stands for all three."""
     out: list[Finding] = []
-    name = "Norm of gravity" if axis is None else f"Axis {'xyz'[axis]}"
-    error = "the axes are not linear" if axis is None else "a reference attitude is wrong"
-    numbers = MappingProxyType({"nis_mean": seen.nis_mean, "nis_low": seen.nis_low, "nis_high": seen.nis_high})
+    name = "" if axis is None else "xyz"[axis]
     if seen.n and seen.nis_mean > seen.nis_high:
         out.append(
-            Finding(
+            Finding.of(
                 FindingCode.INNOVATIONS_TOO_LARGE,
-                Severity.WARNING,
-                f"{name}: squared innovations are {seen.nis_mean:.2f} times what the noise model predicts "
-                f"(99 % limit {seen.nis_high:.2f}).",
-                f"The noise is larger than the model says, or {error}.",
-                f"Multiply the error bars by {np.sqrt(seen.nis_mean):.2f}, or identify the noise anew.",
-                numbers,
+                "norm" if axis is None else "axis",
+                axis=name,
+                nis_mean=seen.nis_mean,
+                nis_low=seen.nis_low,
+                nis_high=seen.nis_high,
+                widening=np.sqrt(seen.nis_mean),
             )
         )
     elif seen.n and seen.nis_mean < seen.nis_low:
         out.append(
-            Finding(
+            Finding.of(
                 FindingCode.INNOVATIONS_TOO_SMALL,
-                Severity.NOTE,
-                f"{name}: squared innovations are only {seen.nis_mean:.2f} times what the noise model predicts "
-                f"(99 % limit {seen.nis_low:.2f}).",
-                "The noise is smaller than the model says.",
-                "The error bars are too wide; identify the noise anew if that matters.",
-                numbers,
+                "norm" if axis is None else "axis",
+                axis=name,
+                nis_mean=seen.nis_mean,
+                nis_low=seen.nis_low,
+                nis_high=seen.nis_high,
             )
         )
     if seen.n_lags and seen.whiteness_p < 1.0 - CONFIDENCE:
         out.append(
-            Finding(
+            Finding.of(
                 FindingCode.INNOVATIONS_COLOURED,
-                Severity.WARNING,
-                f"{name}: innovations are correlated from pose to pose (Ljung-Box p = {seen.whiteness_p:.1e} over "
-                f"{seen.n_lags} lags, first autocorrelation {seen.autocorrelation[0]:+.2f}).",
-                f"Slow noise or temperature that the noise model lacks, or {error}.",
-                "Look at the innovations against time and attitude; add the missing noise term.",
-                MappingProxyType({"whiteness_p": seen.whiteness_p, "autocorrelation_1": seen.autocorrelation[0]}),
+                "norm" if axis is None else "axis",
+                axis=name,
+                whiteness_p=seen.whiteness_p,
+                n_lags=seen.n_lags,
+                autocorrelation_1=seen.autocorrelation[0],
             )
         )
     return out

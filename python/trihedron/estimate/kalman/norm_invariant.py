@@ -15,7 +15,7 @@ from trihedron.estimate.kalman.guide import Goal, Guide
 from trihedron.estimate.kalman.per_axis import noise_per_axis
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, LiveEstimate, NormKalmanCalibration
 
 FloatArray = npt.NDArray[np.float64]
@@ -309,15 +309,7 @@ def calibrate_without_references(
     seen = check_innovations(innovation, innovation_sigma)
     findings: list[Finding] = []
     if not converged:
-        findings.append(
-            Finding(
-                FindingCode.NOT_CONVERGED,
-                Severity.SERIOUS,
-                f"The constants still moved after {MOST_RUNS} runs over all poses.",
-                "The start is too far away, or the poses do not determine the constants.",
-                "Give a start near the data sheet, and poses in more directions.",
-            )
-        )
+        findings.append(Finding.of(FindingCode.NOT_CONVERGED, "kalman", most_runs=MOST_RUNS))
     findings += consistency_findings(None, seen)
     observability, weak = _observability(live)
     findings += weak
@@ -371,13 +363,5 @@ def _observability(live: LiveNormCalibration) -> tuple[Observability, list[Findi
     weakest = names[int(np.argmax(np.abs(direction)))]
     findings: list[Finding] = []
     if condition > 100.0:
-        findings.append(
-            Finding(
-                FindingCode.WEAKLY_OBSERVABLE,
-                Severity.WARNING,
-                f"The poses determine {weakest} {condition:.0f} times worse than the best-seen combination.",
-                "Some directions of gravity in the body were not visited.",
-                "Add poses: the six faces, and edges of the cube between them.",
-            )
-        )
+        findings.append(Finding.of(FindingCode.WEAKLY_OBSERVABLE, "kalman-norm", weakest=weakest, condition=condition))
     return Observability(int(np.sum(singular > 1e-9 * singular[0])), 9, condition, singular, weakest=weakest), findings

@@ -12,7 +12,7 @@ from trihedron import _core
 from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
-from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack, KalmanCalibration, PoseTable
 
 FloatArray = npt.NDArray[np.float64]
@@ -258,12 +258,11 @@ def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
     findings: list[Finding] = []
     if condition > 30.0:
         findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.WEAKLY_OBSERVABLE,
-                Severity.WARNING,
-                f"The attitudes determine the {name} {condition:.0f} times worse than the best-seen constant.",
-                "The poses do not turn every axis towards the vertical, both ways up.",
-                f"Add poses that {advice}.",
+                "kalman-zero" if weakest == 3 else "kalman-sensitivity",
+                axis="" if weakest == 3 else "xyz"[weakest],
+                condition=condition,
             )
         )
     return observability, findings

@@ -20,7 +20,6 @@ from trihedron.records import (
     PoseTable,
     Recording,
     Segments,
-    Severity,
 )
 
 FloatArray = npt.NDArray[np.float64]
@@ -136,13 +135,7 @@ def _noise(
     white = np.array([one.white for one in assumed])
     # What the segmentation saw beyond white noise inside a hold comes on top of each mean.
     extra = np.maximum(poses.sigma_mean**2 - white**2 / poses.hold_s[:, None], 0.0)
-    finding = Finding(
-        FindingCode.NOISE_ASSUMED,
-        Severity.NOTE,
-        "Noise was taken from the scatter inside the still poses; slow noise from pose to pose is not known.",
-        "No noise description was given.",
-        "Identify the noise from an hour of rest and give it, or heed what the innovations say.",
-    )
+    finding = Finding.of(FindingCode.NOISE_ASSUMED)
     return assumed, extra, (finding,)
 
 

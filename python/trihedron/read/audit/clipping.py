@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.audit.repeats import CHUNK
+from trihedron import _core
 from trihedron.read.table import FloatArray
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 Place = Callable[[int], str]
 AXES = "xyz"
@@ -20,6 +19,8 @@ STEEP = 5.0
 """The wall is reached by steps this many times the noise: a quiet sensor resting on its largest count is no wall."""
 FLAT = 6
 """So many equal readings in a row at the wall do the same for a sensor whose noise is above its resolution."""
+MOST_LEVELS = 0.2
+"""Different readings, as a part of all, above which they do not step."""
 PILED = 3.0
 """And it holds this many times more samples than the neighbouring values lead up to."""
 
@@ -39,28 +40,20 @@ class Wall:
 def find_walls(readings: FloatArray, noise: FloatArray) -> list[Wall]:
     """Walls of a triad (n, 3) with ``noise`` (3,) of one sample at rest."""
     walls = []
-    for axis in range(3):
-        values = readings[:, axis]
-        low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
+    for axis, (low, n_low, high, n_high) in enumerate(_core.triad_extremes(readings)):
         if not low < high:
             continue
-        for value in (high, low):
-            wall = _wall(values, value, 0.01 * (high - low), float(noise[axis]))
+        for value, count in ((high, n_high), (low, n_low)):
+            wall = _wall(readings, axis, value, 0.01 * (high - low), float(noise[axis])) if count > 2 else None
             if wall is not None:
                 count, stretches, sample = wall
                 walls.append(Wall(axis, value, value == high, count, stretches, sample))
     return walls
 
 
-def _wall(values: FloatArray, value: float, depth: float, noise: float) -> tuple[int, int, int] | None:
-    at = np.flatnonzero(values == value)
-    if len(at) < 3:
-        return None
-    near, width = -len(at), math.inf
-    for start in range(0, len(values), CHUNK):
-        distance = np.abs(values[start : start + CHUNK] - value)
-        near += int(np.count_nonzero(distance <= depth))
-        width = min(width, float(np.min(distance, where=distance > 0, initial=math.inf)))
+def _wall(readings: FloatArray, axis: int, value: float, depth: float, noise: float) -> tuple[int, int, int] | None:
+    within, width, at = _core.readings_near(readings, axis, value, depth)
+    values, near = readings[:, axis], within - len(at)
     # Towards the top of a smooth peak the density grows as one over the root of the distance, so the share of the
     # topmost level among all within `depth` is the root of its width.
     by_shape = near * min(math.sqrt(width / depth), 1.0)
@@ -89,15 +82,19 @@ def _is_full_scale(value: float) -> bool:
 def quantum(values: FloatArray) -> float:
     """Step between neighbouring possible readings; zero where the values do not repeat, as those of a fine sensor."""
     probe = values[:: max(1, len(values) // 200_000)]
-    levels = np.unique(probe[np.isfinite(probe)])
-    if len(levels) < 2 or len(levels) > 0.2 * len(probe):
+    finite = probe[np.isfinite(probe)]
+    # Where a quarter of them holds that many levels, all do.
+    if len(np.unique(finite[::4])) > MOST_LEVELS * len(probe):
+        return 0.0
+    levels = np.unique(finite)
+    if len(levels) < 2 or len(levels) > MOST_LEVELS * len(probe):
         return 0.0
     # Decimals as written may differ in the last digit for one and the same code: the tenth percentile passes over that.
     step: np.float64 = np.percentile(np.diff(levels), 10.0)
     return float(step)
 
 
-def _runs(at: npt.NDArray[np.intp]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def _runs(at: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """(start, length) of runs of consecutive indices."""
     breaks = np.flatnonzero(np.diff(at) > 1)
     starts = np.concatenate([at[:1], at[breaks + 1]])
@@ -114,20 +111,17 @@ def audit_clipping(sensor: str, walls: list[Wall], place: Place) -> list[Finding
     """One finding per sensor that names every wall."""
     if not walls:
         return []
-    listed = ", ".join(
-        f"{AXES[w.axis]} at {w.value:.7g} ({w.count} samples in {w.stretches} stretch{'es' if w.stretches > 1 else ''})"
-        for w in walls
-    )
     first = min(w.sample for w in walls)
     numbers = {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_count": float(w.count) for w in walls}
     numbers |= {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_value": w.value for w in walls}
     return [
-        Finding(
+        Finding.of(
             FindingCode.CLIPPING,
-            Severity.WARNING,
-            f"The {short(sensor)} is clipped: {listed}; first at {place(first)}.",
-            "The motion left the measuring range.",
-            "Turn more slowly, or set a wider range; angles integrated over clipped moves are too small.",
-            MappingProxyType({"count": float(sum(w.count for w in walls)), "sample": float(first), **numbers}),
+            sensor=short(sensor),
+            walls=[(AXES[w.axis], w.value, w.count, w.stretches) for w in walls],
+            where=place(first),
+            count=sum(w.count for w in walls),
+            sample=first,
+            numbers=numbers,
         )
     ]

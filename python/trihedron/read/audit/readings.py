@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import MappingProxyType
 
 import numpy as np
 
 from trihedron.read.audit.clipping import AXES, audit_clipping, find_walls, quantum, short
-from trihedron.read.audit.repeats import CHUNK, Repeats, longest_by_chance
+from trihedron.read.audit.repeats import Repeats, longest_by_chance
 from trihedron.read.rest import Windows
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Severity
 
 Place = Callable[[int], str]
+MANY, LONG, HALF = 0.05, 0.1, 0.5
+"""Shares of a log without readings, frozen, or repeated beyond which what is left no longer speaks for it."""
 
 
 def audit_readings(sensor: str, readings: FloatArray, windows: Windows | None, place: Place) -> list[Finding]:
-    """Findings on one triad (n, 3). ``place(i)`` names sample i for people; memory is bounded by ``CHUNK``."""
-    findings = _non_finite(sensor, readings, place)
+    """Findings on one triad (n, 3). ``place(i)`` names sample i for people; one pass for the usual log."""
+    repeats = Repeats(readings)
+    findings = _non_finite(sensor, repeats, place)
     if len(readings) < 8:
         return findings
-    repeats = Repeats(readings)
     findings += _repeated(sensor, repeats, place)
     walls = find_walls(readings, windows.quiet_noise(sensor) if windows is not None else np.zeros(3))
     findings += audit_clipping(sensor, walls, place)
@@ -33,27 +34,19 @@ def audit_readings(sensor: str, readings: FloatArray, windows: Windows | None, p
     return findings
 
 
-def _non_finite(sensor: str, readings: FloatArray, place: Place) -> list[Finding]:
-    count, first = 0, -1
-    for start in range(0, len(readings), CHUNK):
-        finite = np.isfinite(readings[start : start + CHUNK])
-        if finite.all():
-            continue
-        bad = ~finite.all(axis=1)
-        here = int(np.count_nonzero(bad))
-        if here and first < 0:
-            first = start + int(np.argmax(bad))
-        count += here
-    if not count:
+def _non_finite(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
+    count, first = repeats.n_missing, repeats.first_missing
+    if first is None:
         return []
     return [
-        Finding(
+        Finding.of(
             FindingCode.NON_FINITE,
-            Severity.WARNING if count < 0.05 * len(readings) else Severity.SERIOUS,
-            f"The {short(sensor)} has {count} rows without a finite reading (first: {place(first)}).",
-            "Lost samples, or a logger that writes NaN.",
-            "These rows are left out; nothing is made up in their place.",
-            MappingProxyType({"count": float(count), "sample": float(first)}),
+            "readings",
+            severity=Severity.WARNING if count < MANY * repeats.n else Severity.SERIOUS,
+            sensor=short(sensor),
+            count=count,
+            where=place(first),
+            sample=first,
         )
     ]
 
@@ -69,22 +62,16 @@ def _repeated(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
         return []
     longest = int(repeats.longest[3])
     return [
-        Finding(
+        Finding.of(
             FindingCode.REPEATED_ROWS,
-            Severity.WARNING if seen < 0.5 else Severity.SERIOUS,
-            f"The {short(sensor)} repeats its last reading in {repeats.count[3]} rows ({100 * seen:.3g} %; chance "
-            f"would give {100 * expected:.2g} %); the longest run is {longest} rows from "
-            f"{place(int(repeats.longest_start[3]))}.",
-            "The log is faster than the sensor, or the logger repeats a value when it has no new one.",
-            "Noise and error bars count repeated rows as new; log at the sensor's own rate.",
-            MappingProxyType(
-                {
-                    "count": float(repeats.count[3]),
-                    "fraction": float(seen),
-                    "longest_run": float(longest),
-                    "sample": float(repeats.longest_start[3]),
-                }
-            ),
+            severity=Severity.WARNING if seen < HALF else Severity.SERIOUS,
+            sensor=short(sensor),
+            count=int(repeats.count[3]),
+            fraction=seen,
+            chance=expected,
+            longest_run=longest,
+            where=place(int(repeats.longest_start[3])),
+            sample=repeats.longest_start[3],
         )
     ]
 
@@ -108,14 +95,16 @@ def _stuck(
         if step > 2.0 * noise[k] and not moving.any():
             return []
     return [
-        Finding(
+        Finding.of(
             FindingCode.STUCK_VALUES,
-            Severity.WARNING if longest < 0.1 * repeats.n else Severity.SERIOUS,
-            f"The {short(sensor)}'s {AXES[k]} axis stays at {readings[start, k]:.7g} for {longest} samples from "
-            f"{place(start)}, far longer than chance.",
-            "A frozen channel, clipping, or a bus that answers with an old value.",
-            "Leave that stretch out.",
-            MappingProxyType({"axis": float(k), "longest_run": float(longest), "sample": float(start)}),
+            severity=Severity.WARNING if longest < LONG * repeats.n else Severity.SERIOUS,
+            sensor=short(sensor),
+            axis_name=AXES[k],
+            value=readings[start, k],
+            longest_run=longest,
+            where=place(start),
+            axis=k,
+            sample=start,
         )
     ]
 
@@ -132,14 +121,11 @@ def _coarse(sensor: str, readings: FloatArray, windows: Windows | None) -> list[
             found.append((k, step, float(noise[k])))
     if not found:
         return []
-    listed = ", ".join(f"{AXES[k]}: step {step:.4g}, noise {sigma:.2g}" for k, step, sigma in found)
     return [
-        Finding(
+        Finding.of(
             FindingCode.COARSE_RESOLUTION,
-            Severity.WARNING,
-            f"The {short(sensor)}'s resolution is coarser than its noise ({listed}, raw units).",
-            "Few bits, or values rounded when they were written.",
-            "Averaging longer does not help where the noise does not move the last digit; choose a smaller range.",
-            MappingProxyType({f"{AXES[k]}_step": step for k, step, _ in found}),
+            sensor=short(sensor),
+            axes=[(AXES[k], step, sigma) for k, step, sigma in found],
+            numbers={f"{AXES[k]}_step": step for k, step, _ in found},
         )
     ]

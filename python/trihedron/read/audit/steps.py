@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from types import MappingProxyType
 
 import numpy as np
 
 from trihedron.read.audit.clipping import AXES, quantum, short
 from trihedron.read.table import FloatArray
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,
     AccelerationUnit,
@@ -32,18 +31,16 @@ def audit_steps(sensor: str, readings: FloatArray, unit: AccelerationUnit | Rate
         return []
     scale = acceleration_to_si(unit) if isinstance(unit, AccelerationUnit) else rate_to_si(unit)
     usual = float(np.median(steps))
-    listed = ", ".join(f"{axis} {step:.5g}" for axis, step in zip(AXES, steps, strict=True))
     return [
-        Finding(
+        Finding.of(
             FindingCode.RAW_STEP,
-            Severity.NOTE,
-            f"The {short(sensor)} is in {unit.value} but steps like counts ({listed} {unit.value}"
-            f"{_per_unit(usual * (scale or math.nan), sensor)}).",
-            "Rounded to so many decimals when it was written."
-            if _is_decimal(usual)
-            else "Counts times a nominal scale.",
-            "",
-            MappingProxyType({f"{axis}_step": step for axis, step in zip(AXES, steps, strict=True)}),
+            sensor=short(sensor),
+            unit=unit.value,
+            steps=list(zip(AXES, steps, strict=True)),
+            per_unit=_per_unit(usual * (scale or math.nan), sensor),
+            is_accelerometer=sensor == "accelerometer",
+            is_decimal=_is_decimal(usual),
+            numbers={f"{axis}_step": step for axis, step in zip(AXES, steps, strict=True)},
         )
     ]
 
@@ -72,7 +69,8 @@ def _is_decimal(step: float) -> bool:
     return abs(exponent - round(exponent)) < 1e-4
 
 
-def _per_unit(step_si: float, sensor: str) -> str:
+def _per_unit(step_si: float, sensor: str) -> float:
+    """Steps in one g, or in one degree per second."""
     if sensor == "accelerometer":
-        return f"; {STANDARD_GRAVITY_M_S2 / step_si:.5g} per g"
-    return f"; {1.0 / degrees_from_radians(step_si):.5g} per deg/s"
+        return STANDARD_GRAVITY_M_S2 / step_si
+    return 1.0 / degrees_from_radians(step_si)

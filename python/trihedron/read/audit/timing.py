@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
+from trihedron import _core
 from trihedron.read.clock.rate import usual_step
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Sampling, Severity, StampKind
 from trihedron.records.sampling import UNJUDGED
@@ -20,6 +21,8 @@ GAP_STEPS = 1.5
 JITTER_STEPS = 0.03
 """Jitter below three per cent of a step is the clock's rounding, not worth a sentence."""
 SERIOUS_LOSS = 0.05
+MUCH_JITTER = 0.2
+"""Jitter of a fifth of a step moves the ends of a short turn by as much as a reading's noise does."""
 
 
 def audit_timing(
@@ -40,48 +43,42 @@ def audit_timing(
     usual = usual_step(time_s)
     if not usual > 0:
         return []
-    step = np.diff(time_s)
-    findings = _duplicates(step if stamps_s is None else np.diff(stamps_s), place, is_mended=stamps_s is not None)
+    findings: list[Finding] = []
+    if steps_of(time_s if stamps_s is None else stamps_s).same:
+        findings += _duplicates(
+            np.diff(time_s if stamps_s is None else stamps_s), place, is_mended=stamps_s is not None
+        )
     if lost_behind is not None:
-        findings += _lost(step, lost_behind, place)
+        findings += _lost(np.diff(time_s), lost_behind, place) if lost_behind.any() else []
     elif sampling.kind in (StampKind.LATE, StampKind.SCATTERED):
         pass  # a late stamp looks like a loss: how many are lost is not told
     else:
-        batched = bool(findings) and np.count_nonzero(step == 0) > 0.2 * len(step)
-        gaps = np.flatnonzero(step > (5.0 if batched else GAP_STEPS) * usual)
-        lost = np.zeros(len(step), dtype=np.int64)
-        lost[gaps] = np.maximum(np.rint(step[gaps] / usual) - 1, 0)
-        findings += _gap(step, gaps, lost, place) if len(gaps) else []
+        batched = bool(findings) and steps_of(time_s).same > 0.2 * (len(time_s) - 1)
+        gaps = _core.steps_above(time_s, (5.0 if batched else GAP_STEPS) * usual)
+        if len(gaps):
+            step = np.diff(time_s)
+            lost = np.zeros(len(step), dtype=np.int64)
+            lost[gaps] = np.maximum(np.rint(step[gaps] / usual) - 1, 0)
+            findings += _gap(step, gaps, lost, place)
+    stamps = time_s
     if stamps_s is not None:
-        usual = usual_step(stamps_s)
-        step = np.diff(stamps_s)
-    is_inside = (step <= GAP_STEPS * usual) & (step > 0)
-    inside = step if is_inside.all() else step[is_inside]
-    jitter = float(inside.std())
-    mean = float(inside.mean())
+        usual, stamps = usual_step(stamps_s), stamps_s
+    count, total, jitter, least, most = _core.inside_steps(stamps, 0.0, GAP_STEPS * usual)
+    mean = total / count
     if jitter > JITTER_STEPS * mean:
         findings.append(
-            Finding(
+            Finding.of(
                 FindingCode.TIME_JITTER,
-                Severity.NOTE if jitter < 0.2 * mean or stamps_s is not None else Severity.WARNING,
-                f"Steps between stamps vary by {1e3 * jitter:.3g} ms rms (median {1e3 * usual:.5g} ms = "
-                f"{1 / usual:.5g} Hz, mean {1e3 * mean:.5g} ms = {1 / mean:.5g} Hz, {1e3 * float(inside.min()):.3g} to "
-                f"{1e3 * float(inside.max()):.3g} ms)"
-                + (", and no even clock lies behind them" if sampling.kind is StampKind.IRREGULAR else "")
-                + f"; the rate used is {rate_hz:.5g} Hz.",
-                "Stamps taken when the data arrived, or rounded."
-                if sampling.kind is not StampKind.IRREGULAR
-                else "A program that samples in its own time: its stamps were kept.",
-                "Stamp in the sensor's own interrupt if turns matter.",
-                MappingProxyType(
-                    {
-                        "jitter_s": jitter,
-                        "median_step_s": usual,
-                        "mean_step_s": mean,
-                        "median_rate_hz": 1 / usual,
-                        "rate_hz": rate_hz,
-                    }
-                ),
+                severity=Severity.NOTE if jitter < MUCH_JITTER * mean or stamps_s is not None else Severity.WARNING,
+                jitter_s=jitter,
+                median_step_s=usual,
+                median_rate_hz=1 / usual,
+                mean_step_s=mean,
+                mean_rate_hz=1 / mean,
+                least_s=least,
+                largest_s=most,
+                rate_hz=rate_hz,
+                is_irregular=sampling.kind is StampKind.IRREGULAR,
             )
         )
     return findings
@@ -98,14 +95,13 @@ def _duplicates(step: FloatArray, place: Place, *, is_mended: bool) -> list[Find
         return []
     fraction = len(same) / len(step)
     return [
-        Finding(
+        Finding.of(
             FindingCode.TIME_DUPLICATE,
-            Severity.NOTE if is_mended else Severity.WARNING,
-            f"{len(same)} samples ({100 * fraction:.3g} %) carry the same time as the one before "
-            f"(first: {place(int(same[0]) + 1)}).",
-            "Several samples stamped in one go, a stamp of too few digits, or rows written twice.",
-            "" if is_mended else "With samples stamped in batches, read with --columns time=none and --rate.",
-            MappingProxyType({"count": float(len(same)), "fraction": fraction, "sample": float(same[0] + 1)}),
+            "mended" if is_mended else "",
+            count=len(same),
+            fraction=fraction,
+            where=place(int(same[0]) + 1),
+            sample=same[0] + 1,
         )
     ]
 
@@ -115,24 +111,17 @@ def _gap(step: FloatArray, gaps: npt.NDArray[np.intp], lost: npt.NDArray[np.int6
     total = int(lost.sum())
     fraction = total / (len(step) + 1 + total)
     worst = sorted((int(g) for g in gaps[np.argsort(step[gaps])[::-1][:3]]), key=int)
-    listed = "; ".join(f"{step[g]:.4g} s before {place(g + 1)}" for g in worst)
     return [
-        Finding(
+        Finding.of(
             FindingCode.TIME_GAP,
-            Severity.SERIOUS if fraction > SERIOUS_LOSS else Severity.WARNING,
-            f"{len(gaps)} gaps, about {total} samples lost ({100 * fraction:.2g} %); the "
-            f"longest lasts {step[longest]:.4g} s. Where: {listed}{' ...' if len(gaps) > 3 else ''}.",
-            "Lost packets or a full buffer.",
-            "Turns that fall into a gap are integrated wrongly; repeat them.",
-            MappingProxyType(
-                {
-                    "count": float(len(gaps)),
-                    "longest_s": float(step[longest]),
-                    "sample": float(longest + 1),
-                    "lost_samples": float(total),
-                    "fraction": fraction,
-                }
-            ),
+            severity=Severity.SERIOUS if fraction > SERIOUS_LOSS else Severity.WARNING,
+            count=len(gaps),
+            lost_samples=total,
+            fraction=fraction,
+            longest_s=step[longest],
+            worst=[(step[g], place(g + 1)) for g in worst],
+            has_more=len(gaps) > len(worst),
+            sample=longest + 1,
         )
     ]
 
@@ -156,13 +145,14 @@ def audit_counter(counter: FloatArray, label: str, place: Place) -> list[Finding
         return []
     missing = int(np.sum(np.rint(step[lost] / usual) - 1))
     return [
-        Finding(
+        Finding.of(
             FindingCode.SAMPLES_LOST,
-            Severity.WARNING if missing <= SERIOUS_LOSS * len(counter) else Severity.SERIOUS,
-            f"The counter {label} skips at {len(lost)} places, {missing} samples are missing "
-            f"(first: {place(int(lost[0]) + 1)}).",
-            "Lost packets.",
-            "Turns that fall into a gap are integrated wrongly; repeat them.",
-            MappingProxyType({"count": float(len(lost)), "lost_samples": float(missing), "sample": float(lost[0] + 1)}),
+            "counter",
+            severity=Severity.WARNING if missing <= SERIOUS_LOSS * len(counter) else Severity.SERIOUS,
+            column=label,
+            count=len(lost),
+            lost_samples=missing,
+            where=place(int(lost[0]) + 1),
+            sample=lost[0] + 1,
         )
     ]

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
-
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.errors import ReadError
 from trihedron.read.table import FloatArray, Table
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 MAX_DISPLACEMENT = 64
 """Rows a packet may arrive late. Anything further is another recording, not another order."""
@@ -37,12 +35,12 @@ def unwrap(
             turns = np.zeros(len(raw))
             turns[back + 1] = modulus
             findings.append(
-                Finding(
+                Finding.of(
                     FindingCode.TIME_WRAPPED,
-                    Severity.NOTE,
-                    f"The clock counter of {int(np.log2(modulus))} bits starts again from zero {len(back)} times "
-                    f"(first: {_place(table, rows, int(back[0]) + 1)}); the time was continued.",
-                    numbers=MappingProxyType({"count": float(len(back)), "sample": float(back[0] + 1)}),
+                    bits=int(np.log2(modulus)),
+                    count=len(back),
+                    where=_place(table, rows, int(back[0]) + 1),
+                    sample=back[0] + 1,
                 )
             )
             return raw + np.cumsum(turns), True
@@ -80,14 +78,6 @@ def order_of_rows(
             "was set; cut the file there."
         )
     findings.append(
-        Finding(
-            FindingCode.TIME_BACKWARD,
-            Severity.WARNING,
-            f"Time runs backward at {len(back)} places (first: {place}); the rows were sorted by time, none moved "
-            f"further than {displaced} rows.",
-            "Packets that overtook each other.",
-            "If the rows stand in the right order and the stamps are wrong, read with --columns time=none and --rate.",
-            MappingProxyType({"count": float(len(back)), "sample": float(first), "displaced_rows": float(displaced)}),
-        )
+        Finding.of(FindingCode.TIME_BACKWARD, count=len(back), where=place, displaced_rows=displaced, sample=first)
     )
     return order

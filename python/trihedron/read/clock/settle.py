@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.clock.even import EvenClock, find_even_clock
 from trihedron.read.clock.followed import followed
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.table import FloatArray
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 from trihedron.records.sampling import Sampling, StampKind
 
 IntArray = npt.NDArray[np.int64]
@@ -61,7 +61,7 @@ def settle_clock(
         return Settled(time_s, start_s, Sampling(StampKind.IRREGULAR, clock.period_s), None, ())
     lost = clock.lost_behind
     share, sigma = 0.0, float("inf")
-    shared = float(np.mean(time_s[1:] == time_s[:-1]))
+    shared = steps_of(time_s).same / (len(time_s) - 1)
     is_even = False
     if clock.stamp_error_s > WORTH * clock.period_s:
         share, sigma = followed(time_s, clock.even_s, clock.tick, triads)
@@ -104,43 +104,26 @@ def sample_numbers(counter: FloatArray) -> IntArray | None:
 def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Finding, ...]:
     if sampling.stamp_error_s <= WORTH * sampling.period_s:
         return ()
-    period, error = sampling.period_s, sampling.stamp_error_s
-    numbers = MappingProxyType(
-        {
-            "period_s": period,
-            "sigma_period_s": sampling.sigma_period_s,
-            "stamp_error_s": error,
-            "shared_fraction": shared,
-            "followed": sampling.followed,
-            "sigma_followed": sampling.sigma_followed,
-        }
+    follows = sampling.followed - STANDARD_ERRORS * sampling.sigma_followed > SYSTEMATIC
+    follows_wholly = follows and sampling.followed + STANDARD_ERRORS * sampling.sigma_followed > 1.0 - SYSTEMATIC
+    return (
+        Finding.of(
+            FindingCode.EVEN_CLOCK
+            if sampling.is_even
+            else FindingCode.STAMPS_KEPT
+            if follows_wholly
+            else FindingCode.CLOCK_UNDECIDED,
+            period_s=sampling.period_s,
+            sigma_period_s=sampling.sigma_period_s,
+            rate_hz=1.0 / sampling.period_s,
+            stamp_error_s=sampling.stamp_error_s,
+            is_rounded=sampling.kind is StampKind.ROUNDED,
+            grid_s=clock.grid_s,
+            is_late=sampling.kind is StampKind.LATE,
+            motion_tells=sampling.sigma_followed < VAGUE,
+            followed=sampling.followed,
+            sigma_followed=sampling.sigma_followed,
+            shared_fraction=shared,
+            is_partly=follows,
+        ),
     )
-    how = {
-        StampKind.ROUNDED: f"rounded to {1e3 * clock.grid_s:.3g} ms",
-        StampKind.LATE: f"late by {1e3 * error:.2g} ms rms, as they are when samples are stamped on arrival",
-    }.get(sampling.kind, f"scattered by {1e3 * error:.2g} ms rms")
-    by_motion = (
-        f"the readings follow {sampling.followed:.2f} ± {sampling.sigma_followed:.2g} of it"
-        if sampling.sigma_followed < VAGUE
-        else "no motion tells when the samples were taken"
-    )
-    rate = f"T = {1e3 * period:.6g} ± {1e3 * sampling.sigma_period_s:.1g} ms ({1 / period:.6g} Hz)"
-    if sampling.is_even:
-        seen = f"The stamps are those of an even clock, {rate}, {how} ({by_motion}); the even clock was taken."
-        return (Finding(FindingCode.EVEN_CLOCK, Severity.NOTE, seen, "", "", numbers),)
-    if sampling.followed - STANDARD_ERRORS * sampling.sigma_followed > SYSTEMATIC:
-        if sampling.followed + STANDARD_ERRORS * sampling.sigma_followed > 1.0 - SYSTEMATIC:
-            seen = (
-                f"The stamps leave an even clock ({rate}) by {1e3 * error:.2g} ms rms and {by_motion}: they were kept."
-            )
-            return (Finding(FindingCode.STAMPS_KEPT, Severity.NOTE, seen, "", "", numbers),)
-        seen = (
-            f"The stamps are {how} about an even clock ({rate}) and {by_motion}: both are partly right, the stamps "
-            "were kept."
-        )
-        cause = "Samples taken unevenly and stamped inexactly."
-    else:
-        seen = f"The stamps are {how} about an even clock ({rate}) and {by_motion}: the stamps were kept."
-        cause = "A sensor that is sampled evenly and stamped on arrival, or one that is sampled unevenly."
-    action = "Log the sensor's own sample counter or data-ready times if turns matter."
-    return (Finding(FindingCode.CLOCK_UNDECIDED, Severity.WARNING, seen, cause, action, numbers),)

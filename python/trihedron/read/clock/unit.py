@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 
 from trihedron.read.clock.rate import usual_step
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.errors import ReadError
 from trihedron.read.table import FloatArray
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "100us": 1e-4}
 _CANDIDATES = ("s", "ms", "us", "ns")
@@ -64,7 +64,7 @@ def time_unit(
         return parse_time_unit(given)
     if named:
         return named
-    n_steps, n_forward = len(raw) - 1, int(np.count_nonzero(raw[1:] > raw[:-1]))
+    n_steps, n_forward = len(raw) - 1, steps_of(raw).forward
     if not n_forward:
         return "s"
     # Stamps that several rows share: a row lasts the span over the rows, not the step between stamps.
@@ -136,7 +136,7 @@ def _quickest_turns(accelerometer: FloatArray | None) -> tuple[int | None, int |
     rows, any_turn = 1, None
     while rows + _SIDE < len(mean):
         lag = rows + _SIDE - 1
-        has_turned = (mean[:-lag] * mean[lag:]).sum(axis=1) < math.cos(turn)
+        has_turned = np.einsum("ij,ij->i", mean[:-lag], mean[lag:]) < math.cos(turn)
         if np.any(has_turned):
             any_turn = any_turn or rows + 1
             quiet = spread <= 0.1 * turn * _SIDE / (rows + 1)
@@ -160,12 +160,12 @@ def _quickest_warming(temperature: FloatArray | None) -> float | None:
 def _statement(usual: float, choice: str, sure: bool, possible: list[str]) -> Finding:
     rate = 1.0 / (usual * SECONDS[choice])
     others = [f"{u} ({1.0 / (usual * SECONDS[u]):.4g} Hz)" for u in possible if u != choice]
-    return Finding(
+    return Finding.of(
         FindingCode.TIME_UNIT_DETECTED,
-        Severity.NOTE if sure else Severity.WARNING,
-        f"The time column steps by {usual:.6g}, so its unit is {choice} ({rate:.5g} Hz)"
-        + (f"; {', '.join(others)} would be possible too." if others else "."),
-        "" if sure else "The step alone does not tell the unit; every rate and every noise density depends on it.",
-        "" if sure else "Say it with --time-unit s, ms, us or ns if this is wrong.",
-        MappingProxyType({"rate_hz": rate, "step": usual}),
+        "" if sure else "unsure",
+        step=usual,
+        unit=choice,
+        rate_hz=rate,
+        others=others,
+        has_others=bool(others),
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +16,7 @@ from trihedron.read.reference.attitude import attitude_of
 from trihedron.read.reference.roles import WAYS, Role, roles_of
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
-from trihedron.records import Finding, FindingCode, Recording, Severity
+from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.reference import ReferenceMotion
 from trihedron.units import acceleration_to_si, rate_to_si
 
@@ -136,10 +135,4 @@ def _settled(
 
 
 def _commands(n: int) -> Finding:
-    return Finding(
-        FindingCode.COLUMNS_ASSUMED,
-        Severity.NOTE,
-        f"Its {n} rows are seconds apart, so each rate was taken to hold until the next row.",
-        "Commands of a rate table.",
-        numbers=MappingProxyType({"n_rows": float(n)}),
-    )
+    return Finding.of(FindingCode.COLUMNS_ASSUMED, "commands", n_rows=n)

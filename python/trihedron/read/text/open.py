@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 
 from trihedron.read.errors import ReadError, refuse_after_fork
 from trihedron.read.room import check_memory
@@ -14,7 +13,7 @@ from trihedron.read.text.blocks import Cursor, as_utf8, blocks
 from trihedron.read.text.dialect import Rewritten, rewrite
 from trihedron.read.text.reader import TextReader
 from trihedron.read.text.records import split_records
-from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records import Finding, FindingCode
 
 _SAMPLE_BYTES = 1 << 17
 
@@ -81,12 +80,11 @@ def _of_records(
     left = sum(counts.values()) - taken
     if left < 0:
         raise ReadError(f"{path}: the records of this file cannot be told apart; split it by sensor.")
-    listed = ", ".join(f"{word} ({count})" for word, count in sorted(counts.items(), key=lambda kv: -kv[1])[:12])
-    note = Finding(
+    note = Finding.of(
         FindingCode.DEVICE_CHOSEN,
-        Severity.NOTE,
-        f"Each line names its record: {listed}; those of the accelerometer and the gyro were read.",
-        numbers=MappingProxyType({"rows_left_out": float(left)}),
+        "records",
+        kinds=sorted(counts.items(), key=lambda kv: -kv[1])[:12],
+        rows_left_out=left,
     )
     accelerometer = tables["accelerometer"]
     return (

@@ -1,0 +1,145 @@
+"""What is said about a fitted accelerometer."""
+
+from __future__ import annotations
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
+_UNQUIET = "Poses not quite still, a zero that drifts between poses, nonlinearity, or noise of the means underrated."
+_LOOK = "Look at the residual per pose; `trihedron diagnose` names the effect."
+_ADD_POSES = "Add still poses with {advice:numbered}."
+
+ENTRIES = (
+    Entry(
+        Code.RESIDUAL_ABOVE_NOISE,
+        "poses",
+        WARNING,
+        "The residual of the still poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
+        "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); all standard errors "
+        "of the accelerometer are multiplied by {widening:.3g}.",
+        _UNQUIET,
+        _LOOK,
+    ),
+    Entry(
+        Code.RESIDUAL_ABOVE_NOISE,
+        "poses-joint",
+        WARNING,
+        "The residual of the still poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
+        "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); the fit lets the "
+        "zero differ from pose to pose, here by {zero_scatter_m_s2:.2g mm/s²} rms, and the standard errors contain "
+        "that.",
+        _UNQUIET,
+        _LOOK,
+    ),
+    Entry(
+        Code.NOT_OBSERVABLE,
+        "poses-rank",
+        SERIOUS,
+        "The still poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; unseen is the "
+        "{unseen:&, the }, held within {anchor:.0f %} of a perfect triad.",
+        "Too few different orientations: six faces alone are six equations for nine parameters.",
+        _ADD_POSES,
+    ),
+    Entry(
+        Code.NOT_OBSERVABLE,
+        "poses-weak",
+        SERIOUS,
+        "The still poses determine the accelerometer so weakly that some pose could be wrong by {at_worst:.2g %} of "
+        "gravity; worst is {weakest}. All parameters were held within {anchor:.0f %} of a perfect triad.",
+        "The orientations are too much alike.",
+        _ADD_POSES,
+        numbers=("rank", "n_parameters", "worst_prediction_g"),
+    ),
+    Entry(
+        Code.WEAKLY_OBSERVABLE,
+        "poses",
+        WARNING,
+        "Some orientations are predicted {times_worse:.2g} times worse than one pose is measured; worst is {weakest}.",
+        "No pose lies near those orientations.",
+        _ADD_POSES,
+        numbers=("rank", "n_parameters", "worst_prediction_g"),
+    ),
+    Entry(
+        Code.OUTLIER_POSE,
+        "",
+        WARNING,
+        "Still pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
+        "standard errors, limit {limit:.1f}).",
+        "The sensor was touched or not still in this pose, or a reading clipped.",
+        "Leave the pose out, or use a robust loss.",
+    ),
+    Entry(
+        Code.HELD_OUT_WORSE,
+        "poses",
+        WARNING,
+        "Poses that the fit did not see are missed by {held_out_z_rms:.2g} times their predicted error.",
+        "The fit bends to its own poses: too few of them, or an effect that a linear model does not have.",
+        "Record more poses; see `trihedron diagnose`.",
+    ),
+    Entry(
+        Code.LEFT_HANDED,
+        "accelerometer",
+        WARNING,
+        "The accelerometer's axes form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
+        "The documented direction of one axis (or of all three) is wrong, or two axes are swapped.",
+        "Check the axis directions printed on the board against a pose with one axis up.",
+        numbers=("det_S_sign",),
+    ),
+    Entry(
+        Code.LEFT_HANDED,
+        "accelerometer-signs-asked",
+        WARNING,
+        "The accelerometer's axes form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
+        "The documented direction of one axis (or of all three) is wrong, or two axes are swapped. Still poses alone "
+        "cannot tell signs; these are the ones asked for.",
+        "Check the axis directions printed on the board against a pose with one axis up.",
+        numbers=("det_S_sign",),
+    ),
+    Entry(
+        Code.SCALE_NOT_NOMINAL,
+        "accelerometer",
+        WARNING,
+        "Axis {axis} needs a factor {scale_ratio:.4g} although the log is in {unit}.",
+        "The log is in another unit than stated, or |g| is wrong.",
+        "State the unit of the log and |g|.",
+    ),
+    Entry(
+        Code.NOT_CONVERGED,
+        "accelerometer",
+        SERIOUS,
+        "The accelerometer fit did not converge ({stopped_because}).",
+        "Poses contradict each other, or hardly differ.",
+        "Check that every pose was still; add poses.",
+    ),
+    Entry(
+        Code.POSE_NOT_A_FACE,
+        "",
+        NOTE,
+        "{n_left_out} of {n_poses} still poses have no axis within {largest_tilt_deg:.0f}° of the vertical and are not "
+        "used by method 1 (poses {poses:&, }).",
+        "They are edges, corners or leaning poses.",
+        "Method 2 uses them all.",
+    ),
+    Entry(
+        Code.TABLE_TILT,
+        "",
+        WARNING,
+        "The faces contradict each other (χ² per degree of freedom {chi2_per_dof:.3g}) as if each pose were tilted by "
+        "{tilt_deg:.2g}° rms; most in pose {pose} ({face}). The standard errors include this tilt.",
+        "The table is not level, the case is not square or did not lie flat; a drifting zero looks the same.",
+        "Level the table, press the case flat, or use method 2, which needs neither.",
+    ),
+    Entry(
+        Code.RESIDUAL_ABOVE_NOISE,
+        "verify-rest",
+        WARNING,
+        "Gravity at rest is missed by {norm_rms_m_s2:.3g} m/s² rms ({norm_rms_m_s2:.2g mg}), {times_expected:.1f} "
+        "times what noise and the stated errors of the calibration allow.",
+        "The sensor has changed since (temperature, shock, supply), gravity is another here, or poses were not still.",
+        "Calibrate again near the conditions of use; compare the two calibrations.",
+        numbers=("chi2_per_pose",),
+        or_severity=SERIOUS,
+    ),
+)

@@ -1,0 +1,54 @@
+"""The closed catalogue of findings: every sentence the tool says about a recording, by code and case."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from trihedron.records.finding import FindingCode, Severity
+from trihedron.report.findings import (
+    accelerometer,
+    clock,
+    gyroscope,
+    kalman,
+    noise,
+    pipeline,
+    read,
+    readings,
+    reference,
+    segment,
+)
+from trihedron.report.findings.entry import Entry
+from trihedron.report.findings.wording import filled
+
+ENTRIES: tuple[Entry, ...] = (
+    *read.ENTRIES,
+    *clock.ENTRIES,
+    *readings.ENTRIES,
+    *accelerometer.ENTRIES,
+    *gyroscope.ENTRIES,
+    *kalman.ENTRIES,
+    *noise.ENTRIES,
+    *pipeline.ENTRIES,
+    *reference.ENTRIES,
+    *segment.ENTRIES,
+)
+CATALOGUE: Mapping[tuple[FindingCode, str], Entry] = MappingProxyType(
+    {(entry.code, entry.case): entry for entry in ENTRIES}
+)
+
+
+def words_of(
+    code: FindingCode, case: str, severity: Severity | None, values: Mapping[str, Any]
+) -> tuple[Severity, str, str, str]:
+    """Severity, what was seen, the likely cause and the next action.
+
+    Raises
+    ------
+    KeyError
+        When the catalogue has no such entry, or a place of it has no value.
+    """
+    entry = CATALOGUE[code, case]
+    seen, cause, action = (filled(text, values, entry.lines) for text in (entry.seen, entry.cause, entry.action))
+    return severity or entry.severity, seen, cause, action

@@ -1,0 +1,208 @@
+"""What is said about time: stamps, rates, gaps, and the clock that a recording gets."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
+_INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
+
+_STAMPS = (
+    Entry(
+        Code.TIME_JITTER,
+        "",
+        NOTE,
+        "Steps between stamps vary by {jitter_s:.3g ms} rms (median {median_step_s:.5g ms} = {median_rate_hz:.5g} Hz, "
+        "mean {mean_step_s:.5g ms} = {mean_rate_hz:.5g} Hz, {least_s:.3g !ms} to {largest_s:.3g ms})"
+        "{is_irregular:?, and no even clock lies behind them|}; the rate used is {rate_hz:.5g} Hz.",
+        "{is_irregular:?A program that samples in its own time: its stamps were kept.|Stamps taken when the data "
+        "arrived, or rounded.}",
+        "Stamp in the sensor's own interrupt if turns matter.",
+        or_severity=WARNING,
+    ),
+    Entry(
+        Code.TIME_DUPLICATE,
+        "",
+        WARNING,
+        "{count} samples ({fraction:.3g %}) carry the same time as the one before (first: {where}).",
+        "Several samples stamped in one go, a stamp of too few digits, or rows written twice.",
+        "With samples stamped in batches, read with --columns time=none and --rate.",
+        numbers=("sample",),
+    ),
+    Entry(
+        Code.TIME_DUPLICATE,
+        "mended",
+        NOTE,
+        "{count} samples ({fraction:.3g %}) carry the same time as the one before (first: {where}).",
+        "Several samples stamped in one go, a stamp of too few digits, or rows written twice.",
+        numbers=("sample",),
+    ),
+    Entry(
+        Code.TIME_GAP,
+        "",
+        WARNING,
+        "{count} gaps, about {lost_samples} samples lost ({fraction:.2g %}); the longest lasts {longest_s:.4g} s. "
+        "Where: {worst:each; }{has_more:? ...|}.",
+        "Lost packets or a full buffer.",
+        _INTEGRATED,
+        numbers=("sample",),
+        or_severity=SERIOUS,
+        lines=MappingProxyType({"worst": "{v0:.4g} s before {v1}"}),
+    ),
+    Entry(
+        Code.TIME_WRAPPED,
+        "",
+        NOTE,
+        "The clock counter of {bits} bits starts again from zero {count} times (first: {where}); the time was "
+        "continued.",
+        numbers=("sample",),
+    ),
+    Entry(
+        Code.TIME_BACKWARD,
+        "",
+        WARNING,
+        "Time runs backward at {count} places (first: {where}); the rows were sorted by time, none moved further than "
+        "{displaced_rows} rows.",
+        "Packets that overtook each other.",
+        "If the rows stand in the right order and the stamps are wrong, read with --columns time=none and --rate.",
+        numbers=("sample",),
+    ),
+    Entry(
+        Code.NON_FINITE,
+        "time",
+        WARNING,
+        "{count} rows have no time (first: {where}) and were left out.",
+        "Damaged rows.",
+        "Check the logger.",
+        numbers=("row",),
+    ),
+    Entry(
+        Code.TIME_UNIT_DETECTED,
+        "",
+        NOTE,
+        "The time column steps by {step:.6g}, so its unit is {unit} ({rate_hz:.5g} Hz){has_others:?; {others:&, } "
+        "would be possible too|}.",
+    ),
+    Entry(
+        Code.TIME_UNIT_DETECTED,
+        "unsure",
+        WARNING,
+        "The time column steps by {step:.6g}, so its unit is {unit} ({rate_hz:.5g} Hz){has_others:?; {others:&, } "
+        "would be possible too|}.",
+        "The step alone does not tell the unit; every rate and every noise density depends on it.",
+        "Say it with --time-unit s, ms, us or ns if this is wrong.",
+    ),
+    Entry(
+        Code.TIME_UNIT_DETECTED,
+        "sample-time-us",
+        NOTE,
+        "SampleTimeFine steps by {step:.6g}, so it counts microseconds, as Movella DOT does.",
+    ),
+    Entry(
+        Code.TIME_UNIT_DETECTED,
+        "sample-time-100us",
+        NOTE,
+        "SampleTimeFine steps by {step:.6g}, so it counts 100 µs, as Xsens MTi does.",
+        action="Say it with --time-unit us if this is wrong.",
+    ),
+)
+
+_RATES = (
+    Entry(
+        Code.RATE_CONTRADICTED,
+        "",
+        WARNING,
+        "The rate was given as {given_hz:.6g} Hz but the time column runs at {clock_hz:.6g} Hz; the column was used.",
+        "A nominal rate, or a clock that is wrong.",
+        "To use the given rate, read with --columns time=none.",
+    ),
+    Entry(
+        Code.RATE_STATED,
+        "",
+        NOTE,
+        "No time column; the rate is {rate_hz:.6g} Hz {is_given:?as you said|as the file states above its numbers or "
+        "beside them}.",
+    ),
+    Entry(
+        Code.RATE_ASSUMED,
+        "",
+        WARNING,
+        "The log has no time column and no rate; {rate_hz:g} Hz was assumed.",
+        "Only readings were logged.",
+        "Give --rate HZ.",
+    ),
+    Entry(
+        Code.RATE_ASSUMED,
+        "gyro",
+        SERIOUS,
+        "The log has no time column and no rate; {rate_hz:g} Hz was assumed.",
+        "Only readings were logged.",
+        "Give --rate HZ. Gyro scale is inversely proportional to it: 1 % of rate is 1 % of scale.",
+    ),
+)
+
+_EVEN = "T = {period_s:.6g !ms} ± {sigma_period_s:.1g ms} ({rate_hz:.6g} Hz)"
+_HOW = (
+    "{is_rounded:?rounded to {grid_s:.3g ms}|{is_late:?late by {stamp_error_s:.2g ms} rms, as they are when samples "
+    "are stamped on arrival|scattered by {stamp_error_s:.2g ms} rms}}"
+)
+_BY_MOTION = (
+    "{motion_tells:?the readings follow {followed:.2f} ± {sigma_followed:.2g} of it|no motion tells when the samples "
+    "were taken}"
+)
+_WITH_THEM = ("stamp_error_s", "shared_fraction", "followed", "sigma_followed", "grid_s", "is_partly")
+_LOG_COUNTER = "Log the sensor's own sample counter or data-ready times if turns matter."
+
+_CLOCKS = (
+    Entry(
+        Code.EVEN_CLOCK,
+        "",
+        NOTE,
+        f"The stamps are those of an even clock, {_EVEN}, {_HOW} ({_BY_MOTION}); the even clock was taken.",
+        numbers=_WITH_THEM,
+    ),
+    Entry(
+        Code.STAMPS_KEPT,
+        "",
+        NOTE,
+        f"The stamps leave an even clock ({_EVEN}) by {{stamp_error_s:.2g ms}} rms and {_BY_MOTION}: they were kept.",
+        numbers=(*_WITH_THEM, "is_rounded", "is_late"),
+    ),
+    Entry(
+        Code.CLOCK_UNDECIDED,
+        "",
+        WARNING,
+        f"The stamps are {_HOW} about an even clock ({_EVEN}) and {_BY_MOTION}: {{is_partly:?both are partly right, |}}"
+        "the stamps were kept.",
+        "{is_partly:?Samples taken unevenly and stamped inexactly.|A sensor that is sampled evenly and stamped on "
+        "arrival, or one that is sampled unevenly.}",
+        _LOG_COUNTER,
+        numbers=_WITH_THEM,
+    ),
+    Entry(
+        Code.CLOCKS_MERGED,
+        "same-stamps",
+        NOTE,
+        "Both sensors carry the same time stamps.",
+    ),
+    Entry(
+        Code.CLOCKS_MERGED,
+        "",
+        NOTE,
+        "Two clocks merged: accelerometer {accelerometer_rate_hz:.5g} Hz, gyro {gyroscope_rate_hz:.5g} Hz, gyro starts "
+        "{offset_s:+.3g ms} after; the {base} keeps its samples, the {other} was taken at the same tick in "
+        "{same_tick_fraction:.3g %} of rows and interpolated between neighbours in the rest, which leaves "
+        "{variance_factor:.3g %} of its white-noise variance; {cut_rows} rows outside the overlap were cut, and "
+        "{beyond_rows} of the {other}'s, {lost_rows} rows in gaps of the {other} hold no reading.",
+        "Each sensor was logged with its own time stamps.",
+        "{is_coloured:?For the {other}'s noise (Allan variance) read its file alone, where nothing is interpolated.|}",
+        numbers=("rate_ratio", "rows_left_out"),
+        or_severity=WARNING,
+    ),
+)
+
+ENTRIES = (*_STAMPS, *_RATES, *_CLOCKS)

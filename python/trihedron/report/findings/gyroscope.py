@@ -1,0 +1,266 @@
+"""What is said about a fitted gyro: by moves, by turns of known angle, by the fit of a whole session."""
+
+from __future__ import annotations
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
+_CONTRADICTING = "moves that contradict each other, or a start far from the truth"
+_LOOK_AT_MOVES = "Look at the residual per move; give the nominal scale."
+_OUTSIDE_THE_MODEL = (
+    "an effect outside the linear model: g-sensitivity, a time offset between the sensors, nonlinearity"
+)
+_ZERO_MOVES = "warm-up, slow noise, or a zero reading that depends on attitude (g-sensitivity)"
+_SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whole turn brings it back"
+
+_MOVES = (
+    Entry(
+        Code.NOT_CONVERGED,
+        "gyro",
+        SERIOUS,
+        "the gyro fit did not settle ({stopped_because}).",
+        _CONTRADICTING,
+        _LOOK_AT_MOVES,
+    ),
+    Entry(
+        Code.NOT_CONVERGED,
+        "session",
+        SERIOUS,
+        "the fit of the session did not settle ({stopped_because}).",
+        _CONTRADICTING,
+        _LOOK_AT_MOVES,
+    ),
+    Entry(
+        Code.RESIDUAL_ABOVE_NOISE,
+        "moves",
+        WARNING,
+        "gravity after the moves is missed by more than the noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
+        "degrees of freedom; the error bars are widened by its root.",
+        _OUTSIDE_THE_MODEL,
+        "Run trihedron diagnose to see which.",
+    ),
+    Entry(
+        Code.RESIDUAL_ABOVE_NOISE,
+        "moves-joint",
+        WARNING,
+        "gravity after the moves is missed by more than the noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
+        "degrees of freedom; the moves count with the noise that they show.",
+        _OUTSIDE_THE_MODEL,
+        "Run trihedron diagnose to see which.",
+    ),
+    Entry(
+        Code.SCALE_NOT_NOMINAL,
+        "gyro",
+        SERIOUS,
+        "The gyro needs a factor {scale_ratio:.4g} although the log is in {unit}.",
+        "The log's time base or rate is wrong by that factor, or its unit is another one.",
+        "Check --time-unit, --rate and --gyro-unit.",
+    ),
+    Entry(
+        Code.LEFT_HANDED,
+        "gyro",
+        WARNING,
+        "the gyro's axes as logged form a left-handed triad (det S < 0).",
+        "one documented gyro axis is reversed, or two are exchanged",
+        "Check the axis directions of the board; the calibration itself corrects them.",
+        numbers=("determinant",),
+    ),
+    Entry(
+        Code.LEFT_HANDED,
+        "gyro-against-accelerometer",
+        WARNING,
+        "gyro axes {axes:& and } run against the accelerometer's axes of the same name.",
+        "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed",
+        "Check the axis directions of the board against both data sheets.",
+    ),
+    Entry(
+        Code.LEFT_HANDED,
+        "gyro-other-axes",
+        WARNING,
+        "the gyro's axes as logged point along other axes of the accelerometer than their names say.",
+        "the accelerometer's axes as logged are left-handed, or one sensor's signs or order were changed",
+        "Check the axis directions of the board against both data sheets.",
+    ),
+    Entry(
+        Code.OUTLIER_MOVE,
+        "",
+        WARNING,
+        "move {move} (hold {before} to hold {after}) misses gravity by {residual_m_s2:.3g} m/s², {times:.0f} times its "
+        "noise, and is left out.",
+        "one of its holds was not still, samples were lost, or the gyro was driven beyond its range",
+        "Look at this move; repeat it.",
+    ),
+    Entry(
+        Code.HELD_OUT_WORSE,
+        "moves",
+        WARNING,
+        "moves that the fit did not see are predicted {times:.1f} times worse than the error bars say.",
+        "too few moves for the number of parameters, or an effect that differs from move to move",
+        "Record more moves, about all axes, both ways.",
+        numbers=("chi2_per_dof",),
+    ),
+    Entry(
+        Code.GYRO_G_SENSITIVITY,
+        "",
+        NOTE,
+        "the gyro's zero reading follows gravity, by up to {per_g_rad_s:.2g deg/s} per g (axis {rate_axis} for force "
+        "along axis {force_axis}), {scatter_left:.0f %} of its scatter between holds is left without it. The moves "
+        "were fitted without it, but S and b alone cannot correct it.",
+        "g-sensitivity of the gyro",
+        "Run trihedron diagnose for the extended model.",
+        numbers=("largest_rad_s_per_m_s2",),
+        or_severity=WARNING,
+    ),
+    Entry(
+        Code.GYRO_BIAS_DRIFT,
+        "holds",
+        NOTE,
+        "the gyro's zero reading differs between holds by up to {change_rad_s:.2g deg/s} (axis {axis}), {times:.1f} "
+        "times its noise; each move uses the holds next to it.",
+        _ZERO_MOVES,
+        "Let the sensor warm up; use the stated zero only near this temperature.",
+    ),
+    Entry(
+        Code.NOT_OBSERVABLE,
+        "moves-rank",
+        SERIOUS,
+        "the moves determine {rank} of {n_parameters} gyro parameters; least known: {weakest}.",
+        _SAME_GRAVITY,
+        "{advice:& }",
+    ),
+    Entry(
+        Code.NOT_OBSERVABLE,
+        "moves-weak",
+        SERIOUS,
+        "the moves hardly show {weakest}.",
+        _SAME_GRAVITY,
+        "{advice:& }",
+    ),
+    Entry(
+        Code.WEAKLY_OBSERVABLE,
+        "moves",
+        WARNING,
+        "the moves hardly show {weakest}.",
+        _SAME_GRAVITY,
+        "{advice:& }",
+    ),
+    Entry(
+        Code.SAMPLES_LOST,
+        "seen-in-motion",
+        WARNING,
+        "Samples are missing though the stamps run on evenly: {long_steps} of {steps} steps in motion are one sample "
+        "too long, {short_steps} too short (first at {first_s:.2f} s): about {lost_share:.2g !%} ± "
+        "{sigma_lost_share:.1g %} of the samples, and of every turn, are lost. The gyro's scale factors are too large "
+        "by about that.",
+        "A link or a logger that drops samples and stamps, or numbers, what is left anew.",
+        "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
+        "`trihedron diagnose` puts single losses back.",
+        or_severity=SERIOUS,
+    ),
+    Entry(
+        Code.CLIPPING,
+        "moves",
+        WARNING,
+        "the gyro met its limit in {moves} of {n_moves} moves (move {which:first 8}), for {longest_s:.0f ms} at most; "
+        "{bridged} of them are bridged and weigh less, {left_out} left out.",
+        "the sensor was turned faster than its range",
+        "Turn more slowly, or set a wider range.",
+    ),
+    Entry(
+        Code.TIME_GAP,
+        "moves",
+        WARNING,
+        "samples are missing inside {moves} of {n_moves} moves (move {which:first 8}); their rotation is uncertain and "
+        "they weigh less.",
+        "the logger lost samples while the sensor moved",
+        "Record again, or log at a rate that the link sustains.",
+    ),
+    Entry(
+        Code.HELD_OUT_WORSE,
+        "verify-moves",
+        WARNING,
+        "Gravity carried through the moves by the gyro is missed by {angle_rms_deg:.3g}° rms (worst move {worst_move}: "
+        "{worst_deg:.3g}°), {times_expected:.1f} times what noise and the stated errors allow.",
+        "The gyro's scale has changed since, it clipped, samples were lost, or a pose was not still.",
+        "Look at the worst moves; calibrate again near the conditions of use.",
+        or_severity=SERIOUS,
+    ),
+)
+
+_TURNS = (
+    Entry(
+        Code.TURN_NOT_A_MULTIPLE,
+        "left-out",
+        WARNING,
+        "turn {turn}, taken for {angle_rad:.0f deg} about axis {axis}, is off by {deviation_rad:.2g deg} against the "
+        "others; it is left out.",
+        "the case was not pushed home against the wall, or the turn was another one",
+        "Repeat this turn.",
+    ),
+    Entry(
+        Code.TURN_NOT_A_MULTIPLE,
+        "contradicted",
+        SERIOUS,
+        "turn {turn}, taken for {angle_rad:.0f deg} about axis {axis}, is off by {deviation_rad:.2g deg} against the "
+        "others; no third turn tells which of them is wrong.",
+        "the case was not pushed home against the wall, or the turn was another one",
+        "Repeat this turn.",
+    ),
+    Entry(
+        Code.TURN_NOT_A_MULTIPLE,
+        "scatter",
+        WARNING,
+        "the turns scatter by {sigma_turn_rad:.2g deg} about the multiples they were taken for; the error bars contain "
+        "it.",
+        "turned by eye, without a wall",
+        "Push the case against a wall before and after each turn.",
+    ),
+    Entry(
+        Code.TURN_NOT_A_MULTIPLE,
+        "not-the-stated",
+        WARNING,
+        "turn {turn} about axis {axis} is {seen_rad:.1f deg}, far from the stated {wanted_rad:.0f deg}; it is left "
+        "out.",
+        "turned without a wall, or the nominal scale is far off",
+        "Repeat it against a wall, or give its angle.",
+    ),
+    Entry(
+        Code.TURN_NOT_A_MULTIPLE,
+        "no-multiple",
+        WARNING,
+        "turn {turn} about axis {axis} is {seen_rad:.1f deg}, far from any multiple of {wanted_rad:.0f deg}; it is "
+        "left out.",
+        "turned without a wall, or the nominal scale is far off",
+        "Repeat it against a wall, or give its angle.",
+    ),
+    Entry(
+        Code.TURN_UNCHECKED,
+        "",
+        WARNING,
+        "only one turn about axis {axes:& and }: nothing would show if its angle was wrong.",
+        "a wrong angle goes into the scale unseen",
+        "Turn there and back at least once about every axis.",
+    ),
+    Entry(
+        Code.RESIDUAL_ABOVE_NOISE,
+        "turns",
+        WARNING,
+        "the turns are missed by more than their noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} degrees of "
+        "freedom; the error bars are widened by its root.",
+        "turns that were not the stated angle, a table that is not level, or a drifting zero",
+        "Repeat the turns against a wall.",
+    ),
+    Entry(
+        Code.GYRO_BIAS_DRIFT,
+        "turns",
+        NOTE,
+        "the gyro's zero reading differs between still stretches by {times:.1f} times its noise (axis {axis}).",
+        _ZERO_MOVES,
+        "Let the sensor warm up; keep still before and after every turn.",
+        numbers=("chi2_per_dof",),
+    ),
+)
+
+ENTRIES = (*_MOVES, *_TURNS)

@@ -1,0 +1,94 @@
+"""What is said about a Kalman filter's answer and its innovations."""
+
+from __future__ import annotations
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
+
+_OF_AXES = tuple(
+    entry
+    for case, name, error in (
+        ("axis", "Axis {axis}", "a reference attitude is wrong"),
+        ("norm", "Norm of gravity", "the axes are not linear"),
+    )
+    for entry in (
+        Entry(
+            Code.INNOVATIONS_TOO_LARGE,
+            case,
+            WARNING,
+            f"{name}: squared innovations are {{nis_mean:.2f}} times what the noise model predicts (99 % limit "
+            "{nis_high:.2f}).",
+            f"The noise is larger than the model says, or {error}.",
+            "Multiply the error bars by {widening:.2f}, or identify the noise anew.",
+            numbers=("axis", "nis_low"),
+        ),
+        Entry(
+            Code.INNOVATIONS_TOO_SMALL,
+            case,
+            NOTE,
+            f"{name}: squared innovations are only {{nis_mean:.2f}} times what the noise model predicts (99 % limit "
+            "{nis_low:.2f}).",
+            "The noise is smaller than the model says.",
+            "The error bars are too wide; identify the noise anew if that matters.",
+            numbers=("axis", "nis_high"),
+        ),
+        Entry(
+            Code.INNOVATIONS_COLOURED,
+            case,
+            WARNING,
+            f"{name}: innovations are correlated from pose to pose (Ljung-Box p = {{whiteness_p:.1e}} over {{n_lags}} "
+            "lags, first autocorrelation {autocorrelation_1:+.2f}).",
+            f"Slow noise or temperature that the noise model lacks, or {error}.",
+            "Look at the innovations against time and attitude; add the missing noise term.",
+            numbers=("axis",),
+        ),
+    )
+)
+
+ENTRIES = (
+    *_OF_AXES,
+    Entry(
+        Code.NOT_CONVERGED,
+        "kalman",
+        SERIOUS,
+        "The constants still moved after {most_runs} runs over all poses.",
+        "The start is too far away, or the poses do not determine the constants.",
+        "Give a start near the data sheet, and poses in more directions.",
+    ),
+    Entry(
+        Code.WEAKLY_OBSERVABLE,
+        "kalman-norm",
+        WARNING,
+        "The poses determine {weakest} {condition:.0f} times worse than the best-seen combination.",
+        "Some directions of gravity in the body were not visited.",
+        "Add poses: the six faces, and edges of the cube between them.",
+    ),
+    Entry(
+        Code.WEAKLY_OBSERVABLE,
+        "kalman-sensitivity",
+        WARNING,
+        "The attitudes determine the sensitivity to {axis} {condition:.0f} times worse than the best-seen constant.",
+        "The poses do not turn every axis towards the vertical, both ways up.",
+        "Add poses that tilt {axis} towards the vertical.",
+    ),
+    Entry(
+        Code.WEAKLY_OBSERVABLE,
+        "kalman-zero",
+        WARNING,
+        "The attitudes determine the zero reading {condition:.0f} times worse than the best-seen constant.",
+        "The poses do not turn every axis towards the vertical, both ways up.",
+        "Add poses that turn the zero reading's axis both ways up.",
+        numbers=("axis",),
+    ),
+    Entry(
+        Code.NOISE_ASSUMED,
+        "",
+        NOTE,
+        "Noise was taken from the scatter inside the still poses; slow noise from pose to pose is not known.",
+        "No noise description was given.",
+        "Identify the noise from an hour of rest and give it, or heed what the innovations say.",
+    ),
+)

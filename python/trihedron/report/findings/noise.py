@@ -1,0 +1,193 @@
+"""What is said about a log at rest and the noise terms it shows."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
+_WIDENED = "Intervals were widened to allow for it."
+
+_LOG = (
+    Entry(
+        Code.REPEATED_ROWS,
+        "at-rest",
+        WARNING,
+        "{share:.2g %} of the rows repeat the row before in every channel.",
+        "the log was written faster than the sensor measures, or resampled by holding the last value",
+        "N and Q then depend on the resampling; log at the sensor's own rate.",
+    ),
+    Entry(
+        Code.LOG_STEP,
+        "",
+        WARNING,
+        "The level jumps {n_steps:?once|{n_steps} times}, by up to {step:abs .3g} {unit} at {time_s:.1f} s.",
+        "the sensor or its table was moved, the supply or a heater switched, or the sensor has telegraph noise",
+        "A step looks like K and R; each side is fitted with a level of its own, so that K holds what is left.",
+    ),
+    Entry(
+        Code.LOG_KNOCK,
+        "",
+        NOTE,
+        "{n_knocks:# short excursion} of up to {knock:abs .3g} {unit}, the largest at {time_s:.1f} s.",
+        "a knock at the table, a door, a lost or damaged reading",
+        "They raise N and Q; these stretches are left out.",
+    ),
+    Entry(
+        Code.LOG_MOTION,
+        "",
+        WARNING,
+        "For {shaken_s:.3g} s the readings scatter up to {times:.2g} times as much as in the rest, first at "
+        "{first_s:.1f} s.",
+        "motion, vibration or handling during a log that should be still",
+        "It raises N; these stretches are left out.",
+    ),
+    Entry(
+        Code.LOG_MOTION,
+        "throughout",
+        SERIOUS,
+        "Events cover {share:.0f %} of the log: it is disturbed throughout, and nothing was left out.",
+        "the sensor was not at rest",
+        "The terms describe the disturbance as much as the sensor; record at rest.",
+    ),
+    Entry(
+        Code.STRETCHES_EXCLUDED,
+        "",
+        NOTE,
+        "{n_stretches:# stretch} of together {excluded_s:.3g} s ({share:.2g %} of the log) left out.",
+        "",
+        "Clusters there are means of the readings that remain, weighted by their number; nothing is interpolated.",
+    ),
+    Entry(
+        Code.CLIPPING,
+        "at-rest",
+        SERIOUS,
+        "{share:.2g %} of the readings lie on the same extreme value.",
+        "the sensor or the converter is at the end of its range",
+        "Every term comes out too small; use a wider range or another orientation.",
+    ),
+    Entry(
+        Code.QUANTISATION_DEAD,
+        "",
+        SERIOUS,
+        "One reading's noise ({sigma:.3g} {unit}) is below half a step of the converter ({resolution:.3g} {unit}): "
+        "{repeated:.0f %} of the readings repeat the one before.",
+        "the resolution is coarser than the noise",
+        "N is that of the rounding, and slow terms may hide inside one step; use a narrower range or a finer output.",
+    ),
+)
+
+_SPECTRUM = (
+    Entry(
+        Code.SPECTRAL_LINE,
+        "",
+        NOTE,
+        "{n_lines:# periodic line}: {strongest:each}{has_more:? and {n_more} more|}.",
+        "mains, a fan, vibration of the building, or a clock inside the sensor",
+        "A line makes waves in the Allan curve near half its period; its frequencies were left out of the fit.",
+        numbers=("frequency_hz", "amplitude"),
+        lines=MappingProxyType({"strongest": "{v0:.4g} Hz ({v1:.2g} {v2})"}),
+    ),
+    Entry(
+        Code.SPECTRUM_COLOURED,
+        "throughout",
+        SERIOUS,
+        "No part of the upper spectrum is a sum of noise terms.",
+        "resampling, a narrow filter or periodic disturbance shapes the whole band",
+        "N and Q are not those of the sensor; log at its own rate without filtering.",
+    ),
+    Entry(
+        Code.SPECTRUM_COLOURED,
+        "falls",
+        WARNING,
+        "Above {highest_hz:.3g} Hz the spectrum leaves the noise terms and falls to {ratio:.3g %} of them at "
+        "{nyquist_hz:.3g} Hz.",
+        "a low-pass filter in the sensor or the logger, or averaging by a resampler",
+        "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
+        "cannot be told from it.",
+    ),
+    Entry(
+        Code.SPECTRUM_COLOURED,
+        "rises",
+        WARNING,
+        "Above {highest_hz:.3g} Hz the spectrum leaves the noise terms and rises to {ratio:.3g %} of them at "
+        "{nyquist_hz:.3g} Hz.",
+        "aliasing, resampling, a resonance or vibration",
+        "All terms are quoted from below; averaging times under half a period of that frequency show the filter, and Q "
+        "cannot be told from it.",
+    ),
+    Entry(
+        Code.SPECTRUM_COLOURED,
+        "curve",
+        WARNING,
+        "Below {first_s:.3g} s the curve is not a sum of noise terms.",
+        "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance",
+        "All terms are quoted from longer averaging times; a Q may be the tail of what was left out.",
+    ),
+    Entry(
+        Code.SPECTRUM_UNEXPLAINED,
+        "",
+        WARNING,
+        "Near {frequency_hz:.2g} Hz the spectrum lies {deviation:abs .0f %} {deviation:<below|above} the fitted terms.",
+        "disturbance that is not noise (temperature, daily life of the building), or noise of another shape",
+        _WIDENED,
+    ),
+    Entry(
+        Code.SPECTRUM_UNEXPLAINED,
+        "curve",
+        WARNING,
+        "Near {tau_s:.2g} s the curve lies {deviation:abs .0f %} {deviation:<below|above} the fitted terms.",
+        "a periodic disturbance, temperature, or noise of another shape",
+        _WIDENED,
+    ),
+)
+
+_TERMS = (
+    Entry(
+        Code.CURVE_ALONE,
+        "",
+        NOTE,
+        "The terms come from Allan deviations alone, taken as overlapping ones of an undisturbed log.",
+        "",
+        "Steps, knocks, lines and gaps cannot be told from noise in a curve; identify from the log where there is one.",
+    ),
+    Entry(
+        Code.RAMP_OR_WALK,
+        "",
+        WARNING,
+        "R and K are hard to tell apart in a curve: a random walk that happened to go one way has the curve of a ramp.",
+        "the curve keeps the squares of differences and loses their order",
+        "Identify from the log where there is one.",
+    ),
+    Entry(
+        Code.SLOW_NOISE_UNRESOLVED,
+        "",
+        NOTE,
+        "Slow noise is there; B and K are not separable here: B {flicker_lower:.2g} … {flicker_upper:.2g} {unit}, "
+        "K {walk_lower:.2g} … {walk_upper:.2g} {unit}/√s, not both zero.",
+        "the log is short compared with the times over which flicker and walk differ",
+        "Variances of means use the most likely sum of both; record longer to tell them apart.",
+        numbers=("evidence",),
+    ),
+    Entry(
+        Code.LOG_DRIFT,
+        "",
+        WARNING,
+        "The level drifts by {drift:.3g} {unit} over the log ({slope:.3g} ± {sigma_slope:.1g} {unit}/s).",
+        "warming up, or a change of the room's temperature",
+        "R describes this log, not the sensor; let it warm up, or log the temperature.",
+    ),
+    Entry(
+        Code.LOG_TOO_SHORT,
+        "",
+        NOTE,
+        "No minimum before the log's end: K is below {limit:.2g} {unit}/√s, more is not known.",
+        "the log is short compared with the sensor's stability",
+        "Record longer to find the best averaging time.",
+    ),
+)
+
+ENTRIES = (*_LOG, *_SPECTRUM, *_TERMS)

@@ -1,0 +1,270 @@
+"""What is said where stages meet: gravity, limits, temperature, many recordings, what is applied or compared."""
+
+from __future__ import annotations
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
+_MANY = "The common numbers are the mean of different ones: use the spread below as their error, or calibrate anew "
+_MANY += "after the change."
+
+_CALIBRATE = (
+    Entry(
+        Code.GRAVITY_DEFAULTED,
+        "",
+        WARNING,
+        "Gravity was not given; {gravity_m_s2} m/s² was used. Where people live it lies between {low_m_s2:.3f} and "
+        "{high_m_s2:.3f} m/s², and its error goes into every scale and zero of the accelerometer: up to "
+        "{possible_error_percent:.1f} % that no residual shows and no ± contains.",
+        "Neither --gravity nor --latitude was said.",
+        "Give --latitude DEG (and --height M), or --gravity M_S2.",
+    ),
+    Entry(
+        Code.JOINT_FIT_LEFT,
+        "",
+        NOTE,
+        "The moves contradict the still poses (one fit of both raises χ² of the poses by {chi2_increase:.3g}; noise "
+        "explains 28); the accelerometer was therefore taken from the still poses alone, and the gyro from the moves "
+        "by it.",
+        "An effect in the moves that the model does not have, which one fit of both would spread over the "
+        "accelerometer.",
+        "Say --method separate to choose this from the start.",
+    ),
+    Entry(
+        Code.TURN_ANGLE_UNKNOWN,
+        "",
+        SERIOUS,
+        "The gyro was not calibrated: its readings are counts, and its turns would fit 90°, 180° and 360° alike. "
+        "90, 180 or 360°? say --turns",
+        "Nothing in the log tells the gyro's scale: no unit, no nominal scale, and no moves that turn gravity well "
+        "enough to exclude half and twice.",
+        "Say --turns 180,-180,... (one angle a turn, 0 leaves it out), or --gyro-nominal.",
+    ),
+    Entry(
+        Code.GYROSCOPE_LEFT_OUT,
+        "not-calibrated",
+        WARNING,
+        "The gyro was not calibrated: {why}.",
+        "The recording does not hold what the gyro needs.",
+        "Turn the sensor about all three axes between still poses; docs/procedure.md shows how.",
+    ),
+    Entry(
+        Code.NOT_FIT,
+        "no-calibration",
+        SERIOUS,
+        "No calibration can be made from this log: {why}",
+        "The log does not hold what a calibration needs.",
+        "docs/procedure.md shows how to move the sensor.",
+    ),
+    Entry(
+        Code.NOT_FIT,
+        "few-orientations",
+        NOTE,
+        "One or two orientations in {duration_s:.0f} s: scales, angles between axes and moves are not tested.",
+        "A static log, a chamber log or a table that stands still.",
+        "To test those too, hold 18 or more poses of 3 to 5 s in different directions (docs/procedure.md).",
+        numbers=("n_holds",),
+    ),
+)
+
+_USE = (
+    Entry(
+        Code.GYROSCOPE_LEFT_OUT,
+        "calibration-has-none",
+        WARNING,
+        "The gyro was left out: the calibration holds none.",
+        "It was made without gyro readings, or they did not suffice.",
+        "Calibrate both sensors in one recording.",
+    ),
+    Entry(
+        Code.GYROSCOPE_LEFT_OUT,
+        "model-has-none",
+        WARNING,
+        "The gyro was left out: the model has none.",
+        "It was made without gyro readings, or they did not suffice.",
+        "Give a calibration of both sensors.",
+    ),
+    Entry(
+        Code.CALIBRATION_DOUBTED,
+        "",
+        SERIOUS,
+        "The calibration itself was not to be trusted: {seen}",
+        "What it said when it was made holds for all that it is applied to.",
+        "Calibrate again as its findings say, or apply another calibration.",
+    ),
+    Entry(
+        Code.EFFECT_NOT_APPLIED,
+        "of-session",
+        NOTE,
+        "{effect} of the extended calibration was not taken off: {why}.",
+        "It was in the recording that was calibrated; S and b were fitted beside it.",
+    ),
+    Entry(
+        Code.EFFECT_NOT_APPLIED,
+        "",
+        WARNING,
+        "{effect} of the extended calibration was not taken off: {why}.",
+        "It was in the recording that was calibrated; S and b were fitted beside it.",
+        "Log that channel, or update the program that applies the calibration.",
+    ),
+    Entry(
+        Code.LIMIT_EXCEEDED,
+        "rest",
+        SERIOUS,
+        "Gravity at rest is missed by {rms_mg:.3g} mg rms; the limit is {limit_mg:g} mg.",
+        "The calibration does not hold here as well as was asked for.",
+        "Calibrate again, or accept a wider limit.",
+    ),
+    Entry(
+        Code.LIMIT_EXCEEDED,
+        "moves",
+        SERIOUS,
+        "Gravity carried through moves is missed by {rms_deg:.3g} deg rms; the limit is {limit_deg:g} deg.",
+        "The calibration does not hold here as well as was asked for.",
+        "Calibrate again, or accept a wider limit.",
+    ),
+    Entry(
+        Code.SAME_RECORDING,
+        "",
+        WARNING,
+        "This is the recording that the calibration was made from: what it says here proves nothing.",
+        "The same file was named twice.",
+        "Verify on another session; the calibration's own report already holds out poses and moves.",
+    ),
+    Entry(
+        Code.OUTSIDE_VALID_RANGE,
+        "",
+        SERIOUS,
+        "{n_outside} of {n_samples} samples were recorded outside {low_degc:.1f} to {high_degc:.1f} °C, for which the "
+        "calibration was made (the log: {log_low_degc:.1f} to {log_high_degc:.1f} °C).{ends_are_held:? S and b of the "
+        "nearer end were used there.|}",
+        "The calibration saw no such temperature: a polynomial beyond its ends is no measurement.",
+        "Calibrate at these temperatures too, or leave those samples out.",
+    ),
+    Entry(
+        Code.TEMPERATURE_MISSING,
+        "",
+        SERIOUS,
+        "The calibration follows temperature ({low_degc:.1f} to {high_degc:.1f} °C) and the log has none: S and b of "
+        "its reference temperature were used.",
+        "No temperature column was logged, or it was not recognised.",
+        "Log the sensor's temperature; name its column with --columns temperature=N.",
+    ),
+)
+
+_MODELLED = "The linear model alone does not reproduce this recording: {statements:&; }."
+_TAKES_OFF = "`trihedron apply` takes off what belongs to the sensor; S and b alone are only half of this model."
+_DIAGNOSE = (
+    Entry(
+        Code.EFFECTS_MODELLED,
+        "stays-linear",
+        WARNING,
+        "The calibration stays linear: with {effects:&, } what was left out is predicted worse ({domain} from "
+        "{rms_before:.3g} to {rms_after:.3g} {unit} rms).",
+        "The effects belong to this session more than to the sensor, or its poses are too few to tell their size.",
+        "`trihedron diagnose` shows them; record another session to see which of them return.",
+        numbers=("n_effects",),
+    ),
+    Entry(
+        Code.EFFECTS_MODELLED,
+        "none",
+        NOTE,
+        "The diagnosis accepted no effect: the linear model stands as it was.",
+        numbers=("left", "n_effects", "n_domains_left"),
+    ),
+    Entry(
+        Code.EFFECTS_MODELLED,
+        "none-but-disagree",
+        WARNING,
+        "The diagnosis accepted no effect: the linear model stands as it was, and {left:&, } still disagree with it.",
+        "Something in this recording that no effect of the catalogue describes.",
+        "`trihedron diagnose` shows where it sits.",
+        numbers=("n_effects", "n_domains_left"),
+    ),
+    Entry(
+        Code.EFFECTS_MODELLED,
+        "fitted",
+        NOTE,
+        "S and b were fitted together with {effects:&, }.",
+        _MODELLED,
+        _TAKES_OFF,
+        numbers=("left", "n_effects", "n_domains_left"),
+    ),
+    Entry(
+        Code.EFFECTS_MODELLED,
+        "fitted-but-disagree",
+        WARNING,
+        "S and b were fitted together with {effects:&, }; {left:&, } still disagree.",
+        _MODELLED,
+        _TAKES_OFF,
+        numbers=("n_effects", "n_domains_left"),
+    ),
+    Entry(
+        Code.PROTOCOL_DIFFERS,
+        "",
+        NOTE,
+        "The simulated recording has {n_simulated} still poses and the real one {n_real}.",
+        "They do not follow the same protocol, or a pose was not still.",
+        "Numbers, noise and physics are compared all the same, each from its own poses; only their error bars differ.",
+    ),
+)
+
+_CHANGED_CAUSE = {
+    "zero": "Turning on, mounting, temperature or age moved the zero by more than it wanders in a recording.",
+    "scale": "Temperature, stress or the gravity that was given.",
+    "misalignment": "Stress in the package or the board, or another unit.",
+    "alignment": "One of two parts was remounted, or another unit.",
+    "other": "Gravity was another, or all three scales changed alike.",
+}
+_CHANGED_SEEN = {
+    "differs": "differs between the two recordings by {amount}",
+    "apart": "is another in {where} than in all other recordings, by {amount}",
+    "step": "changed before {where}, by {amount}",
+    "trend": "moves from recording to recording, by {amount} each",
+    "scatter": "is another in every recording, by {amount} (standard deviation)",
+}
+_MANY_RECORDINGS = (
+    Entry(
+        Code.SESSION_LEFT_OUT,
+        "",
+        WARNING,
+        "{name} was left out: {why}.",
+        "One recording that cannot be calibrated does not stop the others.",
+        "See `trihedron check {path}`.",
+    ),
+    Entry(
+        Code.FEW_SESSIONS,
+        "",
+        NOTE,
+        "Only {n_groups} {kind}: spreads are known to a factor of several, as their intervals say.",
+        "A standard deviation of few values is uncertain whatever is done with them.",
+        "Record {wanted} or more.",
+    ),
+    Entry(
+        Code.TEMPERATURE_DRIVEN,
+        "",
+        WARNING,
+        "The recordings were made between {low_degc:.0f} and {high_degc:.0f} °C, and what temperature does is in their "
+        "spread.",
+        "Zeros and scales of every part follow temperature.",
+        "Say --by temperature.",
+        numbers=("span_degc",),
+    ),
+    *(
+        Entry(
+            Code.NUMBERS_CHANGED,
+            f"{parameter}-{kind}",
+            WARNING,
+            f"{{what:& of }} {seen}.",
+            cause,
+            _MANY,
+            numbers=("p_adjusted", "where"),
+        )
+        for parameter, cause in _CHANGED_CAUSE.items()
+        for kind, seen in _CHANGED_SEEN.items()
+    ),
+)
+
+ENTRIES = (*_CALIBRATE, *_USE, *_DIAGNOSE, *_MANY_RECORDINGS)

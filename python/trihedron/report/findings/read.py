@@ -1,0 +1,315 @@
+"""What is said about a file: its columns, units, rows and devices."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
+_SAY_ACCEL_UNIT = "Say it with --accel-unit m/s^2, g, mg or counts if this is wrong."
+_SAY_GYRO_UNIT = "Say it with --gyro-unit rad/s, mrad/s, deg/s or counts if this is wrong."
+_SOURCE = "{is_given:?as you said|by its column names}"
+_TURNING = (
+    "{by_path:?in {n_turns} turns between rests gravity moved as far as a gyro in {turning_unit} says|"
+    "gravity turns with {slope:.2f} times the rate of a gyro in {turning_unit} (correlation {correlation:.2f})}"
+)
+_INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
+_CUT_OFF = "A log that was cut off, or a memory card with errors."
+_COPY_AGAIN = "Copy it again from the vehicle; gaps in time show where readings are missing."
+
+_UNITS = (
+    Entry(
+        Code.UNIT_ASSUMED,
+        "counts-or-mg",
+        WARNING,
+        "The accelerometer reads whole numbers of length {rest_norm:.4g} at rest: counts of about 1/1000 g, or mg; "
+        "taken as counts.",
+        "Both look alike. The calibration differs only in its name of the raw unit.",
+        _SAY_ACCEL_UNIT,
+    ),
+    Entry(
+        Code.UNIT_DETECTED,
+        "accelerometer-counts",
+        NOTE,
+        "The accelerometer's readings are whole numbers and were taken as counts.",
+        numbers=("rest_norm",),
+    ),
+    Entry(
+        Code.UNIT_DETECTED,
+        "accelerometer-at-rest",
+        NOTE,
+        "The accelerometer reads {rest_norm:.4g} at rest, so its unit is {unit}.",
+    ),
+    Entry(
+        Code.UNIT_ASSUMED,
+        "never-whole",
+        WARNING,
+        "The accelerometer has no stretch without missing readings to tell its unit by; taken as raw counts.",
+        "A raw reading of unknown scale, a log that never rests, or wrong columns.",
+        _SAY_ACCEL_UNIT,
+        numbers=("rest_norm",),
+    ),
+    Entry(
+        Code.UNIT_ASSUMED,
+        "no-gravity",
+        WARNING,
+        "The accelerometer reads {rest_norm:.4g} in its quietest stretches, which is gravity in no known unit; taken "
+        "as raw counts.",
+        "A raw reading of unknown scale, a log that never rests, or wrong columns.",
+        _SAY_ACCEL_UNIT,
+    ),
+    Entry(
+        Code.GRAVITY_MISSING,
+        "",
+        SERIOUS,
+        "The accelerometer reads only {rest_norm:.3g} at rest: gravity is missing from it.",
+        "'Linear' or 'user' acceleration of a phone, from which gravity was taken out, or wrong columns.",
+        "Log the accelerometer itself; nothing here can be calibrated without gravity.",
+    ),
+    Entry(
+        Code.UNIT_CONTRADICTED,
+        "accelerometer",
+        SERIOUS,
+        f"The accelerometer is in {{unit}} {_SOURCE}, but at rest it reads {{rest_norm:.4g}} {{unit}}, "
+        "{gravities:.3g} times gravity.",
+        "A wrong unit, wrong columns, or a log that never rests.",
+        _SAY_ACCEL_UNIT,
+    ),
+    Entry(Code.UNIT_DETECTED, "stated", NOTE, f"The {{sensor}} is in {{unit}} {_SOURCE}."),
+    Entry(
+        Code.UNIT_CONTRADICTED,
+        "gyro-by-turning",
+        SERIOUS,
+        f"The gyro is in {{unit}} {_SOURCE}, but {_TURNING}.",
+        "A wrong unit or a wrong sampling rate.",
+        _SAY_GYRO_UNIT,
+    ),
+    Entry(
+        Code.UNIT_CONTRADICTED,
+        "gyro-turns-too-far",
+        SERIOUS,
+        f"The gyro is in {{unit}} {_SOURCE}, but in {{turns}} turns between rests gravity moved {{turn_ratio:.3g}} "
+        "times as far as it can have.",
+        "A wrong unit, or a time base or rate that is wrong by that factor.",
+        "Check --time-unit, --rate and --gyro-unit: gyro scale is inversely proportional to the rate.",
+    ),
+    Entry(
+        Code.UNIT_DETECTED,
+        "gyro-counts",
+        NOTE,
+        "The gyro's readings are whole numbers and were taken as counts.",
+    ),
+    Entry(Code.UNIT_DETECTED, "gyro-by-turning", NOTE, f"The gyro's unit is {{turning_unit}}: {_TURNING}."),
+    Entry(
+        Code.UNIT_ASSUMED,
+        "gyro",
+        WARNING,
+        "Nothing states the gyro's unit; it reads {rest:.3g} at rest and {largest:.4g} at most, so it was taken as "
+        "{unit}.",
+        "No unit in the header, and no turns between rests to settle it.",
+        _SAY_GYRO_UNIT,
+    ),
+)
+
+_WHY_FIRST = {
+    "poses": "its quiet readings differ from pose to pose",
+    "level": "its steady reading stands far above its noise, as gravity does",
+}
+_WHY_UNKNOWN = {"short": "the log is too short to tell", "alike": "both triads look alike"}
+_NAME_THEM = "Name them with --columns, for example --columns ax,ay,az,gx,gy,gz."
+_COLUMNS = (
+    Entry(
+        Code.COLUMNS_RECOGNISED,
+        "",
+        NOTE,
+        "Columns{has_file:? of {file}|}: {roles:each}{has_rest:?; kept aside: {rest:& }|}.",
+        lines=MappingProxyType({"roles": "{v0} from {v1}"}),
+    ),
+    Entry(
+        Code.COLUMNS_ASSUMED,
+        "accelerometer",
+        WARNING,
+        "The {n_columns} columns have no names and were taken as an accelerometer.",
+        "A log without a header.",
+        "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4.",
+    ),
+    Entry(
+        Code.COLUMNS_ASSUMED,
+        "x-y-z",
+        WARNING,
+        "Columns x y z do not say which sensor they are and were taken as an accelerometer.",
+        "A log without a header.",
+        "Name them with --columns, for example --columns time=1,ax=2,ay=3,az=4.",
+    ),
+    Entry(
+        Code.COLUMNS_ASSUMED,
+        "one-of-several",
+        WARNING,
+        "More than one triad could be the {sensor}: {taken} was taken, {others:&; } kept aside.",
+        "The log holds raw and corrected readings, or several devices.",
+        "A calibration wants the uncorrected ones; choose with --columns if this is wrong.",
+    ),
+    Entry(
+        Code.COLUMNS_ASSUMED,
+        "header-ignored",
+        WARNING,
+        "The line '{line}' above the numbers does not name their {n_columns} columns, so it was passed over.",
+        "A header with another number of names than there are columns.",
+        "Name the columns with --columns.",
+    ),
+    Entry(
+        Code.COLUMNS_ASSUMED,
+        "commands",
+        NOTE,
+        "Its {n_rows} rows are seconds apart, so each rate was taken to hold until the next row.",
+        "Commands of a rate table.",
+    ),
+    *(
+        Entry(
+            Code.COLUMNS_ASSUMED,
+            f"six-{why}-accelerometer",
+            NOTE,
+            f"Six columns without names: the first three are the accelerometer, because {words}.",
+            "A log without a header.",
+            _NAME_THEM,
+        )
+        for why, words in _WHY_FIRST.items()
+    ),
+    *(
+        Entry(
+            Code.COLUMNS_ASSUMED,
+            f"six-{why}-gyro",
+            WARNING,
+            "Six columns without names: the first three are the gyro, the last three the accelerometer, because "
+            f"{words}.",
+            "A log without a header.",
+            _NAME_THEM,
+        )
+        for why, words in _WHY_FIRST.items()
+    ),
+    *(
+        Entry(
+            Code.COLUMNS_ASSUMED,
+            f"six-{why}",
+            SERIOUS,
+            f"Six columns without names were taken as ax ay az gx gy gz, but {words}.",
+            "A log without a header.",
+            _NAME_THEM,
+        )
+        for why, words in _WHY_UNKNOWN.items()
+    ),
+    Entry(
+        Code.COLUMN_LEFT_OUT,
+        "words",
+        NOTE,
+        "Column {column} holds words (such as {example!r}) and was left out.",
+    ),
+    Entry(
+        Code.COLUMN_LEFT_OUT,
+        "type",
+        NOTE,
+        "Column '{column}' holds {kind}, not numbers, and was left out.",
+    ),
+)
+
+_ROWS = (
+    Entry(
+        Code.ROWS_LEFT_OUT,
+        "above",
+        WARNING,
+        "{rows_left_out} lines above the first row of {n_columns} numbers were passed over (first: line {line}).",
+        "Rows of another layout, damaged rows, or numbers that belong to a preamble.",
+        "Look at these lines; nothing else of the file was left out.",
+    ),
+    Entry(
+        Code.ROWS_LEFT_OUT,
+        "remarks",
+        NOTE,
+        "{rows_left_out} lines between the rows begin like remarks and were passed over (first: line {line}).",
+        "Remarks of the logger, or rows that somebody took out.",
+    ),
+    Entry(
+        Code.LINE_INCOMPLETE,
+        "",
+        NOTE,
+        "The last line ({line}) breaks off in the middle and was left out.",
+        "The logger was stopped while it wrote.",
+        "Nothing is lost but one sample.",
+        numbers=("rows_left_out",),
+        or_severity=WARNING,
+    ),
+    Entry(
+        Code.ROWS_UNACCOUNTED,
+        "",
+        SERIOUS,
+        "The file holds {in_file} rows, {read} were read and {reported} reported as left out: {count} are not "
+        "accounted for.",
+        "A fault of the reader.",
+        "Report it with the file; until then convert the log to CSV with another program.",
+    ),
+    Entry(
+        Code.REPEATED_ROWS,
+        "copies",
+        WARNING,
+        "{rows_left_out} rows are copies of the row before, time stamp included (first: {where}); they were left out.",
+        "A logger that writes a row twice, or a stream joined with itself.",
+        numbers=("count", "row"),
+    ),
+    Entry(
+        Code.SAMPLES_LOST,
+        "bytes-skipped",
+        WARNING,
+        "{bytes} bytes at {count} places of the log are damaged and were skipped, readings among them.",
+        _CUT_OFF,
+        _COPY_AGAIN,
+    ),
+    Entry(
+        Code.SAMPLES_LOST,
+        "damaged",
+        WARNING,
+        "The log is damaged inside; what could not be read of it was skipped, readings among it.",
+        _CUT_OFF,
+        _COPY_AGAIN,
+    ),
+    Entry(
+        Code.SAMPLES_LOST,
+        "dropouts",
+        WARNING,
+        "The logger itself reports {count} dropouts, {lost_s:.3g} s altogether.",
+        "A memory card that was too slow.",
+        _INTEGRATED,
+    ),
+    Entry(
+        Code.SAMPLES_LOST,
+        "counter",
+        WARNING,
+        "The counter {column} skips at {count} places, {lost_samples} samples are missing (first: {where}).",
+        "Lost packets.",
+        _INTEGRATED,
+        numbers=("sample",),
+        or_severity=SERIOUS,
+    ),
+)
+
+_DEVICES = (
+    Entry(Code.DEVICE_CHOSEN, "", NOTE, "{where} offers {listed}; {chosen} was read."),
+    Entry(
+        Code.DEVICE_CHOSEN,
+        "archive",
+        NOTE,
+        "Of the archive {members:& and } {n_members:?was|were} read; not read: {others:first 12}.",
+    ),
+    Entry(
+        Code.DEVICE_CHOSEN,
+        "records",
+        NOTE,
+        "Each line names its record: {kinds:each}; those of the accelerometer and the gyro were read.",
+        numbers=("rows_left_out",),
+        lines=MappingProxyType({"kinds": "{v0} ({v1})"}),
+    ),
+)
+
+ENTRIES = (*_UNITS, *_COLUMNS, *_ROWS, *_DEVICES)

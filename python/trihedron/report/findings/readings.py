@@ -1,0 +1,74 @@
+"""What is said about the readings themselves: missing, repeated, frozen, clipped, coarse."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
+
+ENTRIES = (
+    Entry(
+        Code.NON_FINITE,
+        "readings",
+        WARNING,
+        "The {sensor} has {count} rows without a finite reading (first: {where}).",
+        "Lost samples, or a logger that writes NaN.",
+        "These rows are left out; nothing is made up in their place.",
+        numbers=("sample",),
+        or_severity=SERIOUS,
+    ),
+    Entry(
+        Code.REPEATED_ROWS,
+        "",
+        WARNING,
+        "The {sensor} repeats its last reading in {count} rows ({fraction:.3g %}; chance would give {chance:.2g %}); "
+        "the longest run is {longest_run} rows from {where}.",
+        "The log is faster than the sensor, or the logger repeats a value when it has no new one.",
+        "Noise and error bars count repeated rows as new; log at the sensor's own rate.",
+        numbers=("sample",),
+        or_severity=SERIOUS,
+    ),
+    Entry(
+        Code.STUCK_VALUES,
+        "",
+        WARNING,
+        "The {sensor}'s {axis_name} axis stays at {value:.7g} for {longest_run} samples from {where}, far longer than "
+        "chance.",
+        "A frozen channel, clipping, or a bus that answers with an old value.",
+        "Leave that stretch out.",
+        numbers=("axis", "sample"),
+        or_severity=SERIOUS,
+    ),
+    Entry(
+        Code.COARSE_RESOLUTION,
+        "",
+        WARNING,
+        "The {sensor}'s resolution is coarser than its noise ({axes:each}, raw units).",
+        "Few bits, or values rounded when they were written.",
+        "Averaging longer does not help where the noise does not move the last digit; choose a smaller range.",
+        lines=MappingProxyType({"axes": "{v0}: step {v1:.4g}, noise {v2:.2g}"}),
+    ),
+    Entry(
+        Code.CLIPPING,
+        "",
+        WARNING,
+        "The {sensor} is clipped: {walls:each}; first at {where}.",
+        "The motion left the measuring range.",
+        "Turn more slowly, or set a wider range; angles integrated over clipped moves are too small.",
+        numbers=("count", "sample"),
+        lines=MappingProxyType({"walls": "{v0} at {v1:.7g} ({v2} samples in {v3:# stretch})"}),
+    ),
+    Entry(
+        Code.RAW_STEP,
+        "",
+        NOTE,
+        "The {sensor} is in {unit} but steps like counts ({steps:each} {unit}; {per_unit:.5g} per "
+        "{is_accelerometer:?g|deg/s}).",
+        "{is_decimal:?Rounded to so many decimals when it was written.|Counts times a nominal scale.}",
+        lines=MappingProxyType({"steps": "{v0} {v1:.5g}"}),
+    ),
+)

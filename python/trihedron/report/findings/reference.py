@@ -1,0 +1,97 @@
+"""What is said where a log is held against a known motion, or against another log."""
+
+from __future__ import annotations
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING = Severity.NOTE, Severity.WARNING
+
+ENTRIES = (
+    Entry(
+        Code.REFERENCE_TURNED_ROUND,
+        "",
+        WARNING,
+        "The reference's attitudes turn world into body: only so do they move as the log does.",
+        "Two conventions of attitude.",
+        "Nothing, unless another program will read this file.",
+    ),
+    Entry(
+        Code.REFERENCE_LAG_AMBIGUOUS,
+        "",
+        WARNING,
+        "The motion repeats itself: more than one offset of the reference's clock fits as well as {offset_s:.4g} s.",
+        "Turns that are alike.",
+        "Shake the unit once, irregularly, at the start.",
+    ),
+    Entry(
+        Code.REFERENCE_MISFIT,
+        "",
+        WARNING,
+        "Parts of the log disagree about the {sensor} by {widened:.2g} times what its residuals' noise explains; the "
+        "error bars were widened by that.",
+        "A reference that wobbles or was corrected on the way, a zero that drifts, an effect.",
+        "Look at --report FILE.html for where; repeat the motion.",
+    ),
+    Entry(
+        Code.REFERENCE_OUTLIERS,
+        "",
+        WARNING,
+        "{left_out} of {rows} windows of the {sensor} were left out as outliers.",
+        "Jumps of a tracker that lost its markers, or knocks.",
+        "Look at the reference's own quality flags.",
+    ),
+    Entry(
+        Code.REFERENCE_UPSIDE_DOWN,
+        "down",
+        WARNING,
+        "At rest the specific force points along -z of the reference's world.",
+        "Its z points down (north, east, down), or the reference is mirrored, or the log's accelerometer shows gravity "
+        "instead of specific force.",
+        "If z is up there, turn the sign of one axis of the reference, or of the accelerometer.",
+        numbers=("up_x", "up_y", "up_z"),
+    ),
+    Entry(
+        Code.REFERENCE_UPSIDE_DOWN,
+        "leans",
+        WARNING,
+        "The plumb line leans {lean_deg:.0f}° from the z of the reference's world.",
+        "A world frame that is not level.",
+        "Nothing, if you know that: the plumb line was estimated.",
+        numbers=("up_x", "up_y", "up_z"),
+    ),
+    Entry(
+        Code.REFERENCE_OF_ITSELF,
+        "",
+        WARNING,
+        "The reference stands in the log's own file.",
+        "An attitude that the unit computed from its own gyro agrees with that gyro by construction.",
+        "Believe it only if another instrument measured it.",
+    ),
+    Entry(
+        Code.REFERENCE_ONLY,
+        "",
+        NOTE,
+        "Only the reference was asked: {why}.",
+        "The log holds no still poses to speak of.",
+    ),
+    Entry(
+        Code.ACCELEROMETER_NOMINAL,
+        "",
+        WARNING,
+        "The accelerometer was not calibrated: the reference knows no force. Its numbers in the file are nominal.",
+        "A rate alone says nothing of gravity.",
+        "Calibrate it from still poses (`trihedron calibrate LOG`); the frame is the reference's body.",
+        numbers=("scale",),
+    ),
+    Entry(
+        Code.SHARED_MOTION,
+        "",
+        NOTE,
+        "Both logs hold the same motion (correlation {correlation:.3f}, the other clock {offset_s:+.5g} s): compared "
+        "sample by sample they differ by {rate_rms:.3g °/s}{has_force:? and {force_rms:.3g mm/s²}|} rms.",
+        "A motion that was replayed, or two units on one body.",
+        numbers=("offset_std_s",),
+    ),
+)

@@ -1,0 +1,74 @@
+"""What is said about still poses and moves."""
+
+from __future__ import annotations
+
+from trihedron.records.finding import FindingCode as Code
+from trihedron.records.finding import Severity
+from trihedron.report.findings.entry import Entry
+
+NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
+
+ENTRIES = (
+    Entry(
+        Code.HOLD_CREEPS,
+        "",
+        WARNING,
+        "{holds:# hold} {holds:?drifts|drift} while still: in hold {worst_hold} at {worst_s:.1f} s the second half "
+        "reads {worst_sigmas:.1f} standard errors from the first (hold {which:first 8}).",
+        "The support gives way, the case settles after being let go, or the sensor warms up.",
+        "Wait until the case has settled, hold for less time, or put it on a firmer support.",
+    ),
+    Entry(
+        Code.HOLD_BUMPED,
+        "",
+        NOTE,
+        "{disturbances:# disturbance} inside {holds:# hold} (hold {which:first 8}), {left_out_s:.1f} s in all, the "
+        "first at {first_s:.1f} s, left out of the means.",
+        "The table or the cable was touched, or samples are missing there.",
+        "Nothing needs to be done; keep hands off the table during a hold.",
+    ),
+    Entry(
+        Code.HOLD_UNSTEADY,
+        "",
+        WARNING,
+        "{holds:# hold} never {holds:?comes|come} down to the sensor's own noise (hold {which:first 8}; first at "
+        "{first_s:.1f} s).",
+        "The sensor was held in the hand or stood on a support that shakes.",
+        "Their means weigh less, by their own scatter; rest the case on something firm for a better result.",
+    ),
+    Entry(
+        Code.NOT_STATIC,
+        "",
+        SERIOUS,
+        "No still pose of a second or more in {duration_s:.1f} s of log.",
+        "The sensor was moving, or held in the hand, all the time; or the log is too short.",
+        "Log again: put the case down for several seconds in each pose.",
+        numbers=("holds",),
+    ),
+    Entry(
+        Code.SLOW_TURN,
+        "",
+        NOTE,
+        "{turning_s:.1f} s look still to the accelerometer but turn: the gyro reads away from its zero, first at "
+        "{first_s:.1f} s; taken as moving.",
+        "A slow steady turn about the vertical.",
+        "Nothing needs to be done.",
+    ),
+    Entry(
+        Code.NO_INITIAL_REST,
+        "",
+        NOTE,
+        "The log does not begin at rest: the first still pose starts at {first_hold_s:.1f} s.",
+        "Logging was started with the case in hand.",
+        "Nothing needs to be done: the noise was measured in the still poses themselves.",
+    ),
+    Entry(
+        Code.FEW_POSES,
+        "",
+        WARNING,
+        "{holds:# still pose} found in {duration_s:.1f} s; a calibration of nine parameters needs at least {needed}, "
+        "in different directions.",
+        "The log has few poses, or they were held for less than a second.",
+        "Log the six faces and twelve edges of a cube (18 poses), a few seconds each.",
+    ),
+)

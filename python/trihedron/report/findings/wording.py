@@ -1,0 +1,113 @@
+"""Sentences with places for values: ``{rms_m_s2:.3g mm/s²}`` is the value in that unit with three digits.
+
+A place is a name and, after the colon, how its value becomes words:
+
+``.3g`` · ``.3g mm/s²``  a number, in the unit named there (values are SI); ``abs .3g %`` without its sign;
+                         ``.3g !%`` without the unit's name
+``# hold``               ``1 hold``, ``3 holds``
+``?drifts|drift``        the first words where the value is 1 or true, else the second; they may hold places
+``<below|above``         the first words where the value is negative, else the second; they may hold places
+``&, the ``              several words, joined by what stands after the ``&``; ``and``: ``x, y and z``
+``first 8``              ``3, 5, 6``, with ``...`` behind the eighth
+``numbered``             several words as ``(1) ...; (2) ...``
+``each`` · ``each; ``    several groups of values, each by the entry's line of that name, joined by comma or ``; ``
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from string import Formatter
+from typing import Any
+
+from trihedron.report.numbers import listed
+from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, ms_from_s
+
+UNITS: Mapping[str, Callable[[float], float]] = {
+    "mm/s²": mm_s2_from_m_s2,
+    "mg": mg_from_m_s2,
+    "ms": ms_from_s,
+    "deg": degrees_from_radians,
+    "deg/s": degrees_from_radians,
+    "°/s": degrees_from_radians,
+    "%": lambda share: 100.0 * share,
+}
+
+BRANCHES = "?<"
+"""First letters of rules that choose between two branches."""
+
+
+def places(template: str) -> frozenset[str]:
+    """Names of the values that a sentence has places for."""
+    found: set[str] = set()
+    for _, name, how, _ in Formatter().parse(template):
+        if name:
+            found |= {name} | (places(how[1:]) if how and how[0] in BRANCHES else frozenset())
+    return frozenset(found)
+
+
+def filled(template: str, values: Mapping[str, Any], lines: Mapping[str, str]) -> str:
+    """The sentence with its values.
+
+    Raises
+    ------
+    KeyError
+        When a place has no value.
+    """
+    words = []
+    for text, name, how, _ in Formatter().parse(template):
+        words.append(text)
+        if name:
+            if how and how[0] in BRANCHES:
+                words.append(_chosen(values, name, how, lines))
+            else:
+                words.append(_in_words(values[name], how or "", lines.get(name, "")))
+    return "".join(words)
+
+
+def _chosen(values: Mapping[str, Any], name: str, how: str, lines: Mapping[str, str]) -> str:
+    """The words of one of two branches; those of the other need no values."""
+    first, second = branches(how)
+    return filled(first if (values[name] == 1 if how[0] == "?" else values[name] < 0) else second, values, lines)
+
+
+def branches(how: str) -> tuple[str, str]:
+    """The two branches of a rule: a bar outside all braces parts them."""
+    depth = 0
+    for i, letter in enumerate(how):
+        depth += (letter == "{") - (letter == "}")
+        if letter == "|" and depth == 0:
+            return how[1:i], how[i + 1 :]
+    raise ValueError(f"no second branch in {how!r}")
+
+
+def _in_words(value: Any, how: str, line: str) -> str:
+    if how.startswith("each"):
+        return (how[4:] or ", ").join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
+    if how == "and":
+        return listed([str(word) for word in value])
+    if how == "numbered":
+        return "; ".join(f"({i + 1}) {word}" for i, word in enumerate(value))
+    if how.startswith("&"):
+        return how[1:].join(map(str, value))
+    if how.startswith("first "):
+        most = int(how[6:])
+        return ", ".join(map(str, value[:most])) + (" ..." if len(value) > most else "")
+    if how.startswith("# "):
+        noun = how[2:]
+        return f"{value:.0f} {noun if value == 1 else _plural(noun)}"
+    return _number(value, how) if how else str(value)
+
+
+def _number(value: float, how: str) -> str:
+    if how.startswith("abs "):
+        value, how = abs(value), how[4:]
+    digits, _, unit = how.partition(" ")
+    if not unit:
+        return format(value, digits)
+    if unit.startswith("!"):
+        return format(UNITS[unit[1:]](value), digits)
+    return f"{UNITS[unit](value):{digits}} {unit}"
+
+
+def _plural(noun: str) -> str:
+    return f"{noun}es" if noun.endswith(("ch", "s", "x")) else f"{noun}s"

@@ -1,0 +1,152 @@
+"""The catalogue of findings is closed: stages give codes and values, every sentence stands under report/."""
+
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trihedron.records import Finding, FindingCode, Severity
+from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
+from trihedron.report.findings.page import page
+from trihedron.report.findings.wording import filled
+
+PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
+READS_BACK = {"files/calibration.py"}
+
+
+def _calls(attribute):
+    """Calls of ``Finding.of`` (or of ``Finding`` itself) with the file they stand in."""
+    for path in sorted(PACKAGE.rglob("*.py")):
+        name = str(path.relative_to(PACKAGE))
+        if name.startswith("report/"):
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.Call):
+                continue
+            called = node.func
+            if isinstance(called, ast.Attribute) and isinstance(called.value, ast.Name):
+                is_one = attribute and called.value.id == "Finding" and called.attr == "of"
+            else:
+                is_one = not attribute and isinstance(called, ast.Name) and called.id == "Finding"
+            if is_one:
+                yield name, node
+
+
+def _choices(node):
+    """What an argument may be: a code, a literal, or one of two; None where only the run tells."""
+    if isinstance(node, ast.IfExp):
+        one, other = _choices(node.body), _choices(node.orelse)
+        return None if one is None or other is None else one | other
+    if isinstance(node, ast.Constant):
+        return {node.value}
+    if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "FindingCode":
+        return {FindingCode[node.attr]}
+    return None
+
+
+def _created():
+    """(file, line, codes, cases, names of the values, severities) of every finding that a stage makes."""
+    for name, node in _calls(attribute=True):
+        codes = _choices(node.args[0])
+        cases = _choices(node.args[1]) if len(node.args) > 1 else {""}
+        assert codes is not None, f"{name}:{node.lineno}: which code is it?"
+        if cases is None:
+            start = node.args[1].values[0].value if isinstance(node.args[1], ast.JoinedStr) else ""
+            cases = {case for code, case in CATALOGUE if code in codes and case.startswith(start)}
+        given = {keyword.arg for keyword in node.keywords} - {"severity", "numbers"}
+        yield f"{name}:{node.lineno}", codes, cases, given, node
+
+
+def test_every_finding_of_a_stage_is_in_the_catalogue_with_exactly_its_places():
+    for where, codes, cases, given, _ in _created():
+        for code in codes:
+            for case in cases:
+                assert (code, case) in CATALOGUE, f"{where}: {code.value} '{case}' is not in the catalogue"
+                assert given == CATALOGUE[code, case].places, f"{where}: {code.value} '{case}'"
+
+
+def test_every_entry_of_the_catalogue_is_created_somewhere_and_once_in_the_table():
+    created = {(code, case) for _, codes, cases, _, _ in _created() for code in codes for case in cases}
+    assert set(CATALOGUE) == created
+    assert len(ENTRIES) == len(CATALOGUE)
+    assert {code for code, _ in CATALOGUE} == set(FindingCode)
+
+
+def test_a_stated_severity_is_one_the_catalogue_allows():
+    for where, codes, cases, _, node in _created():
+        for keyword in node.keywords:
+            if keyword.arg == "severity":
+                stated = {n.attr for n in ast.walk(keyword.value) if isinstance(n, ast.Attribute)} & set(
+                    Severity.__members__
+                )
+                for code in codes:
+                    for case in cases:
+                        entry = CATALOGUE[code, case]
+                        assert stated == {entry.severity.name, entry.or_severity.name}, where
+
+
+def test_no_finding_is_written_outside_the_report():
+    written = {name for name, _ in _calls(attribute=False)}
+    assert written == READS_BACK
+    for name, node in _calls(attribute=True):
+        for keyword in (k for k in node.keywords if k.arg != "numbers"):
+            for part in ast.walk(keyword.value):
+                text = part.value if isinstance(part, ast.Constant) and isinstance(part.value, str) else ""
+                assert " " not in text, f"{name}:{node.lineno}: a sentence belongs into the catalogue"
+                assert not isinstance(part, ast.JoinedStr), f"{name}:{node.lineno}"
+
+
+def test_a_sentence_ends_and_says_what_to_do_about_a_warning():
+    for entry in ENTRIES:
+        assert entry.seen.rstrip().endswith((".", "}", "--turns")), entry
+        if entry.severity is not Severity.NOTE:
+            assert entry.cause or entry.action, entry
+
+
+@pytest.mark.parametrize(
+    ("template", "value", "words"),
+    [
+        ("{x:.3g mm/s²}", 0.0123456, "12.3 mm/s²"),
+        ("{x:.2g !%} ± 1 %", 0.123, "12 ± 1 %"),
+        ("{x:.1f deg}", np.pi / 2, "90.0 deg"),
+        ("{x:abs .1f}", -2.04, "2.0"),
+        ("{x:# hold}", 1, "1 hold"),
+        ("{x:# hold}", 3, "3 holds"),
+        ("{x:# stretch}", 2, "2 stretches"),
+        ("{x:?once|{x} times}", 1, "once"),
+        ("{x:?once|{x} times}", 4, "4 times"),
+        ("{x:?as you said|by its names}", True, "as you said"),
+        ("{x:?as you said|by its names}", False, "by its names"),
+        ("{x:<below|above}", -0.1, "below"),
+        ("{x:<below|above}", 0.1, "above"),
+        ("{x:&, the }", ["a", "b"], "a, the b"),
+        ("{x:and}", ["x", "y", "z"], "x, y and z"),
+        ("{x:numbered}", ["tilt", "turn"], "(1) tilt; (2) turn"),
+        ("{x:first 3}", [1, 2, 3, 4], "1, 2, 3 ..."),
+        ("{x:first 3}", [1, 2, 3], "1, 2, 3"),
+        ("{x:each}", [("x", 1.25), ("z", 2.0)], "x at 1.2, z at 2.0"),
+        ("{x}", "as it is", "as it is"),
+    ],
+)
+def test_a_place_becomes_words_as_its_rule_says(template, value, words):
+    assert filled(template, {"x": value}, {"x": "{v0} at {v1:.1f}"}) == words
+
+
+def test_a_finding_carries_its_numbers_for_machines():
+    found = Finding.of(FindingCode.FEW_POSES, holds=np.int64(1), duration_s=np.float64(12.5), needed=9)
+    assert found.seen.startswith("1 still pose found in 12.5 s")
+    assert found.severity is Severity.WARNING
+    assert dict(found.numbers) == {"holds": 1.0, "duration_s": 12.5, "needed": 9.0}
+
+
+def test_a_value_that_is_missing_or_a_case_that_is_not_there_is_refused():
+    with pytest.raises(KeyError):
+        Finding.of(FindingCode.FEW_POSES, holds=1)
+    with pytest.raises(KeyError):
+        Finding.of(FindingCode.FEW_POSES, "no such case", holds=1, duration_s=1.0, needed=9)
+
+
+def test_the_documents_list_the_catalogue_as_it_is():
+    documented = (Path(__file__).parents[1] / "docs" / "findings.md").read_text()
+    assert documented == page(), "python -m trihedron.report.findings.page > docs/findings.md"
