@@ -9,6 +9,10 @@ scale, misalignment, the gyro triad turned, gravity); an effect that only the re
 both; noise twice as large; a coarser converter. Each pair is held against its log (``--against``) or, for one kind in
 three, against a calibration made from the simulated log (``--calibration``). A name said of nothing that was drawn is
 false; a group of numbers whose true difference exceeds five of its own stated errors must be found.
+
+Each pair goes through a folder: the generator writes ``simulation.csv``, ``recording.csv`` and ``sealed.json``; the
+question is asked of the two logs alone and its answer written to ``found.json``; only then the seal is opened.
+``--keep DIR`` keeps the folders.
 """
 
 from __future__ import annotations
@@ -17,10 +21,12 @@ import argparse
 import itertools
 import json
 import sys
+import tempfile
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +35,8 @@ import numpy as np
 import trihedron
 from blind_trial.draw import grade_profile, moves_of
 from blind_trial.sizes import ON_A_TABLE, SIZES, Session
+from trihedron.diagnose.effects import catalogue
+from trihedron.files.log import write_recording
 from trihedron.records import Recording
 from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
@@ -199,34 +207,68 @@ def true_differences(sim: Any, real: Any, kind: str) -> dict[str, list[float]]:
     return out
 
 
-def trial(pair: Pair) -> dict[str, Any]:
-    warnings.simplefilter("ignore")
+def seal(pair: Pair, folder: Path) -> None:
+    """The two logs, the question, and the answer nobody may read yet."""
     simulated, recording, gravity, answer = make(pair)
+    write_recording(simulated, folder / "simulation.csv")
+    write_recording(recording, folder / "recording.csv")
+    (folder / "question.json").write_text(json.dumps({"gravity_m_s2": gravity, "by_file": pair.by_file}))
+    (folder / "sealed.json").write_text(json.dumps(answer))
+
+
+def ask(folder: Path) -> None:
+    """The answer to the two logs, written down before the seal is opened."""
+    question = json.loads((folder / "question.json").read_text())
+    gravity = question["gravity_m_s2"]
+    recording, simulated = (trihedron.read(folder / f"{name}.csv") for name in ("recording", "simulation"))
+    if question["by_file"]:
+        known = trihedron.calibrate(simulated, gravity_m_s2=gravity)
+        found = trihedron.diagnose(recording, calibration=known)
+    else:
+        found = trihedron.diagnose(recording, against=simulated, gravity_m_s2=gravity)
+    (folder / "found.json").write_text(json.dumps(found.to_dict()))
+
+
+def trial(pair: Pair, keep: Path | None = None) -> dict[str, Any]:
+    warnings.simplefilter("ignore")
     result: dict[str, Any] = {"kind": pair.kind, "seed": pair.seed, "by_file": pair.by_file, "crash": ""}
-    try:
-        if pair.by_file:
-            known = trihedron.calibrate(simulated, gravity_m_s2=gravity)
-            found = trihedron.diagnose(recording, calibration=known)
-        else:
-            found = trihedron.diagnose(recording, against=simulated, gravity_m_s2=gravity)
-    except Exception as error:  # a crash is a result
-        return {**result, "crash": f"{type(error).__name__}: {error}", "right": False, "false": [], "z": []}
-    document = found.to_dict()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) if keep is None else keep / f"{pair.kind}-{pair.seed}"
+        folder.mkdir(parents=True, exist_ok=True)
+        seal(pair, folder)
+        try:
+            ask(folder)
+        except Exception as error:  # a crash is a result
+            return {**result, "crash": f"{type(error).__name__}: {error}", "right": False, "false": [], "z": []}
+        document = json.loads((folder / "found.json").read_text())
+        answer = json.loads((folder / "sealed.json").read_text())
+    return {**result, **scored(pair, document, answer)}
+
+
+def left_open(effects: list[tuple[str, str, list[str]]]) -> set[str]:
+    """Groups whose level is a convention once one of these effects stands (the temperature that a zero is of)."""
+    by_id = {effect.id: effect.leaves_open for effect in catalogue()}
+    return {group for _, name, _ in effects for group in by_id.get(name, ())}
+
+
+def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict[str, Any]:
+    """The opened seal beside what was said."""
     said_groups = sorted({p["id"] for p in document["parameters"] if p["significant"]})
     z: list[float] = []
     must, may = set(), set()
+    effects = [(e["in"], e["id"], e["confounded_with"]) for e in document["effects"]]
+    is_open = left_open(effects)
     for group, values in answer["numbers"].items():
         rows = [p for p in document["parameters"] if p["id"] == group]
         if any(abs(v) > 1e-9 for v in values):
             may.add(group)
         if len(rows) == len(values):
             errors = [(p["difference"] - v) / p["std"] for p, v in zip(rows, values, strict=True)]
-            z += errors
+            z += [] if group in is_open else errors
             if any(abs(v) > 5 * p["std"] for p, v in zip(rows, values, strict=True)):
                 must.add(group)
         elif group == "gravity":
             must.add(group)
-    effects = [(e["in"], e["id"], e["confounded_with"]) for e in document["effects"]]
     side = {"missing": "recording", "surplus": "model"}.get(answer["kind"], "")
     false = [g for g in said_groups if g in GROUPS and g not in may and not (g == "accel-scale" and "gravity" in may)]
     false += [
@@ -256,7 +298,7 @@ def trial(pair: Pair) -> dict[str, Any]:
         and (effects[0][1] == answer["effect"] or answer["effect"] in effects[0][2])
     )
     return {
-        **result, "verdict": document["verdict"], "expected": expected, "right": document["verdict"] == expected,
+        "verdict": document["verdict"], "expected": expected, "right": document["verdict"] == expected,
         "effect": answer["effect"], "first": first if side else None, "said": said_groups,
         "missed": sorted(must - set(said_groups)),
         "effects": [f"{w}:{e}" for w, e, _ in effects], "noise": noise, "false": false, "z": z,
@@ -272,6 +314,7 @@ def main() -> None:
     parser.add_argument("--nuisances", action="store_true")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--keep", type=Path, help="a folder for the logs, seals and answers of all pairs")
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
     kinds = options.kind or list(KINDS)
@@ -281,7 +324,7 @@ def main() -> None:
     ]
     results = []
     with ProcessPoolExecutor(options.jobs) as pool:
-        for r in pool.map(trial, pairs):
+        for r in pool.map(partial(trial, keep=options.keep), pairs):
             results.append(r)
             if not r["right"] or r["false"] or r.get("missed") or r["crash"]:
                 print({k: v for k, v in r.items() if k != "z"}, flush=True)

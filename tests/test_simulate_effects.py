@@ -25,6 +25,8 @@ from trihedron.simulate import (
     with_effect,
 )
 from trihedron.simulate.motion import attitude_with_up
+from trihedron.simulate.motion.plan import Label
+from trihedron.simulate.zero_scatter import zero_of_poses
 
 IDEAL = Scenario(hand_session(8, hold_s=1.0, first_hold_s=2.0, arm_m=0.1), "ideal")
 
@@ -324,6 +326,33 @@ def test_a_left_handed_triad_has_a_negative_determinant_and_one_axis_reversed():
     recording, truth = both("axis-handedness", sensor="gyroscope", axis=2)
     assert np.linalg.det(truth.gyroscope_S) < 0.0
     assert np.abs(recording.gyroscope - truth.angular_rate_rad_s * [1, -1, 1]).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("effect_id", "sensor"), [("accel-zero-scatter", "accelerometer"), ("gyro-zero-scatter", "gyroscope")]
+)
+def test_scattered_zeros_are_constant_in_a_pose_and_drawn_anew_after_a_move(effect_id, sensor):
+    base = Scenario(hand_session(40, hold_s=1.0))
+    sigma = np.array([0.01, 0.02, 0.04])
+    recording, truth = both(effect_id, base=base, sigma=tuple(sigma))
+    clean, _ = simulate(base, seed=5)
+    added = getattr(recording, sensor) - getattr(clean, sensor)
+    holds = [added[s.start : s.stop] for s in truth.segments if s.kind == "hold"]
+    assert max(np.ptp(part, axis=0).max() for part in holds) < 1e-12
+    zeros = np.array([part[0] for part in holds])
+    # 40 draws: their deviation is known to 11 %; four of these.
+    assert np.all(np.abs(np.log(zeros.std(axis=0) / sigma)) < 0.45)
+    assert np.abs(np.diff(added, axis=0)).max() < 0.02  # goes over within the move, no step
+    assert truth.effects[effect_id]["sigma"] == tuple(sigma)
+
+
+def test_a_pushed_pose_keeps_its_zero():
+    _, truth = simulate(with_effect(IDEAL, "disturbed-pose", poses=[2], tilt_deg=1.0))
+    labels = [Label(s.kind, s.name, s.start_s, s.stop_s, s.axis, s.turn_rad) for s in truth.segments]
+    pushed = next(k for k, label in enumerate(labels) if label.kind == "disturbance")
+    t = np.array([labels[pushed].start_s - 0.1, labels[pushed].stop_s + 0.1])
+    before, after = zero_of_poses(tuple(labels), t, (1.0, 1.0, 1.0), np.random.default_rng(1))
+    assert np.array_equal(before, after)
 
 
 def test_every_effect_id_is_exercised_here():

@@ -141,7 +141,8 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
     if len(judged.accepted) < len(model.accepted):
         # What was needless stood where another may belong.
         scored, _ = scores(judged, exclude=judged.refused)
-        judged = judged_again(_grown(judged, scored, alpha, lambda _part: None))
+        grown = _grown(judged, scored, alpha, lambda _part: None)
+        judged = judged if grown is judged else judged_again(grown)
     judged, candidates = _with_late(judged, candidates, alpha)
     chosen = chosen_again(judged)
     judged = judged if chosen is judged else judged_again(chosen)

@@ -14,7 +14,7 @@ from trihedron.diagnose.against import (
     model_of_calibration,
     model_of_diagnosis,
 )
-from trihedron.diagnose.against.numbers import SPREAD_DOF, RangeRatio
+from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import (
@@ -45,7 +45,8 @@ def compared(
     """
     model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated)
     given_effects = () if simulated is None else simulated.effects
-    effects = compare_effects(given_effects, found.effects, found.candidates, alpha=alpha)
+    unexplained = {test.domain for test in found.remaining if test.disagrees}
+    effects = compare_effects(given_effects, found.effects, found.candidates, alpha=alpha, unexplained=unexplained)
     numbers = compare_numbers(
         model,
         model_of_diagnosis(found),
@@ -55,7 +56,7 @@ def compared(
         left_open=left_open_by((*effects.missing, *effects.surplus)),
     )
     parameters = (*numbers.parameters, *effects.parameters)
-    noise = (*noise, *(_range(one) for one in numbers.ranges))
+    noise = (*noise, *(_factor(one) for one in numbers.factors))
     differ = any(p.significant for p in parameters) or any(n.significant for n in noise)
     verdict: Verdict = found.verdict
     if found.verdict not in ("unexplained", "not-testable"):
@@ -93,11 +94,18 @@ def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
     )
 
 
-def _range(one: RangeRatio) -> NoiseDifference:
-    ratio = 2.0**-one.exponent
+def _factor(one: CommonFactor) -> NoiseDifference:
+    ratio = 1.0 / one.factor
     name = "gyro" if one.sensor == "gyroscope" else one.sensor
-    remark = f"The {name} of the model counts {ratio:g} times as many per unit: another range of the part."
-    return NoiseDifference(one.sensor, "", "range", None, None, ratio, None, "1", None, True, remark)
+    if not one.written:
+        remark = f"The {name} of the model counts {ratio:g} times as many per unit: another range of the part."
+        return NoiseDifference(one.sensor, "", "range", None, None, ratio, None, "1", None, True, remark)
+    remark = f"The {name} of the model reads {ratio:.4g} times the recording's"
+    if one.side:
+        remark += f": the {one.side} writes {one.written} where it says {one.taken}."
+    else:
+        remark += f", the ratio of {one.taken} to {one.written}: one of the two is in the wrong unit."
+    return NoiseDifference(one.sensor, "", "unit", None, None, ratio, None, "1", None, True, remark)
 
 
 def _as_given(given: Calibration, recording: Recording, segments: Segments) -> Stage:

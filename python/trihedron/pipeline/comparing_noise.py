@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from trihedron.diagnose.against import FittedModel
 from trihedron.estimate.noise import noise_of_holds, ratio_of
-from trihedron.records import Recording, Segments
+from trihedron.records import Hold, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.hold_noise import HoldNoise, Measured
 
@@ -55,9 +55,9 @@ class Sampled:
     jitter_steps: float
 
 
-def sampled(recording: Recording, segments: Segments, model: FittedModel) -> Sampled:
-    """Noise inside the still poses of a recording, by the scale of its own fit."""
-    holds = [(hold.start, hold.stop) for hold in segments.holds]
+def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> Sampled:
+    """Noise inside still poses of a recording, by the scale of its own fit."""
+    holds = [(pose.start, pose.stop) for pose in poses]
     noise: dict[Sensor, tuple[HoldNoise, ...]] = {}
     excess: dict[Sensor, FloatArray] = {}
     count: dict[Sensor, int] = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,13 @@ from trihedron.pipeline.beside import beside, shared_log
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
+from trihedron.pipeline.comparing_frames import rates_of_world, sign_of_gravity
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
-from trihedron.pipeline.diagnosing_rest import at_rest, diagnosed_at_rest
+from trihedron.pipeline.comparing_slow import slow_noise
+from trihedron.pipeline.comparing_stages import with_noise_stage
+from trihedron.pipeline.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
 from trihedron.pipeline.improving import driven
-from trihedron.pipeline.reading import AnyRecording, read, recording_of, segments_of
+from trihedron.pipeline.reading import AnyRecording, read, recording_of, segment, segments_of
 from trihedron.pipeline.referring import AnyReference
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
@@ -117,7 +120,8 @@ def _of_poses(
     tell(0.02, "finding still poses")
     segments = segments_of(segments, recording)
     findings += segments.findings
-    resting = None if against is not None else at_rest(recording, segments, known, gravity)
+    calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
+    resting = None if against is not None else at_rest(recording, segments, known, gravity, calibrated)
     if resting is not None:
         tell(0.1, "looking at zeros and lines")
         return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
@@ -130,7 +134,7 @@ def _of_poses(
         findings += _protocol(simulated.segments, segments)
     begun = 0.05 if simulated is None else 0.45
     tell(begun, "calibrating")
-    used, free = _start(recording, segments, gravity, known)
+    used, free = _start(calibrated, gravity, known)
     recording_used, segments_used = recording, segments
     # Where the poses leave the model open the twin starts from nominal values, for the gyro too.
     if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
@@ -149,10 +153,23 @@ def _of_poses(
         given = replace(known, gravity_m_s2=gravity)
         noise: tuple[NoiseDifference, ...] = ()
         if simulated is not None:
-            ours = sampled(recording_used, segments_used, model_of_diagnosis(found))
-            noise = compare_noise(simulated.sampled, ours, alpha=alpha)
+            ours = sampled(recording_used, segments_used.holds, model_of_diagnosis(found))
+            noise = (
+                *simulated.frames,
+                *_frames((simulated.segments, simulated.calibration), (segments, used)),
+                *compare_noise(simulated.sampled, ours, alpha=alpha),
+                *slow_noise(
+                    (simulated.diagnosis, simulated.recording, simulated.segments),
+                    (found, recording_used, segments_used),
+                    alpha=alpha,
+                ),
+            )
         free_simulation = None if simulated is None else simulated.diagnosis
+        fit = model_of_diagnosis(found)
         found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
+        if simulated is not None:
+            stages = with_noise_stage(found.stages, simulated.sampled, recording_used, segments_used, fit)
+            found = replace(found, stages=stages)
         updated, used = used, given
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(
@@ -176,20 +193,20 @@ class _Free:
     segments: Segments
     diagnosis: Diagnosis
     sampled: Sampled
+    recording: Recording
+    frames: tuple[NoiseDifference, ...] = ()
 
 
-def _start(
-    recording: Recording, segments: Segments, gravity: float, known: Calibration | None
-) -> tuple[Calibration, bool]:
+def _start(calibrated: Calibrated, gravity: float, known: Calibration | None) -> tuple[Calibration, bool]:
     """The model that the search begins from, and whether it is the recording's own.
 
     A given model is compared with what the recording says of itself. Where its poses are too few to say it, the given
     numbers stay, with their error bars as knowledge.
     """
     if known is None:
-        return calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration, True
+        return calibrated(), True
     try:
-        own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+        own = calibrated()
     except ValueError:
         return replace(known, gravity_m_s2=gravity), False
     is_poor = is_open(own) or (known.gyroscope is not None and own.gyroscope is None)
@@ -211,13 +228,24 @@ def _simulated_log(against: GivenModel, recording: Recording, segments: Segments
 
 
 def _simulation(recording: Recording, gravity: float, alpha: float, tell: Progress) -> _Free:
+    of_world = rates_of_world(recording, segment(recording))
+    if of_world is not None:
+        recording = replace(recording, gyroscope=None)
     try:
         result = calibrate(recording, gravity_m_s2=gravity)
     except ValueError as error:
         raise ValueError(f"the simulated recording cannot be calibrated: {error}") from None
     diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=tell)
-    noise = sampled(recording, result.segments, model_of_diagnosis(diagnosis))
-    return _Free(result.calibration, result.segments, diagnosis, noise)
+    noise = sampled(recording, result.segments.holds, model_of_diagnosis(diagnosis))
+    frames = () if of_world is None else (of_world,)
+    return _Free(result.calibration, result.segments, diagnosis, noise, recording, frames)
+
+
+def _frames(
+    simulated: tuple[Segments, Calibration], recording: tuple[Segments, Calibration]
+) -> tuple[NoiseDifference, ...]:
+    turned = sign_of_gravity(simulated, recording)
+    return () if turned is None else (turned,)
 
 
 def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:

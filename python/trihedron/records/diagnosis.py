@@ -210,8 +210,9 @@ class ParameterDifference:
 
 
 NoiseTerm = Literal[
-    "N", "B", "K", "Q", "bandwidth", "line", "resolution", "range", "rate", "jitter", "octave", "distribution"
-]
+    "N", "B", "K", "Q", "bandwidth", "line", "resolution", "range", "rate", "jitter", "octave", "distribution",
+    "unit", "frame",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -219,7 +220,8 @@ class NoiseDifference:
     """One figure of noise or sampling of a given model against the recording's.
 
     ``ratio`` is model over recording with its 95 % ``interval``; ``axis`` is empty for what all axes share; ``remark``
-    says in words what the number resembles (a density scaled by the rate twice).
+    says in words what the number resembles (a density scaled by the rate twice). ``term`` ``unit`` is a reading written
+    in another unit than it says, ``frame`` one along other axes (gravity's sign, rates of the world).
     """
 
     sensor: Literal["accelerometer", "gyroscope", "both"]

@@ -147,6 +147,8 @@ _SIZES: dict[str, Callable[[Parameters, str], Size | list[Size]]] = {
     "gyro-thermal-scale": _thermal("scale"),
     "accel-hidden-drift": _drift,
     "gyro-hidden-drift": _drift,
+    "accel-zero-scatter": lambda v, _: {"sigma": (v["sigma"],) * 3},
+    "gyro-zero-scatter": lambda v, _: {"sigma": _axis(v, "sigma")},
     "gyro-g-sensitivity": _g_sensitivity,
     "gyro-scale-nonlinearity": lambda v, _: {"c2": _axis(v, "quadratic"), "c3": _axis(v, "cubic")},
     "gyro-saturation": _limit,

@@ -140,6 +140,7 @@ class Electronics:
 
     ``asymmetry`` δ: gain 1+δ for positive and 1-δ for negative signals. ``ratiometric`` 1: the reading follows the
     supply; 0: not at all. ``saturation`` [SI] clips in front of the filter. ``lag_s`` first-order lag per channel.
+    ``zero_scatter`` [SI] standard deviation of a zero that is drawn anew in every pose, and goes over during the move.
     """
 
     asymmetry: Triple = NONE
@@ -150,6 +151,7 @@ class Electronics:
     lag_s: Triple = NONE
     filter: Filter = field(default_factory=Filter)
     ratiometric: float = 0.0
+    zero_scatter: Triple = NONE
 
     @property
     def is_dynamic(self) -> bool:

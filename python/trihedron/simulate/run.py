@@ -18,6 +18,7 @@ from trihedron.simulate.motion import Plan, plan_motion
 from trihedron.simulate.noise import NoiseTerms, make_noise, stream
 from trihedron.simulate.readout import Triple, sense_axes
 from trihedron.simulate.scenario import Clock, Environment, Scenario
+from trihedron.simulate.zero_scatter import zero_of_poses
 
 FloatArray = npt.NDArray[np.float64]
 Sensor = Accelerometer | Gyroscope
@@ -124,6 +125,9 @@ def _read(
     noise = sensor.noise
     if any(any(getattr(noise, term)) for term in "QNBKR"):
         signal += sensor.noise_filter.apply(make_noise(noise, len(time_s), dt, seed, name), dt)
+    if any(sensor.electronics.zero_scatter):
+        rng = stream(seed, f"{name}/zero scatter")
+        signal = signal + zero_of_poses(plan.labels, time_s, sensor.electronics.zero_scatter, rng)
     _, gain = sense_axes(sensor.S, name)
     offset = -np.linalg.solve(np.asarray(sensor.S), np.asarray(sensor.b))
     raw = signal  # in place: ten million samples are 240 MB

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import norm
 
 from trihedron.diagnose.effects import catalogue
-from trihedron.records.diagnosis import AcceptedEffect, Candidate, ParameterDifference
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, Domain, ParameterDifference
 
 FRAME_TOLERANCE = 0.03
 """Parameters of one effect are stated along the axes of each side's own fit: 3 % (the angle between the two frames and
@@ -48,10 +48,13 @@ def compare_effects(
     candidates: Sequence[Candidate],
     *,
     alpha: float,
+    unexplained: Collection[Domain] = (),
 ) -> ComparedEffects:
     """Pair the effects of both sides by name, or by what neither recording could tell apart.
 
     Effects of one session (a pushed pose, a table that was not level) belong to that session: they are never surplus.
+    Nor is an effect that would show in a domain of which the recording leaves more ``unexplained`` than its noise:
+    it may be there, and hidden.
     """
     of_session = {effect.id for effect in catalogue() if effect.is_of_session}
     applicable = {c.id for c in candidates if c.applicable}
@@ -68,7 +71,9 @@ def compare_effects(
     surplus = [
         replace(effect, side="model", share=None, statement=f"Only the model has it: {effect.statement}")
         for effect in left
-        if effect.id not in of_session and effect.id in applicable
+        if effect.id not in of_session
+        and effect.id in applicable
+        and not {seen.domain for seen in effect.held_out[:1]} & set(unexplained)
     ]
     parameters = [p for m, r in pairs if m.id == r.id and m.id not in of_session for p in _parameters(m, r, alpha)]
     return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))

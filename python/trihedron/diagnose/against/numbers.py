@@ -23,7 +23,7 @@ from trihedron.invariants import (
     triad_rotation,
 )
 from trihedron.records.diagnosis import ParameterDifference
-from trihedron.units import AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
+from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
 
 FloatArray = npt.NDArray[np.float64]
 Sensor = Literal["accelerometer", "gyroscope", "both"]
@@ -37,6 +37,18 @@ simulated sessions of 20 to 32 poses), which is that of a variance with 4 degree
 RANGE_TOLERANCE = 0.05
 """A ratio of sensitivities within 5 % of a power of two on all axes is another range of the part: no part strays by a
 factor of 1.9 and ranges come in powers of two."""
+MISTAKEN_UNITS: Mapping[str, tuple[tuple[float, str, str], ...]] = MappingProxyType(
+    {
+        "accelerometer": (
+            (1.0 / STANDARD_GRAVITY_M_S2, "g", "m/s²"),
+            (STANDARD_GRAVITY_M_S2, "m/s²", "g"),
+            (1e3, "mm/s²", "m/s²"),
+            (1e-3, "g", "mg"),
+        ),
+        "gyroscope": ((math.degrees(1.0), "degrees", "radians"), (math.radians(1.0), "radians", "degrees")),
+    }
+)
+"""Reading over truth where it is written in the first unit and taken for the second."""
 ADRIFT = 1e-9
 """Variance, relative to its group's largest, below which a covariance is not told from zero."""
 
@@ -68,11 +80,18 @@ class _Group:
 
 
 @dataclass(frozen=True)
-class RangeRatio:
-    """A sensor whose counts are a power of two apart: ``exponent`` n means 2ⁿ times as many counts in the recording."""
+class CommonFactor:
+    """A sensor whose readings are ``factor`` times as large in the recording, on all axes: a range, or a unit misread.
+
+    ``written`` and ``taken`` name the units where one side (``side``, empty where nobody knows) writes one of them and
+    is read as the other; both are empty for another range.
+    """
 
     sensor: Sensor
-    exponent: int
+    factor: float
+    written: str = ""
+    taken: str = ""
+    side: Literal["", "model", "recording"] = ""
 
 
 @dataclass(frozen=True)
@@ -80,7 +99,7 @@ class ComparedNumbers:
     """Every number, significant or not, and what was told apart from it."""
 
     parameters: tuple[ParameterDifference, ...]
-    ranges: tuple[RangeRatio, ...]
+    factors: tuple[CommonFactor, ...]
 
     @property
     def differ(self) -> bool:
@@ -110,7 +129,7 @@ def compare_numbers(
     left_open : mapping from id to size, optional
         Groups whose level an accepted effect leaves open by so much: beneath it they are shown, never significant.
     """
-    groups, ranges = _groups(model, recording)
+    groups, factors = _groups(model, recording)
     p = np.array([group.p_value for group in groups])
     if linear is not None:
         beside = {group.id: group.p_value for group in _groups(model, linear)[0]}
@@ -136,7 +155,7 @@ def compare_numbers(
             )
             for k in range(len(named.names))
         ]
-    return ComparedNumbers(tuple(out), ranges)
+    return ComparedNumbers(tuple(out), factors)
 
 
 def _holm(p: FloatArray, alpha: float) -> npt.NDArray[np.bool_]:
@@ -148,27 +167,27 @@ def _holm(p: FloatArray, alpha: float) -> npt.NDArray[np.bool_]:
     return out
 
 
-def _groups(model: FittedModel, recording: FittedModel) -> tuple[list[_Group], tuple[RangeRatio, ...]]:
+def _groups(model: FittedModel, recording: FittedModel) -> tuple[list[_Group], tuple[CommonFactor, ...]]:
     groups: list[_Group] = []
-    ranges: list[RangeRatio] = []
+    factors: list[CommonFactor] = []
     accel = (model.accel_S, model.accel_b), (recording.accel_S, recording.accel_b)
     blocks = model.covariance[:12, :12], recording.covariance[:12, :12]
     units = _known_acceleration(model.accel_unit), _known_acceleration(recording.accel_unit)
     is_same = model.accel_unit == recording.accel_unit
-    more, ratio = _sensor("accel", accel, blocks, units, is_same, model.accel_wander, recording.accel_wander)
+    more, factor = _sensor("accel", accel, blocks, units, is_same, model.accel_wander, recording.accel_wander)
     groups += more
-    ranges += [RangeRatio("accelerometer", ratio)] if ratio else []
+    factors += [factor] if factor else []
     if model.gyro_S is None or model.gyro_b is None or recording.gyro_S is None or recording.gyro_b is None:
-        return groups, tuple(ranges)
+        return groups, tuple(factors)
     gyro = (model.gyro_S, model.gyro_b), (recording.gyro_S, recording.gyro_b)
     blocks = model.covariance[12:, 12:], recording.covariance[12:, 12:]
     units = _known_rate(model.gyro_unit), _known_rate(recording.gyro_unit)
     is_same = model.gyro_unit == recording.gyro_unit
-    more, ratio = _sensor("gyro", gyro, blocks, units, is_same, model.gyro_wander, recording.gyro_wander)
+    more, factor = _sensor("gyro", gyro, blocks, units, is_same, model.gyro_wander, recording.gyro_wander)
     groups += more
-    ranges += [RangeRatio("gyroscope", ratio)] if ratio else []
+    factors += [factor] if factor else []
     groups.append(_triads(model, recording))
-    return groups, tuple(ranges)
+    return groups, tuple(factors)
 
 
 def _known_acceleration(unit: str) -> float | None:
@@ -187,8 +206,8 @@ def _sensor(
     is_same_unit: bool,
     wander_model: FloatArray,
     wander_recording: FloatArray,
-) -> tuple[list[_Group], int]:
-    """Zero, scale and misalignment of one sensor, and the power of two between its counts."""
+) -> tuple[list[_Group], CommonFactor | None]:
+    """Zero, scale and misalignment of one sensor, and the common factor of its scales where it has a name."""
     (S_m, b_m), (S_r, b_r) = pair
     a, r = invariants(S_m, b_m), invariants(S_r, b_r)
     J_m, J_r = jacobian(S_m, b_m), jacobian(S_r, b_r)
@@ -199,13 +218,10 @@ def _sensor(
     sensor: Sensor = "accelerometer" if prefix == "accel" else "gyroscope"
     unit = "m/s^2" if prefix == "accel" else "rad/s"
     log_m, log_r, is_relative = _log_scales(a, r, units, is_same_unit)
-    exponent = 0
+    common = _common_factor(sensor, log_r - log_m, _sizes_in_si(a, r, units))
+    if common is not None:
+        log_m = log_m + math.log(common.factor)
     change = log_r - log_m
-    nearest = round(float(np.median(change)) / math.log(2.0))
-    if nearest and np.all(np.abs(change - nearest * math.log(2.0)) < RANGE_TOLERANCE):
-        exponent = nearest
-        log_m = log_m + nearest * math.log(2.0)
-        change = log_r - log_m
     scale_covariance = covariance[3:6, 3:6]
     if is_relative:
         # Counts against SI: only what differs from axis to axis can be compared.
@@ -223,7 +239,29 @@ def _sensor(
             f"{prefix}-misalignment", sensor, names, a.angle, r.angle, r.angle - a.angle, covariance[6:, 6:], "rad"
         ),
     ]  # fmt: skip
-    return groups, exponent
+    return groups, common
+
+
+def _sizes_in_si(a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> tuple[float, float] | None:
+    """ln of reading over truth of both sides, where both say their unit: zero for a healthy sensor."""
+    if units[0] is None or units[1] is None:
+        return None
+    return float(np.median(a.log_scale)) + math.log(units[0]), float(np.median(r.log_scale)) + math.log(units[1])
+
+
+def _common_factor(sensor: Sensor, change: FloatArray, sizes: tuple[float, float] | None) -> CommonFactor | None:
+    """The unit misread or the power of two by which all scales differ; ``change`` (3,) is Δ ln k."""
+
+    def is_near(factor: float) -> bool:
+        return bool(np.all(np.abs(change - math.log(factor)) < RANGE_TOLERANCE))
+
+    for times, written, taken in MISTAKEN_UNITS[sensor]:
+        if is_near(times) and (sizes is None or abs(sizes[1]) > abs(sizes[0])):
+            return CommonFactor(sensor, times, written, taken, "" if sizes is None else "recording")
+        if sizes is not None and is_near(1.0 / times) and abs(sizes[0]) > abs(sizes[1]):
+            return CommonFactor(sensor, 1.0 / times, written, taken, "model")
+    nearest = round(float(np.median(change)) / math.log(2.0))
+    return CommonFactor(sensor, 2.0**nearest) if nearest and is_near(2.0**nearest) else None
 
 
 def _log_scales(

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.ndimage import percentile_filter
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.plateaus import plateaus
+from trihedron.diagnose.effects.plateaus import plateaus_of
 from trihedron.diagnose.session.observations import FloatArray, Observations
 
 HALF_WINDOW = 6
@@ -45,12 +45,8 @@ def _whitened(obs: Observations) -> list[FloatArray]:
 def clipped_samples(obs: Observations) -> npt.NDArray[np.bool_]:
     """Samples on or next to a plateau at the end of the range: their steps say nothing about time."""
     mask = np.zeros(len(obs.time_s), dtype=bool)
-    root = np.sqrt(obs.recording.rate_hz)
-    pairs = [(obs.raw_force, obs.force_density)]
-    if obs.raw_rate is not None and obs.rate_density is not None:
-        pairs.append((obs.raw_rate, obs.rate_density))
-    for raw, density in pairs:
-        for run in plateaus(raw, density * root, obs.move_ranges):
+    for is_gyro in (False, True):
+        for run in plateaus_of(obs, is_gyro=is_gyro):
             mask[max(run.start - HALF_WINDOW, 0) : run.stop + HALF_WINDOW] = True
     return mask
 

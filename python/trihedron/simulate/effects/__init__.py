@@ -25,6 +25,8 @@ _EFFECTS: dict[str, Change] = {
     "gyro-thermal-scale": sensor.thermal("gyroscope", "scale"),
     "accel-hidden-drift": sensor.drift("accelerometer"),
     "gyro-hidden-drift": sensor.drift("gyroscope"),
+    "accel-zero-scatter": sensor.zero_scatter("accelerometer"),
+    "gyro-zero-scatter": sensor.zero_scatter("gyroscope"),
     "gyro-g-sensitivity": sensor.g_sensitivity,
     "gyro-scale-nonlinearity": sensor.gyro_nonlinearity,
     "gyro-saturation": sensor.saturation("gyroscope"),

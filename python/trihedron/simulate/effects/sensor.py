@@ -57,6 +57,13 @@ def _warmed(scenario: Scenario, warm_up_k: float, warm_up_tau_s: float, logged: 
     return replace(scenario, environment=replace(scenario.environment, temperature=temperature))
 
 
+def zero_scatter(sensor: Sensor) -> Change:
+    def change(scenario: Scenario, sigma: Values) -> Scenario:
+        return electronics(scenario, sensor, zero_scatter=triple(sigma))
+
+    return change
+
+
 def thermal(sensor: Sensor, kind: Literal["bias", "scale"]) -> Change:
     def change(
         scenario: Scenario,

@@ -1,0 +1,34 @@
+"""A zero that is another in every pose: repeatability after a turn, stress of the mounting."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.simulate.motion.plan import Label
+from trihedron.simulate.noise import FloatArray, Triple
+
+RESTS = frozenset({"hold", "disturbance", "vibration"})
+"""Kinds of steps that leave the attitude: a knocked pose is the same pose."""
+
+
+def zero_of_poses(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, rng: np.random.Generator) -> FloatArray:
+    """(n, 3) zeros at ``time_s`` (n,): one normal draw a pose with deviations ``sigma`` (3,), a straight line between.
+
+    Poses are stretches of rest between which anything moved. Unit: that of ``sigma``.
+    """
+    stretches: list[list[float]] = []
+    moved = True
+    for label in labels:
+        if label.kind not in RESTS:
+            moved = True
+        elif moved:
+            stretches.append([label.start_s, label.stop_s])
+            moved = False
+        else:
+            stretches[-1][1] = label.stop_s
+    if not stretches:
+        return np.zeros((len(time_s), 3))
+    draws = np.repeat(rng.standard_normal((len(stretches), 3)) * np.asarray(sigma), 2, axis=0)
+    knots = np.array(stretches).ravel()
+    out: FloatArray = np.column_stack([np.interp(time_s, knots, draws[:, k]) for k in range(3)])
+    return out
