@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
@@ -166,7 +167,8 @@ def audited(
         if triad is not None
     }
     for triad in present.values():
-        triad[np.isinf(triad)] = np.nan
+        if any(np.isinf(value) for low, _, high, _ in _core.triad_extremes(triad) for value in (low, high)):
+            triad[np.isinf(triad)] = np.nan
     windows = look(present, rate)
     acc_unit, gyr_unit = AccelerationUnit.M_S2, RateUnit.RAD_S
     if sensors.accelerometer is not None:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz, settle_clock
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
@@ -183,9 +184,9 @@ def _refuse_unread_time(table: Table, options: Options) -> None:
 
 def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:
     """Rows written twice (same stamp, same readings) once; they are no samples."""
-    again = np.flatnonzero(np.diff(clock.time_s) == 0) + 1
-    if chosen.time is None or not len(again):
+    if chosen.time is None or not steps_of(clock.time_s).same:
         return clock
+    again = np.flatnonzero(np.diff(clock.time_s) == 0) + 1
     rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
     copied = np.ones(len(again), dtype=bool)
     for column in (*(chosen.accelerometer or ()), *(chosen.gyroscope or ())):
