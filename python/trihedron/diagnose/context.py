@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter1d, uniform_filter1d
-from scipy.signal import savgol_filter
+from scipy.ndimage import convolve1d, gaussian_filter1d, uniform_filter1d
+from scipy.signal import savgol_coeffs
 
 from trihedron.diagnose.session.observations import FloatArray, Observations
 from trihedron.diagnose.session.solve import Fit
@@ -131,12 +131,8 @@ class Context:
     # -- whole-recording signals ----------------------------------------------------------------------------------
     def at_points(self, samples: FloatArray) -> FloatArray:
         """Values of a whole-recording signal (n, ...) at the points: hold means, then move samples."""
-        path = self.fitted.line.path
-        h = self.obs.n_holds
-        out = np.array(samples[path.point_samples], dtype=np.float64)
-        for i, hold in enumerate(self.obs.segments.holds):
-            out[i] = np.nanmean(samples[hold.samples()], axis=0)
-        assert len(out) >= h
+        out = np.array(samples[self.fitted.line.path.point_samples], dtype=np.float64)
+        out[: self.obs.n_holds] = self.obs.hold_means(samples)
         return out
 
     @cached_property
@@ -209,6 +205,7 @@ class Context:
         out: FloatArray = 1.0 / np.linalg.norm(np.linalg.inv(S), axis=1)
         return out
 
+    @cached_property
     def vibration_power(self) -> FloatArray:
         """(points, 3) power of vibration above the quiet floor, SI²: of a hold its variance, in moves a running one.
 
@@ -222,10 +219,12 @@ class Context:
         out[: obs.n_holds] = np.maximum(holds - floor, 0.0)
         width = max(round(VIBRATION_WINDOW_S * obs.recording.rate_hz), 7) | 1
 
+        parabola = savgol_coeffs(width, 2)
+
         def rough(force: FloatArray) -> FloatArray:
             if len(force) < width:
                 return np.zeros_like(force)
-            away = force - savgol_filter(force, width, 2, axis=0, mode="nearest")
+            away = force - convolve1d(force, parabola, axis=0, mode="nearest")
             return np.asarray(uniform_filter1d(away**2, width, axis=0, mode="nearest"))
 
         inside = np.array(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +21,14 @@ from trihedron.pipeline.comparing_frames import rates_of_world, sign_of_gravity
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
 from trihedron.pipeline.comparing_slow import slow_noise
 from trihedron.pipeline.comparing_stages import with_noise_stage
-from trihedron.pipeline.diagnosing_rest import at_rest, diagnosed_at_rest
+from trihedron.pipeline.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
 from trihedron.pipeline.improving import driven
-from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segment, segments_of
+from trihedron.pipeline.reading import AnyRecording, read, recording_of, segment, segments_of
 from trihedron.pipeline.referring import AnyReference
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
+from trihedron.records.progress import Progress
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
 
@@ -119,7 +120,8 @@ def _of_poses(
     tell(0.02, "finding still poses")
     segments = segments_of(segments, recording)
     findings += segments.findings
-    resting = None if against is not None else at_rest(recording, segments, known, gravity)
+    calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
+    resting = None if against is not None else at_rest(recording, segments, known, gravity, calibrated)
     if resting is not None:
         tell(0.1, "looking at zeros and lines")
         return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
@@ -132,7 +134,7 @@ def _of_poses(
         findings += _protocol(simulated.segments, segments)
     begun = 0.05 if simulated is None else 0.45
     tell(begun, "calibrating")
-    used, free = _start(recording, segments, gravity, known)
+    used, free = _start(calibrated, gravity, known)
     recording_used, segments_used = recording, segments
     # Where the poses leave the model open the twin starts from nominal values, for the gyro too.
     if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
@@ -195,18 +197,16 @@ class _Free:
     frames: tuple[NoiseDifference, ...] = ()
 
 
-def _start(
-    recording: Recording, segments: Segments, gravity: float, known: Calibration | None
-) -> tuple[Calibration, bool]:
+def _start(calibrated: Calibrated, gravity: float, known: Calibration | None) -> tuple[Calibration, bool]:
     """The model that the search begins from, and whether it is the recording's own.
 
     A given model is compared with what the recording says of itself. Where its poses are too few to say it, the given
     numbers stay, with their error bars as knowledge.
     """
     if known is None:
-        return calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration, True
+        return calibrated(), True
     try:
-        own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
+        own = calibrated()
     except ValueError:
         return replace(known, gravity_m_s2=gravity), False
     is_poor = is_open(own) or (known.gyroscope is not None and own.gyroscope is None)

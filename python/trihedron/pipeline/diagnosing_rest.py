@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
 from types import MappingProxyType
 from typing import Any
@@ -16,12 +17,13 @@ from trihedron.diagnose.session.starting_point import (
     extended_sensor,
     is_open,
 )
-from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, LinearModel
 from trihedron.units import acceleration_to_si, rate_to_si
 
+Calibrated = Callable[[], Calibration]
+"""The recording's own calibration, made when first asked for; raises what ``calibrate`` raises."""
 FEWEST_POSES = 3
 """Below this nothing can be calibrated."""
 SAME_POSE_RAD = 0.15
@@ -34,15 +36,15 @@ TURNED_RAD, MOST_TURNS = 0.7, 2
 
 
 def at_rest(
-    recording: Recording, segments: Segments, known: Calibration | None, gravity_m_s2: float
+    recording: Recording, segments: Segments, known: Calibration | None, gravity_m_s2: float, calibrated: Calibrated
 ) -> LinearModel | None:
     """The model whose units a log of one or two orientations is read in; ``None`` where the log is a session."""
-    if recording.accelerometer is None or not _is_rest(recording, segments, gravity_m_s2):
+    if recording.accelerometer is None or not _is_rest(recording, segments, calibrated):
         return None
     return _nominal(recording, segments, gravity_m_s2) if known is None else _given(known)
 
 
-def _is_rest(recording: Recording, segments: Segments, gravity_m_s2: float) -> bool:
+def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -> bool:
     mean = segments.accelerometer_mean
     if mean is None or segments.n_holds < FEWEST_POSES:
         return True
@@ -63,7 +65,7 @@ def _is_rest(recording: Recording, segments: Segments, gravity_m_s2: float) -> b
     if longest < MOSTLY * sum(of_orientations):
         return False
     try:
-        own = calibrate(recording, segments=segments, gravity_m_s2=gravity_m_s2).calibration
+        own = calibrated()
     except ValueError:
         return True
     return is_open(own)

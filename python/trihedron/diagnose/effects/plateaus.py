@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
-from trihedron.diagnose.session.observations import FloatArray
+from trihedron.diagnose.session.observations import FloatArray, Observations
 
 BAND_SIGMA = 4.0
 """A plateau is a run of samples within four standard deviations of the limit."""
@@ -46,20 +48,29 @@ class Plateau:
     is_rail: bool = False
 
 
+@lru_cache(maxsize=16)
+def plateaus_of(obs: Observations, *, is_gyro: bool) -> list[Plateau]:
+    """Runs on a common limit of one sensor as it is now observed, found once."""
+    raw, density = (obs.raw_rate, obs.rate_density) if is_gyro else (obs.raw_force, obs.force_density)
+    if raw is None or density is None:
+        return []
+    return plateaus(raw, density * np.sqrt(obs.recording.rate_hz), obs.move_ranges)
+
+
 def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int], ...]) -> list[Plateau]:
     """Runs of a raw (n, 3) signal on a common limit inside moves."""
     found: list[Plateau] = []
+    if not ranges:
+        return found
+    moves = _Moves.of(ranges)
     for axis in range(signal.shape[1]):
+        codes = np.unique(signal[moves.samples, axis])
+        step_size = float(np.diff(codes).min()) if len(codes) > 1 else 0.0
         for sign in (1, -1):
             x = sign * signal[:, axis]
-            pieces = [x[a:b] for a, b in ranges]
-            if not pieces:
-                continue
-            top = np.array([p.max() for p in pieces])
-            codes = np.unique(np.concatenate(pieces))
-            step_size = float(np.diff(codes).min()) if len(codes) > 1 else 0.0
-            rails = _rails(x, step_size, float(sigma[axis]), axis, sign, ranges) or _piled_up(
-                x, step_size, float(sigma[axis]), axis, sign, ranges
+            top = np.maximum.reduceat(x[moves.samples], moves.first)
+            rails = _rails(x, step_size, float(sigma[axis]), axis, sign, moves) or _piled_up(
+                x, step_size, float(sigma[axis]), axis, sign, moves
             )
             if rails:
                 found += rails
@@ -69,7 +80,7 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
             # The limit is a level that moves end on and that nothing exceeds but noise.
             ends = np.round((top[top > top.max() - 2.0 * BAND_SIGMA * noise] - 2.0 * noise) / noise) * noise
             for level in np.unique(ends):
-                runs = _on_level(x, float(level), noise, axis, sign, ranges)
+                runs = _on_level(x, float(level), noise, axis, sign, moves)
                 if len(runs) > len(best):
                     best = runs
             # Nothing is read beyond a limit but noise.
@@ -78,31 +89,59 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
     return found
 
 
-def _on_level(
-    x: FloatArray, level: float, noise: float, axis: int, sign: int, ranges: tuple[tuple[int, int], ...]
-) -> list[Plateau]:
+@dataclass(frozen=True, eq=False)
+class _Moves:
+    """Samples of all moves one after the other, so that one look finds the runs of all.
+
+    ``samples`` (k,) and the ``first`` (m,) of each move among them; ``padded`` the same with a stop (-1) before,
+    between and behind the moves, ``start`` and ``stop`` the range that each padded place belongs to.
+    """
+
+    samples: npt.NDArray[np.intp]
+    first: npt.NDArray[np.intp]
+    padded: npt.NDArray[np.intp]
+    start: npt.NDArray[np.intp]
+    stop: npt.NDArray[np.intp]
+
+    @staticmethod
+    def of(ranges: tuple[tuple[int, int], ...]) -> _Moves:
+        edges = np.array(ranges, dtype=np.intp)
+        lengths = edges[:, 1] - edges[:, 0]
+        own = [np.arange(a, b) for a, b in ranges]
+        padded = np.concatenate([*(part for one in own for part in ([-1], one)), [-1]]).astype(np.intp)
+        of_range = np.repeat(np.arange(len(edges)), lengths + 1)
+        of_range = np.append(of_range, len(edges) - 1)
+        return _Moves(np.concatenate(own), np.cumsum(lengths) - lengths, padded, edges[of_range, 0], edges[of_range, 1])
+
+    def runs(self, x: FloatArray, low: float, high: float) -> npt.NDArray[np.intp]:
+        """(runs, 4) first sample of every run between two values, the one behind it, and the range of its move."""
+        inside = (x >= low) & (x <= high)
+        here = np.where(self.padded < 0, False, inside[self.padded])
+        edge = np.flatnonzero(here[1:] != here[:-1])
+        begins, ends = edge[0::2] + 1, edge[1::2]
+        return np.stack([self.padded[begins], self.padded[ends] + 1, self.start[begins], self.stop[begins]], axis=1)
+
+
+def _on_level(x: FloatArray, level: float, noise: float, axis: int, sign: int, moves: _Moves) -> list[Plateau]:
     """Runs that arrive steeply at a level, stay flat on it within noise, leave it steeply, and agree about it."""
     width = BAND_SIGMA * noise
     runs, means, errors, clear = [], [], [], []
-    for a, b in ranges:
-        near = np.abs(x[a:b] - level) <= width
-        edges = np.flatnonzero(np.diff(np.r_[0, near.astype(np.int8), 0]))
-        for first, last in edges.reshape(-1, 2):
-            n = last - first
-            if n < MIN_RUN or first < REACH or last > b - a - REACH:
-                continue
-            run = x[a + first : a + last]
-            arrival = (run[0] - x[a + first - REACH]) / REACH
-            departure = (run[-1] - x[a + last - 1 + REACH]) / REACH
-            # A parabola with these slopes at its edges would rise this high above them.
-            rise = min(arrival, departure) * n / 4.0
-            if rise < STEEP * noise or not _is_flat(_middle(run) / noise):
-                continue
-            height = rise / noise
-            runs.append(Plateau(axis, sign, a + int(first), a + int(last), 0.0))
-            clear.append(n >= LONG_RUN and height > HIGH)
-            means.append(float(_middle(run).mean()))
-            errors.append(noise / np.sqrt(len(_middle(run))))
+    all_runs = moves.runs(x, level - width, level + width)
+    begins, ends, start, stop = all_runs.T
+    long = (ends - begins >= MIN_RUN) & (begins - start >= REACH) & (ends <= stop - REACH)
+    # A parabola with the slopes at its edges would rise this high above them.
+    begins, ends = begins[long], ends[long]
+    arrival = (x[begins] - x[begins - REACH]) / REACH
+    departure = (x[ends - 1] - x[ends - 1 + REACH]) / REACH
+    rises = np.minimum(arrival, departure) * (ends - begins) / 4.0
+    for first, last, rise in zip(begins.tolist(), ends.tolist(), rises.tolist(), strict=True):
+        run = x[first:last]
+        if rise < STEEP * noise or not _is_flat(_middle(run) / noise):
+            continue
+        runs.append(Plateau(axis, sign, first, last, 0.0))
+        clear.append(last - first >= LONG_RUN and rise / noise > HIGH)
+        means.append(float(_middle(run).mean()))
+        errors.append(noise / np.sqrt(len(_middle(run))))
     if len(runs) < MIN_PLATEAUS and not any(clear):
         return []
     # Peaks that merely end in one band differ by more than the error of their means.
@@ -128,22 +167,17 @@ def _is_flat(run: FloatArray) -> bool:
     return bool(float(((basis[:, 1:].T @ run) ** 2).sum()) < FLAT)
 
 
-def _rails(
-    x: FloatArray, step_size: float, sigma: float, axis: int, sign: int, ranges: tuple[tuple[int, int], ...]
-) -> list[Plateau]:
+def _rails(x: FloatArray, step_size: float, sigma: float, axis: int, sign: int, moves: _Moves) -> list[Plateau]:
     """Runs of one number, the largest of the recording, where noise should have told neighbours apart."""
     # On a coarse grid equal readings are the rule, at the top of a peak too.
     if not 0.0 < step_size < sigma:
         return []
     shortest = 4 if step_size < FINE_STEP * sigma else 6
-    top = np.nanmax(x)
-    found = []
-    for a, b in ranges:
-        edges = np.flatnonzero(np.diff(np.r_[0, (x[a:b] == top).astype(np.int8), 0]))
-        for first, last in edges.reshape(-1, 2):
-            if last - first >= shortest:
-                found.append(Plateau(axis, sign, a + int(first), a + int(last), sign * float(top), True))
-    return found
+    top = float(np.nanmax(x))
+    return [
+        Plateau(axis, sign, first, last, sign * top, True)
+        for first, last, _, _ in moves.runs(x, top, top).tolist() if last - first >= shortest
+    ]  # fmt: skip
 
 
 NEIGHBOURS, LEAST_PILED, PILED = 40, 6, 10.0
@@ -153,27 +187,21 @@ SHARED_SIGMA = 4.0
 """Levels of several channels within this many of their errors are one limit of the part."""
 
 
-def _piled_up(
-    x: FloatArray, step_size: float, sigma: float, axis: int, sign: int, ranges: tuple[tuple[int, int], ...]
-) -> list[Plateau]:
+def _piled_up(x: FloatArray, step_size: float, sigma: float, axis: int, sign: int, moves: _Moves) -> list[Plateau]:
     """Readings of one number, the largest of the recording, far more often than of the numbers below it.
 
     A part that turns back and forth across its limit ends there for two samples at a time.
     """
     if not 0.0 < step_size < sigma:
         return []
-    top = np.nanmax(x)
-    inside = np.concatenate([x[a:b] for a, b in ranges])
+    top = float(np.nanmax(x))
+    inside = x[moves.samples]
     n_top = int((inside == top).sum())
     n_below = int(((inside < top) & (inside >= top - NEIGHBOURS * step_size)).sum())
     if n_top < LEAST_PILED or n_top < PILED * n_below / NEIGHBOURS:
         return []
-    found = []
-    for a, b in ranges:
-        edges = np.flatnonzero(np.diff(np.r_[0, (x[a:b] == top).astype(np.int8), 0]))
-        for first, last in edges.reshape(-1, 2):
-            found.append(Plateau(axis, sign, a + int(first), a + int(last), sign * float(top), True))
-    return found
+    runs = moves.runs(x, top, top).tolist()
+    return [Plateau(axis, sign, first, last, sign * top, True) for first, last, _, _ in runs]
 
 
 def shared_levels(

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.ndimage import percentile_filter
 
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.plateaus import plateaus
+from trihedron.diagnose.effects.plateaus import plateaus_of
 from trihedron.diagnose.session.observations import FloatArray, Observations
 
 HALF_WINDOW = 6
@@ -45,12 +45,8 @@ def _whitened(obs: Observations) -> list[FloatArray]:
 def clipped_samples(obs: Observations) -> npt.NDArray[np.bool_]:
     """Samples on or next to a plateau at the end of the range: their steps say nothing about time."""
     mask = np.zeros(len(obs.time_s), dtype=bool)
-    root = np.sqrt(obs.recording.rate_hz)
-    pairs = [(obs.raw_force, obs.force_density)]
-    if obs.raw_rate is not None and obs.rate_density is not None:
-        pairs.append((obs.raw_rate, obs.rate_density))
-    for raw, density in pairs:
-        for run in plateaus(raw, density * root, obs.move_ranges):
+    for is_gyro in (False, True):
+        for run in plateaus_of(obs, is_gyro=is_gyro):
             mask[max(run.start - HALF_WINDOW, 0) : run.stop + HALF_WINDOW] = True
     return mask
 
@@ -62,7 +58,7 @@ def step_errors(context: Context) -> StepErrors:
 
 @lru_cache(maxsize=8)
 def _step_errors(obs: Observations) -> StepErrors:
-    """A step against the slope of a line through the samples around it (the two of the step left out), eq. 8.11.
+    """A step against the slope of a line through the samples around it (the two of the step left out).
 
     The slope comes from a wide window, so that shaking does not pass for motion; each sensor is judged for itself, so
     that only what both see at once is time.
@@ -134,7 +130,7 @@ def find_losses(context: Context) -> list[Loss]:
 
 @lru_cache(maxsize=8)
 def _losses(obs: Observations) -> list[Loss]:
-    """Intervals where the motion on either side joins smoothly only if samples are put between (eq. 8.12).
+    """Intervals where the motion on either side joins smoothly only if samples are put between (eq. 8.16).
 
     For a trial count n one cubic is laid through six samples before and six after, those after moved by n steps. The
     count that joins all channels best is taken if no sensor objects and what is left is ordinary.

@@ -12,7 +12,7 @@ from scipy.special import chdtrc
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
-from trihedron.diagnose.effects.plateaus import BAND_SIGMA, MIN_PLATEAUS, Plateau, plateaus, shared_levels
+from trihedron.diagnose.effects.plateaus import BAND_SIGMA, MIN_PLATEAUS, Plateau, plateaus_of, shared_levels
 from trihedron.diagnose.session.observations import FloatArray, Observations
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES
 from trihedron.records.diagnosis import EffectParameter, Where
@@ -41,7 +41,7 @@ class _Saturation(DirectEffect):
         if raw is None or density is None or not obs.move_ranges:
             return None
         sigma = density * np.sqrt(obs.recording.rate_hz)
-        runs = plateaus(raw, sigma, obs.move_ranges)
+        runs = plateaus_of(obs, is_gyro=is_gyro)
         if not runs:
             return None
         touched = sorted({m for m, (a, b) in enumerate(obs.move_ranges) for r in runs if a <= r.start < b})

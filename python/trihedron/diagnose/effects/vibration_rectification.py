@@ -24,7 +24,7 @@ class VibrationRectification(Effect):
         return None
 
     def variants(self, context: Context) -> list[Variant]:
-        excess = context.vibration_power()
+        excess = context.vibration_power
         own = context.on_accelerometers(excess)
         out = [Variant(force_only(own), per_axis("accel_bias_per_power"), ("1/(m/s^2)",) * 3, label="accelerometer")]
         if context.obs.raw_rate is not None:

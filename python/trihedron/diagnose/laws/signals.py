@@ -95,7 +95,7 @@ def _logged(context: Context) -> list[Signal]:
 
 
 def _vibration(context: Context) -> list[Signal]:
-    power = context.vibration_power()[: context.obs.n_holds]
+    power = context.vibration_power[: context.obs.n_holds]
     total = power.sum(axis=1)
     # A power that stands out of its own floor in some poses; else it is the noise of a variance.
     if not total.any() or np.quantile(total, 0.9) < 3.0 * max(float(np.median(total)), 1e-300):

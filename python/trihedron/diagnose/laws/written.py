@@ -62,7 +62,7 @@ class {class_name}(Effect):
 def _expression(name: str) -> str | None:
     """How a term of the dictionary reads in a context."""
     table = {"T": "context.temperature", "T^2": "context.temperature**2", "supply": "context.supply"}
-    table |= {"vibration power": "context.vibration_power().sum(axis=1)", "|w|": "np.linalg.norm(w, axis=1)"}
+    table |= {"vibration power": "context.vibration_power.sum(axis=1)", "|w|": "np.linalg.norm(w, axis=1)"}
     for i, a in enumerate(AXES):
         table |= {
             f"u_{a}": f"u[:, {i}]", f"u_{a}^2": f"u[:, {i}] ** 2", f"u_{a}^3": f"u[:, {i}] ** 3",

@@ -100,9 +100,14 @@ class Comparison:
     base: Fit
     base_prediction: Prediction
     fitted: Fit
-    prediction: Prediction
     cost: float
     first: int
+    known_prediction: Prediction | None = None
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """Held-out prediction of the model with the effect, made when first asked for."""
+        return held_out(self.fitted) if self.known_prediction is None else self.known_prediction
 
     @property
     def n_new(self) -> int:
@@ -204,8 +209,7 @@ def refit(model: StepwiseModel, scored: Scored) -> Refit:
     return Refit(
         scored,
         Comparison(
-            scored.variant, scored.effect.is_local, base, model.prediction, fitted, held_out(fitted), cost,
-            base.n_effect,
+            scored.variant, scored.effect.is_local, base, model.prediction, fitted, cost, base.n_effect
         ),
     )  # fmt: skip
 

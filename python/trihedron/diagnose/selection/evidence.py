@@ -68,7 +68,7 @@ def _with_one(model: StepwiseModel, effect: DirectEffect, evidence: Evidence) ->
         n_new = sum(d.n_parameters for d in added)
         start = replace(model.fitted.twin, effect=np.concatenate([model.fitted.twin.effect, np.zeros(n_new)]))
         fitted = tune_noise(obs, start, distortion, model.prior)
-        after = replace(model, obs=obs, fitted=fitted, prediction=held_out(fitted))
+        after = replace(model, context=Context(obs, fitted), prediction=held_out(fitted))
         if not effect.is_proof and not mends(
             model.fitted, model.prediction, fitted, after.prediction, evidence.touched
         ):

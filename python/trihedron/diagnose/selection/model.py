@@ -56,22 +56,27 @@ class StepwiseModel:
     """A session's model with some effects; every step of the selection takes one and returns another.
 
     ``bare`` are the observations before any effect changed them, ``start`` and ``prior`` where every fit begins;
+    ``context`` is what effects look at, kept with all that they computed while observations and fit stay the same;
     ``refused`` names effects whose mending did not predict held-out moves any better.
     """
 
     bare: Observations
     start: Twin
     prior: Prior | None
-    obs: Observations
-    fitted: Fit
+    context: Context
     prediction: Prediction
     accepted: tuple[Accepted, ...] = ()
     refused: frozenset[str] = field(default_factory=frozenset)
 
     @property
-    def context(self) -> Context:
-        """What effects may look at."""
-        return Context(self.obs, self.fitted)
+    def obs(self) -> Observations:
+        """The observations as they now are."""
+        return self.context.obs
+
+    @property
+    def fitted(self) -> Fit:
+        """The fit with everything accepted."""
+        return self.context.fitted
 
     @property
     def distortions(self) -> list[Distortion]:
@@ -86,7 +91,7 @@ class StepwiseModel:
 def begin(obs: Observations, start: Twin, prior: Prior | None) -> StepwiseModel:
     """The session without any effect."""
     fitted = tune_noise(obs, start, stacked([]), prior)
-    return StepwiseModel(obs, start, prior, obs, fitted, held_out(fitted))
+    return StepwiseModel(obs, start, prior, Context(obs, fitted), held_out(fitted))
 
 
 def held_out(fitted: Fit) -> Prediction:
@@ -111,7 +116,7 @@ def with_only(model: StepwiseModel, kept: tuple[Accepted, ...]) -> StepwiseModel
     distortion = stacked([one.variant.distortion for one in kept if one.variant is not None])
     start = replace(_start_on(model, obs), effect=np.zeros(distortion.n_parameters))
     fitted = tune_noise(obs, start, distortion, model.prior)
-    return replace(model, obs=obs, fitted=fitted, prediction=held_out(fitted), accepted=kept)
+    return replace(model, context=Context(obs, fitted), prediction=held_out(fitted), accepted=kept)
 
 
 def _start_on(model: StepwiseModel, obs: Observations) -> Twin:

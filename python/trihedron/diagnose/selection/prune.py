@@ -59,8 +59,8 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
     assert one.variant is not None
     first = sum(o.variant.distortion.n_parameters for o in model.accepted[:k] if o.variant is not None)
     against = Comparison(
-        one.variant, one.effect.is_local, without.fitted, without.prediction, model.fitted, model.prediction,
-        cost_of(model.fitted, one.rank, len(one.variant.shape)), first,
+        one.variant, one.effect.is_local, without.fitted, without.prediction, model.fitted,
+        cost_of(model.fitted, one.rank, len(one.variant.shape)), first, model.prediction,
     )  # fmt: skip
     bic = against.bic_gain
     gain = max(excess(without.fitted) - excess(model.fitted), 0.0)

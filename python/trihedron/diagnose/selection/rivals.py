@@ -80,8 +80,8 @@ def _against(without: StepwiseModel, model: StepwiseModel, one: Accepted, first:
     assert one.variant is not None
     cost = cost_of(model.fitted, one.rank, len(one.variant.shape))
     return Comparison(
-        one.variant, one.effect.is_local, without.fitted, without.prediction, model.fitted, model.prediction, cost,
-        first,
+        one.variant, one.effect.is_local, without.fitted, without.prediction, model.fitted, cost, first,
+        model.prediction,
     )  # fmt: skip
 
 

@@ -68,7 +68,7 @@ def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored],
             result = score(reduced, columns)
             if result.rank == 0:
                 continue
-            after = residual + reduced.project(columns) @ result.estimate
+            after = residual + result.projected @ result.estimate
             scale = dispersion(after, fitted, used)
             gain = 0.0
             for d in range(N_DOMAINS):

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtrc
 
+from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.compare import Refit, refined, refit
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel
@@ -85,7 +86,7 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     )  # fmt: skip
     return replace(
         model,
-        fitted=best.against.fitted,
+        context=Context(model.obs, best.against.fitted),
         prediction=best.against.prediction,
         accepted=(*model.accepted, one),
     )

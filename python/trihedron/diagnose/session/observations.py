@@ -88,6 +88,24 @@ class Observations:
         return out
 
     @cached_property
+    def _still(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], FloatArray]:
+        """Samples of all holds one after the other, the first of each among them, and how many each has."""
+        samples = [hold.samples() for hold in self.segments.holds]
+        lengths = np.array([len(one) for one in samples])
+        return np.concatenate(samples), np.cumsum(lengths) - lengths, lengths.astype(np.float64)
+
+    def hold_means(self, samples: FloatArray) -> FloatArray:
+        """(holds, ...) means over each hold of a whole-recording signal (n, ...), missing readings left out."""
+        index, first, n = self._still
+        values = samples[index]
+        missing = np.isnan(values)
+        if missing.any():
+            present = np.add.reduceat(~missing, first, axis=0, dtype=np.float64)
+            with np.errstate(invalid="ignore"):
+                return np.asarray(np.add.reduceat(np.where(missing, 0.0, values), first, axis=0) / present)
+        return np.asarray(np.add.reduceat(values, first, axis=0) / n.reshape(-1, *[1] * (values.ndim - 1)))
+
+    @cached_property
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves, arranged once for many fits."""
         unresolved = np.zeros((self.n_moves, 2, 3))

@@ -54,6 +54,11 @@ class Fit:
             channel=labels[:, 2].astype(np.int8), walk=labels[:, 3].astype(np.int8),
         )  # fmt: skip
 
+    @cached_property
+    def used(self) -> FloatArray:
+        """(rows,) share of every row that the fit used up."""
+        return self.line.core.leverage()
+
     @property
     def n_effect(self) -> int:
         """Number of effect parameters in the fit."""
@@ -142,7 +147,7 @@ def move_misfit(obs: Observations, twin: Twin) -> FloatArray:
 
 def leverage(fitted: Fit) -> FloatArray:
     """(rows,) share of every row that the fit used up; degrees of freedom of a block are the sum of one minus it."""
-    return fitted.line.core.leverage()
+    return fitted.used
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,13 +168,17 @@ def reduce(fitted: Fit) -> Reduced:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Score test of added columns: ``chi2`` gained, ``rank`` directions seen, the one-step estimate, its covariance."""
+    """Score test of added columns: ``chi2`` gained, ``rank`` directions seen, the one-step estimate, its covariance.
+
+    ``projected`` (rows, K) are the columns minus what the unknowns of the fit can imitate.
+    """
 
     chi2: float
     rank: int
     estimate: FloatArray
     covariance: FloatArray
     visible: npt.NDArray[np.bool_]
+    projected: FloatArray
 
 
 def score(reduced: Reduced, columns: FloatArray) -> Score:
@@ -190,7 +199,8 @@ def score(reduced: Reduced, columns: FloatArray) -> Score:
     chi2 = float((along**2 / value[seen]).sum())
     inverse = (vector[:, seen] / value[seen]) @ vector[:, seen].T
     visible = np.diag(normal) > 1e-6
-    return Score(chi2, int(seen.sum()), -(inverse @ gradient) / length, inverse / np.outer(length, length), visible)
+    estimate, covariance = -(inverse @ gradient) / length, inverse / np.outer(length, length)
+    return Score(chi2, int(seen.sum()), estimate, covariance, visible, projected)
 
 
 @dataclass(frozen=True, eq=False)

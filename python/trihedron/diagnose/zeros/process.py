@@ -222,6 +222,16 @@ class ZeroProcess:
 
     def maximum(self, free: tuple[int, ...], keep: list[int], *, restricted: bool) -> tuple[float, FloatArray]:
         """Largest log-likelihood with the strengths ``free`` (the others 0), and the strengths (3,) there."""
+        asked = (free, tuple(keep), restricted)
+        if asked not in self._maxima:
+            self._maxima[asked] = self._searched(free, keep, restricted=restricted)
+        return self._maxima[asked]
+
+    @cached_property
+    def _maxima(self) -> dict[tuple[tuple[int, ...], tuple[int, ...], bool], tuple[float, FloatArray]]:
+        return {}
+
+    def _searched(self, free: tuple[int, ...], keep: list[int], *, restricted: bool) -> tuple[float, FloatArray]:
         held = [k for k in range(3) if k not in free]
         rows = np.flatnonzero((self.grid.sigmas[:, held] == 0.0).all(axis=1))
         part = Grams(self.grid.sigmas[rows], self.grid.log_det[:, rows], self.grid.gram[:, rows])
