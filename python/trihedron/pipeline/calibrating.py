@@ -26,9 +26,10 @@ from trihedron.estimate.gyroscope.missing_samples import missing_samples
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.pipeline.choices import settle_gravity
-from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segments_of
+from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
+from trihedron.records.progress import Progress
 from trihedron.sensor_model import in_frame
 from trihedron.units import rate_to_si
 

@@ -14,6 +14,8 @@ from trihedron.read.errors import ReadError
 from trihedron.read.table import FloatArray, Table
 from trihedron.records import Finding, FindingCode
 
+_SHORTEST_STEP_S = 1e-9
+"""Mean step of a log: no converter takes a sample in a nanosecond."""
 _LONGEST_S = 3.2e9
 """A century."""
 NOBODY = Witness()
@@ -79,6 +81,12 @@ def build_clock(
         rows = order if rows is None else rows[order]
     unit = time_unit(raw, named, given, wraps, witness, findings)
     scale = SECONDS[unit]
+    span = (raw[-1] - raw[0]) * scale
+    if len(raw) > 1 and span < _SHORTEST_STEP_S * (len(raw) - 1):
+        raise ReadError(
+            f"{table.path}: column {table.label(column)} read as time in {unit} steps by "
+            f"{span / (len(raw) - 1):.3g} s, which no log does; give --time-unit, or name another time column."
+        )
     if not (raw[-1] - raw[0]) * scale < _LONGEST_S:
         raise ReadError(
             f"{table.path}: column {table.label(column)} read as time in {unit} spans "

@@ -71,9 +71,8 @@ def time_unit(
     shared = n_forward < 0.8 * n_steps
     usual = float((raw[-1] - raw[0]) / n_steps) if shared else usual_step(raw)
     start = float(raw[0])
-    possible = [
-        u for u in _CANDIDATES if PLAUSIBLE_HZ[0] <= 1.0 / (usual * SECONDS[u]) <= PLAUSIBLE_HZ[1]
-    ]  # fmt: skip
+    shortest, longest = 1.0 / PLAUSIBLE_HZ[1], 1.0 / PLAUSIBLE_HZ[0]
+    possible = [u for u in _CANDIDATES if shortest <= usual * SECONDS[u] <= longest]
     # A date between 2001 and 2096 in the unit settles it; nothing else counts that high.
     dated = [u for u in _CANDIDATES if 1e9 <= start * SECONDS[u] <= 4e9]
     dated = [u for u in dated if u in possible] or (dated if len(dated) == 1 and not wraps else [])
