@@ -12,6 +12,7 @@ mod accelerometer;
 mod allan;
 mod arrays;
 mod attitude;
+mod audit;
 mod chi_square;
 mod doorway;
 mod gyro_alignment;
@@ -25,6 +26,7 @@ mod screening;
 mod session_model;
 mod simulate;
 mod spectral_likelihood;
+mod stamps;
 mod stillness;
 mod zero_process;
 
@@ -35,6 +37,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     doorway::keep_panics_quiet();
     allan::register(module)?;
     attitude::register(module)?;
+    audit::register(module)?;
     chi_square::register(module)?;
     gyro_alignment::register(module)?;
     number_text::register(module)?;
@@ -47,6 +50,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     session_model::register(module)?;
     simulate::register(module)?;
     spectral_likelihood::register(module)?;
+    stamps::register(module)?;
     stillness::register(module)?;
     zero_process::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc, chdtri
 
 from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
 
@@ -212,7 +212,7 @@ def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) ->
         distances = _distances(_with_scatter(system, used, sigma_turn_rad), used)
         if not distances:
             break
-        limit = float(chi2_distribution.isf(FALSE_ALARM / len(distances), 3))
+        limit = float(chdtri(3, FALSE_ALARM / len(distances)))
         worst = max(distances, key=lambda index: distances[index])
         if distances[worst] <= limit:
             break
@@ -264,7 +264,7 @@ def _matching_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
     fit = solve(system, used)
     if fit.dof < 1:
         return system
-    if chi2_distribution.sf(fit.chi2, fit.dof) > FALSE_ALARM:
+    if chdtrc(fit.dof, fit.chi2) > FALSE_ALARM:
         _, across2, noise2 = _components(system, system.residuals(fit))
         k = int(np.count_nonzero(used))
         beyond = _beyond(float(np.sum(across2[used])) / max(2 * k - 6, 1), noise2)
@@ -287,7 +287,7 @@ def _turns_a_placement(angles: FloatArray) -> float:
     return len(axis) / (1.0 + float(np.count_nonzero(np.diff(axis))))
 
 
-MEDIAN_1, MEDIAN_2 = (float(chi2_distribution.median(n)) for n in (1, 2))
+MEDIAN_1, MEDIAN_2 = (float(chdtri(n, 0.5)) for n in (1, 2))
 
 
 def _components(system: TurnSystem, raw: FloatArray) -> tuple[FloatArray, FloatArray, float]:

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc
 
 from trihedron.estimate.gyroscope.turn_angles import (
     AMBIGUOUS,
@@ -128,7 +128,7 @@ def calibrate_turns(
     S, b = other_form(fit.S_w, fit.b_w)
     jacobian = other_form_jacobian(fit.S_w, fit.b_w)
     inflation = 1.0
-    if fit.dof > 0 and chi2_distribution.sf(fit.chi2, fit.dof) < FALSE_ALARM:
+    if fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM:
         inflation = fit.chi2 / fit.dof
     inverse_covariance = inflation * fit.covariance
     if shared_errors is not None:
