@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -33,6 +33,9 @@ SPACING = 1.3
 """Levels of B and of K are this factor apart, half of what an interval of 30 poses spans."""
 LOWEST, HIGHEST = 0.03, 8.0
 """Range of the levels in parts of what the zeros spread by: a tenth of it is not seen, three times it is refuted."""
+LEAST_SIDE = 0.02
+"""A side whose zeros spread by less than this share of the other's is silent, as a simulation without noise is: how
+silent says nothing more."""
 SHOWS = 6.63
 """Twice the log-likelihood that a term must win over its absence: χ² of one degree of freedom passes it in 1 %, half
 of that on the edge."""
@@ -97,8 +100,10 @@ def compare_slow(first: Sequence[PoseZeros], second: Sequence[PoseZeros]) -> Slo
     won, by_b, by_k = 0.0, 0.0, 0.0
     tables = []
     for one, other in zip(first, second, strict=True):
-        b = _levels([one.spread, other.spread])
-        k = _levels([z.spread / math.sqrt(z.span_s / MIDDLE_OF_WALK) for z in (one, other)])
+        least = LEAST_SIDE * max(one.spread, other.spread)
+        one, other = (replace(z, sigma=np.hypot(z.sigma, LOWEST * least)) for z in (one, other))
+        b = _levels([max(z.spread, least) for z in (one, other)])
+        k = _levels([max(z.spread, least) / math.sqrt(z.span_s / MIDDLE_OF_WALK) for z in (one, other)])
         p, q = _table(one, b, k), _table(other, b, k)
         tables.append((b, k, p, q))
         together = float((p + q).max())
