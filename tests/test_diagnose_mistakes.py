@@ -143,6 +143,17 @@ def test_a_simulation_without_any_noise_has_less_walk_than_a_recording_and_no_nu
         assert all(axis["K"].value < 1e-5 for axis in found.first)
 
 
+def test_poses_of_unlike_length_side_by_side_leave_every_strength_a_covariance():
+    # A first hold ten times as long as the others, and hardly a gap: an expansion in T over distance fails here.
+    length = np.r_[45.0, np.full(19, 4.5)]
+    t = np.cumsum(length + 0.2) - length / 2.0
+    rng = np.random.default_rng(1)
+    real = [PoseZeros(1e-3 * rng.standard_normal(20), np.full(20, 1e-6), t, length, scatters=True) for _ in range(3)]
+    ideal = [replace(z, values=np.zeros(20), sigma=np.zeros(20)) for z in real]
+    # What differs from pose to pose without memory is scatter, of which either side may have its own.
+    assert compare_slow(ideal, real).p_value > 0.01
+
+
 def test_slow_noise_is_not_compared_with_few_poses():
     short = [replace(z, values=z.values[:8], sigma=z.sigma[:8], time_s=z.time_s[:8], length_s=z.length_s[:8])
              for z in zeros(1, 1e-5)]  # fmt: skip

@@ -6,7 +6,7 @@ zeros y of poses at t with lengths T have the covariance
     V = σ² + s² I + K² [min(t, t') - δ T/6] - (B²/π) L
 
 where σ² are the variances of the means by white noise, s the scatter of zeros from pose to pose where that is known to
-be there, and L the mean of ln|t - t'| over both windows: ln T - 3/2 on the diagonal, ln Δ - T²/12Δ² off it (1/f noise
+be there, and L the mean of ln|t - t'| over both windows, by its second integral x²/2 ln|x| - 3x²/4 (1/f noise
 of two-sided density B²/2πf has no variance, only the variogram (2B²/π) ln; constants drop out beside the free mean).
 The likelihood is restricted; B and K have flat priors in their logarithms and a weight on zero.
 docs/noise.md, section 9.
@@ -39,8 +39,6 @@ silent says nothing more."""
 SHOWS = 6.63
 """Twice the log-likelihood that a term must win over its absence: χ² of one degree of freedom passes it in 1 %, half
 of that on the edge."""
-WINDOW_LOG = 1.5
-"""Mean of ln(T/|u - v|) over a window of length T."""
 MIDDLE_OF_WALK = 6.0
 """A walk's mean square about its mean over a span: K² span/6."""
 
@@ -180,13 +178,20 @@ def _ratios(b: FloatArray, k: FloatArray, p: FloatArray, q: FloatArray) -> dict[
 def _kernels(zeros: PoseZeros) -> tuple[FloatArray, FloatArray]:
     """(n, n) covariance of the means per B² and per K², beside a free constant."""
     t, length = zeros.time_s - zeros.time_s[0], zeros.length_s
-    apart = np.abs(np.subtract.outer(t, t))
-    np.fill_diagonal(apart, 1.0)
-    wide = np.add.outer(length**2, length**2) / 2.0
-    mean_log = np.log(apart) - wide / (12.0 * apart**2)
-    np.fill_diagonal(mean_log, np.log(length) - WINDOW_LOG)
+    begin, end = t - length / 2.0, t + length / 2.0
+    mean_log = (
+        _twice_integrated(np.subtract.outer(end, begin)) - _twice_integrated(np.subtract.outer(end, end))
+        - _twice_integrated(np.subtract.outer(begin, begin)) + _twice_integrated(np.subtract.outer(begin, end))
+    ) / np.multiply.outer(length, length)  # fmt: skip
     walk = np.minimum.outer(t, t) + 0.5 * float(length[0]) - np.diag(length / 6.0)
     return -mean_log / math.pi, walk
+
+
+def _twice_integrated(x: FloatArray) -> FloatArray:
+    """The second integral of ln|x|: x²/2 ln|x| - 3x²/4."""
+    size = np.maximum(np.abs(x), 1e-300)
+    out: FloatArray = size**2 * (0.5 * np.log(size) - 0.75)
+    return out
 
 
 def _log_likelihood(
