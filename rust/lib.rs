@@ -5,6 +5,7 @@
 
 pub mod allan;
 pub mod attitude;
+pub mod audit;
 pub mod banded;
 pub mod chi_square;
 pub mod ellipsoid;
@@ -23,6 +24,7 @@ pub mod session_model;
 pub mod simd;
 pub mod simulate;
 pub mod spectral_likelihood;
+pub mod stamps;
 pub mod stillness;
 pub mod zero_process;
 

@@ -18,10 +18,26 @@ from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 G = "9.80665"
 SCENARIO = """name = "small"
+profile = "mpu"
+unit = 3
+table_tilt_deg = [0.1, -0.2]
+
+[session]
+kind = "hand"
+n_poses = 8
+hold_s = 1.5
+move_s = 1.0
+first_hold_s = 3.0
+
+[environment]
 gravity_m_s2 = 9.80665
 
-[motion]
-kind = "hand"
+[accelerometer]
+noise = { N = [1e-3, 1e-3, 1e-3] }
+
+[[effect]]
+id = "gyro-g-sensitivity"
+matrix = [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]
 """
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from trihedron import _core
 from trihedron.estimate.accelerometer import calibrate_norm, calibrate_norm_samples
 from trihedron.records import FindingCode, Severity
 from trihedron.sensor_model import distort
@@ -263,3 +264,24 @@ def test_strided_and_read_only_input_is_read_and_left_alone():
     same, _ = calibrate_norm(np.ascontiguousarray(view, dtype=np.float64), SIGMA, G)
     np.testing.assert_array_equal(sensor.S, same.S)
     np.testing.assert_array_equal(view, before)
+
+
+@pytest.mark.parametrize("loss", [0, 1])
+@pytest.mark.parametrize("n", [20_001, 150_000])
+def test_very_many_readings_are_fitted_as_carefully_as_few(n, loss):
+    """From a share's answer full steps are taken; a start of one's own takes the careful way."""
+    rng = np.random.default_rng(n + loss)
+    up = rng.standard_normal((40, 3))
+    up = np.repeat(up / np.linalg.norm(up, axis=1, keepdims=True), -(-n // 40), axis=0)[:n]
+    true = np.array([[1.02, 0.0, 0.0], [0.004, 0.985, 0.0], [-0.009, 0.012, 1.01]])
+    raw = (9.81 * up - [0.1, -0.2, 0.05]) @ np.linalg.inv(true).T + 0.03 * rng.standard_normal((n, 3))
+    settings, noise = _core.NormSettings(9.81, loss=loss, loss_scale=1.5), 9e-4 * np.eye(3)[None]
+    near = _core.fit_norm(raw, noise, settings)
+    careful = _core.fit_norm(raw, noise, settings, (true, np.zeros(3)))
+    # The step that ends the way is 1e-7 long, and what is left behind it a hundredth of it.
+    np.testing.assert_allclose(near.S, careful.S, atol=2e-9)
+    np.testing.assert_allclose(near.b, careful.b, atol=2e-8)
+    np.testing.assert_allclose(near.sigmas, careful.sigmas, rtol=1e-6)
+    # An entry that is nearly nothing moves by as little of the largest ones.
+    np.testing.assert_allclose(near.covariance, careful.covariance, atol=1e-6 * np.abs(careful.covariance).max())
+    assert abs(near.chi2 / careful.chi2 - 1.0) < 1e-6

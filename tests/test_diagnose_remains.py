@@ -9,6 +9,7 @@ import pytest
 
 import trihedron
 from trihedron.diagnose.effects.plateaus import plateaus, shared_levels
+from trihedron.diagnose.effects.table_tilt import _error_of_mean
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
 from trihedron.diagnose.selection import verdict
 from trihedron.pipeline import extending
@@ -20,7 +21,7 @@ RATE_HZ = 100.0
 
 
 class Poses:
-    """What the test of halves looks at: 30 poses of 5 s at 100 Hz."""
+    """What the test of steps looks at: 30 poses of 5 s at 100 Hz."""
 
     def __init__(self, force, rate):
         self.raw_force, self.raw_rate = force, rate
@@ -59,6 +60,42 @@ def test_a_zero_that_jumps_in_a_few_poses_is_found_and_a_pose_that_turns_is_not(
     for k in (3, 9, 14, 22, 27):
         moved[500 * k + 250 : 500 * k + 500, 0] += 1.0
     assert min(jumps_in_poses(Poses(moved, turning)).p_value) > JUMPS
+
+
+def test_flicker_and_supports_that_creep_are_no_jumps():
+    called = 0
+    for seed in range(30):
+        rng = np.random.default_rng(100 + seed)
+        slow = np.fft.rfft(rng.normal(0.0, 3.0, (15000, 3)), axis=0)
+        slow[1:] /= np.sqrt(np.arange(1, len(slow)))[:, None]  # flicker that outweighs white noise below 1 Hz
+        creep = np.exp(-np.arange(500)[:, None] / RATE_HZ / 2.0) * rng.normal(0.0, 1.0, (30, 1, 3))
+        force = white(rng) + np.fft.irfft(slow * np.sqrt(30.0), 15000, axis=0)
+        rate = white(rng) + creep.reshape(15000, 3)
+        called += min(jumps_in_poses(Poses(force, rate)).p_value) < JUMPS
+    assert called <= 1  # 60 looks at one in a thousand
+
+
+def test_a_telegraph_zero_is_found_in_most_sessions():
+    found = 0
+    for seed in range(12):
+        rng = np.random.default_rng(200 + seed)
+        switches = np.cumsum(rng.exponential(9.0 * RATE_HZ, 60))
+        sign = np.where(np.searchsorted(switches, np.arange(15000)) % 2, 1.0, -1.0)
+        rate = white(rng)
+        rate[:, 0] += 12.0 * 0.1 / np.sqrt(5.0) * sign  # 12 errors of a mean of 5 s
+        found += jumps_in_poses(Poses(white(rng), rate)).p_value[1] < JUMPS
+    assert found >= 6  # by the halves of the poses it was 1 or 2
+
+
+def test_the_error_of_a_mean_of_few_turns_covers_it():
+    rng = np.random.default_rng(6)
+    inside = 0
+    for _ in range(1000):
+        n = int(rng.integers(3, 8))
+        values, weights = rng.normal(0.5, 0.01, n), np.ones(n)
+        inside += abs(values.mean() - 0.5) < 2.0 * _error_of_mean(values, weights, np.zeros(n))
+    # 95.4 % +- 3 sigma of 1000; the plain scatter of a few turns covers 86 to 92.
+    assert 0.934 < inside / 1000 < 0.975
 
 
 def test_footnotes_are_no_answer_while_something_else_disagrees(monkeypatch):

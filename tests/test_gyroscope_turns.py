@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from trihedron.estimate.gyroscope import Turn, calibrate_turns, turns_from_segments
+from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
+from trihedron.estimate.gyroscope.turn_system import TurnSystem, solve
 from trihedron.records import FindingCode
 from trihedron.simulate import Gyroscope, NoiseTerms, Scenario, simulate, table_turns
 from true_segments import segments_from_truth
@@ -182,3 +184,22 @@ def test_malformed_turns_are_refused():
         calibrate_turns(recording, turns, [])
     with pytest.raises(ValueError, match="inside the record"):
         calibrate_turns(recording, [Turn(0, 10**7)], zeros)
+
+
+def test_errors_that_all_turns_share_pull_the_scale_as_a_whole_and_are_not_averaged_by_more_turns():
+    # All axes turned by one small rotation e change every turn by e x phi: the scale by S_w [e]x, however many.
+    S_w = np.diag([1.0, 0.9, 1.1]) + 0.02
+    e = np.array([2e-4, -1e-4, 3e-4])
+    for repeats in (1, 10):
+        angles = 2.0 * np.pi * np.tile(np.concatenate([np.eye(3), -np.eye(3)]), (repeats, 1))
+        k = len(angles)
+        measured = MeasuredTurns(
+            angles @ S_w.T, np.full(k, 3.0), np.zeros((4, 3)), np.full(4, 3.0), np.full(3, 1e-6), np.zeros(3),
+            np.zeros(3), np.zeros(3),
+        )  # fmt: skip
+        system = TurnSystem(measured, angles, S_w, sigma_directions=np.full(k, 1e-4))
+        used = np.ones(k, dtype=bool)
+        pull = system.pull(solve(system, used), used, np.cross(e, angles)[:, :, None])[:, 0]
+        skew = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
+        np.testing.assert_allclose(pull[:9].reshape(3, 3), S_w @ skew, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(pull[9:], 0.0, atol=1e-12)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from attacks.cases import Commands, Inputs
+from attacks.faults import Faults
 from trihedron import _core
 from trihedron.documents import DocumentError, parse_json, read_text
 from trihedron.files.calibration import CalibrationFileError, read_calibration
@@ -94,6 +95,85 @@ def test_escapes_of_a_terminal_are_spelled_out():
     assert printable_json('"\x9b"') == '"\\u009b"'
 
 
+@pytest.mark.parametrize("step_s", [1e-300, 5e-324, 1e-30, 1e-11])
+def test_a_time_that_hardly_moves_is_refused(tmp_path, step_s):
+    rng = np.random.default_rng(1)
+    rows = [f"{k * step_s!r},{a[0]:.4f},{a[1]:.4f},{a[2]:.4f}" for k, a in enumerate(rng.normal(9.8, 0.1, (300, 3)))]
+    (tmp_path / "log.csv").write_text("t,ax,ay,az\n" + "\n".join(rows) + "\n")
+    with pytest.raises(ReadError, match="which no log does"):
+        read_recording(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('"a","x","y","z","q"', "line 200 has 5 fields"),
+        ('"1.97","oops","0.1","9.8"', "line 200, column 'ax': 'oops'"),
+        ('"1.97","0.1","0.1","9.8', "line 200 opens a quote"),
+        ('"1.97","0,1","0.1","9.8"', "line 200, column 'ax': '0,1'"),
+    ],
+)
+@pytest.mark.parametrize("blank_before", [False, True])
+def test_a_damaged_line_of_a_quoted_table_is_named_by_its_number(tmp_path, line, words, blank_before):
+    rng = np.random.default_rng(1)
+    lines = ['"t","ax","ay","az"']
+    lines += [
+        f'"{k / 100}","{a[0]:.4f}","{a[1]:.4f}","{a[2]:.4f}"' for k, a in enumerate(rng.normal(9.8, 0.1, (300, 3)))
+    ]
+    if blank_before:
+        lines.insert(50, "")
+    lines[199] = line
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    with pytest.raises(ReadError, match=words):
+        read_recording(tmp_path / "log.csv")
+
+
+def test_a_log_read_in_pieces_that_becomes_shorter_is_a_sentence(tmp_path):
+    from trihedron.read import open_chunks
+
+    path = tmp_path / "log.npy"
+    for array in (np.arange(60_000.0).reshape(-1, 6), np.asfortranarray(np.arange(60_000.0).reshape(-1, 6))):
+        np.save(path, array)
+        log = open_chunks(path, "ax,ay,az,gx,gy,gz")
+        np.testing.assert_array_equal(log.rows(10, 5000), array[10:5000])
+        with path.open("r+b") as stream:
+            stream.truncate(10_000)
+        with pytest.raises(ReadError, match="became shorter"):
+            log.rows(5000, 9000)
+        path.unlink()
+        with pytest.raises(ReadError, match="no such file"):
+            log.rows(0, 10)
+
+
+def test_a_session_of_a_thousand_million_poses_is_refused(tmp_path):
+    (tmp_path / "s.toml").write_text('[session]\nkind = "hand"\nn_poses = 999999999\n')
+    with pytest.raises(ValueError, match="a session has at most"):
+        read_scenario(tmp_path / "s.toml")
+
+
+@pytest.mark.parametrize("text", ["unit = [1]", "table_tilt_deg = [{}, 1]", "unit = inf"])
+def test_a_scenario_whose_value_is_of_another_kind_is_refused(tmp_path, text):
+    (tmp_path / "s.toml").write_text(text + "\n")
+    with pytest.raises(ValueError, match=r"s\.toml: a value is of another kind"):
+        read_scenario(tmp_path / "s.toml")
+
+
+def test_the_empty_name_is_not_every_log_below_here(capsys):
+    from trihedron.cli import main
+
+    assert main(["fleet", "", "--out", "x"]) == 1
+    assert "the name of the logs is empty" in capsys.readouterr().err
+
+
+def test_the_attack_mutates_files_that_are_good():
+    attack = Inputs(1)
+    for name, readers in attack.readers.items():
+        if name != "untrusted.json":
+            path = attack.folder / name
+            path.write_bytes(attack.files[name])
+            assert all(reader(path) is not None for reader in readers), name
+
+
 # Fork
 
 
@@ -121,6 +201,16 @@ def test_mutated_inputs_are_taken_or_refused_in_a_sentence():
 def test_command_lines_end_with_a_status_and_a_sentence():
     attack = Commands(11)
     failed = [(n, attack.describe(n), out) for n, out in attack.run_forked(range(40)) if out.startswith("FAILED")]
+    assert failed == []
+
+
+def test_outputs_are_old_or_new_and_whole_under_every_fault():
+    # One of each kind of fault for three ways of writing: the whole is in benches/fuzz.py.
+    attack = Faults(11)
+    numbers = [
+        6 * attack.names.index(name) + fault for name in ("convert", "export", "apply") for fault in (0, 3, 4, 5)
+    ]
+    failed = [(n, attack.describe(n), out) for n, out in attack.run_forked(numbers) if out.startswith("FAILED")]
     assert failed == []
 
 

@@ -291,11 +291,30 @@ def test_a_small_disk_that_fills_up_leaves_the_old_output(session):
 # Statuses
 
 
-@pytest.mark.parametrize("words", [["apply"], ["verify"]])
+UNTRUSTED = {
+    "apply": ["apply", "untrusted.json", "log.csv", "-o", "x.csv"],
+    "verify": ["verify", "untrusted.json", "log.csv"],
+    "diagnose": ["diagnose", "log.csv", "--calibration", "untrusted.json"],
+    "simulate": ["simulate", "--like", "log.csv", "--calibration", "untrusted.json", "-o", "x.csv"],
+    "export": ["export", "untrusted.json", "--to", "c"],
+}
+
+
+def test_every_command_that_takes_a_calibration_is_asked_about_an_untrusted_one():
+    import typer
+
+    from trihedron.cli import build_app
+
+    commands = typer.main.get_command(build_app()).commands
+    takes = {name for name, command in commands.items() if any(p.name == "calibration" for p in command.params)}
+    # Where it is an output (capture, guide) nothing is read.
+    assert takes - {"capture", "guide", "calibrate", "kalman"} == set(UNTRUSTED)
+
+
+@pytest.mark.parametrize("words", UNTRUSTED.values(), ids=list(UNTRUSTED))
 def test_an_untrusted_calibration_ends_in_status_2_with_its_reason(session, capsys, words, monkeypatch):
     monkeypatch.chdir(session)
-    more = ["-o", "x.csv"] if words == ["apply"] else []
-    assert main([*words, "untrusted.json", "log.csv", *more]) == 2
+    assert main(words) == 2
     err = capsys.readouterr().err
     assert "not to be trusted" in err
     assert "Scale 3 is not determined" in err

@@ -39,7 +39,11 @@ class Foreign:
         motion = truth.angular_rate_rad_s if self.sensor == "gyroscope" else truth.specific_force_m_s2
         noise = session.sample_noise[self.sensor] / np.sqrt(5.0 * scenario.clock.rate_hz)
         extra = scale * self.signal(truth, motion @ directions.T, noise, rng)
-        raw = getattr(log, self.sensor) + extra * gain
+        raw = getattr(log, self.sensor)
+        if part.adc.lsb > 0.0:
+            # What a converter has rounded already would round less than half a step away: nothing would be added.
+            raw = raw + part.adc.lsb * rng.uniform(-0.5, 0.5, raw.shape)
+        raw = raw + extra * gain
         if part.adc.lsb > 0.0:
             raw = np.clip(np.round(raw / part.adc.lsb) * part.adc.lsb, part.adc.low, part.adc.high)
         return replace(log, **{self.sensor: raw})

@@ -100,7 +100,7 @@ def slow_noise(n, rate_hz, rng, shortest_s=0.05):
         x += lfilter([1.0], [1.0, -a], drive, axis=0)
     # Unit variances, ``spacing`` apart in ln τ, add to a two-sided density of 1/(2 spacing f); B²/(2πf) is asked for.
     spacing = np.log(1200.0 / max(shortest_s, 2.0 / rate_hz)) / 8.0
-    return x * np.sqrt(spacing / np.pi)
+    return (x - x.mean(axis=0)) * np.sqrt(spacing / np.pi)
 
 
 def carried(

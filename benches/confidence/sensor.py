@@ -27,7 +27,9 @@ def one_over_f(n, rate_hz, rng):
     gain[1:] = np.sqrt(1.0 / (2.0 * np.pi * f[1:]))
     white = np.fft.rfft(rng.normal(size=(size, 3)) * np.sqrt(rate_hz), axis=0)
     # One-sided density 1/(2πf) of unit B is half of it on each side.
-    return np.fft.irfft(white * gain[:, None] / np.sqrt(2.0), size, axis=0)[:n]
+    x = np.fft.irfft(white * gain[:, None] / np.sqrt(2.0), size, axis=0)[:n]
+    # The zero that a calibration can know is that of its day; what it does on other days is the noise curve's to say.
+    return x - x.mean(axis=0)
 
 
 def read_out(

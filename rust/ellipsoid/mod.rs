@@ -4,65 +4,14 @@
 //! are centred on their mean and divided by their spread before the linear step.
 
 mod moments;
+mod standard;
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use crate::error::{Error, Result};
 use crate::norm_invariant::{Frame, Model};
 pub(crate) use moments::Moments;
-
-/// Readings moved to the origin and to unit size: `a' = centre + size · u`.
-#[derive(Debug, Clone, Copy)]
-pub struct Standardisation {
-    /// Mean reading.
-    pub centre: Vector3<f64>,
-    /// Root mean square distance from it.
-    pub size: f64,
-}
-
-impl Standardisation {
-    /// Of these readings.
-    ///
-    /// # Errors
-    /// When all readings are the same, or one is missing, infinite or beyond any sensor.
-    pub fn of(readings: &[Vector3<f64>]) -> Result<Self> {
-        let n = readings.len().max(1) as f64;
-        let centre = readings.iter().sum::<Vector3<f64>>() / n;
-        let size = (readings
-            .iter()
-            .map(|a| (a - centre).norm_squared())
-            .sum::<f64>()
-            / n)
-            .sqrt();
-        if !size.is_finite() {
-            return Err(Error::bad_input(
-                "the readings hold numbers that are missing, infinite or too large for any sensor",
-            ));
-        }
-        if size <= 1e-12 * (1.0 + centre.norm()) {
-            return Err(Error::not_determined(
-                "all still poses read the same: turn the sensor into different orientations between holds",
-            ));
-        }
-        Ok(Self { centre, size })
-    }
-
-    /// The reading as the linear step sees it.
-    #[must_use]
-    pub fn apply(&self, reading: &Vector3<f64>) -> Vector3<f64> {
-        (reading - self.centre) / self.size
-    }
-
-    /// The model in raw units of a model in standardised readings.
-    #[must_use]
-    pub fn undo(&self, model: &Model) -> Model {
-        let s = model.s / self.size;
-        Model {
-            s,
-            b: model.b - s * self.centre,
-        }
-    }
-}
+pub use standard::Standardisation;
 
 /// `uᵀ A u + 2 hᵀ u = 1` in standardised readings.
 #[derive(Debug, Clone, Copy)]

@@ -3,10 +3,13 @@
 //! Normal equations cost half the digits of what poses leave free. They are used where the poses leave nothing nearly
 //! free ([`SMALLEST_PIVOT`]); elsewhere rows are kept and compressed orthogonally.
 
+use std::cell::RefCell;
+
 use nalgebra::{Cholesky, Const, DMatrix, DVector, SMatrix, SVector};
 
+use super::parameters::unpack_standardised;
 use super::sums::{self, At, Charged};
-use super::{N_PARAMETERS, problem, unpack_standardised};
+use super::{N_PARAMETERS, problem};
 use crate::error::{Error, Result};
 use crate::gauss_newton::{Certainty, Descent, Linear, Local, Problem};
 
@@ -23,6 +26,8 @@ pub(super) struct Direct<'a> {
     pub at: At,
     /// `|det S|` of the start, in standardised readings.
     pub volume: f64,
+    /// The point whose cost was asked for last, and its sums: the next linearisation is nearly always there.
+    pub tried: RefCell<Option<(Column, sums::Normal)>>,
 }
 
 impl Direct<'_> {
@@ -38,12 +43,49 @@ impl Direct<'_> {
             .ok_or_else(|| Error::bad_input("there are no still poses to fit"))
     }
 
+    fn is_collapsed(&self, at: &At) -> bool {
+        at.model.s.determinant().abs() < problem::SMALLEST_VOLUME * self.volume
+    }
+
     fn cost_at(&self, x: &[f64]) -> f64 {
         let at = self.at(x);
-        if at.model.s.determinant().abs() < problem::SMALLEST_VOLUME * self.volume {
+        if self.is_collapsed(&at) {
             return f64::INFINITY;
         }
         sums::cost(&self.charged, &at)
+    }
+
+    /// The normal equations at a point.
+    ///
+    /// # Errors
+    /// When they leave too few digits.
+    pub(super) fn equations(&self, x: &Column, previous: Option<&Equations>) -> Result<Equations> {
+        let normal = match self.tried.take() {
+            Some((point, normal)) if point == *x => normal,
+            _ => self.normal(x.as_slice())?,
+        };
+        let norms = Column::from_fn(|j, _| positive_or_one(normal.gram[(j, j)].sqrt()));
+        // Marquardt's scaling, never shrinking: a column that fades must not let its parameter run away.
+        let scale = previous.map_or(norms, |local| local.scale.zip_map(&norms, f64::max));
+        let scaled = Square::from_fn(|i, j| normal.gram[(i, j)] / (scale[i] * scale[j]));
+        let factor = scaled
+            .cholesky()
+            .filter(|factor| {
+                (0..N_PARAMETERS).all(|k| {
+                    let pivot = factor.l_dirty()[(k, k)].powi(2);
+                    pivot >= SMALLEST_PIVOT * scaled[(k, k)]
+                })
+            })
+            .ok_or_else(|| Error::not_determined("the normal equations are too weak"))?;
+        Ok(Equations {
+            size: scale.component_mul(x).norm(),
+            normal,
+            n: self.charged.values.len(),
+            norms,
+            scale,
+            scaled,
+            factor,
+        })
     }
 }
 
@@ -95,40 +137,23 @@ impl Descent for Direct<'_> {
     type Local = Equations;
 
     fn linearise(&self, x: &Column, previous: Option<&Equations>) -> Result<Equations> {
-        let normal = self.normal(x.as_slice())?;
-        let norms = Column::from_fn(|j, _| positive_or_one(normal.gram[(j, j)].sqrt()));
-        // Marquardt's scaling, never shrinking: a column that fades must not let its parameter run away.
-        let scale = previous.map_or(norms, |local| local.scale.zip_map(&norms, f64::max));
-        let scaled = Square::from_fn(|i, j| normal.gram[(i, j)] / (scale[i] * scale[j]));
-        let factor = scaled
-            .cholesky()
-            .filter(|factor| {
-                (0..N_PARAMETERS).all(|k| {
-                    let pivot = factor.l_dirty()[(k, k)].powi(2);
-                    pivot >= SMALLEST_PIVOT * scaled[(k, k)]
-                })
-            })
-            .ok_or_else(|| Error::not_determined("the normal equations are too weak"))?;
-        Ok(Equations {
-            size: scale.component_mul(x).norm(),
-            normal,
-            n: self.charged.values.len(),
-            norms,
-            scale,
-            scaled,
-            factor,
-        })
+        self.equations(x, previous)
     }
 
     fn cost(&self, x: &Column) -> Result<f64> {
-        Ok(self.cost_at(x.as_slice()))
+        if self.is_collapsed(&self.at(x.as_slice())) {
+            return Ok(f64::INFINITY);
+        }
+        let normal = self.normal(x.as_slice())?;
+        let cost = normal.cost;
+        self.tried.replace(Some((*x, normal)));
+        Ok(cost)
     }
 
     fn moved(&self, x: &Column, step: &DVector<f64>) -> Column {
         Column::from_fn(|k, _| x[k] + step[k])
     }
 }
-
 impl Local for Equations {
     fn cost(&self) -> f64 {
         self.normal.cost

@@ -5,25 +5,26 @@
 //! between runs: left free it would reward a large `S`.
 
 mod descent;
+mod fitting;
 mod held_out;
 mod lanes;
+mod near;
 mod noise;
+mod parameters;
 mod problem;
 mod start;
 mod sums;
 
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use rayon::prelude::*;
 
-use descent::{Direct, Equations};
+pub use fitting::fit;
 pub use held_out::{HeldOut, held_out};
+pub use parameters::in_frame;
 pub use problem::residual_gradient;
-use problem::{Frozen, PoseProblem};
-use start::Starts;
-use sums::At;
 
-use crate::ellipsoid::{self, Standardisation};
 use crate::error::{Error, Result};
-use crate::gauss_newton::{self, Certainty, Loss, Options, Stop};
+use crate::gauss_newton::{Certainty, Loss, Stop};
 
 /// Free parameters: six of `S`, three of `b`.
 pub const N_PARAMETERS: usize = 9;
@@ -151,10 +152,12 @@ impl Readings<'_> {
                 self.values.len()
             )));
         }
-        if let Some(i) = self
-            .values
-            .iter()
-            .position(|a| a.iter().any(|value| !value.is_finite()))
+        let is_finite = |a: &Vector3<f64>| a.iter().all(|value| value.is_finite());
+        // Without a branch for each reading; the place is looked for where there is one.
+        let all_finite =
+            |part: &[Vector3<f64>]| part.iter().fold(true, |all, a| all & is_finite(a));
+        if !self.values.par_chunks(sums::SHARE).all(all_finite)
+            && let Some(i) = self.values.iter().position(|a| !is_finite(a))
         {
             return Err(Error::bad_input(format!("reading {i} is not finite")));
         }
@@ -179,318 +182,3 @@ pub const UNKNOWN: f64 = 0.02;
 
 /// How far, in |g|, parameters left free may be from the sphere's: scales within 10 %, axes within 6°.
 pub const ANCHOR: f64 = 0.1;
-
-/// Times that σ is renewed at most; it depends on the answer only through directions and settles in two.
-const RENEWALS: usize = 8;
-
-/// Fits from an ellipsoid start, or from `start`.
-///
-/// Poses that leave a parameter unknown to 2 % of |g| (six faces leave three altogether) would let it run away into any
-/// accident of the readings: all are then held near a sphere through the readings, and `is_anchored` tells.
-///
-/// A given start that leads nowhere (no convergence, or a triad a hundred times smaller than the sphere through the
-/// readings: the way to `S = 0`) is given up for the ellipsoid.
-///
-/// # Errors
-/// When readings are malformed or all the same, or the fit collapses to `S = 0`.
-pub fn fit(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -> Result<Fit> {
-    let Some(given) = start else {
-        return fit_from(readings, settings, None);
-    };
-    match fit_from(readings, settings, Some(given)) {
-        Ok(found)
-            if found.stop.is_converged() && !is_shrunken(&found.model, readings, settings) =>
-        {
-            Ok(found)
-        }
-        // A malformed start is a mistake to be told of, not to be worked around.
-        Err(error @ Error::BadInput(_)) => Err(error),
-        first => fit_from(readings, settings, None).or(first),
-    }
-}
-
-/// Whether a triad is far smaller than the sphere through the readings.
-fn is_shrunken(model: &Model, readings: Readings<'_>, settings: &Settings) -> bool {
-    let stride = readings.values.len().div_ceil(ROWS_KEPT);
-    let few: Vec<Vector3<f64>> = readings.values.iter().step_by(stride).copied().collect();
-    Starts::of(&few)
-        .and_then(|starts| starts.sphere(settings))
-        .is_ok_and(|sphere| model.s.determinant().abs() < 1e-2 * sphere.s.determinant().abs())
-}
-
-fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -> Result<Fit> {
-    readings.check()?;
-    if !settings.gravity.is_finite() || settings.gravity <= 0.0 {
-        return Err(Error::bad_input(format!(
-            "gravity must be a positive number in m/s², got {}",
-            settings.gravity
-        )));
-    }
-    let few = start::even_share(readings, ROWS_KEPT);
-    // Of very many readings, a share shows nearly the same answer: all are then passed over a few times only.
-    let shown = few.fitted(settings);
-    let starts = Starts::of(few.values())?;
-    let standard = match few {
-        start::Share::All(_) => starts.standard,
-        start::Share::Some { .. } => Standardisation::of(readings.values)?,
-    };
-    let nominal = match start.or(shown) {
-        Some(model) => in_frame(&model, settings.frame)?,
-        None => starts.sphere(settings)?,
-    };
-    let mut frozen = Frozen::at(readings, settings, &nominal);
-    // What a share of the readings determines, all of them do.
-    let is_anchored =
-        shown.is_none() && problem::is_weak(&frozen.charge(readings), settings, &nominal);
-    let begin = if is_anchored || start.is_some() || shown.is_some() {
-        nominal
-    } else {
-        starts.best(settings)?
-    };
-    if spread(&begin, &standard) < SMALLEST_SPREAD * settings.gravity {
-        return Err(Error::not_determined(WORTHLESS));
-    }
-    let first = pack(&begin, &standard);
-    let mut theta = first;
-    let volume = (begin.s * standard.size).determinant().abs();
-    let anchor = is_anchored.then(|| DVector::from_column_slice(first.as_slice()));
-    let mut iterations = 0;
-    let mut widening = 1.0;
-    for renewal in 0.. {
-        let model = unpack(&theta, settings.frame, &standard);
-        if renewal > 0 || begin != nominal {
-            frozen.renew(readings, settings, &model);
-        }
-        frozen.widening = widening;
-        let problem = PoseProblem {
-            readings,
-            settings,
-            standard,
-            frozen: &frozen,
-            volume,
-            anchor: anchor.clone(),
-        };
-        let settled = settle(&problem, &theta)?;
-        iterations += settled.iterations;
-        let change = (settled.theta - theta).norm() / theta.norm();
-        theta = settled.theta;
-        if is_anchored {
-            // Scatter beyond the noise must not buy itself an angle of ten degrees where nothing else contradicts it.
-            let spare = readings.values.len().saturating_sub(N_PARAMETERS).max(1);
-            let scatter =
-                problem.chi2(&DVector::from_column_slice(theta.as_slice())) / spare as f64;
-            widening *= scatter.max(widening.powi(-2)).sqrt();
-        }
-        // σ moves with the parameters at first order only through S: 1e-7 in S is 1e-7 in σ, far below its own error.
-        if change < 1e-7 || renewal >= RENEWALS {
-            let mut fit = finish(&problem, &settled, iterations)?;
-            fit.sigmas = frozen.sigma;
-            return Ok(fit);
-        }
-    }
-    unreachable!("the loop returns at its last renewal")
-}
-
-/// Where the solver ended for one set of σ.
-struct Settled {
-    theta: Parameters,
-    stop: Stop,
-    iterations: usize,
-    found: Found,
-}
-
-/// What the solution is known by.
-enum Found {
-    /// Normal equations.
-    Direct(Box<Equations>),
-    /// Rows, or normal equations too weak to be solved as they are.
-    Dense(Certainty),
-}
-
-fn settle(problem: &PoseProblem<'_>, theta: &Parameters) -> Result<Settled> {
-    let settings = problem.settings;
-    let options = Options {
-        loss: settings.loss,
-        ..Options::default()
-    };
-    let direct = Direct {
-        charged: problem.charged(),
-        at: At {
-            model: unpack_standardised(theta.as_slice(), settings.frame),
-            standard: problem.standard,
-            settings: *settings,
-            widening: problem.frozen.widening,
-        },
-        volume: problem.volume,
-    };
-    let has_anchor = problem.anchor.is_some();
-    if !has_anchor && let Ok(ended) = gauss_newton::descend(&direct, *theta, &options) {
-        return Ok(Settled {
-            theta: ended.point,
-            stop: ended.stop,
-            iterations: ended.iterations,
-            found: Found::Direct(Box::new(ended.local)),
-        });
-    }
-    let start = DVector::from_column_slice(theta.as_slice());
-    let solution = if problem.readings.values.len() > ROWS_KEPT && !has_anchor {
-        gauss_newton::minimise_problem(&direct, start, &options)?
-    } else {
-        gauss_newton::minimise(
-            |x| Ok(problem.linearise(x)),
-            |x| Ok(problem.residuals(x)),
-            start,
-            &options,
-        )?
-    };
-    Ok(Settled {
-        theta: Parameters::from_column_slice(solution.parameters.as_slice()),
-        stop: solution.stop,
-        iterations: solution.iterations,
-        found: Found::Dense(solution.certainty),
-    })
-}
-
-/// Poses whose specific forces differ by less than this fraction of |g|, half a degree, are one pose, or `S` is nothing.
-const SMALLEST_SPREAD: f64 = 1e-2;
-
-const WORTHLESS: &str = "the fit runs into the worthless minimum S = 0, |b| = |g|: the poses hardly differ, or are not \
-                         still; hold the sensor still in clearly different orientations";
-
-/// Root mean square size of `S (a' - mean)`, m/s².
-fn spread(model: &Model, standard: &Standardisation) -> f64 {
-    (model.s * standard.size).norm() / 3.0_f64.sqrt()
-}
-
-fn finish(problem: &PoseProblem<'_>, settled: &Settled, iterations: usize) -> Result<Fit> {
-    let settings = problem.settings;
-    let factor = settings.loss.covariance_factor(1);
-    let held = match &settled.found {
-        Found::Direct(equations) => equations.certainty(factor),
-        Found::Dense(certainty) => certainty.clone(),
-    };
-    // Noise in a reading enters residual and derivative alike and draws S towards zero, by (σ/g)² of itself.
-    let pull = problem.noise_in_gradient(settled.theta.as_slice());
-    let theta = settled.theta + fixed(&held.covariance) * pull;
-    let certainty = match problem.anchor {
-        None => held,
-        Some(_) => gauss_newton::certainty(
-            &problem.data_jacobian(&DVector::from_column_slice(settled.theta.as_slice())),
-            factor,
-            Options::default().rank_tolerance,
-        ),
-    };
-    let model = unpack(&theta, settings.frame, &problem.standard);
-    let shrink = (model.s * problem.standard.size).determinant().abs() / problem.volume;
-    if shrink < 2.0 * problem::SMALLEST_VOLUME
-        || spread(&model, &problem.standard) < SMALLEST_SPREAD * settings.gravity
-    {
-        return Err(Error::not_determined(WORTHLESS));
-    }
-    let map = map_to_entries(settings.frame, &problem.standard);
-    let covariance = map * fixed(&certainty.covariance) * map.transpose();
-    let residuals = problem.in_m_s2(&model);
-    let squares = || {
-        residuals
-            .iter()
-            .zip(&problem.frozen.sigma)
-            .map(|(r, s)| (r / s).powi(2))
-    };
-    let chi2 = squares().sum();
-    let (weights, robust_chi2) = if settings.loss == Loss::Linear {
-        (Vec::new(), chi2)
-    } else {
-        let weights: Vec<f64> = squares().map(|z2| settings.loss.weight(z2)).collect();
-        let influence: f64 = squares().zip(&weights).map(|(z2, w)| w * w * z2).sum();
-        (weights, influence / settings.loss.expected_influence(1))
-    };
-    Ok(Fit {
-        model,
-        covariance,
-        chi2,
-        robust_chi2,
-        residuals,
-        sigmas: Vec::new(),
-        weights,
-        certainty,
-        is_anchored: problem.anchor.is_some(),
-        stop: settled.stop,
-        iterations,
-    })
-}
-
-/// The same numbers without a heap.
-fn fixed(square: &DMatrix<f64>) -> SMatrix<f64, N_PARAMETERS, N_PARAMETERS> {
-    SMatrix::from_column_slice(square.as_slice())
-}
-
-/// The same norms in the frame asked for.
-///
-/// # Errors
-/// When `S` is singular.
-pub fn in_frame(model: &Model, frame: Frame) -> Result<Model> {
-    let m = model.s.transpose() * model.s;
-    let s = match frame {
-        Frame::Lower => ellipsoid::reversed_cholesky(&m),
-        Frame::Symmetric => ellipsoid::symmetric_root(&m),
-    }
-    .ok_or_else(|| Error::bad_input("the starting S is singular"))?;
-    let inverse = model
-        .s
-        .try_inverse()
-        .ok_or_else(|| Error::bad_input("the starting S is singular"))?;
-    Ok(Model {
-        s,
-        b: s * inverse * model.b,
-    })
-}
-
-/// Solver's parameters: six entries of `S · size`, then `d = b + S centre`, so that columns are of one size.
-fn pack(model: &Model, standard: &Standardisation) -> Parameters {
-    let s = model.s * standard.size;
-    let d = model.b + model.s * standard.centre;
-    let mut theta = Parameters::zeros();
-    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
-        theta[k] = s[(i, j)];
-    }
-    theta.fixed_rows_mut::<3>(6).copy_from(&d);
-    theta
-}
-
-/// `S` and `d` in standardised readings.
-fn unpack_standardised(theta: &[f64], frame: Frame) -> Model {
-    let mut s = Matrix3::zeros();
-    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
-        s[(i, j)] = theta[k];
-        if frame == Frame::Symmetric {
-            s[(j, i)] = theta[k];
-        }
-    }
-    Model {
-        s,
-        b: Vector3::new(theta[6], theta[7], theta[8]),
-    }
-}
-
-fn unpack(theta: &Parameters, frame: Frame, standard: &Standardisation) -> Model {
-    standard.undo(&unpack_standardised(theta.as_slice(), frame))
-}
-
-/// `∂(S row by row, b)/∂θ`: linear, because `b = d - S centre`.
-fn map_to_entries(frame: Frame, standard: &Standardisation) -> SMatrix<f64, 12, N_PARAMETERS> {
-    let mut map = SMatrix::zeros();
-    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
-        let mut place = |row: usize, column: usize| {
-            map[(3 * row + column, k)] = 1.0 / standard.size;
-            map[(9 + row, k)] -= standard.centre[column] / standard.size;
-        };
-        place(i, j);
-        if frame == Frame::Symmetric && i != j {
-            place(j, i);
-        }
-    }
-    for i in 0..3 {
-        map[(9 + i, 6 + i)] = 1.0;
-    }
-    map
-}

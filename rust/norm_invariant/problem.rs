@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector, SVector, Vector3};
 
 use super::noise;
+use super::parameters::unpack_standardised;
 use super::sums::{self, At, Charged};
 use super::{
     ANCHOR, Frame, Model, N_PARAMETERS, Objective, Parameters, Readings, Settings, UNKNOWN,
-    unpack_standardised,
 };
 use crate::ellipsoid::Standardisation;
 

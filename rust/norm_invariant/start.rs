@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Fit, Model, N_PARAMETERS, Readings, Settings, fit_from};
+use super::fitting::fit_from;
+use super::{Fit, Model, N_PARAMETERS, Readings, Settings};
 use crate::ellipsoid::{self, Moments, Standardisation};
 use crate::error::{Error, Result};
 

@@ -12,6 +12,7 @@ mod accelerometer;
 mod allan;
 mod arrays;
 mod attitude;
+mod audit;
 mod chi_square;
 mod doorway;
 mod gyro_alignment;
@@ -26,6 +27,7 @@ mod screening;
 mod session_model;
 mod simulate;
 mod spectral_likelihood;
+mod stamps;
 mod stillness;
 mod zero_process;
 
@@ -36,6 +38,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     doorway::keep_panics_quiet();
     allan::register(module)?;
     attitude::register(module)?;
+    audit::register(module)?;
     chi_square::register(module)?;
     gyro_alignment::register(module)?;
     move_signals::register(module)?;
@@ -49,6 +52,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     session_model::register(module)?;
     simulate::register(module)?;
     spectral_likelihood::register(module)?;
+    stamps::register(module)?;
     stillness::register(module)?;
     zero_process::register(module)?;
     // The stub is the list of names; a second one made on the fly would have to be kept in step with it.

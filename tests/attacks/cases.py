@@ -130,12 +130,10 @@ def originals() -> dict[str, bytes]:
     files["quoted.csv"] = quoted + b"\n"
     files["axis.json"] = b'{"white": 0.002, "walk": [1e-5, 1e-5, 2e-5]}'
     files["poses.csv"] = b"pitch,roll,hold\n" + b"".join(b"%d,%d,%d\n" % (10 * k, 5 * k, k + 1) for k in range(12))
-    files["curve.csv"] = b"tau_s,gx [rad/s],gy [rad/s]\n" + b"".join(
-        b"%g,%g,%g\n" % (2**k, 1 / (1 + k), 2) for k in range(12)
-    )
+    files["curve.csv"] = b"tau_s,adev\n" + b"".join(b"%g,%g\n" % (2**k, 1 / (1 + k)) for k in range(12))
     files["frame.toml"] = (
-        b'name = "x"\nsync = "AA 55"\nlength = 16\n[checksum]\nkind = "xor"\nat = 15\nfrom = 0\nto = 14\n'
-        b'[[field]]\nname = "ax"\ntype = "i16"\nat = 2\nscale = 0.001\nunit = "g"\nrole = "ax"\n'
+        b'name = "x"\nsync = "AA 55"\nlength = 16\n[checksum]\nkind = "xor8"\n'
+        b'[[field]]\nname = "ax"\ntype = "i16"\nat = 2\nscale = 0.001\nunit = "g"\nrole = "value"\n'
     )
     return files
 
@@ -171,7 +169,7 @@ def _readers() -> dict[str, list[Callable[[Path], object]]]:
         "noise.json": [read_noise],
         "diagnosis.json": [read_diagnosis],
         "axis.json": [read_axis_noise],
-        "s.toml": [read_scenario, lambda path: improved_scenario(path, {}, [("dropped_samples", {"rate": 0.1})])],
+        "s.toml": [read_scenario, lambda path: improved_scenario(path, {}, [("dropped-samples", {"rate": 0.1})])],
         "frame.toml": [read_frame_declaration],
         "poses.csv": [lambda path: read_pose_table(path, gravity_m_s2=9.8)],
         "curve.csv": [read_allan_table],

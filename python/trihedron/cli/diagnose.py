@@ -8,7 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
-from trihedron.cli.output import check_outputs, say, show, write_json, write_report
+from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
 
 
 @with_options(source=LogSource, place=GravitySource)
@@ -112,3 +112,8 @@ def diagnose(
         say("The calibration that this log itself gives: --updated FILE.")
     if not full and report is None:
         say("Every candidate, both models and findings: --full; pictures before and after: --report FILE.html.")
+    if known is not None:
+        from trihedron.pipeline.applying import doubted
+
+        # What a model that nobody should trust differs by says nothing of the physics.
+        leave(doubted(known))

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Optional
 import typer
 
 from trihedron.cli.options import Force, Report
-from trihedron.cli.output import check_outputs, write_report
+from trihedron.cli.output import check_outputs, leave, say, write_report
 
 
 def simulate(
@@ -112,12 +112,16 @@ def simulate(
     typer.echo(f"{len(known.holds)} holds, {len(known.moves)} moves, |g| {known.gravity_m_s2:.6g} m/s²")
     for name, parameters in known.effects.items():
         typer.echo(f"effect {name}: " + ", ".join(f"{key} {value}" for key, value in parameters.items()))
+    if calibration is not None:
+        from trihedron.files.calibration import read_calibration
+        from trihedron.pipeline.applying import doubted
+
+        leave(doubted(read_calibration(calibration)))
 
 
 def _scenario(name: str, diagnosis: Path | None) -> Any:
     if diagnosis is None:
         return name
-    from trihedron.cli.output import say
     from trihedron.files.diagnosis import read_diagnosis
     from trihedron.pipeline import with_effects
 

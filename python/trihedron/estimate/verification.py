@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried
@@ -38,7 +38,7 @@ def verify_calibration(
     gravity_m_s2: float,
     gravity_source: str,
 ) -> Verification:
-    """Judge a calibration by the still poses and moves of another recording (equations 3.1 and 5.1, nothing fitted).
+    """Judge a calibration by the poses (docs/model.md, 10) and moves (equation 5.1) of another recording; no fit.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def _carried(
 
 def _norm_findings(error: FloatArray, sigma: FloatArray) -> list[Finding]:
     z2 = (error / sigma) ** 2
-    if stats.chi2.sf(float(z2.sum()), len(z2)) > FALSE_ALARM:
+    if special.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
         return []
     rms = float(np.sqrt(np.mean(error**2)))
     times = float(np.sqrt(np.mean(z2)))
@@ -139,7 +139,7 @@ def _angle_findings(angle_deg: FloatArray, sigma_deg: FloatArray) -> list[Findin
         return []
     # Two components per move share the variance sigma², so the squared ratio has mean one and two degrees of freedom.
     z2 = 2.0 * (angle_deg / sigma_deg) ** 2
-    if stats.chi2.sf(float(z2.sum()), 2 * len(z2)) > FALSE_ALARM:
+    if special.chdtrc(2 * len(z2), float(z2.sum())) > FALSE_ALARM:
         return []
     rms = float(np.sqrt(np.mean(angle_deg**2)))
     worst = int(np.argmax(angle_deg))

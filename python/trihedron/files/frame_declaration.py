@@ -48,6 +48,8 @@ def read_frame_declaration(path: str | Path) -> FrameDeclaration:
         raise ValueError(f"{path} is not TOML: {error}.") from None
     try:
         return _declaration(table, path.stem)
+    except OverflowError:
+        raise ValueError(f"{path}: a length or a place is not a finite number of bytes.") from None
     except (KeyError, TypeError) as error:
         raise ValueError(f"{path}: {_said(error)}; docs/capture.md shows a whole declaration.") from None
     except ValueError as error:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
@@ -20,8 +21,9 @@ from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of, settled
 from trihedron.read.source import read_tables
-from trihedron.read.table import FloatArray, Progress, Table
+from trihedron.read.table import FloatArray, Table
 from trihedron.records import Finding, FindingCode, Recording
+from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
 STAMPS = "stamps as logged [s]"
@@ -166,7 +168,8 @@ def audited(
         if triad is not None
     }
     for triad in present.values():
-        triad[np.isinf(triad)] = np.nan
+        if any(np.isinf(value) for low, _, high, _ in _core.triad_extremes(triad) for value in (low, high)):
+            triad[np.isinf(triad)] = np.nan
     windows = look(present, rate)
     acc_unit, gyr_unit = AccelerationUnit.M_S2, RateUnit.RAD_S
     if sensors.accelerometer is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.read.errors import ReadError
 from trihedron.read.rest import Windows, is_integer, look
 from trihedron.read.table import FloatArray
@@ -204,8 +205,9 @@ def _rate_contradiction(unit: RateUnit, turns: tuple[float, int], *, is_given: b
 
 
 def _gyroscope_by_magnitude(readings: FloatArray, windows: Windows | None) -> Judged:
-    # Without a copy of the readings; what was infinite is missing (NaN) by now.
-    largest = max(float(np.fmax.reduce(readings, axis=None)), -float(np.fmin.reduce(readings, axis=None)))
+    # What was infinite is missing (NaN) by now.
+    extremes = _core.triad_extremes(readings)
+    largest = float(np.nanmax([max(high, -low) for low, _, high, _ in extremes]))
     rest = largest
     if windows is not None:
         rest = float(np.median(np.abs(windows.quiet_mean("gyroscope")).max(axis=1)))

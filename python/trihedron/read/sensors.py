@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz, settle_clock
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
@@ -17,9 +18,10 @@ from trihedron.read.merge import merge
 from trihedron.read.names import parse_name
 from trihedron.read.rest import is_integer
 from trihedron.read.sensing import WHOLE, order_of_triads
-from trihedron.read.table import FloatArray, Progress, Table
+from trihedron.read.table import FloatArray, Table
 from trihedron.read.text.store import side_by_side
 from trihedron.records import Finding, FindingCode, Sampling
+from trihedron.records.progress import Progress
 from trihedron.records.sampling import UNJUDGED
 
 ASSUMED_RATE_HZ = 100.0
@@ -183,9 +185,9 @@ def _refuse_unread_time(table: Table, options: Options) -> None:
 
 def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:
     """Rows written twice (same stamp, same readings) once; they are no samples."""
-    again = np.flatnonzero(np.diff(clock.time_s) == 0) + 1
-    if chosen.time is None or not len(again):
+    if chosen.time is None or not steps_of(clock.time_s).same:
         return clock
+    again = np.flatnonzero(np.diff(clock.time_s) == 0) + 1
     rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
     copied = np.ones(len(again), dtype=bool)
     for column in (*(chosen.accelerometer or ()), *(chosen.gyroscope or ())):

@@ -123,7 +123,8 @@ class Recording(Presented):
         n = len(time_s)
         if n == 0:
             raise ValueError("a recording needs at least one sample")
-        if not np.all(np.isfinite(time_s)) or np.any(np.diff(time_s) < 0):
+        # Between finite ends, what never steps back (NaN would) is finite.
+        if not (np.isfinite(time_s[0]) and np.isfinite(time_s[-1]) and np.all(time_s[1:] >= time_s[:-1])):
             raise ValueError("time_s must be finite and non-decreasing")
         object.__setattr__(self, "time_s", time_s)
         if self.accelerometer is None and self.gyroscope is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, rolling_mean
 
@@ -100,9 +100,9 @@ def measure_activity(channels: Channels) -> Activity:
 
 def _limit(activity: FloatArray, freedom: int) -> float:
     median = float(np.median(activity))
-    lower = median - float(np.quantile(activity, stats.norm.cdf(-1.0)))
-    return median + float(stats.norm.isf(FALSE_ALARM)) * max(lower, float(np.sqrt(2.0 / freedom)))
+    lower = median - float(np.quantile(activity, special.ndtr(-1.0)))
+    return median + -float(special.ndtri(FALSE_ALARM)) * max(lower, float(np.sqrt(2.0 / freedom)))
 
 
 def _chi2_median_ratio(freedom: int) -> float:
-    return float(stats.chi2.median(freedom) / freedom)
+    return float(special.chdtri(freedom, 0.5) / freedom)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, stats
+from scipy import special
 
 from trihedron.segment.channels import Channels, FloatArray
 
@@ -95,7 +95,7 @@ def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = F
     members = [octave == k for k in np.unique(octave)]
     n = np.array([float(m.sum()) for m in members])
     if is_robust:
-        variances = np.array([np.median(halves.square[m], axis=0) for m in members]) / stats.chi2.median(1)
+        variances = np.array([np.median(halves.square[m], axis=0) for m in members]) / special.chdtri(1, 0.5)
     else:
         variances = np.array([halves.square[m].mean(axis=0) for m in members])
     tau = halves.size * channels.step_s
@@ -126,6 +126,8 @@ def _fit(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int])
 
     A variance with n degrees of freedom has the deviance n (s/v - 1 - ln(s/v)).
     """
+    from scipy import optimize
+
     terms = np.zeros(3)
     least = 1e-3 * seen.max() * design[:, 0] / design[0, 0]
     model = np.maximum(seen, 100.0 * least)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, rolling_mean
 from trihedron.segment.floor import Activity
@@ -184,7 +184,7 @@ def _densest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     at = width.argmin(axis=0)
     axes = np.arange(values.shape[1])
     middle: FloatArray = ordered[at + quarter // 2, axes]
-    deviation: FloatArray = width[at, axes] / (2.0 * float(stats.norm.ppf(0.5 + 0.25 / 2.0)))
+    deviation: FloatArray = width[at, axes] / (2.0 * float(special.ndtri(0.5 + 0.25 / 2.0)))
     return middle, deviation
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import enum
 import sys
 import types
@@ -55,8 +56,15 @@ def read_scenario(path: str | Path) -> Scenario:
         raise ValueError(f"{path.name} is not a TOML file: {error}") from None
     try:
         return scenario_from_table(table, path.stem)
+    except (TypeError, OverflowError):
+        kinds = "unit is a whole number, table_tilt_deg two numbers, an effect a table"
+        raise ValueError(f"{path.name}: a value is of another kind than its key takes ({kinds}).") from None
     except ValueError as error:
         raise ValueError(f"{path.name}: {error}") from None
+
+
+_MOST_POSES = 100_000
+"""Poses of a session: three days of holds of two seconds."""
 
 
 def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Scenario:
@@ -102,6 +110,9 @@ def _motion(table: Mapping[str, Any]) -> Motion:
         if kind not in SESSIONS:
             raise ValueError(f"no session is of kind {kind!r}; there are {', '.join(SESSIONS)}")
         values = {key: _tupled(value) for key, value in values.items()}
+        for key, value in values.items():
+            if isinstance(value, int) and abs(value) > _MOST_POSES:
+                raise ValueError(f"session {kind}: {key} is {value:.3g}, and a session has at most {_MOST_POSES}")
         try:
             motion = SESSIONS[kind](**values)
         except TypeError as error:
@@ -119,7 +130,9 @@ def _tupled(value: Any) -> Any:
 def _refuse_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
     for key in values:
         if key not in known:
-            raise ValueError(f"{where} has no key {key!r}; it knows {', '.join(known)}")
+            near = difflib.get_close_matches(key, known, 1)
+            meant = f" (is {near[0]!r} meant?)" if near else ""
+            raise ValueError(f"{where} has no key {key!r}{meant}; it knows {', '.join(known)}")
 
 
 def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:

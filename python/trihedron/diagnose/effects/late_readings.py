@@ -1,4 +1,4 @@
-"""Readings that come late: what a delay and a low-pass add, to all orders that a recording can tell (eq. 9.14).
+"""Readings that come late: what a delay and a low-pass add, to all orders that a recording can tell.
 
 A reading y that trails the truth x by a pure delay δ has x(t) = y(t + δ); behind a low-pass of first order
 x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y''. All three begin with τ y': what tells them apart is

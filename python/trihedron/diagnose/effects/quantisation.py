@@ -133,18 +133,6 @@ class Quantisation(DirectEffect):
         found = [one for c in range(3 if obs.raw_rate is None else 6) if (one := self._channel(obs, c)) is not None]
         if not found:
             return None
-        parameters = []
-        for one in found:
-            scale, relative = _scale_of(context, one.channel)
-            unit = "m/s^2" if one.channel < 3 else "rad/s"
-            name = CHANNELS[one.channel]
-            # The step is exact in raw units; in SI it is as good as the channel's scale factor.
-            sigma = max(relative, 1e-6) * one.step * scale
-            parameters.append(EffectParameter(f"lsb_{name}", one.step * scale, sigma, unit))
-            if one.missing:
-                parameters.append(EffectParameter(f"missing_codes_{name}", float(one.missing), 0.0, "1"))
-            if one.dead:
-                parameters.append(EffectParameter(f"dead_band_{name}", one.dead * scale, one.step * scale, unit))
 
         def reweigh(old: Observations) -> Observations:
             for one in found:
@@ -161,9 +149,10 @@ class Quantisation(DirectEffect):
             else f"move in steps of {worst.step:.4g} raw units, {worst.step / worst.sigma:.2g} times their noise"
         )
         return Evidence(
-            1e-300, strength, tuple(parameters),
+            1e-300, strength, _parameters(context, found),
             f"Readings of {', '.join(names)} {what}: averaging does not resolve between steps.",
             "within-static", Where(names), reweigh=reweigh, share=grid / (grid + worst.sigma**2),
+            restate=lambda later: _parameters(later, found),  # the staircase had bent the scale factors
         )  # fmt: skip
 
     def _channel(self, obs: Observations, c: int) -> Lattice | None:
@@ -196,6 +185,23 @@ class Quantisation(DirectEffect):
         if sigma > COARSE:
             return None
         return Lattice(c, step, sigma * step, scatter, shift * step, spread * step, 0, 0.0)
+
+
+def _parameters(context: Context, found: list[Lattice]) -> tuple[EffectParameter, ...]:
+    """Steps in SI, codes that are missing, zones in which nothing moves."""
+    parameters = []
+    for one in found:
+        scale, relative = _scale_of(context, one.channel)
+        unit = "m/s^2" if one.channel < 3 else "rad/s"
+        name = CHANNELS[one.channel]
+        # The step is exact in raw units; in SI it is as good as the channel's scale factor.
+        sigma = max(relative, 1e-6) * one.step * scale
+        parameters.append(EffectParameter(f"lsb_{name}", one.step * scale, sigma, unit))
+        if one.missing:
+            parameters.append(EffectParameter(f"missing_codes_{name}", float(one.missing), 0.0, "1"))
+        if one.dead:
+            parameters.append(EffectParameter(f"dead_band_{name}", one.dead * scale, one.step * scale, unit))
+    return tuple(parameters)
 
 
 def _scale_of(context: Context, channel: int) -> tuple[float, float]:

@@ -3,12 +3,32 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, ndtr, stdtrit
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.table_turns import meant_as_multiples, table_turns
+from trihedron.diagnose.session.observations import FloatArray
 from trihedron.records.diagnosis import EffectParameter, Where
+
+FEWEST_TO_SCATTER = 3
+"""Turns from which their own scatter says anything."""
+
+
+def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -> float:
+    """Standard error of a weighted mean of few values: as they scatter, or as their noise says where that is more.
+
+    Neighbouring turns share a pose, and a scatter of four values is itself known to 40 %: of a t distribution with so
+    few degrees of freedom as much lies within two of what is given as of a normal one.
+    """
+    share = weights / weights.sum()
+    by_noise = float(np.sqrt((share**2 * noise**2).sum()))
+    n = len(values)
+    if n < FEWEST_TO_SCATTER:
+        return by_noise
+    variance = float((share * (values - (share * values).sum()) ** 2).sum()) * n / (n - 1)
+    wider = float(stdtrit(n - 1, ndtr(2.0)) / 2.0)
+    return max(by_noise, wider * float(np.sqrt(variance * (share**2).sum())))
 
 
 class TableTilt(DirectEffect):
@@ -26,7 +46,7 @@ class TableTilt(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         twin, obs = context.fitted.twin, context.obs
-        chi2, dof, tilts, weights = 0.0, 0, [], []
+        chi2, dof, tilts, weights, noises = 0.0, 0, [], [], []
         for turn in table_turns(context):
             before, after = obs.move_holds[turn.move]
             half = abs(np.sin(turn.angle_rad / 2.0))
@@ -43,11 +63,12 @@ class TableTilt(DirectEffect):
             dof += 2
             tilts.append(float(np.linalg.norm(change)) / (2.0 * half))
             weights.append(half**2)
+            noises.append(sigma / (2.0 * half))
         if dof == 0:
             return None
         p = float(chdtrc(dof, chi2))
         tilt = float(np.degrees(np.average(tilts, weights=weights)))
-        scatter = float(np.degrees(np.std(tilts))) / np.sqrt(len(tilts))
+        scatter = _error_of_mean(np.degrees(tilts), np.array(weights), np.degrees(noises))
         # Feet, dust and hands tilt a case by a few hundredths of a degree on any table.
         if p > 1e-4 or tilt < 0.05 or tilt < 3.0 * scatter:
             return None

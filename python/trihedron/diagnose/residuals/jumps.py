@@ -1,4 +1,4 @@
-"""Zeros that change inside still poses: the second half of some poses against their first (eq. 8.7a)."""
+"""Zeros that jump inside still poses: a step through a pose against a smooth curve (eq. 8.7a)."""
 
 from __future__ import annotations
 
@@ -7,80 +7,160 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import lfilter
 
 from trihedron.diagnose.session.observations import FloatArray, Observations
 
-QUIET, LOUD = 0.3, 0.9
-"""Quantiles over the poses whose ratio tells jumps from slow noise: that is in all poses alike, a zero that jumps only
-in those where it did."""
-N_DRAWS, SEED = 20_000, 1
+N_BLOCKS, EDGE = 16, 3
+"""A pose is seen as so many block means; a step leaves at least so many on either side, so that what the hand's jolt
+does in the first block is none."""
+SMOOTH = 3
+"""Degree of the curve that a step must beat: creep, warm-up and slow noise are smooth."""
+LEAST_SAMPLES = 3 * N_BLOCKS
+"""Readings of a pose below which its blocks say nothing."""
+LOUD = 3.0
+"""Variance of the blocks about the step over the usual, from which a pose holds something else than one step."""
+COUNTS = 6.0
+"""Chi-square by which a step must beat the curve to count: white noise does it in one pose of some hundred."""
+TURNS = 4.0
+"""How much larger than usual what the other sensor reads at the step marks it as motion (a pose that slips)."""
+LAG, LIKE_A_WALK = 4, 3.0
+"""Ratio of squared differences four blocks apart to neighbours': white noise 0.7 to 1.4, flicker 1.3 to 2.8, with jumps
+in a third of the poses up to 3; a walk 3.4 to 8 (25 poses)."""
+N_POOL, N_DRAWS, SEED = 40_000, 20_000, 1
 FEWEST_POSES = 12
-BOTH = 4.0
-"""A pose in which both sensors change by this many times their usual is motion, and tells nothing of a zero."""
 JUMPS = 1e-3
 """p-value from which zeros are said to change inside poses."""
 N_LOOKS = 3
 """Axes."""
-LEAST_QUIET = 0.05
-"""Below this a coarse converter hides what the quiet poses do."""
 
 
 @dataclass(frozen=True, eq=False)
 class Jumps:
-    """``p_value`` (two sensors) of zeros that change in some poses, ``ratio`` how much more than in the others (as a
-    variance), ``holds`` which: accelerometer, gyro."""
+    """``p_value`` (two sensors) of zeros that jump in some poses, ``ratio`` how much larger the steps are than noise
+    (as a variance), ``holds`` which: accelerometer, gyro."""
 
     p_value: tuple[float, float]
     ratio: tuple[float, float]
     holds: tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
 
 
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """(poses, axes): chi-square by which the best step beats the smooth curve, its block, the variance that it leaves
+    per degree of freedom; blocks (poses, blocks, axes) in units of their noise."""
+
+    beats: FloatArray
+    at: npt.NDArray[np.intp]
+    left: FloatArray
+    blocks: FloatArray
+
+
 @lru_cache(maxsize=4)
 def jumps_in_poses(obs: Observations) -> Jumps:
-    """Whether some poses change from their first half to their second as the others do not.
+    """Whether some poses are better described by a step than slow noise ever is.
 
-    Flicker and walks change all poses by normal amounts, and the ratio of two quantiles over the poses has a known law
-    then. A pose that turns shows it in both sensors and is left out.
+    White noise and flicker beat a cubic by a step with a known chance, and so do walks where the blocks look like one;
+    the largest is the p-value.
+    A step at which the other sensor reads a motion is a pose that slipped.
     """
-    sides = [_changes(obs, obs.raw_force, obs.force_density)]
-    sides += [_changes(obs, obs.raw_rate, obs.rate_density)]
-    usual = [None if s is None else s / np.maximum(np.quantile(s, QUIET, axis=0) / 0.3853, 1e-12) for s in sides]
     still = np.array([not hold.is_unsteady for hold in obs.segments.holds])
-    if usual[0] is not None and usual[1] is not None:
-        still &= ~((usual[0].max(axis=1) > BOTH) & (usual[1].max(axis=1) > BOTH))
+    still &= np.array([hold.stop - hold.start >= LEAST_SAMPLES for hold in obs.segments.holds])
+    which = np.flatnonzero(still)
+    sides = [None if raw is None else _block_means(obs, raw, which) for raw in (obs.raw_force, obs.raw_rate)]
     p, ratio, holds = [1.0, 1.0], [1.0, 1.0], [np.zeros(0, dtype=np.intp)] * 2
-    for k, side in enumerate(sides):
-        if side is None or still.sum() < FEWEST_POSES:
+    if len(which) < FEWEST_POSES:
+        return Jumps((p[0], p[1]), (ratio[0], ratio[1]), (holds[0], holds[1]))
+    steps = [None if side is None else _steps(side) for side in sides]
+    for k, own in enumerate(steps):
+        if own is None:
             continue
-        z = side[still]
-        low, high = np.quantile(z, QUIET, axis=0), np.quantile(z, LOUD, axis=0)
-        seen = low > LEAST_QUIET
-        if not seen.any():
-            continue
-        ratios = np.where(seen, high / np.maximum(low, 1e-12), 0.0)
-        axis = int(ratios.argmax())
-        p[k] = min(1.0, N_LOOKS * float((1 + (_null(len(z)) >= ratios[axis]).sum()) / (N_DRAWS + 1)))
-        ratio[k] = float((ratios[axis] * 0.3853 / 1.645) ** 2)
-        holds[k] = np.flatnonzero(still)[np.argsort(-z[:, axis])[: max(1, len(z) // 10)]]
+        other = steps[1 - k]
+        counted = np.where((own.left < LOUD) & ~_moved(own, other, k), np.maximum(own.beats - COUNTS, 0.0), 0.0)
+        total = counted.sum(axis=0)
+        axis = int(total.argmax())
+        nulls = _nulls(len(which))[: 3 if _walks(own.blocks[:, :, axis]) else 2]
+        chance = max(float((1 + (null >= total[axis]).sum()) / (N_DRAWS + 1)) for null in nulls)
+        p[k] = min(1.0, N_LOOKS * chance)
+        found = np.flatnonzero(counted[:, axis])
+        ratio[k] = 1.0 + float(counted[:, axis].max())
+        holds[k] = which[found[np.argsort(-counted[found, axis])]][: max(1, len(which) // 10)]
     return Jumps((p[0], p[1]), (ratio[0], ratio[1]), (holds[0], holds[1]))
 
 
-def _changes(obs: Observations, values: FloatArray | None, density: FloatArray | None) -> FloatArray | None:
-    """(holds, 3) |second half − first| over what white noise makes of it."""
-    if values is None or density is None:
-        return None
+def _block_means(obs: Observations, raw: FloatArray, which: npt.NDArray[np.intp]) -> FloatArray:
+    """(poses, blocks, axes) means of equal stretches, over the noise that neighbours show, whatever the length."""
     out = []
-    for hold in obs.segments.holds:
-        first, second = np.array_split(values[hold.samples()], 2)
-        lasts = max(len(first) + len(second), 2) / obs.recording.rate_hz
-        change = np.nanmean(second, axis=0) - np.nanmean(first, axis=0)
-        out.append(np.abs(change) * np.sqrt(lasts) / np.maximum(2.0 * density, 1e-300))
-    return np.array(out)
+    for i in which:
+        values = raw[obs.segments.holds[i].samples()]
+        lasts = np.sqrt(len(values) / obs.recording.rate_hz)
+        out.append(np.stack([np.nanmean(part, axis=0) for part in np.array_split(values, N_BLOCKS)]) * lasts)
+    blocks = np.array(out)
+    change = np.diff(blocks, axis=1)
+    # Robust: the median over all poses of squared changes (0.455 of a chi-square's mean), half of it one block's.
+    noise = np.sqrt(np.median(change**2, axis=(0, 1)) / 0.4549 / 2.0)
+    return np.asarray(blocks / np.where(noise > 0.0, noise, np.inf))
+
+
+def _steps(blocks: FloatArray) -> _Steps:
+    x = blocks - blocks.mean(axis=1, keepdims=True)
+    whole = (x**2).sum(axis=1)
+    basis, _ = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, N_BLOCKS), SMOOTH + 1))
+    curve = (np.einsum("nbc,bd->ndc", x, basis) ** 2).sum(axis=1)
+    k = np.arange(EDGE, N_BLOCKS - EDGE + 1)
+    before = np.cumsum(x, axis=1)[:, k - 1]
+    # A step between k and n - k blocks explains S_k²/k + S_k²/(n - k): what is centred sums to nothing.
+    step = before**2 * (1.0 / k + 1.0 / (N_BLOCKS - k))[None, :, None]
+    best = step.argmax(axis=1)
+    explained = step.max(axis=1)
+    return _Steps(explained - curve, k[best], (whole - explained) / (N_BLOCKS - 3), x)
+
+
+def _walks(blocks: FloatArray) -> bool:
+    """Whether blocks four apart differ so much more than neighbours as only a walk's do (medians, jumps aside)."""
+    near, far = (float(np.median((blocks[:, lag:] - blocks[:, :-lag]) ** 2)) for lag in (1, LAG))
+    return far > LIKE_A_WALK * near
+
+
+def _moved(own: _Steps, other: _Steps | None, sensor: int) -> npt.NDArray[np.bool_]:
+    """(poses, axes) whether the other sensor sees motion at the step: a change that lasts, of a gyro also a pulse."""
+    if other is None:
+        return np.zeros(own.beats.shape, dtype=bool)
+    n_poses = len(own.beats)
+    rows = np.arange(n_poses)[:, None]
+    at = own.at
+    before = np.cumsum(other.blocks, axis=1)[rows, at - 1]
+    change = before**2 * (1.0 / at + 1.0 / (N_BLOCKS - at))[:, :, None]
+    seen = change.max(axis=2)
+    out = seen > TURNS**2 * np.maximum(np.median(seen, axis=0), 1.0)
+    if sensor == 0:
+        pulse = np.maximum(np.abs(other.blocks[rows, at - 1]), np.abs(other.blocks[rows, at])).max(axis=2)
+        out |= pulse > TURNS * np.maximum(np.median(pulse, axis=0), 1.0)
+    return np.asarray(out)
 
 
 @lru_cache(maxsize=16)
-def _null(n: int) -> FloatArray:
-    """Draws of the ratio for ``n`` poses whose changes are normal."""
-    z = np.abs(np.random.default_rng(SEED).normal(size=(N_DRAWS, n)))
-    low, high = np.quantile(z, (QUIET, LOUD), axis=1)
-    return np.asarray(high / np.maximum(low, 1e-12))
+def _nulls(n: int) -> tuple[FloatArray, ...]:
+    """Draws of the sum for ``n`` poses of white noise, of flicker, and of a walk."""
+    rng = np.random.default_rng(SEED)
+    return tuple(pool[rng.integers(0, len(pool), (N_DRAWS, n))].sum(axis=1) for pool in _pools())
+
+
+@lru_cache(maxsize=1)
+def _pools() -> tuple[FloatArray, ...]:
+    """What single poses of the three noises count."""
+    rng = np.random.default_rng(SEED)
+    white = rng.normal(size=(N_POOL, 4 * N_BLOCKS))
+    # 1/f by Kasdin's filter (fractional integration of order one half), and white over it summed up.
+    taps = np.ones(4 * N_BLOCKS)
+    for j in range(1, len(taps)):
+        taps[j] = taps[j - 1] * (j - 0.5) / j
+    flicker = np.asarray(lfilter(taps, [1.0], white, axis=1))
+    out = []
+    for series in (white, flicker, np.cumsum(white, axis=1)):
+        blocks = series.reshape(N_POOL, N_BLOCKS, 4).mean(axis=2)[:, :, None]
+        noise = np.sqrt(np.median(np.diff(blocks, axis=1) ** 2) / 0.4549 / 2.0)
+        steps = _steps(blocks / noise)
+        counted = np.where(steps.left < LOUD, np.maximum(steps.beats - COUNTS, 0.0), 0.0)
+        out.append(counted[:, 0])
+    return tuple(out)

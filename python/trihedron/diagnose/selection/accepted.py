@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.compare import excess
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel
@@ -31,7 +32,9 @@ def accepted_effects(model: StepwiseModel, numbers: Fit | None = None) -> tuple[
         first += k
         values, cov = final.twin.effect[span], effect_cov[span, span]
         if found.evidence is not None:
-            parameters, statement = found.evidence.parameters, found.evidence.statement
+            again = found.evidence.restate
+            parameters = found.evidence.parameters if again is None else again(Context(final.line.obs, final))
+            statement = found.evidence.statement
         else:
             assert found.variant is not None
             parameters = found.effect.parameters(found.variant, values, cov)

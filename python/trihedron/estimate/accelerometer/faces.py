@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+from scipy import special
 
 from trihedron.estimate.accelerometer import face_poses, inputs, verdict
+from trihedron.estimate.accelerometer.face_placements import placements
 from trihedron.estimate.accelerometer.face_poses import IntArray
 from trihedron.estimate.accelerometer.norm import norm_residual
 from trihedron.records.calibration import FitQuality, FloatArray, Frame, Observability, SensorCalibration
@@ -116,30 +117,13 @@ def calibrate_faces(
 def _estimate_placements(
     values: FloatArray, noise: FloatArray, faces: IntArray, g: float, *, closed: bool
 ) -> _Estimate:
-    """Fit with one mean for each time that the case was set down: holds between turns on one face share their tilt.
-
-    Poses that follow each other on the same face are one placement. Taken as independent they would seem to show, by
-    agreeing with each other, that nothing is tilted. What they scatter beyond noise (a tilt that turns with the case)
-    goes into the error of their mean.
-    """
-    start = np.flatnonzero(np.concatenate([[True], faces[1:] != faces[:-1]]))
-    if len(start) == len(faces):
+    """Fit with one mean for each time that the case was set down: holds between turns on one face share their tilt."""
+    placed = placements(values, noise, faces)
+    if len(placed.means) == len(faces):
         return _estimate(values, noise, faces, g, closed=closed)
-    count = np.diff(np.concatenate([start, [len(faces)]]))
-    merged = np.add.reduceat(values, start, axis=0) / count[:, None]
-    error = np.add.reduceat(noise, start, axis=0) / (count**2)[:, None, None]
-    level = np.abs(face_poses.direction_of(faces)) < 0.5
-    deviation = np.where(level, values - np.repeat(merged, count, axis=0), 0.0)
-    freedom = 2.0 * float(np.sum(count - 1))
-    scatter = float(np.sum(deviation**2)) / freedom
-    expected = float(np.mean(np.einsum("nii->n", noise))) / 3.0
-    is_tilted = scatter > expected * stats.chi2.isf(verdict.SIGNIFICANCE, freedom) / freedom
-    if is_tilted:
-        across = level[start][:, :, None] * np.eye(3)
-        error = error + across * (scatter / count)[:, None, None]
-    estimate = _estimate(merged, error, faces[start], g, closed=closed)
-    if is_tilted:
-        tilt2 = scatter / (g**2 * float(np.mean(np.sum(estimate.S_a**2, axis=0))))
+    estimate = _estimate(placed.means, placed.noise, placed.faces, g, closed=closed)
+    if placed.scatter is not None:
+        tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(estimate.S_a**2, axis=0))))
         estimate = _with_doubt(estimate, tilt2)
     residual = values - g * face_poses.direction_of(faces) @ estimate.S_a.T - estimate.b_a
     return replace(estimate, residual=residual)
@@ -162,7 +146,7 @@ def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float, 
     dof = 3 * len(values) - 12
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
     chi2_noise = _chi2(values, noise, faces, g)
-    if dof <= 0 or chi2_noise <= stats.chi2.ppf(1.0 - verdict.SIGNIFICANCE, dof):
+    if dof <= 0 or chi2_noise <= special.chdtri(dof, verdict.SIGNIFICANCE):
         return _Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof)
     low, high = 0.0, 0.5
     for _ in range(60):
@@ -175,7 +159,7 @@ def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float, 
     S_a, b_a, covariance = fit(values, widened, faces, g)
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
     # A tilt estimated from few degrees of freedom has Student's tails: 1.96 standard errors shall hold in 95 %.
-    covariance = covariance * float(stats.t.isf(0.025, dof) / stats.norm.isf(0.025)) ** 2
+    covariance = covariance * float(special.stdtrit(dof, 0.025) / special.ndtri(0.025)) ** 2
     return _with_doubt(_Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof), high**2)
 
 

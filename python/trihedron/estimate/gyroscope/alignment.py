@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc, chdtri
 
 from trihedron._core import AlignmentFit
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
@@ -150,7 +150,7 @@ def align_screened(
         # The median of χ²(2) is 1.386; residuals of p fitted parameters are smaller by 1 − p/n.
         shrink = max(1.0 - screen.rank / (2.0 * np.count_nonzero(used)), 0.1)
         typical = max(1.0, float(np.median(distance[used])) / (1.386 * shrink))
-        limit = float(chi2_distribution.isf(FALSE_ALARM / np.count_nonzero(used), 2)) * typical
+        limit = float(chdtri(2, FALSE_ALARM / np.count_nonzero(used))) * typical
         far = used & (distance > limit)
         # Screening may not decide the fit: enough moves must remain.
         if np.any(far) and 2 * np.count_nonzero(used & ~far) > n_parameters + 2:
@@ -160,7 +160,7 @@ def align_screened(
         is_near = screen.is_converged
     fit = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, None, is_near)
     inflation = 1.0
-    if fit.dof > 0 and chi2_distribution.sf(fit.chi2, fit.dof) < FALSE_ALARM:
+    if fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM:
         inflation = fit.chi2 / fit.dof
     return assemble(fit, measured, accelerometer, used, outliers, inflation)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -58,6 +58,6 @@ def attitude_dependence(zero: FloatArray, var_zero: FloatArray, force: FloatArra
         chi2_line += float(np.sum(weight * rest**2))
     ratio = ((chi2_mean - chi2_line) / 9.0) / max(chi2_line / (3.0 * (n - 4)), 1e-300)
     # Where noise alone explains the holds, a significant ratio of two tiny numbers means nothing.
-    p_value = float(f_distribution.sf(ratio, 9, 3 * (n - 4))) if chi2_mean > 3.0 * (n - 1) else 1.0
+    p_value = float(fdtrc(9, 3 * (n - 4), ratio)) if chi2_mean > 3.0 * (n - 1) else 1.0
     left = float(np.sqrt(chi2_line / (n - 4) / max(chi2_mean / (n - 1), 1e-300)))
     return AttitudeDependence(A, z0, var_z0, p_value, left)

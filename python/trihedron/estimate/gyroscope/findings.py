@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc
 
 from trihedron.estimate.gyroscope.alignment import FALSE_ALARM, Aligned
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, audit_moves
@@ -101,7 +101,7 @@ def _held_out_findings(held: Prediction | None, aligned: Aligned) -> list[Findin
     z2 = held.z2[aligned.used & np.isfinite(held.z2)]
     chi2, dof = float(z2.sum()), 2 * len(z2)
     # Residuals of neighbouring moves are correlated, which widens the scatter of their sum.
-    if chi2_distribution.sf(chi2 / aligned.inflation / 1.5, dof) > FALSE_ALARM:
+    if chdtrc(dof, chi2 / aligned.inflation / 1.5) > FALSE_ALARM:
         return []
     return [
         Finding.of(
@@ -136,7 +136,7 @@ def _attitude_findings(measured: MoveMeasurements, S: FloatArray) -> list[Findin
 
 def _drift_findings(measured: MoveMeasurements, S: FloatArray) -> list[Finding]:
     dof = len(measured.zero) - 1
-    if dof < 1 or chi2_distribution.sf(float(measured.zero_excess.max()), dof) > FALSE_ALARM / 3.0:
+    if dof < 1 or chdtrc(dof, float(measured.zero_excess.max())) > FALSE_ALARM / 3.0:
         return []
     rates = np.abs(np.diagonal(S)) if np.all(np.abs(np.diagonal(S)) > 0) else np.linalg.norm(S, axis=0)
     change = np.ptp(measured.zero, axis=0) * rates

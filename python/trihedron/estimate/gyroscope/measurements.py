@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc, chdtri
 
 from trihedron._core import Moves
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
@@ -302,7 +302,7 @@ def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArra
     if quality is None or not np.isfinite(quality.rms_dof) or not np.isfinite(quality.floor):
         return np.zeros(3)
     # Only beyond chance: half of all sound recordings scatter a little more than predicted.
-    if quality.dof < 1 or chi2_distribution.sf(quality.chi2, quality.dof) > 1e-3:
+    if quality.dof < 1 or chdtrc(quality.dof, quality.chi2) > 1e-3:
         return np.zeros(3)
     excess = max(quality.rms_dof**2 - quality.floor**2, 0.0)
     gains: FloatArray = np.sum(accelerometer.S**2, axis=0)
@@ -338,7 +338,7 @@ def excess_variance(values: FloatArray, noise: FloatArray) -> FloatArray:
 
     Solves ``median(x²/(v + τ²)) = median of χ²(1)`` for τ² of each column; zero where noise alone explains the median.
     """
-    target = float(chi2_distribution.median(1))
+    target = float(chdtri(1, 0.5))
     out = np.zeros(values.shape[1])
     for axis, (x2, v) in enumerate(zip((values**2).T, noise.T, strict=True)):
         low, high = 0.0, float(np.max(x2)) / target

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, median_filter
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
 
@@ -42,7 +42,7 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     shorter.
 
     One quintic is laid through four samples on either side of a step, in all channels at once, as they stand and with
-    one sample put between (docs/diagnosis-method.md, 8.12 with one count): a step is long if that joins them, by as
+    one sample put between (docs/diagnosis-method.md, 8.16 with one count): a step is long if that joins them, by as
     much as the motion's slope says. Steps that are as much too short are jolts, and so are as many of the long ones;
     the rest was lost: each takes the angle of one step from its turn. ``sigma_scale`` is the relative standard error
     of the gyro's scale: a share beyond it is serious.
@@ -72,7 +72,7 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
         long_steps.append(first + np.flatnonzero(found.is_long & is_known))
     at = np.concatenate(long_steps) if long_steps else np.zeros(0, dtype=np.intp)
     n_long = len(at)
-    if n_long < FEWEST or float(binom.sf(n_long - 1, n_long + n_short, 0.5)) > CHANCE:
+    if n_long < FEWEST or float(bdtrc(n_long - 1, n_long + n_short, 0.5)) > CHANCE:
         return []
     share, error = (n_long - n_short) / n, float(np.sqrt(n_long + n_short)) / n
     if share < FALSE_SHARE:

@@ -67,7 +67,7 @@ def stated_turns(
             "give one angle in degrees for each, 0 to leave it out."
         )
     return [
-        _turn(recording, segments, accelerometer, gravity_m_s2, move, math.radians(angle))
+        _turn(recording, segments, accelerometer, move, math.radians(angle))
         for move, angle in zip(moves, angles_deg, strict=True)
         if angle != 0.0
     ]
@@ -77,7 +77,6 @@ def _turn(
     recording: Recording,
     segments: Segments,
     accelerometer: SensorCalibration,
-    gravity_m_s2: float,
     move: Move,
     angle_rad: float,
 ) -> Turn:
@@ -90,17 +89,27 @@ def _turn(
         seen, sigma_seen = axis_of_turn(recording, segments, accelerometer, move, angle_rad)
         if sigma_seen < max(sigma, 1e-4):
             axis, sigma = seen, sigma_seen
-    axis = axis / np.linalg.norm(axis)
-    x, y, z = (float(v) for v in axis)
-    sigma = math.hypot(sigma, _sigma_of_direction(accelerometer, both.mean(axis=0), axis) / gravity_m_s2)
+    x, y, z = (float(v) for v in axis / np.linalg.norm(axis))
     return Turn(move.start, move.stop, None, angle_rad, (x, y, z), sigma)
 
 
-def _sigma_of_direction(accelerometer: SensorCalibration, reading: FloatArray, axis: FloatArray) -> float:
-    """Standard error [m/s²] across the axis that the accelerometer's calibration gives a force, per component."""
-    jacobian = np.concatenate([np.kron(np.eye(3), reading), np.eye(3)], axis=1)
-    across = np.eye(3) - np.outer(axis, axis)
-    return math.sqrt(max(float(np.trace(across @ jacobian @ accelerometer.covariance @ jacobian.T)), 0.0) / 2.0)
+def shared_errors(turns: Sequence[Turn], accelerometer: SensorCalibration, gravity_m_s2: float) -> FloatArray:
+    """(k, 3, 12) by what one standard error of each of the accelerometer's principal errors changes the turns, rad.
+
+    All turns share these errors: a turn there and one back on the same side do not average them, as they do the noise
+    of each circle.
+    """
+    values, vectors = np.linalg.eigh(accelerometer.covariance)
+    principal = vectors * np.sqrt(np.maximum(values, 0.0))
+    out = np.empty((len(turns), 3, len(principal)))
+    for k, turn in enumerate(turns):
+        assert turn.direction is not None
+        assert turn.angle_rad is not None
+        axis = np.array(turn.direction)
+        reading = np.linalg.solve(accelerometer.S, gravity_m_s2 * axis - accelerometer.b)
+        jacobian = np.concatenate([np.kron(np.eye(3), reading), np.eye(3)], axis=1)
+        out[k] = turn.angle_rad / gravity_m_s2 * (np.eye(3) - np.outer(axis, axis)) @ jacobian @ principal
+    return out
 
 
 def axis_of_turn(

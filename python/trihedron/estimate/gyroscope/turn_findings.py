@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc
 
 from trihedron.estimate.gyroscope.turn_angles import KnownTurn
 from trihedron.estimate.gyroscope.turn_system import FALSE_ALARM, Screened
@@ -76,7 +76,7 @@ def _not_a_multiple(index: int, turn: KnownTurn, quantum_rad: float) -> Finding:
 def _drift(screened: Screened) -> list[Finding]:
     measured = screened.system.measured
     dof = len(measured.zero_duration_s) - 1
-    if dof < 1 or chi2_distribution.sf(float(measured.zero_excess.max()), dof) > FALSE_ALARM / 3.0:
+    if dof < 1 or chdtrc(dof, float(measured.zero_excess.max())) > FALSE_ALARM / 3.0:
         return []
     axis = int(np.argmax(measured.zero_excess))
     return [

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc, chdtri
 
 from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
 
@@ -84,6 +84,14 @@ class TurnSystem:
             design = np.concatenate([design, factor @ still])
             side = np.concatenate([side, (factor @ measured.zero_angle[:, :, None])[:, :, 0]])
         return design.reshape(-1, 12), side.ravel()
+
+    def pull(self, fit: Solution, used: BoolArray, errors: FloatArray) -> FloatArray:
+        """(12, m) by what errors of the turns (k, 3, m), rad, that all of them share, pull the solution."""
+        matrix, _ = self.whitened(used, with_zeros=False)
+        factor = np.linalg.inv(np.linalg.cholesky(self.covariances()[used]))
+        moved = factor @ (fit.S_w @ errors[used])
+        out: FloatArray = fit.covariance @ matrix.T @ moved.reshape(len(matrix), -1)
+        return out
 
     def residuals(self, fit: Solution) -> FloatArray:
         """(k, 3) measured minus predicted raw turns."""
@@ -204,7 +212,7 @@ def screen(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | None) ->
         distances = _distances(_with_scatter(system, used, sigma_turn_rad), used)
         if not distances:
             break
-        limit = float(chi2_distribution.isf(FALSE_ALARM / len(distances), 3))
+        limit = float(chdtri(3, FALSE_ALARM / len(distances)))
         worst = max(distances, key=lambda index: distances[index])
         if distances[worst] <= limit:
             break
@@ -245,11 +253,22 @@ def _with_scatter(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | N
 
 
 def _matching_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
-    """Scatter along and across the turns by moments; none where the rate noise explains the residuals."""
+    """Scatter along and across the turns by moments, where the rate noise does not explain the residuals; that across
+    wherever it is seen.
+
+    A case that lies flat to some hundredths of a degree scatters as much as the noise of a turn, which no test shows in
+    twelve turns: left out for want of proof, 95 % intervals held 91 %. Turns that follow each other about one axis
+    share how the case lies: as many of them count as one.
+    """
     system = replace(system, sigma_turn=0.0, sigma_tilt=0.0)
     fit = solve(system, used)
-    if fit.dof < 1 or chi2_distribution.sf(fit.chi2, fit.dof) > FALSE_ALARM:
+    if fit.dof < 1:
         return system
+    if chdtrc(fit.dof, fit.chi2) > FALSE_ALARM:
+        _, across2, noise2 = _components(system, system.residuals(fit))
+        k = int(np.count_nonzero(used))
+        beyond = _beyond(float(np.sum(across2[used])) / max(2 * k - 6, 1), noise2)
+        return replace(system, sigma_tilt=beyond * math.sqrt(_turns_a_placement(system.angles[used])))
     k = int(np.count_nonzero(used))
     for _ in range(3):
         along2, across2, noise2 = _components(system, system.residuals(solve(system, used)))
@@ -262,7 +281,13 @@ def _matching_scatter(system: TurnSystem, used: BoolArray) -> TurnSystem:
     return system
 
 
-MEDIAN_1, MEDIAN_2 = (float(chi2_distribution.median(n)) for n in (1, 2))
+def _turns_a_placement(angles: FloatArray) -> float:
+    """How many turns follow each other about one axis, on the average."""
+    axis = np.argmax(np.abs(angles), axis=1)
+    return len(axis) / (1.0 + float(np.count_nonzero(np.diff(axis))))
+
+
+MEDIAN_1, MEDIAN_2 = (float(chdtri(n, 0.5)) for n in (1, 2))
 
 
 def _components(system: TurnSystem, raw: FloatArray) -> tuple[FloatArray, FloatArray, float]:

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2 as chi2_distribution
+from scipy.special import chdtrc
 
 from trihedron.estimate.gyroscope.turn_angles import (
     AMBIGUOUS,
@@ -74,6 +74,7 @@ def calibrate_turns(
     quantum_rad: float = QUARTER,
     route: Route = "least-squares",
     sigma_turn_rad: float | None = None,
+    shared_errors: FloatArray | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Calibrate the gyro from turns about case axes: ``φ'_i = S_w φ_i + b_w Δt_i + δφ_i`` (equation 5.12).
 
@@ -94,6 +95,8 @@ def calibrate_turns(
         All rows at once (default), or ``b_w`` from the zero turns alone, then ``S_w`` from ``Δw' = w' − b_w``.
     sigma_turn_rad : float, optional
         Standard error of a turn's angle (wall, corners); estimated from the residuals when not given.
+    shared_errors : (k, 3, m), optional
+        What one standard error of each of m independent errors that all turns share does to the turns, rad.
 
     Returns
     -------
@@ -125,9 +128,13 @@ def calibrate_turns(
     S, b = other_form(fit.S_w, fit.b_w)
     jacobian = other_form_jacobian(fit.S_w, fit.b_w)
     inflation = 1.0
-    if fit.dof > 0 and chi2_distribution.sf(fit.chi2, fit.dof) < FALSE_ALARM:
+    if fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM:
         inflation = fit.chi2 / fit.dof
-    covariance = inflation * jacobian @ fit.covariance @ jacobian.T
+    inverse_covariance = inflation * fit.covariance
+    if shared_errors is not None:
+        pull = system.pull(fit, used, shared_errors)
+        inverse_covariance = inverse_covariance + pull @ pull.T
+    covariance = jacobian @ inverse_covariance @ jacobian.T
     calibration = SensorCalibration(
         S=S,
         b=b,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.audit.repeats import CHUNK
+from trihedron import _core
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode
 
@@ -19,6 +19,8 @@ STEEP = 5.0
 """The wall is reached by steps this many times the noise: a quiet sensor resting on its largest count is no wall."""
 FLAT = 6
 """So many equal readings in a row at the wall do the same for a sensor whose noise is above its resolution."""
+MOST_LEVELS = 0.2
+"""Different readings, as a part of all, above which they do not step."""
 PILED = 3.0
 """And it holds this many times more samples than the neighbouring values lead up to."""
 
@@ -38,28 +40,20 @@ class Wall:
 def find_walls(readings: FloatArray, noise: FloatArray) -> list[Wall]:
     """Walls of a triad (n, 3) with ``noise`` (3,) of one sample at rest."""
     walls = []
-    for axis in range(3):
-        values = readings[:, axis]
-        low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
+    for axis, (low, n_low, high, n_high) in enumerate(_core.triad_extremes(readings)):
         if not low < high:
             continue
-        for value in (high, low):
-            wall = _wall(values, value, 0.01 * (high - low), float(noise[axis]))
+        for value, count in ((high, n_high), (low, n_low)):
+            wall = _wall(readings, axis, value, 0.01 * (high - low), float(noise[axis])) if count > 2 else None
             if wall is not None:
                 count, stretches, sample = wall
                 walls.append(Wall(axis, value, value == high, count, stretches, sample))
     return walls
 
 
-def _wall(values: FloatArray, value: float, depth: float, noise: float) -> tuple[int, int, int] | None:
-    at = np.flatnonzero(values == value)
-    if len(at) < 3:
-        return None
-    near, width = -len(at), math.inf
-    for start in range(0, len(values), CHUNK):
-        distance = np.abs(values[start : start + CHUNK] - value)
-        near += int(np.count_nonzero(distance <= depth))
-        width = min(width, float(np.min(distance, where=distance > 0, initial=math.inf)))
+def _wall(readings: FloatArray, axis: int, value: float, depth: float, noise: float) -> tuple[int, int, int] | None:
+    within, width, at = _core.readings_near(readings, axis, value, depth)
+    values, near = readings[:, axis], within - len(at)
     # Towards the top of a smooth peak the density grows as one over the root of the distance, so the share of the
     # topmost level among all within `depth` is the root of its width.
     by_shape = near * min(math.sqrt(width / depth), 1.0)
@@ -88,15 +82,19 @@ def _is_full_scale(value: float) -> bool:
 def quantum(values: FloatArray) -> float:
     """Step between neighbouring possible readings; zero where the values do not repeat, as those of a fine sensor."""
     probe = values[:: max(1, len(values) // 200_000)]
-    levels = np.unique(probe[np.isfinite(probe)])
-    if len(levels) < 2 or len(levels) > 0.2 * len(probe):
+    finite = probe[np.isfinite(probe)]
+    # Where a quarter of them holds that many levels, all do.
+    if len(np.unique(finite[::4])) > MOST_LEVELS * len(probe):
+        return 0.0
+    levels = np.unique(finite)
+    if len(levels) < 2 or len(levels) > MOST_LEVELS * len(probe):
         return 0.0
     # Decimals as written may differ in the last digit for one and the same code: the tenth percentile passes over that.
     step: np.float64 = np.percentile(np.diff(levels), 10.0)
     return float(step)
 
 
-def _runs(at: npt.NDArray[np.intp]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def _runs(at: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """(start, length) of runs of consecutive indices."""
     breaks = np.flatnonzero(np.diff(at) > 1)
     starts = np.concatenate([at[:1], at[breaks + 1]])

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from trihedron.read.audit.clipping import AXES, audit_clipping, find_walls, quantum, short
-from trihedron.read.audit.repeats import CHUNK, Repeats, longest_by_chance
+from trihedron.read.audit.repeats import Repeats, longest_by_chance
 from trihedron.read.rest import Windows
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Severity
@@ -18,11 +18,11 @@ MANY, LONG, HALF = 0.05, 0.1, 0.5
 
 
 def audit_readings(sensor: str, readings: FloatArray, windows: Windows | None, place: Place) -> list[Finding]:
-    """Findings on one triad (n, 3). ``place(i)`` names sample i for people; memory is bounded by ``CHUNK``."""
-    findings = _non_finite(sensor, readings, place)
+    """Findings on one triad (n, 3). ``place(i)`` names sample i for people; one pass for the usual log."""
+    repeats = Repeats(readings)
+    findings = _non_finite(sensor, repeats, place)
     if len(readings) < 8:
         return findings
-    repeats = Repeats(readings)
     findings += _repeated(sensor, repeats, place)
     walls = find_walls(readings, windows.quiet_noise(sensor) if windows is not None else np.zeros(3))
     findings += audit_clipping(sensor, walls, place)
@@ -34,24 +34,15 @@ def audit_readings(sensor: str, readings: FloatArray, windows: Windows | None, p
     return findings
 
 
-def _non_finite(sensor: str, readings: FloatArray, place: Place) -> list[Finding]:
-    count, first = 0, -1
-    for start in range(0, len(readings), CHUNK):
-        finite = np.isfinite(readings[start : start + CHUNK])
-        if finite.all():
-            continue
-        bad = ~finite.all(axis=1)
-        here = int(np.count_nonzero(bad))
-        if here and first < 0:
-            first = start + int(np.argmax(bad))
-        count += here
-    if not count:
+def _non_finite(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
+    count, first = repeats.n_missing, repeats.first_missing
+    if first is None:
         return []
     return [
         Finding.of(
             FindingCode.NON_FINITE,
             "readings",
-            severity=Severity.WARNING if count < MANY * len(readings) else Severity.SERIOUS,
+            severity=Severity.WARNING if count < MANY * repeats.n else Severity.SERIOUS,
             sensor=short(sensor),
             count=count,
             where=place(first),

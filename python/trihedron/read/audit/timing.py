@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from trihedron import _core
 from trihedron.read.clock.rate import usual_step
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Sampling, Severity, StampKind
 from trihedron.records.sampling import UNJUDGED
@@ -41,25 +43,28 @@ def audit_timing(
     usual = usual_step(time_s)
     if not usual > 0:
         return []
-    step = np.diff(time_s)
-    findings = _duplicates(step if stamps_s is None else np.diff(stamps_s), place, is_mended=stamps_s is not None)
+    findings: list[Finding] = []
+    if steps_of(time_s if stamps_s is None else stamps_s).same:
+        findings += _duplicates(
+            np.diff(time_s if stamps_s is None else stamps_s), place, is_mended=stamps_s is not None
+        )
     if lost_behind is not None:
-        findings += _lost(step, lost_behind, place)
+        findings += _lost(np.diff(time_s), lost_behind, place) if lost_behind.any() else []
     elif sampling.kind in (StampKind.LATE, StampKind.SCATTERED):
         pass  # a late stamp looks like a loss: how many are lost is not told
     else:
-        batched = bool(findings) and np.count_nonzero(step == 0) > 0.2 * len(step)
-        gaps = np.flatnonzero(step > (5.0 if batched else GAP_STEPS) * usual)
-        lost = np.zeros(len(step), dtype=np.int64)
-        lost[gaps] = np.maximum(np.rint(step[gaps] / usual) - 1, 0)
-        findings += _gap(step, gaps, lost, place) if len(gaps) else []
+        batched = bool(findings) and steps_of(time_s).same > 0.2 * (len(time_s) - 1)
+        gaps = _core.steps_above(time_s, (5.0 if batched else GAP_STEPS) * usual)
+        if len(gaps):
+            step = np.diff(time_s)
+            lost = np.zeros(len(step), dtype=np.int64)
+            lost[gaps] = np.maximum(np.rint(step[gaps] / usual) - 1, 0)
+            findings += _gap(step, gaps, lost, place)
+    stamps = time_s
     if stamps_s is not None:
-        usual = usual_step(stamps_s)
-        step = np.diff(stamps_s)
-    is_inside = (step <= GAP_STEPS * usual) & (step > 0)
-    inside = step if is_inside.all() else step[is_inside]
-    jitter = float(inside.std())
-    mean = float(inside.mean())
+        usual, stamps = usual_step(stamps_s), stamps_s
+    count, total, jitter, least, most = _core.inside_steps(stamps, 0.0, GAP_STEPS * usual)
+    mean = total / count
     if jitter > JITTER_STEPS * mean:
         findings.append(
             Finding.of(
@@ -70,8 +75,8 @@ def audit_timing(
                 median_rate_hz=1 / usual,
                 mean_step_s=mean,
                 mean_rate_hz=1 / mean,
-                least_s=inside.min(),
-                largest_s=inside.max(),
+                least_s=least,
+                largest_s=most,
                 rate_hz=rate_hz,
                 is_irregular=sampling.kind is StampKind.IRREGULAR,
             )

@@ -8,11 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.clock.order import order_of_rows, unwrap
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.clock.unit import SECONDS, Witness, time_unit
 from trihedron.read.errors import ReadError
 from trihedron.read.table import FloatArray, Table
 from trihedron.records import Finding, FindingCode
 
+_SHORTEST_STEP_S = 1e-9
+"""Mean step of a log: no converter takes a sample in a nanosecond."""
 _LONGEST_S = 3.2e9
 """A century."""
 NOBODY = Witness()
@@ -54,8 +57,9 @@ def build_clock(
         named = "s"
     findings: list[Finding] = []
     rows: npt.NDArray[np.int64] | None = None
-    finite = np.isfinite(raw)
-    if not finite.all():
+    steps = steps_of(raw)
+    if steps.missing:
+        finite = np.isfinite(raw)
         bad = int(np.flatnonzero(~finite)[0])
         if finite.sum() < 2:
             raise ReadError(f"{table.path}: the time column {table.label(column)} holds no numbers; name another one.")
@@ -64,21 +68,31 @@ def build_clock(
         )
         rows = np.flatnonzero(finite)
         raw = raw[rows]
-    if len(raw) > 1 and np.all(raw == raw[0]):
+        steps = steps_of(raw)
+    if len(raw) > 1 and steps.same == len(raw) - 1:
         raise ReadError(
             f"{table.path}: the time column {table.label(column)} holds {raw[0]:.12g} in every row; "
             "choose another with --columns time=..., or --columns time=none with --rate."
         )
-    raw, wraps = unwrap(raw, table, rows, findings)
-    order = order_of_rows(raw, table, column, rows, findings) if len(raw) > 1 else None
+    raw, wraps = unwrap(raw, table, rows, findings) if steps.back else (raw, False)
+    order = order_of_rows(raw, table, column, rows, findings) if steps.back else None
     if order is not None:
         raw = raw[order]
         rows = order if rows is None else rows[order]
     unit = time_unit(raw, named, given, wraps, witness, findings)
     scale = SECONDS[unit]
+    span = (raw[-1] - raw[0]) * scale
+    if len(raw) > 1 and span < _SHORTEST_STEP_S * (len(raw) - 1):
+        raise ReadError(
+            f"{table.path}: column {table.label(column)} read as time in {unit} steps by "
+            f"{span / (len(raw) - 1):.3g} s, which no log does; give --time-unit, or name another time column."
+        )
     if not (raw[-1] - raw[0]) * scale < _LONGEST_S:
         raise ReadError(
             f"{table.path}: column {table.label(column)} read as time in {unit} spans "
             f"{(raw[-1] - raw[0]) * scale:.3g} s, which no log does; give --time-unit, or name another time column."
         )
-    return Clock((raw - raw[0]) * scale, float(base + raw[0]) * scale, rows, tuple(findings))
+    time_s = raw - raw[0]
+    if scale != 1.0:
+        time_s *= scale
+    return Clock(time_s, float(base + raw[0]) * scale, rows, tuple(findings))

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
 
+from trihedron import _core
 from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, earliest, lateness, track
 from trihedron.read.clock.period import find_period
 from trihedron.read.table import FloatArray
@@ -144,7 +145,7 @@ def _lay(
     longest stretch and the standard error of that; whether its rate wanders, followed in so many ``pieces``.
 
     ``least`` rows make a block at least."""
-    late = lateness(time_s, tick.astype(np.float64), period)
+    late = lateness(time_s, tick, period)
     # Each stretch of the clock takes the place of the lateness that it was found from.
     even = late
     edges = np.concatenate([[0], pauses + 1, [len(late)]])
@@ -158,18 +159,15 @@ def _lay(
             continue
         if through_middle:
             cut = (b - a) // width * width
-            x = tick[a : a + cut].reshape(-1, width).mean(axis=1)
-            rows = piece[:cut].reshape(-1, width)
-            # In parts: a median works on a copy.
-            step = max((1 << 18) // width, 1)
-            y = each = np.concatenate([np.median(rows[i : i + step], axis=1) for i in range(0, len(rows), step)])
+            x = _core.block_mean_ticks(tick[a : a + cut], width)
+            y = each = _core.block_medians(piece[:cut], width)
         else:
             at = earliest(piece, width)
             x, each = tick[a:b][at].astype(np.float64), piece[at]
             y = ahead(each, STALL_STEPS // width + 1)
         x0, scale = x.mean(), max(float(np.ptp(x)), 1.0)
         u = (x - x0) / scale
-        line = _robust_line(u, y)
+        line = _core.robust_line(u, y)
         left = y - np.polyval(line, u)
         noise = 1.4826 * float(np.median(np.abs(np.diff(each)))) / np.sqrt(2.0) + 1e-3 * period
         size = min(max(len(y) // 12, 5), 401) | 1
@@ -180,13 +178,12 @@ def _lay(
         if curved and len(y) >= 24:
             wanders = True
             course = median_filter(left, min(max(len(y) // pieces, 5), 101) | 1, mode="nearest")
-        for p in _parts(a, b):
-            even[p] = np.polyval(line, (tick[p] - x0) / scale)
-            if course is not None:
+        _core.lay_even_clock(tick[a:b], line, x0, scale, period, even[a:b])
+        if course is not None:
+            for p in _parts(a, b):
                 even[p] += np.interp(tick[p], x, course)
-            even[p] += period * tick[p]
         if b - a > longest:
-            longest, slope = b - a, float(line[0]) / scale
+            longest, slope = b - a, line[0] / scale
             spread = float(np.std(left - smooth if curved else left))
             # Neighbouring blocks share what delays them: four count as one.
             sigma = spread / scale / max(float(np.std(u)), 1e-9) / np.sqrt(max(len(y) / 4.0, 1.0))
@@ -198,20 +195,6 @@ def _parts(first: int, stop: int) -> Iterator[slice]:
     """Rows in parts that need little room beside the log itself."""
     for a in range(first, stop, 1 << 18):
         yield slice(a, min(a + (1 << 18), stop))
-
-
-def _robust_line(u: FloatArray, y: FloatArray) -> FloatArray:
-    """Straight line through points of which some are far too late."""
-    keep = np.ones(len(y), dtype=bool)
-    line = np.polyfit(u, y, 1)
-    for _ in range(3):
-        left = y - np.polyval(line, u)
-        limit = 4.0 * 1.4826 * float(np.median(np.abs(left - np.median(left)))) + 1e-12
-        keep = np.abs(left - np.median(left)) <= limit
-        if keep.sum() < 3:
-            break
-        line = np.polyfit(u[keep], y[keep], 1)
-    return np.asarray(line)
 
 
 def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:

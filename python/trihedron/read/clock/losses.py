@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
 
+from trihedron import _core
 from trihedron.read.clock.period import PAUSE_STEPS
 from trihedron.read.table import FloatArray
 
@@ -18,6 +19,10 @@ LOST = 0.6
 """Part of a period by which the earliest stamps must move, and stay moved, for a sample to be lost."""
 MISS = 1e-2
 """Chance that no stamp of a whole log's blocks is nearly undelayed."""
+SETTLED_OVER = 5
+"""Blocks over which the level of the earliest stamps is looked at on either side of a place."""
+UNMOVED = LOST / (2.0 * SETTLED_OVER)
+"""Moves from block to block, in periods, of which so many together are no loss."""
 STALL_STEPS = 120
 """A link that stands still for longer than this has paused."""
 
@@ -39,22 +44,12 @@ def block_rows(time_s: FloatArray, period: float, coherence: float) -> int:
 
 def earliest(late: FloatArray, width: int) -> IntArray:
     """Row of the earliest stamp of every block of ``width`` rows (the last one may be longer)."""
-    blocks = max(len(late) // width, 1)
-    body = late[: blocks * width].reshape(blocks, -1) if blocks * width <= len(late) else late[None, :]
-    at = body.argmin(axis=1) + np.arange(blocks) * body.shape[1]
-    rest = late[blocks * width :]
-    if len(rest) and rest.min() < late[at[-1]]:
-        at[-1] = blocks * width + int(rest.argmin())
-    if len(late) - at[-1] > width:
-        at = np.append(at, len(late) - width // 2 + int(late[-(width // 2) :].argmin()))
-    return np.asarray(at, dtype=np.int64)
+    return _core.earliest_stamps(late, width)
 
 
-def lateness(time_s: FloatArray, rows: FloatArray, period: float) -> FloatArray:
-    """``time_s - period * rows`` in the place of ``rows``."""
-    rows *= -period
-    rows += time_s
-    return rows
+def lateness(time_s: FloatArray, tick: IntArray | None, period: float) -> FloatArray:
+    """``time_s - period * tick``; without ticks each row is its own."""
+    return _core.stamp_lateness(time_s, tick, period)
 
 
 def ahead(values: FloatArray, reach: int) -> FloatArray:
@@ -77,11 +72,11 @@ def track(
     and by a little where the period is not quite right; a period that was not seen comes from first and last stamp.
     """
     n = len(time_s)
-    pauses = np.flatnonzero(np.diff(time_s) > PAUSE_STEPS * period)
+    pauses = _core.steps_above(time_s, PAUSE_STEPS * period)
     edges = np.concatenate([[0], pauses + 1, [n]])
     reach = STALL_STEPS // width + 1
     for _ in range(0 if sees else 3):
-        late = lateness(time_s, np.arange(n, dtype=np.float64), period)
+        late = lateness(time_s, None, period)
         slopes, weights = [], []
         for a, b in pairwise(edges):
             if b - a >= 4 * width:
@@ -90,7 +85,7 @@ def track(
                 weights.append(b - a)
         if slopes:
             period += float(np.average(slopes, weights=weights))
-    late = lateness(time_s, np.arange(n, dtype=np.float64), period)
+    late = lateness(time_s, None, period)
     late /= period
     # Half the room where the ticks allow it, and the same numbers.
     is_short = n + float(time_s[-1] - time_s[0]) / period < 0.5 * np.iinfo(np.int32).max
@@ -105,10 +100,13 @@ def track(
         # How many a pause cost is told no better than its own length.
         lost[k + 1] += max(round(float(time_s[k + 1] - time_s[k]) / period) - 1, 0)
     del late
+    if not lost.any():
+        return period, np.arange(n, dtype=lost.dtype), pauses, back / max(blocks, 1)
     # The ticks in the place of the losses: a log of 1e8 rows has no room for both.
+    lost += np.int8(1)
+    lost[0] -= 1
     tick = np.cumsum(lost, out=lost)
-    tick += np.arange(n, dtype=lost.dtype)
-    return period, tick, pauses.astype(np.int64), back / max(blocks, 1)
+    return period, tick, pauses, back / max(blocks, 1)
 
 
 def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost: IntArray) -> tuple[int, int]:
@@ -119,7 +117,12 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
     Returns the number of blocks that moved back by a period, and of all blocks.
     """
     at = earliest(late, width)
-    first = ahead(late[at], reach)
+    first = late[at]
+    if len(first) > 1 and float(np.abs(np.diff(first)).max()) <= UNMOVED:
+        # Nor does any minimum over neighbours move further: nothing is lost, and no hidden loss is to be looked for.
+        _behind_last(late, int(at[-1]), float(first[-1]), is_sharp, lost)
+        return 0, len(at)
+    first = ahead(first, reach)
     # The level the clock itself drifts on: the part of the moves that is not whole periods.
     moves = np.diff(first)
     count = np.floor(moves + (1.0 - LOST)).astype(np.int64)
@@ -136,11 +139,16 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
         whole[-1] = count[j]
         whole = np.maximum.accumulate(whole)
         lost[a + 1 : b + 1] += np.diff(whole, prepend=0)
-    tail = late[at[-1] :] - first[-1]
+    _behind_last(late, int(at[-1]), float(first[-1]), is_sharp, lost)
+    return back, len(at)
+
+
+def _behind_last(late: FloatArray, at: int, level: float, is_sharp: bool, lost: IntArray) -> None:
+    """Write the samples lost behind row ``at``, the earliest of the last block, into ``lost``."""
+    tail = late[at:] - level
     if is_sharp and len(tail) > 1:
         whole = np.floor(np.minimum.accumulate(tail[::-1])[::-1] + (1.0 - LOST)).astype(np.int64)
-        lost[at[-1] + 1 :] += np.diff(np.maximum(whole, 0))
-    return back, len(at)
+        lost[at + 1 :] += np.diff(np.maximum(whole, 0))
 
 
 def _settle(first: FloatArray, count: IntArray) -> None:
@@ -148,7 +156,7 @@ def _settle(first: FloatArray, count: IntArray) -> None:
 
     A block without an early stamp hides the move to the next level in two halves; a chance early one invents a move.
     """
-    m = 5
+    m = SETTLED_OVER
     for _ in range(3):
         level = first - np.concatenate([[0], np.cumsum(count)])
         if len(level) < 2 * m + 1:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft, signal, stats
+from scipy import fft, special
 
 from trihedron.read.table import FloatArray
 
@@ -21,6 +21,8 @@ GRID_HIGHEST = 16.0
 """A grid of stamps finer than this part of a period is no matter."""
 LINE, LINE_HELD = 0.98, 0.9
 """Power of a phase sum, and of that of its eighth multiple, above which all stamps lie on multiples of one step."""
+LEAST = 1e-4
+"""Power below which nothing is a peak."""
 CHANCE = 1e-7
 """Chance of noise to pass for a period at one frequency looked at (some 10⁴ of them). Steps drawn anew, without a clock
 behind them, leave a hump as high as a line, but wide: what a line is held against lies beside it."""
@@ -65,8 +67,11 @@ def find_period(time_s: FloatArray) -> Period:
     cell = mean_step / (2.0 * GRID_HIGHEST)
     size = max(float(w[-1]) for w in windows) / cell
     length = int(fft.next_fast_len(int(4 * size) + 16, real=True))
+    # Sharing stamps linearly between neighbouring cells lowers a frequency by sinc², undone here.
+    damped = np.sinc(np.arange(length // 2 + 1) / length) ** 2
     power = np.average([_phase_sum(w / cell, length) for w in windows], axis=0, weights=[len(w) for w in windows])
-    threshold = float(stats.gamma.isf(CHANCE, len(windows)) / stats.gamma.median(len(windows)))
+    power /= damped**2
+    threshold = float(special.gammainccinv(len(windows), CHANCE) / special.gammaincinv(len(windows), 0.5))
     spectrum = _Spectrum(np.asarray(power), mean_step / (length * cell), int(2 * length / size) + 1, threshold)
     line = _first_line(windows, mean_step, spectrum)
     grid = mean_step / line if line else 0.0
@@ -100,8 +105,9 @@ class _Spectrum:
     def peaks(self) -> IntArray:
         """Points inside the range of periods that stand out sharply from what is beside them."""
         a, b = int(LOWEST / self.width), min(int(HIGHEST / self.width) + 1, len(self.power) - 1)
-        found, _ = signal.find_peaks(self.power[a - 1 : b + 1], height=1e-4)
-        found = found + a - 1
+        inside = self.power[a:b]
+        is_peak = (inside > self.power[a - 1 : b - 1]) & (inside >= self.power[a + 1 : b + 1]) & (inside >= LEAST)
+        found = a + np.flatnonzero(is_peak)
         near, far = self.lobe, 8 * self.lobe
         beside = np.concatenate([np.arange(-far, -near), np.arange(near + 1, far + 1)])
         index = np.clip(found[:, None] + beside, 0, len(self.power) - 1)
@@ -119,19 +125,26 @@ def _first_line(windows: list[FloatArray], mean_step: float, spectrum: _Spectrum
         f = _summit(spectrum.power, k) * spectrum.width
         # The multiple of a rough frequency misses by as many times: its own neighbourhood is looked through.
         fine = f + spectrum.width * np.linspace(-0.5, 0.5, 41)
-        held = [float(np.mean([_direct(w, x * m / mean_step) for w in windows])) for m in (1, 8) for x in fine]
-        first, eighth = max(held[:41]), max(held[41:])
-        if first > LINE and eighth > LINE_HELD:
-            return float(fine[int(np.argmax(held[41:]))])
+        first, eighth = (np.mean([_direct(w, m * fine / mean_step) for w in windows], axis=0) for m in (1, 8))
+        if first.max() > LINE and eighth.max() > LINE_HELD:
+            return float(fine[int(np.argmax(eighth))])
         high = high[high > group[-1] + spectrum.lobe]
         if len(high) > 400:
             return 0.0
     return 0.0
 
 
-def _direct(time_s: FloatArray, frequency_hz: float) -> float:
+def _direct(time_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
+    """Power of the phase sum of the first stamps at every frequency (k,), evenly spaced."""
     part = time_s[:512]
-    return float(np.abs(np.exp(2j * np.pi * frequency_hz * part).mean()) ** 2)
+    # A frequency on, every stamp turns by so much: the first and its turns take the place of k exponentials.
+    phase = np.exp(2j * np.pi * frequency_hz[0] * part)
+    turn = np.exp(2j * np.pi * (frequency_hz[1] - frequency_hz[0]) * part)
+    out = np.empty(len(frequency_hz))
+    for k in range(len(frequency_hz)):
+        out[k] = np.abs(phase.mean()) ** 2
+        phase *= turn
+    return out
 
 
 def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:
@@ -162,9 +175,7 @@ def _phase_sum(position: FloatArray, length: int) -> FloatArray:
     taper = np.sin(np.pi * (np.arange(len(position)) + 0.5) / len(position)) ** 2
     weight = np.bincount(cell, (1.0 - share) * taper, length) + np.bincount(cell + 1, share * taper, length)
     spectrum = fft.rfft(weight[:length])
-    # Sharing stamps linearly between neighbouring cells lowers a frequency by sinc², undone here.
-    damped = np.sinc(np.arange(len(spectrum)) / length) ** 2
-    return np.asarray((np.abs(spectrum) / damped / taper.sum()) ** 2)
+    return np.asarray((np.abs(spectrum) / taper.sum()) ** 2)
 
 
 def _poll(spectrum: _Spectrum) -> float:

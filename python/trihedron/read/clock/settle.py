@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from trihedron.read.clock.even import EvenClock, find_even_clock
 from trihedron.read.clock.followed import followed
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode
 from trihedron.records.sampling import Sampling, StampKind
@@ -60,7 +61,7 @@ def settle_clock(
         return Settled(time_s, start_s, Sampling(StampKind.IRREGULAR, clock.period_s), None, ())
     lost = clock.lost_behind
     share, sigma = 0.0, float("inf")
-    shared = float(np.mean(time_s[1:] == time_s[:-1]))
+    shared = steps_of(time_s).same / (len(time_s) - 1)
     is_even = False
     if clock.stamp_error_s > WORTH * clock.period_s:
         share, sigma = followed(time_s, clock.even_s, clock.tick, triads)

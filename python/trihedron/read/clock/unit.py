@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.read.clock.rate import usual_step
+from trihedron.read.clock.steps import steps_of
 from trihedron.read.errors import ReadError
 from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode
@@ -63,16 +64,15 @@ def time_unit(
         return parse_time_unit(given)
     if named:
         return named
-    n_steps, n_forward = len(raw) - 1, int(np.count_nonzero(raw[1:] > raw[:-1]))
+    n_steps, n_forward = len(raw) - 1, steps_of(raw).forward
     if not n_forward:
         return "s"
     # Stamps that several rows share: a row lasts the span over the rows, not the step between stamps.
     shared = n_forward < 0.8 * n_steps
     usual = float((raw[-1] - raw[0]) / n_steps) if shared else usual_step(raw)
     start = float(raw[0])
-    possible = [
-        u for u in _CANDIDATES if PLAUSIBLE_HZ[0] <= 1.0 / (usual * SECONDS[u]) <= PLAUSIBLE_HZ[1]
-    ]  # fmt: skip
+    shortest, longest = 1.0 / PLAUSIBLE_HZ[1], 1.0 / PLAUSIBLE_HZ[0]
+    possible = [u for u in _CANDIDATES if shortest <= usual * SECONDS[u] <= longest]
     # A date between 2001 and 2096 in the unit settles it; nothing else counts that high.
     dated = [u for u in _CANDIDATES if 1e9 <= start * SECONDS[u] <= 4e9]
     dated = [u for u in dated if u in possible] or (dated if len(dated) == 1 and not wraps else [])
@@ -136,7 +136,7 @@ def _quickest_turns(accelerometer: FloatArray | None) -> tuple[int | None, int |
     rows, any_turn = 1, None
     while rows + _SIDE < len(mean):
         lag = rows + _SIDE - 1
-        has_turned = (mean[:-lag] * mean[lag:]).sum(axis=1) < math.cos(turn)
+        has_turned = np.einsum("ij,ij->i", mean[:-lag], mean[lag:]) < math.cos(turn)
         if np.any(has_turned):
             any_turn = any_turn or rows + 1
             quiet = spread <= 0.1 * turn * _SIDE / (rows + 1)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import polars as pl
 
 from trihedron.read.errors import ReadError
 from trihedron.read.panics import panics_unprinted
@@ -17,6 +18,13 @@ from trihedron.read.table import FloatArray
 from trihedron.read.text.dates import form_of, seconds
 from trihedron.read.text.layout import MISSING, Layout
 
+if TYPE_CHECKING:
+    import polars as pl
+
+# Polars takes longer to import than a short log to read, and most have nothing in them that needs it.
+
+_PLAIN = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?").fullmatch
+"""A number under every convention."""
 MAX_WORDS = 64
 """A column of words with more different ones is text, not a label that tells sensors or devices apart."""
 
@@ -32,6 +40,8 @@ class TextColumn:
 
     def encode(self, cells: pl.Series) -> None:
         """Remember which word stands in each row, unless there are too many to be labels."""
+        import polars as pl
+
         if len(self.words) > MAX_WORDS:
             return
         text = cells.fill_null("").str.strip_chars(' "')
@@ -46,11 +56,15 @@ class TextColumn:
 
 def find_text_columns(rows: list[list[str]], layout: Layout) -> dict[int, TextColumn]:
     """Which columns hold words or dates instead of numbers, judged on the first rows."""
-    if not rows:
-        return {}
-    probe = pl.DataFrame({str(i): [r[i] for r in rows] for i in range(layout.n_fields)})
+    columns = {i: [r[i] for r in rows] for i in range(layout.n_fields)}
+    columns = {i: cells for i, cells in columns.items() if layout.decimal_comma or not all(map(_PLAIN, cells))}
     found: dict[int, TextColumn] = {}
-    for i, series in enumerate(probe.get_columns()):
+    if not rows or not columns:
+        return found
+    import polars as pl
+
+    for i, column in columns.items():
+        series = pl.Series(column, dtype=pl.String)
         are_words = _words(series, layout.decimal_comma)
         if are_words.sum() > 0.5 * len(rows):
             cells = series.filter(are_words)
@@ -68,6 +82,8 @@ def parse(
     ReadError
         When the block is no table.
     """
+    import polars as pl
+
     try:
         with panics_unprinted():
             return pl.read_csv(
@@ -131,6 +147,8 @@ def numbers(series: pl.Series, column: TextColumn | None) -> FloatArray:
 
 def _words(series: pl.Series, decimal_comma: bool) -> pl.Series:
     """Which cells are neither a number nor a word for "missing"."""
+    import polars as pl
+
     text = series.fill_null("").str.strip_chars()
     if decimal_comma:
         text = text.str.replace(",", ".", literal=True)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import polars as pl
 
 from trihedron.read.table import FloatArray
+
+if TYPE_CHECKING:
+    import polars as pl
 
 _DAY_S = 86400.0
 _ZONE = r"(?:Z|[+-]\d\d:?\d\d)?"
@@ -70,6 +73,8 @@ def seconds(cells: pl.Series, form: str) -> FloatArray:
 
     Times of day go on after midnight. Zones are not applied: only differences matter, and the zone of a log is one.
     """
+    import polars as pl
+
     text = _plain(cells)
     if form == "time-of-day":
         parts = text.str.extract_groups(r"^(\d{1,2}):(\d\d):(\d\d(?:\.\d+)?)$").struct.unnest()

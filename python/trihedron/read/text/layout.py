@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from itertools import islice
 
 COMMENT_STARTS = ("#", "%", "//")
 MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
@@ -16,6 +17,8 @@ _UNIT_WORD = re.compile(
     re.IGNORECASE,
 )
 _QUALIFIERS = frozenset({"cal", "uncal", "raw", "calibrated", "uncalibrated"})
+_JUDGED = 200
+"""Lines that separators are judged by."""
 MAX_STRAY_LINES = 20
 """Lines of numbers above the table that a preamble (a matrix, a list of offsets) may hold; more are rows lost."""
 MAX_STRAY_ROWS = 2
@@ -81,10 +84,12 @@ def _judge(lines: list[str], separator: str, decimal_comma: bool) -> tuple[float
 def detect(text: str) -> Layout | None:
     """Layout of a text log from its first lines, or None where no line of numbers is found."""
     lines = [line.strip("\r") for line in text.split("\n")]
-    body = [line.strip(" ") for line in lines if line.strip() and not is_comment(line.strip())]
-    tail = body[len(body) // 2 :][-200:]
+    tail = _from_the_end(lines)
     candidates = [(",", False), ("\t", False), (";", False), (" ", False), (";", True), ("\t", True), (" ", True)]
-    judged = [(_judge(tail, sep, comma), -i, sep, comma) for i, (sep, comma) in enumerate(candidates)]
+    # Separators that no line holds all explain the lines alike.
+    found = {(sep, comma): sep if any(sep in line for line in tail) else "\0" for sep, comma in candidates}
+    scores = {key: _judge(tail, *key) for key in {(found[key], key[1]) for key in candidates}}
+    judged = [(scores[found[key], key[1]], -i, *key) for i, key in enumerate(candidates)]
     (score, n_fields), _, separator, decimal_comma = max(judged, key=lambda j: (j[0][0], j[1]))
     if score <= 0.0:
         return None
@@ -112,6 +117,13 @@ def detect(text: str) -> Layout | None:
         sum(_looks_like_row(lines[i - 1], decimal_comma, 4) for i in stray),
         tuple(i + 1 for i in range(above + 1, first) if is_comment(lines[i].strip())),
     )
+
+
+def _from_the_end(lines: list[str]) -> list[str]:
+    """The last 200 of the second half of the lines that are neither blank nor remarks."""
+    bodies = (line.strip(" ") for line in reversed(lines) if line.strip() and not is_comment(line.strip()))
+    body = list(islice(bodies, 2 * _JUDGED))[::-1]
+    return body[len(body) // 2 :]
 
 
 def _past_start_and_rate(lines: list[str], first: int, separator: str) -> tuple[int, dict[str, str]]:

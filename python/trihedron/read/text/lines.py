@@ -33,7 +33,7 @@ class RowLines:
         self._next = 0
         self._parts: list[Counts | range] = []
 
-    def append(self, lines: Counts) -> None:
+    def append(self, lines: Counts | range) -> None:
         """The lines (k,) of the next rows."""
         start, stop = int(lines[0]), int(lines[-1]) + 1
         if not self._parts:

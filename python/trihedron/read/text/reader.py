@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable
 from contextlib import closing
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-import polars as pl
 
 from trihedron import _core
 from trihedron.read.columns import find_columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.room import check_memory
-from trihedron.read.table import FloatArray, Progress, Table, file_sha256
+from trihedron.read.table import FloatArray, Table, file_sha256
+from trihedron.read.text.ahead import Bytes, blocks_ahead
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks, has_semicolon_remarks, with_hash_remarks
 from trihedron.read.text.cells import MAX_WORDS, TextColumn, find_text_columns, numbers, parse, refuse_words
 from trihedron.read.text.dates import past_midnight
@@ -23,8 +25,11 @@ from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, 
 from trihedron.read.text.lines import Lines, RowLines, data_lines, offset_of_line, regular
 from trihedron.read.text.store import Store
 from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records.progress import Progress
 
 _SAMPLE_BYTES = 1 << 18
+_ROWS_CHECKED = 1_000_000
+"""Rows after which the room left is looked at again; shorter logs are not asked for."""
 
 
 class TextReader:
@@ -51,7 +56,7 @@ class TextReader:
         self.lines = RowLines()
         self.text_columns: dict[int, TextColumn] = {}
         self.findings: list[Finding] = []
-        self.n_rows = 0
+        self.n_rows, self.n_rows_checked = 0, -_ROWS_CHECKED
         self.n_bytes = 0
         self.comments: list[npt.NDArray[np.int64]] = []
         self.n_left_out = 0
@@ -61,34 +66,47 @@ class TextReader:
     def read(self) -> Table:
         """The whole file as a table."""
         # Closed whatever is raised in between: a refusal must not leave the file open until the next collection.
-        with closing(blocks(self.path, self.compression, self.cursor, self.content)) as parts:
-            return self._read(parts)
+        if self.content is None and self.compression is None:
+            digest = hashlib.sha256()
+            with closing(blocks_ahead(self.path, self.cursor, digest)) as ahead:
+                layout = self._read(ahead)
+            self.sha256 = self.sha256 or digest.hexdigest()
+        else:
+            with closing(blocks(self.path, self.compression, self.cursor, self.content)) as parts:
+                layout = self._read(parts)
+        return self._table(layout)
 
-    def _read(self, parts: Iterable[bytes]) -> Table:
+    def _read(self, parts: Iterable[bytes] | Iterable[Bytes]) -> Layout:
         layout: Layout | None = None
-        for raw in parts:
-            data = as_utf8(self.path, raw, self.cursor.lines + 1)
-            if b"\r" in data:
-                # Before the layout is judged: a lone carriage return ends a row for whoever counts rows afterwards.
-                data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-            if layout is None:
-                self.semicolons = has_semicolon_remarks(data)
-            if self.semicolons:
-                data = with_hash_remarks(data)
-            if layout is None:
-                layout = self._layout(data)
-                start = offset_of_line(data, layout.first_line)
-                self.cursor.lines = layout.first_line - 1
-                self._first_block(data, layout)
-                data = data[start:]
-            self._block(data, layout)
-            self.n_bytes += len(raw)
+        for part in parts:
+            # Nearly all blocks but the first are nothing but rows of numbers: those are not looked at any further.
+            if layout is None or self.semicolons or not self._plain(part, layout):
+                layout = self._odd_part(part if isinstance(part, bytes) else part.tobytes(), layout)
+            self.n_bytes += len(part)
             if self.progress is not None:
                 done = min(self.n_bytes / self.size, 1.0) if self.compression is None else 0.5
                 self.progress(done, f"reading {self.path.name}: {self.n_rows} rows")
         if layout is None:
             raise ReadError(f"{self.path}: the file holds no text after unpacking; record or copy it again.")
-        return self._table(layout)
+        return layout
+
+    def _odd_part(self, raw: bytes, layout: Layout | None) -> Layout:
+        data = as_utf8(self.path, raw, self.cursor.lines + 1)
+        if b"\r" in data:
+            # Before the layout is judged: a lone carriage return ends a row for whoever counts rows afterwards.
+            data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        if layout is None:
+            self.semicolons = has_semicolon_remarks(data)
+        if self.semicolons:
+            data = with_hash_remarks(data)
+        if layout is None:
+            layout = self._layout(data)
+            start = offset_of_line(data, layout.first_line)
+            self.cursor.lines = layout.first_line - 1
+            self._first_block(data, layout)
+            data = data[start:]
+        self._block(data, layout)
+        return layout
 
     def line(self, number: int) -> int:
         """Line of the file for a line of the content that is read."""
@@ -139,13 +157,16 @@ class TextReader:
     def _first_block(self, data: bytes, layout: Layout) -> None:
         """Which columns hold words instead of numbers (labels, dates), judged on the first lines."""
         head = data[offset_of_line(data, layout.first_line) :][: 1 << 16].decode("utf-8", errors="replace")
-        rows = [split(line, layout.separator) for line in head.split("\n")[:-1] or [head] if line.strip()]
-        rows = [r[: layout.n_fields] for r in rows if len(r) >= layout.n_fields and not is_comment(r[0])][:200]
-        self.text_columns = find_text_columns(rows, layout)
+        lines = (split(line, layout.separator) for line in head.split("\n")[:-1] or [head] if line.strip())
+        rows = (r[: layout.n_fields] for r in lines if len(r) >= layout.n_fields and not is_comment(r[0]))
+        self.text_columns = find_text_columns(list(islice(rows, 200)), layout)
 
     def _block(self, data: bytes, layout: Layout) -> None:
         if self._plain(data, layout):
             return
+        # One odd block may be the last, cut off; where there are two, looking for more costs time for nothing.
+        self.may_be_plain = self.n_odd_blocks == 0
+        self.n_odd_blocks += 1
         ends_with_line_end = data.endswith(b"\n")
         data = regular(data, layout)
         if not data.strip():
@@ -169,34 +190,44 @@ class TextReader:
         if len(lines):
             self._parse(text, lines, layout)
 
-    def _plain(self, data: bytes, layout: Layout) -> bool:
+    def _plain(self, data: bytes | Bytes, layout: Layout) -> bool:
         """Whether the block was nothing but rows of numbers, and is read: all but a few logs are."""
         if not self.may_be_plain or self.text_columns or layout.decimal_comma or self.true_lines is not None:
             return False
-        table = _core.plain_table(data, ord(layout.separator), layout.n_fields)
-        if table is None:
-            # One odd block may be the last, cut off; where there are two, looking for more costs time for nothing.
-            self.may_be_plain = self.n_odd_blocks == 0
-            self.n_odd_blocks += 1
+        text = np.frombuffer(data, dtype=np.uint8)
+        separator = ord(layout.separator)
+        # Asked for nothing, it counts the lines.
+        rows, _ = _core.plain_table_into(text, separator, [], [])
+        if not rows:
             return False
-        n = table.shape[1]
-        lines = np.arange(self.cursor.lines + 1, self.cursor.lines + 1 + n, dtype=np.int64)
-        self.cursor.lines += n
-        self._take(list(table), lines, len(data), layout)
-        return True
+        if self.n_rows == 0:
+            self.store = Store(layout.n_fields, self._triads(layout, [np.zeros(1)] * layout.n_fields))
+        places, blocks = self.store.lend(rows, self._expected(rows, len(data), layout))
+        rows, is_read = _core.plain_table_into(text, separator, places, blocks)
+        if is_read:
+            self.store.keep(rows)
+            self.lines.append(range(self.cursor.lines + 1, self.cursor.lines + 1 + rows))
+            self.cursor.lines += rows
+            self.n_rows += rows
+        return is_read
+
+    def _expected(self, n_new: int, n_bytes: int, layout: Layout) -> int:
+        """Rows of the whole log, as far as known; refused where they would not fit into memory."""
+        rows = self.n_rows + n_new
+        rows_per_byte = rows / max(self.n_bytes + n_bytes, 1)
+        expected = int(self.size * rows_per_byte) if self.compression is None else rows
+        if expected > _ROWS_CHECKED and rows >= self.n_rows_checked + _ROWS_CHECKED:
+            check_memory(self.path, expected, layout.n_fields, n_held=self.n_rows)
+            self.n_rows_checked = rows
+        return max(expected, rows)
 
     def _take(self, columns: list[FloatArray], lines: npt.NDArray[np.int64], n_bytes: int, layout: Layout) -> None:
         """Keep the rows of a block, unless those expected behind it would not fit into memory."""
         if self.n_rows == 0:
             self.store = Store(layout.n_fields, self._triads(layout, columns))
-        rows = self.n_rows + len(lines)
-        rows_per_byte = rows / max(self.n_bytes + n_bytes, 1)
-        expected = int(self.size * rows_per_byte) if self.compression is None else rows
-        if expected > 1_000_000:
-            check_memory(self.path, expected, layout.n_fields, n_held=self.n_rows)
-        self.store.append(columns, max(expected, rows))
+        self.store.append(columns, self._expected(len(lines), n_bytes, layout))
         self.lines.append(lines)
-        self.n_rows = rows
+        self.n_rows += len(lines)
 
     def _incomplete(
         self, found: Lines, i: int, ends_with_line_end: bool, layout: Layout
@@ -222,6 +253,8 @@ class TextReader:
         return found.number[:-1], found.text[: found.text.rfind(b"\n", 0, -1) + 1]
 
     def _parse(self, data: bytes, lines: npt.NDArray[np.int64], layout: Layout) -> None:
+        import polars as pl
+
         schema: dict[str, type[pl.DataType]] = {
             str(i): pl.String if i in self.text_columns else pl.Float64 for i in range(layout.n_fields)
         }

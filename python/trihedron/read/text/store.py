@@ -34,15 +34,32 @@ class Store:
         for b, block in enumerate(self._blocks):
             if not any(len(columns[i]) for i in block):
                 continue
-            array = self._arrays[b]
-            if len(array) < need:
-                grown = np.empty((max(need, int(expected * _SPARE), int(len(array) * _GROWTH)), len(block)))
-                grown[: self.n_rows] = array[: self.n_rows]
-                self._arrays[b] = array = grown
+            array = self._with_room(b, need, expected)
             for k, i in enumerate(block):
                 array[self.n_rows : need, k] = columns[i]
                 self._is_numeric[i] = True
         self.n_rows = need
+
+    def lend(self, count: int, expected: int) -> tuple[list[tuple[int, int]], list[FloatArray]]:
+        """Room for the next ``count`` rows: ``(block, place)`` of every column, and the blocks (rows, width)."""
+        places = {i: (b, k) for b, block in enumerate(self._blocks) for k, i in enumerate(block)}
+        need = self.n_rows + count
+        blocks = [self._with_room(b, need, expected)[self.n_rows :] for b in range(len(self._blocks))]
+        return [places[i] for i in range(self.n_columns)], blocks
+
+    def keep(self, count: int) -> None:
+        """The next ``count`` rows were written to the blocks lent, a number in every column."""
+        self.n_rows += count
+        self._is_numeric = [True] * self.n_columns
+
+    def _with_room(self, b: int, need: int, expected: int) -> FloatArray:
+        """A block with room for ``need`` rows, for the ``expected`` ones if it has to be made anew."""
+        array = self._arrays[b]
+        if len(array) < need:
+            grown = np.empty((max(need, int(expected * _SPARE), int(len(array) * _GROWTH)), array.shape[1]))
+            grown[: self.n_rows] = array[: self.n_rows]
+            self._arrays[b] = array = grown
+        return array
 
     def columns(self) -> list[FloatArray]:
         """All columns (n,), empty where one holds words; those of a triad are views of one (n, 3)."""

@@ -1,0 +1,25 @@
+"""What the steps from stamp to stamp are, in one pass: most logs have no odd one, and need not be looked at again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron import _core
+from trihedron.read.table import FloatArray
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Numbers of steps ``back``, of zero (``same``) and ``forward``, and of stamps that are not finite."""
+
+    back: int
+    same: int
+    forward: int
+    missing: int
+
+
+def steps_of(time_s: FloatArray) -> Steps:
+    """Steps of stamps (n,)."""
+    return Steps(*_core.stamp_steps(np.asarray(time_s, dtype=np.float64)))

@@ -1,0 +1,81 @@
+//! The solver's nine numbers and the model they stand for.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use super::{Frame, Model, N_PARAMETERS, Parameters};
+use crate::ellipsoid::{self, Standardisation};
+use crate::error::{Error, Result};
+
+/// The same norms in the frame asked for.
+///
+/// # Errors
+/// When `S` is singular.
+pub fn in_frame(model: &Model, frame: Frame) -> Result<Model> {
+    let m = model.s.transpose() * model.s;
+    let s = match frame {
+        Frame::Lower => ellipsoid::reversed_cholesky(&m),
+        Frame::Symmetric => ellipsoid::symmetric_root(&m),
+    }
+    .ok_or_else(|| Error::bad_input("the starting S is singular"))?;
+    let inverse = model
+        .s
+        .try_inverse()
+        .ok_or_else(|| Error::bad_input("the starting S is singular"))?;
+    Ok(Model {
+        s,
+        b: s * inverse * model.b,
+    })
+}
+
+/// Solver's parameters: six entries of `S · size`, then `d = b + S centre`, so that columns are of one size.
+pub(super) fn pack(model: &Model, standard: &Standardisation) -> Parameters {
+    let s = model.s * standard.size;
+    let d = model.b + model.s * standard.centre;
+    let mut theta = Parameters::zeros();
+    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
+        theta[k] = s[(i, j)];
+    }
+    theta.fixed_rows_mut::<3>(6).copy_from(&d);
+    theta
+}
+
+/// `S` and `d` in standardised readings.
+pub(super) fn unpack_standardised(theta: &[f64], frame: Frame) -> Model {
+    let mut s = Matrix3::zeros();
+    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
+        s[(i, j)] = theta[k];
+        if frame == Frame::Symmetric {
+            s[(j, i)] = theta[k];
+        }
+    }
+    Model {
+        s,
+        b: Vector3::new(theta[6], theta[7], theta[8]),
+    }
+}
+
+pub(super) fn unpack(theta: &Parameters, frame: Frame, standard: &Standardisation) -> Model {
+    standard.undo(&unpack_standardised(theta.as_slice(), frame))
+}
+
+/// `∂(S row by row, b)/∂θ`: linear, because `b = d - S centre`.
+pub(super) fn map_to_entries(
+    frame: Frame,
+    standard: &Standardisation,
+) -> SMatrix<f64, 12, N_PARAMETERS> {
+    let mut map = SMatrix::zeros();
+    for (k, &(i, j)) in Frame::ENTRIES.iter().enumerate() {
+        let mut place = |row: usize, column: usize| {
+            map[(3 * row + column, k)] = 1.0 / standard.size;
+            map[(9 + row, k)] -= standard.centre[column] / standard.size;
+        };
+        place(i, j);
+        if frame == Frame::Symmetric && i != j {
+            place(j, i);
+        }
+    }
+    for i in 0..3 {
+        map[(9 + i, 6 + i)] = 1.0;
+    }
+    map
+}

@@ -1,0 +1,76 @@
+//! The audit of readings across the seam.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, ToPyArray};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::lent::{as_rows, flat3};
+use crate::audit;
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(triad_extremes, module)?)?;
+    module.add_function(wrap_pyfunction!(triad_repeats, module)?)?;
+    module.add_function(wrap_pyfunction!(readings_near, module)?)
+}
+
+/// `(low, how many, high, how many)` of each axis of `(n, 3)` readings.
+#[pyfunction]
+fn triad_extremes(
+    py: Python<'_>,
+    readings: PyReadonlyArray2<'_, f64>,
+) -> PyResult<Vec<(f64, usize, f64, usize)>> {
+    let flat = flat3("readings", &readings)?;
+    let found = super::run(py, || Ok(audit::extremes(as_rows(&flat))))?;
+    Ok(found
+        .iter()
+        .map(|e| (e.low, e.n_low, e.high, e.n_high))
+        .collect())
+}
+
+type RepeatNumbers<'py> = (
+    [u64; 4],
+    [u64; 4],
+    [u64; 4],
+    Bound<'py, PyArray2<u8>>,
+    u64,
+    Option<u64>,
+);
+
+/// Counts, longest runs, where they start, equal rows of every window `(w, 4)`, rows that are missing, the first of them.
+#[pyfunction]
+fn triad_repeats<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+) -> PyResult<RepeatNumbers<'py>> {
+    let flat = flat3("readings", &readings)?;
+    let found = super::run(py, || Ok(audit::repeats(as_rows(&flat))))?;
+    let n = found.windows.len();
+    let windows = PyArray1::from_vec(py, found.windows.concat()).reshape([n, 4])?;
+    Ok((
+        found.count,
+        found.longest,
+        found.start,
+        windows,
+        found.missing,
+        found.first_missing,
+    ))
+}
+
+/// Readings of one axis within `depth` of a value, the distance of the nearest other one, rows `(k,)` of the value.
+#[pyfunction]
+fn readings_near<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    axis: usize,
+    value: f64,
+    depth: f64,
+) -> PyResult<(usize, f64, Bound<'py, PyArray1<i64>>)> {
+    if axis > 2 {
+        return Err(PyValueError::new_err(format!(
+            "axis must be 0, 1 or 2, got {axis}"
+        )));
+    }
+    let flat = flat3("readings", &readings)?;
+    let found = super::run(py, || Ok(audit::near(as_rows(&flat), axis, value, depth)))?;
+    Ok((found.count, found.width, found.at.to_pyarray(py)))
+}

@@ -1,0 +1,231 @@
+//! Time stamps across the seam.
+
+use numpy::{
+    PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1, PyUntypedArrayMethods, ToPyArray,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::lent::flat1;
+use crate::stamps::{self, Course};
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(stamp_steps, module)?)?;
+    module.add_function(wrap_pyfunction!(usual_step, module)?)?;
+    module.add_function(wrap_pyfunction!(steps_above, module)?)?;
+    module.add_function(wrap_pyfunction!(inside_steps, module)?)?;
+    module.add_function(wrap_pyfunction!(stamp_lateness, module)?)?;
+    module.add_function(wrap_pyfunction!(earliest_stamps, module)?)?;
+    module.add_function(wrap_pyfunction!(block_medians, module)?)?;
+    module.add_function(wrap_pyfunction!(block_mean_ticks, module)?)?;
+    module.add_function(wrap_pyfunction!(robust_line, module)?)?;
+    module.add_function(wrap_pyfunction!(lay_even_clock, module)?)
+}
+
+/// Ticks as the reader holds them: half the room where they allow it.
+#[derive(FromPyObject)]
+enum Ticks<'py> {
+    Short(PyReadonlyArray1<'py, i32>),
+    Long(PyReadonlyArray1<'py, i64>),
+}
+
+fn same_length(what: &str, expected: usize, found: usize) -> PyResult<()> {
+    if expected == found {
+        return Ok(());
+    }
+    Err(PyValueError::new_err(format!(
+        "{what} must be {expected} numbers, got {found}"
+    )))
+}
+
+/// Steps back, of zero, forward, and stamps that are not finite.
+#[pyfunction]
+fn stamp_steps(
+    py: Python<'_>,
+    time: PyReadonlyArray1<'_, f64>,
+) -> PyResult<(usize, usize, usize, usize)> {
+    let time = flat1(&time);
+    let found = super::run(py, || Ok(stamps::steps(&time)))?;
+    Ok((found.back, found.same, found.forward, found.missing))
+}
+
+/// Median of the steps forward.
+#[pyfunction]
+fn usual_step(py: Python<'_>, time: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
+    let time = flat1(&time);
+    super::run(py, || Ok(stamps::usual_step(&time)))
+}
+
+/// Rows `(k,)` behind which the step is longer than `limit`.
+#[pyfunction]
+fn steps_above<'py>(
+    py: Python<'py>,
+    time: PyReadonlyArray1<'py, f64>,
+    limit: f64,
+) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    let time = flat1(&time);
+    let found = super::run(py, || Ok(stamps::steps_above(&time, limit)))?;
+    let rows: Vec<i64> = found
+        .into_iter()
+        .map(|row| i64::try_from(row).unwrap_or(i64::MAX))
+        .collect();
+    Ok(rows.to_pyarray(py))
+}
+
+/// Number, sum, standard deviation, least and greatest of the steps above `above` and not above `limit`.
+#[pyfunction]
+fn inside_steps(
+    py: Python<'_>,
+    time: PyReadonlyArray1<'_, f64>,
+    above: f64,
+    limit: f64,
+) -> PyResult<(usize, f64, f64, f64, f64)> {
+    let time = flat1(&time);
+    let found = super::run(py, || Ok(stamps::inside(&time, above, limit)))?;
+    Ok((
+        found.count,
+        found.sum,
+        found.deviation,
+        found.least,
+        found.most,
+    ))
+}
+
+/// `time - period tick` `(n,)`; ticks are rows where there are none.
+#[pyfunction]
+#[pyo3(signature = (time, ticks, period))]
+fn stamp_lateness<'py>(
+    py: Python<'py>,
+    time: PyReadonlyArray1<'py, f64>,
+    ticks: Option<Ticks<'py>>,
+    period: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let time = flat1(&time);
+    // NumPy asks the system for large pages.
+    let out = PyArray1::<f64>::zeros(py, time.len(), false);
+    let mut writable = out.try_readwrite()?;
+    let late = writable.as_slice_mut()?;
+    match &ticks {
+        None => super::run(py, || {
+            stamps::lateness::<i64>(&time, None, period, late);
+            Ok(())
+        })?,
+        Some(Ticks::Short(ticks)) => {
+            same_length("ticks", time.len(), ticks.len())?;
+            let ticks = flat1(ticks);
+            super::run(py, || {
+                stamps::lateness(&time, Some(&ticks), period, late);
+                Ok(())
+            })?;
+        }
+        Some(Ticks::Long(ticks)) => {
+            same_length("ticks", time.len(), ticks.len())?;
+            let ticks = flat1(ticks);
+            super::run(py, || {
+                stamps::lateness(&time, Some(&ticks), period, late);
+                Ok(())
+            })?;
+        }
+    }
+    drop(writable);
+    Ok(out)
+}
+
+/// Row of the earliest of every block of `width` stamps.
+#[pyfunction]
+fn earliest_stamps<'py>(
+    py: Python<'py>,
+    late: PyReadonlyArray1<'py, f64>,
+    width: usize,
+) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    let late = flat1(&late);
+    if late.is_empty() {
+        return Err(PyValueError::new_err("there must be stamps, got none"));
+    }
+    let found = super::run(py, || Ok(stamps::earliest(&late, width)))?;
+    Ok(found.to_pyarray(py))
+}
+
+/// Median of every whole block of `width` numbers.
+#[pyfunction]
+fn block_medians<'py>(
+    py: Python<'py>,
+    late: PyReadonlyArray1<'py, f64>,
+    width: usize,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let late = flat1(&late);
+    let found = super::run(py, || Ok(stamps::block_medians(&late, width)))?;
+    Ok(found.to_pyarray(py))
+}
+
+/// Mean of every whole block of `width` ticks.
+#[pyfunction]
+fn block_mean_ticks<'py>(
+    py: Python<'py>,
+    ticks: Ticks<'py>,
+    width: usize,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let found = match &ticks {
+        Ticks::Short(ticks) => {
+            let ticks = flat1(ticks);
+            super::run(py, || Ok(stamps::block_means(&ticks, width)))?
+        }
+        Ticks::Long(ticks) => {
+            let ticks = flat1(ticks);
+            super::run(py, || Ok(stamps::block_means(&ticks, width)))?
+        }
+    };
+    Ok(found.to_pyarray(py))
+}
+
+/// `(slope, level)` of a line through points of which some are far off.
+#[pyfunction]
+fn robust_line(
+    py: Python<'_>,
+    u: PyReadonlyArray1<'_, f64>,
+    y: PyReadonlyArray1<'_, f64>,
+) -> PyResult<(f64, f64)> {
+    same_length("y", u.len(), y.len())?;
+    let (u, y) = (flat1(&u), flat1(&y));
+    super::run(py, || Ok(stamps::robust_line(&u, &y)))
+}
+
+/// Write `slope (tick - origin) / scale + level + period tick` to `even`.
+#[pyfunction]
+fn lay_even_clock(
+    py: Python<'_>,
+    ticks: Ticks<'_>,
+    line: (f64, f64),
+    origin: f64,
+    scale: f64,
+    period: f64,
+    mut even: PyReadwriteArray1<'_, f64>,
+) -> PyResult<()> {
+    let course = Course {
+        slope: line.0,
+        level: line.1,
+        origin,
+        scale,
+    };
+    let even = even
+        .as_slice_mut()
+        .map_err(|_| PyValueError::new_err("even must be a contiguous array"))?;
+    match &ticks {
+        Ticks::Short(ticks) => {
+            same_length("even", ticks.len(), even.len())?;
+            let ticks = flat1(ticks);
+            super::run(py, || {
+                stamps::lay(&ticks, &course, period, even);
+                Ok(())
+            })
+        }
+        Ticks::Long(ticks) => {
+            same_length("even", ticks.len(), even.len())?;
+            let ticks = flat1(ticks);
+            super::run(py, || {
+                stamps::lay(&ticks, &course, period, even);
+                Ok(())
+            })
+        }
+    }
+}

@@ -1,0 +1,50 @@
+"""Rates at rest that are motion: supports that give are no zeros that scatter."""
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.diagnose.residuals.creep import IS_MOTION, share_of_creep
+from trihedron.diagnose.selection.model import begin
+from trihedron.diagnose.session.observations import observe
+from trihedron.diagnose.session.starting_point import start_twin
+from trihedron.records import Recording
+from trihedron.segment import resegment, segment_recording
+from trihedron.simulate import hand_session, simulate
+from trihedron.simulate.named import _of
+from trihedron.simulate.profiles import profile_by_name
+
+
+def session(seed, lean_rad, scatter_rad_s):
+    """Poses that lean by ``lean_rad`` within seconds of being set down, gyro zeros drawn anew in each."""
+    recording, truth = simulate(_of(profile_by_name("tactical"), hand_session(24, layout=seed), "session", seed), seed)
+    rng = np.random.default_rng(seed)
+    force, rate = recording.accelerometer.copy(), recording.gyroscope.copy()
+    to_raw = np.linalg.inv(np.asarray(truth.accelerometer_S)), np.linalg.inv(np.asarray(truth.gyroscope_S))
+    for part in truth.segments:
+        if part.kind != "hold":
+            continue
+        here = slice(part.start, part.stop)
+        since = recording.time_s[here] - recording.time_s[part.start]
+        direction = lean_rad * rng.normal(size=3)
+        up = truth.specific_force_m_s2[part.start]
+        # f' = f x w for a body that turns by w: the vertical of the body goes the other way.
+        force[here] += (1.0 - np.exp(-since / 2.0))[:, None] * (to_raw[0] @ np.cross(up, direction))
+        turning = (np.exp(-since / 2.0) / 2.0)[:, None] * direction + rng.normal(size=3) * scatter_rad_s
+        rate[here] += turning @ to_raw[1].T
+    stamps = recording.time_s
+    log = Recording(
+        time_s=stamps, rate_hz=recording.rate_hz, accelerometer=force, gyroscope=rate,
+        accelerometer_unit=recording.accelerometer_unit, gyroscope_unit=recording.gyroscope_unit,
+    )  # fmt: skip
+    segments = segment_recording(log)
+    calibration = trihedron.calibrate(log, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
+    obs = observe(log, resegment(log, segments))
+    return begin(obs, start_twin(obs, calibration), None).context
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_gravity_tells_a_support_that_gives_from_zeros_that_scatter(seed):
+    assert share_of_creep(session(seed, 0.006, 0.0)) > IS_MOTION
+    # 24 poses: a share by chance of one in 48, four times that one time in a hundred.
+    assert share_of_creep(session(seed, 0.0, 1e-3)) < 0.2
