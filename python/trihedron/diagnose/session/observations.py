@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.records import Recording, Segments
+from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.noise import measure_noise
 
 FloatArray = npt.NDArray[np.float64]
@@ -31,7 +32,7 @@ class Observations:
     ``rate_density`` (3,) are white noise per √Hz in raw units. ``jitter_s`` is the scatter of sample instants about
     their stamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
     ``unresolved`` maps a move's two holds to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
-    by motion faster than the samples and by noise slower than a move.
+    by motion faster than the samples, by noise slower than a move and by shaking that stands in a pose's end.
     ``zero_scatter`` (2, 3), once a diagnosis has found it: how far zeros scatter from hold to hold beside their walk,
     accelerometer and gyro, raw units.
     The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
@@ -133,6 +134,7 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         When the recording has no accelerometer or fewer than two still poses: there is nothing to hold a twin against.
     """
     recording = recording.with_distinct_stamps()
+    segments, swing = means_beside_lines(recording, segments)
     if recording.accelerometer is None or segments.accelerometer_mean is None:
         raise ValueError("a diagnosis needs accelerometer readings: this recording has none")
     if segments.n_holds < 2:
@@ -160,6 +162,7 @@ def observe(recording: Recording, segments: Segments) -> Observations:
             ranges.append((start, stop))
             holds.append((move.hold_before, move.hold_after))
     noise = measure_noise(recording, segments, ranges)
+    unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(noise.unresolved, holds, strict=True)]
     return Observations(
         recording=recording,
         segments=segments,
@@ -179,5 +182,5 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         force_density=noise.force_density,
         rate_density=noise.rate_density,
         bumped_s=bumped,
-        unresolved=dict(zip(holds, noise.unresolved, strict=True)),
+        unresolved=dict(zip(holds, unresolved, strict=True)),
     )

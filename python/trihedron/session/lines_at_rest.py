@@ -1,0 +1,169 @@
+"""Means of poses with a spectral line in them by a joint fit of constant and line (docs/diagnosis-method.md, 8.0)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import median_filter
+from scipy.optimize import minimize_scalar
+from scipy.special import gammaincc
+
+from trihedron.records.recording import Recording
+from trihedron.records.segments import Segments
+
+FloatArray = npt.NDArray[np.float64]
+SURE = 1e-8
+"""Chance of such a line in noise, all frequencies of a pose counted. A fainter one of six cycles or more moves the
+plain mean by less than a quarter of its standard error, and need not be fitted."""
+FEWEST_CYCLES = 6
+"""Slower than that a line is hardly told from drift, which has its own place in the model."""
+ABOVE_SLOWER = 10.0
+"""Power of a line over that of the bins three to five below: a walk of a bias has up to nine times less, not more."""
+FEWEST_SAMPLES = 64
+"""A spectrum of fewer has too few frequencies to tell a line from the noise around it."""
+FEWEST_BINS, MOST_BINS = 27, 101
+"""Frequencies whose median is the level of the noise at one: few follow its colour, many know it well."""
+MOST_LINES = 3
+"""A shaker and its first harmonics; what remains widens the error bar."""
+BLOCKS = 8
+"""Stretches of a pose whose means tell whether something slow is left."""
+
+
+def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segments, FloatArray]:
+    """Segments whose poses with a line have mean and standard error of a fit of constant + lines; swing of the lines.
+
+    A sinusoid of amplitude A that is no whole number of cycles moves the mean of a pose of length T by up to A/(πfT),
+    and block means scatter by it. Poses without a significant line keep their numbers. Samples are taken as even.
+
+    The swing (h, 2, 3), force and rate, is the variance of a line's integral at the edge of its pose, (raw unit · s)²:
+    A²/2(2πf)². A move that begins or ends in it does not begin or end at rest.
+    """
+    changed: dict[str, FloatArray] = {}
+    swing = np.zeros((segments.n_holds, 2, 3))
+    both = (("accelerometer", recording.accelerometer), ("gyroscope", recording.gyroscope))
+    for s, (sensor, readings) in enumerate(both):
+        mean, error = getattr(segments, f"{sensor}_mean"), getattr(segments, f"{sensor}_sigma_mean")
+        sigma = getattr(segments, f"{sensor}_sigma")
+        if readings is None or mean is None or error is None or sigma is None or not len(mean):
+            continue
+        white = sigma / np.sqrt(np.maximum(segments.n_averaged, 1))[:, None]
+        # How far errors of means exceed white noise: a line does not change what slow noise there is.
+        colour = np.maximum(np.median(error / np.maximum(white, 1e-300), axis=0), 1.0)
+        new_mean, new_error = mean.copy(), error.copy()
+        for k, hold in enumerate(segments.holds):
+            part = readings[hold.start : hold.stop]
+            if hold.disturbed or len(part) < FEWEST_SAMPLES or not np.isfinite(part).all():
+                continue
+            lines, has_line = find_pose_lines(part)
+            if not lines:
+                continue
+            fitted, own = _constant_beside(part, lines, sigma)
+            swing[k, s] = np.where(has_line, _swing(part, lines) / recording.rate_hz**2, 0.0)
+            new_mean[k] = np.where(has_line, fitted, mean[k])
+            new_error[k] = np.where(has_line, colour * own, error[k])
+        if (new_mean != mean).any():
+            changed |= {f"{sensor}_mean": new_mean, f"{sensor}_sigma_mean": new_error}
+    return (replace(segments, **changed) if changed else segments), swing  # type: ignore[arg-type]
+
+
+def find_pose_lines(part: FloatArray) -> tuple[list[float], npt.NDArray[np.bool_]]:
+    """Significant lines of one pose's readings (n, 3): frequencies in cycles per sample, and the axes that have any."""
+    lines: list[float] = []
+    has_line = np.zeros(part.shape[1], dtype=bool)
+    rest = part - part.mean(axis=0)
+    while len(lines) < MOST_LINES:
+        found = _strongest(rest)
+        if found is None:
+            break
+        k, axes = found
+        lines.append(_refined(part[:, axes], lines, k / len(part)))
+        has_line |= axes
+        rest = part - _model(part, lines)[0]
+    return lines, has_line
+
+
+def _strongest(rest: FloatArray) -> tuple[int, npt.NDArray[np.bool_]] | None:
+    """Bin of the strongest significant line of the axes together, and which of them have it."""
+    n = len(rest)
+    power = (np.abs(np.fft.rfft(rest * np.hanning(n)[:, None], axis=0)) ** 2)[:-1]
+    if len(power) < FEWEST_BINS:
+        return None
+    width = min(max(FEWEST_BINS, (n // 16) | 1), MOST_BINS)
+    # The median of exponentially distributed power is ln 2 of its mean.
+    local = median_filter(power, size=(width, 1), mode="mirror")
+    level = np.maximum(local, 0.5 * np.median(power, axis=0)) / np.log(2.0)
+    live = (level > 0).all(axis=0)
+    if not live.any():
+        return None
+    ratio = np.where(live, power / np.where(live, level, 1.0), 0.0)
+    together = ratio[FEWEST_CYCLES:].sum(axis=1)
+    k = FEWEST_CYCLES + int(np.argmax(together))
+    # Noise of a bias that walks rises towards slow: a line stands above what is slower, too.
+    if ratio[k].sum() < ABOVE_SLOWER * ratio[k - 5 : k - 2].sum(axis=1).mean():
+        return None
+    if gammaincc(int(live.sum()), ratio[k].sum()) * (n / 2) > SURE:
+        return None
+    axes = ratio[k] > -np.log(SURE) / 2.0
+    return (k, axes) if axes.any() else None
+
+
+def _basis(n: int, lines: list[float]) -> FloatArray:
+    phase = 2.0 * np.pi * np.outer(np.arange(n) - 0.5 * (n - 1), lines)
+    return np.hstack([np.ones((n, 1)), np.cos(phase), np.sin(phase)])
+
+
+def _model(part: FloatArray, lines: list[float]) -> tuple[FloatArray, FloatArray]:
+    basis = _basis(len(part), lines)
+    coefficient = np.asarray(np.linalg.lstsq(basis, part, rcond=None)[0], dtype=np.float64)
+    return basis @ coefficient, coefficient
+
+
+def _swing(part: FloatArray, lines: list[float]) -> FloatArray:
+    """(3,) variance of the lines' integral over a phase that may be any, (reading · samples)²."""
+    _, coefficient = _model(part, lines)
+    m = len(lines)
+    squares = coefficient[1 : 1 + m] ** 2 + coefficient[1 + m :] ** 2
+    out: FloatArray = 0.5 * (squares / (2.0 * np.pi * np.array(lines)[:, None]) ** 2).sum(axis=0)
+    return out
+
+
+def _refined(part: FloatArray, lines: list[float], near: float) -> float:
+    """Frequency of least squares within a bin and a half of ``near``, the lines known already fitted along."""
+    scale = np.maximum(np.std(part, axis=0), 1e-300)
+    reduced = part / scale
+
+    def left(f: float) -> float:
+        return float(((reduced - _model(reduced, [*lines, f])[0]) ** 2).sum())
+
+    grid = near + np.linspace(-1.5, 1.5, 19) / len(part)
+    best = float(min(grid, key=left))
+    step = float(grid[1] - grid[0])
+    return float(
+        minimize_scalar(left, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-3 * step}).x
+    )
+
+
+def _constant_beside(part: FloatArray, lines: list[float], sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Constant (3,) beside the lines and its standard error (3,); amplitudes, phases and frequencies are unknowns."""
+    n, m = len(part), len(lines)
+    model, coefficient = _model(part, lines)
+    rest = part - model
+    basis = _basis(n, lines)
+    cosines, sines = basis[:, 1 : 1 + m], basis[:, 1 + m :]
+    t = (np.arange(n) - 0.5 * (n - 1))[:, None]
+    level = np.maximum(np.sqrt((rest**2).sum(axis=0) / max(n - 1 - 3 * m, 1)), sigma)
+    error = np.empty(part.shape[1])
+    for axis in range(part.shape[1]):
+        a, b = coefficient[1 : 1 + m, axis], coefficient[1 + m :, axis]
+        slope = t * (b * cosines - a * sines)
+        size = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
+        columns = np.hstack([basis, slope / size])
+        error[axis] = level[axis] * np.sqrt(np.linalg.pinv(columns.T @ columns)[0, 0])
+    edges = np.linspace(0, n, BLOCKS + 1).astype(int)
+    blocks = np.array([rest[a:b].mean(axis=0) for a, b in pairwise(edges)])
+    scatter = blocks.std(axis=0, ddof=1) / np.sqrt(BLOCKS)
+    # Eight blocks tell a pose that goes on settling, not a fifth of its noise.
+    return coefficient[0], np.where(scatter > 2.0 * error, scatter, error)
