@@ -93,7 +93,7 @@ def _strongest(rest: FloatArray) -> tuple[int, npt.NDArray[np.bool_]] | None:
         return None
     width = min(max(FEWEST_BINS, (n // 16) | 1), MOST_BINS)
     # The median of exponentially distributed power is ln 2 of its mean.
-    local = median_filter(power, size=(width, 1), mode="mirror")
+    local = np.stack([median_filter(one, size=width, mode="mirror") for one in power.T], axis=1)
     level = np.maximum(local, 0.5 * np.median(power, axis=0)) / np.log(2.0)
     live = (level > 0).all(axis=0)
     if not live.any():
