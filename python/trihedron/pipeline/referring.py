@@ -19,15 +19,14 @@ from trihedron.records.diagnosis import (
     AcceptedEffect,
     Candidate,
     Diagnosis,
-    DomainTest,
     EffectParameter,
-    HeldOut,
     LinearModel,
     ParameterDifference,
     Stage,
     StageDomain,
     Verdict,
 )
+from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceMotion
 from trihedron.sensor_model import in_frame
 from trihedron.units import acceleration_to_si

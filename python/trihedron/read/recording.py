@@ -20,9 +20,10 @@ from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.memory import table_of
 from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
-from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of, settled
+from trihedron.read.sensors import Options, Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
+from trihedron.read.two_files import merge_sensors
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit

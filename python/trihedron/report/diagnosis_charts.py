@@ -8,7 +8,8 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import AcceptedEffect, DomainResiduals
+from trihedron.records.diagnosis import AcceptedEffect
+from trihedron.records.domains import DomainResiduals
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.drawn import said
 from trihedron.report.numbers import plain_number

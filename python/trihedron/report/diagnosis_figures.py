@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from trihedron.arrays import FloatArray
-from trihedron.records.diagnosis import DomainResiduals
+from trihedron.records.domains import DomainResiduals
 from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 

@@ -24,11 +24,11 @@ from trihedron.segment.runs import (
     loose_blocks,
     ranges_of,
     trim_edges,
-    turning_blocks,
     widen,
 )
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks
 from trihedron.segment.turn_scale import centre_of, radians_per_reading
+from trihedron.segment.turning import turning_blocks
 from trihedron.units import AccelerationUnit
 
 LONG_S = 4.0

@@ -8,7 +8,8 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records import Calibration
-from trihedron.records.diagnosis import Diagnosis, Domain, DomainTest
+from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.domains import Domain, DomainTest
 
 PUBLISHED_DIGITS = 1e-6
 """A calibration without error bars is taken at its last printed digits: this share of each number."""

@@ -14,7 +14,8 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.twin import Distortion
-from trihedron.records.diagnosis import Domain, EffectParameter
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Domain
 
 AXES = ("x", "y", "z")
 SHAPE_NAMES = ("time_constant", "half_width", "pose")

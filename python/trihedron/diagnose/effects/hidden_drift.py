@@ -16,7 +16,8 @@ from trihedron.diagnose.effects.drift_shapes import drift_variants, is_possible_
 from trihedron.diagnose.session.twin import Distortion
 from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
 from trihedron.diagnose.zeros.of_session import SessionEvidence
-from trihedron.records.diagnosis import Domain, EffectParameter
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Domain
 
 AXES = ("x", "y", "z")
 FEWEST_HOLDS = 6

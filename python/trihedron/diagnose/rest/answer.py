@@ -23,17 +23,8 @@ from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
 from trihedron.diagnose.zeros.evidence import KIND_LIMIT, examine
 from trihedron.diagnose.zeros.process import ZeroReadings
 from trihedron.records import Hold, Recording
-from trihedron.records.diagnosis import (
-    AcceptedEffect,
-    Candidate,
-    Diagnosis,
-    Domain,
-    DomainTest,
-    EffectParameter,
-    HeldOut,
-    LinearModel,
-    Where,
-)
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
+from trihedron.records.domains import Domain, DomainTest, HeldOut, Where
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, rate_to_si
 
 Sensor = Literal["accelerometer", "gyroscope"]

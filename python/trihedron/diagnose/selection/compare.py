@@ -32,7 +32,7 @@ from trihedron.diagnose.session.twin import (
     Distortion,
     stacked,
 )
-from trihedron.records.diagnosis import HeldOut
+from trihedron.records.domains import HeldOut
 
 VISIBLE = 0.98
 """An effect must lower the held-out misfit of some domain by at least this factor to be worth a name."""

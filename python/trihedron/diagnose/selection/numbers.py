@@ -17,7 +17,7 @@ from trihedron.diagnose.zeros.of_session import (
     with_accel_scatter,
     with_gyro_scatter,
 )
-from trihedron.records.diagnosis import DomainTest
+from trihedron.records.domains import DomainTest
 
 SCATTERS = 0.01
 """p-value from which poses scatter enough for their error bars, though too little for a name."""

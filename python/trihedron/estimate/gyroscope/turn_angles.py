@@ -10,7 +10,8 @@ import numpy as np
 
 from trihedron._core import integrate_raw_rate
 from trihedron.arrays import FloatArray
-from trihedron.estimate.gyroscope.measurements import BLOCK_S, pool_zeros, resolution_of
+from trihedron.estimate.gyroscope.measurements import BLOCK_S, resolution_of
+from trihedron.estimate.gyroscope.zeros import pool_zeros
 from trihedron.records.recording import Recording
 from trihedron.units import rate_to_si
 

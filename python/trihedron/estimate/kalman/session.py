@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.kalman.norm_invariant import NormFrame, NormStart, calibrate_without_references
+from trihedron.estimate.kalman.norm_invariant import NormFrame, calibrate_without_references
+from trihedron.estimate.kalman.norm_start import NormStart
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
 from trihedron.estimate.kalman.shaping import ShapingOptions
 from trihedron.records import (
