@@ -357,7 +357,7 @@ def ask(case: Case, seed: int, folder: Path) -> dict[str, Any]:
     said = said_by(document)
     missed = [m for m in answer["must"] if m not in said]
     false = sorted(said - {*answer["must"], *answer["may"]})
-    unsaid = [w for w in answer["words"] if w not in done.stdout]
+    unsaid = [w for w in answer["words"] if w not in " ".join(done.stdout.split())]
     right = document["verdict"] == answer["verdict"] and not missed and not false and not unsaid
     return {
         "verdict": document["verdict"], "right": right, "missed": missed, "false": false, "unsaid": unsaid,

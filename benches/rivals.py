@@ -1,6 +1,6 @@
 """Our hot paths beside what else there is, on the same data in one run: medians, ratios, peak memory.
 
-python benches/rivals.py [--rounds 3] [--rows 3e6] [--only norm] [--write]
+python benches/rivals.py [--rounds 3] [--rows 1e7] [--only norm] [--write]
 
 Each method runs in a process of its own, in turn, `--rounds` times; a round is the fastest of some calls after a first.
 Numbers are CPU time on one core (`two cores` and reading: wall time), so that a busy machine shifts them little; quote
@@ -183,7 +183,7 @@ def short(results: list[tuple[Subject, dict[str, Any]]]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--rows", default="3e6")
+    parser.add_argument("--rows", default="1e7")
     parser.add_argument("--only", default="")
     parser.add_argument("--write", action="store_true")
     parser.add_argument("--worker")

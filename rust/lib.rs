@@ -14,6 +14,7 @@ pub mod gauss_newton;
 pub mod gyro_alignment;
 pub mod interrupt;
 pub mod kalman;
+pub mod move_signals;
 pub mod norm_invariant;
 pub mod number_text;
 pub mod poisson;

@@ -80,9 +80,10 @@ impl Readings {
                 self.columns
             )));
         }
-        if self.direction.is_empty() || !self.direction.len().is_multiple_of(n) {
+        let directions = self.direction.len() / n;
+        if !(1..=3).contains(&directions) || !self.direction.len().is_multiple_of(n) {
             return Err(Error::bad_input(
-                "every reading needs the same number of directions",
+                "every reading needs the same number of directions, one to three",
             ));
         }
         if self
@@ -110,43 +111,27 @@ impl Readings {
         Ok(())
     }
 
-    /// Lets time pass: d ← d + slope·dt, then the noise of walk and integrated walk over dt.
-    fn step(&self, covariance: &mut [f64], state: &mut [f64], dt: f64, strengths: Strengths) {
-        let c = self.columns;
-        let states = state.len() / c;
-        for first in (1..states).step_by(PART) {
-            let (walk, drift, slope) = (first + WALK, first + DRIFT, first + SLOPE);
-            for j in 0..c {
-                state[drift * c + j] += dt * state[slope * c + j];
-            }
-            for column in 0..states {
-                covariance[drift * states + column] += dt * covariance[slope * states + column];
-            }
-            for row in covariance.chunks_mut(states) {
-                row[drift] += dt * row[slope];
-            }
-            covariance[walk * states + walk] += strengths.walk * dt;
-            covariance[drift * states + drift] += strengths.drift * dt * dt * dt / 3.0;
-            covariance[drift * states + slope] += strengths.drift * dt * dt / 2.0;
-            covariance[slope * states + drift] += strengths.drift * dt * dt / 2.0;
-            covariance[slope * states + slope] += strengths.drift * dt;
-        }
-    }
-
     /// `V^{-1/2}[y X]` summed into its Gram matrix (sequential Kalman filter; every column is filtered with the same gains).
     #[must_use]
     pub fn whitened(&self, strengths: Strengths) -> Whitened {
-        let (c, parts) = (self.columns, self.direction.len() / self.time.len().max(1));
-        let states = 1 + PART * parts;
-        let mut covariance = vec![0.0_f64; states * states];
-        covariance[0] = strengths.scatter;
+        // Sizes known to the compiler: the loops over states are what it costs.
+        match self.direction.len() / self.time.len().max(1) {
+            1 => self.filtered::<{ 1 + PART }>(strengths),
+            2 => self.filtered::<{ 1 + 2 * PART }>(strengths),
+            _ => self.filtered::<{ 1 + 3 * PART }>(strengths),
+        }
+    }
+
+    fn filtered<const S: usize>(&self, strengths: Strengths) -> Whitened {
+        let (c, parts) = (self.columns, (S - 1) / PART);
+        let mut covariance = [[0.0_f64; S]; S];
+        covariance[0][0] = strengths.scatter;
         for part in 0..parts {
             let slope = 1 + PART * part + SLOPE;
-            covariance[slope * states + slope] = strengths.slope;
+            covariance[slope][slope] = strengths.slope;
         }
-        let mut state = vec![0.0_f64; states * c];
+        let mut state = vec![0.0_f64; S * c];
         let mut innovation = vec![0.0_f64; c];
-        let mut gain = vec![0.0_f64; states];
         let mut gram = vec![0.0_f64; c * c];
         let mut log_det = 0.0;
         let mut last = 0.0;
@@ -160,48 +145,57 @@ impl Readings {
             };
             let half = half.min(before.max(0.0));
             if k > 0 {
-                self.step(&mut covariance, &mut state, before - half, strengths);
+                step(&mut covariance, &mut state, c, before - half, strengths);
                 if self.pose[k] != self.pose[k - 1] {
-                    forget_scatter(&mut covariance, states, strengths.scatter);
+                    forget_scatter(&mut covariance, strengths.scatter);
                     state[..c].fill(0.0);
                 }
             }
-            remember_start(&mut covariance, &mut state, states, c);
-            self.step(&mut covariance, &mut state, 2.0 * half, strengths);
+            remember_start(&mut covariance, &mut state, c);
+            step(&mut covariance, &mut state, c, 2.0 * half, strengths);
             last = 2.0 * half;
             let direction = &self.direction[k * parts..(k + 1) * parts];
             // The reading is the scatter and, along every direction, walk and drift.
-            for (g, row) in gain.iter_mut().zip(covariance.chunks(states)) {
-                *g = seen(direction, half, row);
-            }
+            let gain: [f64; S] = std::array::from_fn(|s| seen(direction, half, &covariance[s]));
             let along: f64 = direction.iter().map(|d| d * d).sum();
             let variance = seen(direction, half, &gain)
                 + strengths.noise * self.variance[k]
                 + along * strengths.walk * 2.0 * half / 12.0;
             log_det += variance.ln();
-            let root = variance.sqrt();
-            for j in 0..c {
-                let mut predicted = state[j];
-                for (part, along) in direction.iter().enumerate() {
-                    let at = |which: usize| state[(1 + PART * part + which) * c + j];
-                    predicted +=
-                        along * (0.5 * (at(WALK) + at(START)) + at(DRIFT) - half * at(SLOPE));
+            let inverse_root = variance.sqrt().recip();
+            innovation.copy_from_slice(&self.rows[k * c..(k + 1) * c]);
+            let mut take = |row: usize, factor: f64| {
+                let values = &state[row * c..(row + 1) * c];
+                for (left, value) in innovation.iter_mut().zip(values) {
+                    *left -= factor * value;
                 }
-                innovation[j] = (self.rows[k * c + j] - predicted) / root;
+            };
+            take(0, 1.0);
+            for (part, along) in direction.iter().enumerate() {
+                let first = 1 + PART * part;
+                take(first + WALK, 0.5 * along);
+                take(first + START, 0.5 * along);
+                take(first + DRIFT, *along);
+                take(first + SLOPE, -half * along);
             }
-            for (s, g) in gain.iter().enumerate() {
-                for j in 0..c {
-                    state[s * c + j] += g / root * innovation[j];
+            for value in &mut innovation {
+                *value *= inverse_root;
+            }
+            for (row, g) in state.chunks_exact_mut(c).zip(&gain) {
+                let factor = g * inverse_root;
+                for (value, seen) in row.iter_mut().zip(&innovation) {
+                    *value += factor * seen;
                 }
             }
-            for a in 0..states {
-                for b in 0..states {
-                    covariance[a * states + b] -= gain[a] * gain[b] / variance;
+            let inverse = variance.recip();
+            for (row, a) in covariance.iter_mut().zip(&gain) {
+                for (value, b) in row.iter_mut().zip(&gain) {
+                    *value -= a * b * inverse;
                 }
             }
-            for a in 0..c {
-                for b in 0..c {
-                    gram[a * c + b] += innovation[a] * innovation[b];
+            for (row, a) in gram.chunks_exact_mut(c).zip(&innovation) {
+                for (value, b) in row.iter_mut().zip(&innovation) {
+                    *value += a * b;
                 }
             }
         }
@@ -209,12 +203,39 @@ impl Readings {
     }
 }
 
+/// Lets time pass: d ← d + slope·dt, then the noise of walk and integrated walk over dt.
+fn step<const S: usize>(
+    covariance: &mut [[f64; S]; S],
+    state: &mut [f64],
+    c: usize,
+    dt: f64,
+    strengths: Strengths,
+) {
+    for first in (1..S).step_by(PART) {
+        let (walk, drift, slope) = (first + WALK, first + DRIFT, first + SLOPE);
+        for j in 0..c {
+            state[drift * c + j] += dt * state[slope * c + j];
+        }
+        for column in 0..S {
+            covariance[drift][column] += dt * covariance[slope][column];
+        }
+        for row in covariance.iter_mut() {
+            row[drift] += dt * row[slope];
+        }
+        covariance[walk][walk] += strengths.walk * dt;
+        covariance[drift][drift] += strengths.drift * dt * dt * dt / 3.0;
+        covariance[drift][slope] += strengths.drift * dt * dt / 2.0;
+        covariance[slope][drift] += strengths.drift * dt * dt / 2.0;
+        covariance[slope][slope] += strengths.drift * dt;
+    }
+}
+
 /// Scatter plus, along every direction, the walk's mean over the stretch and the drift in its middle.
-fn seen(direction: &[f64], half: f64, states: &[f64]) -> f64 {
+fn seen<const S: usize>(direction: &[f64], half: f64, states: &[f64; S]) -> f64 {
     states[0]
         + direction
             .iter()
-            .zip(states[1..].chunks(PART))
+            .zip(states[1..].as_chunks::<PART>().0)
             .map(|(along, one)| {
                 along * (0.5 * (one[WALK] + one[START]) + one[DRIFT] - half * one[SLOPE])
             })
@@ -222,25 +243,21 @@ fn seen(direction: &[f64], half: f64, states: &[f64]) -> f64 {
 }
 
 /// The walk as it is now becomes the start of the stretch.
-fn remember_start(covariance: &mut [f64], state: &mut [f64], states: usize, c: usize) {
-    for first in (1..states).step_by(PART) {
+fn remember_start<const S: usize>(covariance: &mut [[f64; S]; S], state: &mut [f64], c: usize) {
+    for first in (1..S).step_by(PART) {
         let (walk, start) = (first + WALK, first + START);
-        for column in 0..states {
-            covariance[start * states + column] = covariance[walk * states + column];
-        }
-        for row in covariance.chunks_mut(states) {
+        covariance[start] = covariance[walk];
+        for row in covariance.iter_mut() {
             row[start] = row[walk];
         }
-        for j in 0..c {
-            state[start * c + j] = state[walk * c + j];
-        }
+        state.copy_within(walk * c..(walk + 1) * c, start * c);
     }
 }
 
-fn forget_scatter(covariance: &mut [f64], states: usize, scatter: f64) {
-    for other in 0..states {
-        covariance[other] = 0.0;
-        covariance[other * states] = 0.0;
+fn forget_scatter<const S: usize>(covariance: &mut [[f64; S]; S], scatter: f64) {
+    covariance[0] = [0.0; S];
+    for row in covariance.iter_mut() {
+        row[0] = 0.0;
     }
-    covariance[0] = scatter;
+    covariance[0][0] = scatter;
 }

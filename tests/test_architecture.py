@@ -11,7 +11,42 @@ PACKAGE = ROOT / "python" / "trihedron"
 STAGES = ("read", "segment", "estimate", "diagnose", "simulate", "report", "capture")
 # What any stage may import: the nouns, the model, units. `_core` only where numbers are made.
 # A fleet is the pipeline over many logs.
-COMPOSERS = {"pipeline", "cli", "fleet", "__init__"}
+COMPOSERS = {"pipeline", "cli", "fleet", "__init__", "__main__"}
+# Records ask for how they are shown (to_dict, plot, a page) and for the reader of plain arrays only when asked.
+LOOKS_UP = {"records/presented.py", "records/recording.py"}
+# Where numbers are made.
+MAY_USE_CORE = {"read", "segment", "estimate", "diagnose", "simulate"}
+LONGEST_FILE, LONGEST_FUNCTION = 350, 80
+# Longer ones that are there. The list may only shrink: a file that was split leaves it.
+LONG_FILES = {
+    "python/trihedron/estimate/gyroscope/measurements.py": 370,
+    "python/trihedron/estimate/kalman/norm_invariant.py": 370,
+    "python/trihedron/pipeline/sessions.py": 400,
+    "python/trihedron/read/sensors.py": 410,
+    "python/trihedron/records/diagnosis.py": 410,
+    "python/trihedron/report/calibration.py": 380,
+    "python/trihedron/report/diagnosis.py": 460,
+    "python/trihedron/segment/runs.py": 355,
+    "rust/attitude/tile.rs": 450,
+    "rust/kalman/norm.rs": 510,
+    "rust/kalman/shaping.rs": 365,
+    "rust/poisson/lanes.rs": 430,
+    "rust/python/kalman.rs": 465,
+}
+# Functions over the limit; those of the commands are lists of options.
+LONG_FUNCTIONS = {
+    "cli/allan.py:allan",
+    "cli/calibrate.py:calibrate",
+    "cli/capture.py:capture",
+    "cli/diagnose.py:diagnose",
+    "cli/simulate.py:simulate",
+    "estimate/gyroscope/measurements.py:measure_moves",
+    "estimate/kalman/norm_invariant.py:calibrate_without_references",
+    "estimate/kalman/per_axis.py:calibrate_with_references",
+    "estimate/gyroscope/turns.py:calibrate_turns",
+    "pipeline/calibrating.py:calibrate",
+    "pipeline/diagnosing.py:_of_poses",
+}
 
 
 def imported_modules(path: Path) -> set[str]:
@@ -65,3 +100,60 @@ def test_the_top_level_is_the_agreed_one():
 def test_nothing_is_called_utils():
     for path in [*PACKAGE.rglob("*"), *(ROOT / "rust").rglob("*")]:
         assert path.stem not in {"utils", "helpers", "common", "misc"}, path
+
+
+def test_nothing_below_the_pipeline_knows_who_composes_it():
+    lookups = set()
+    for path in PACKAGE.rglob("*.py"):
+        name = path.relative_to(PACKAGE)
+        if name.parts[0].removesuffix(".py") in COMPOSERS:
+            continue
+        above = {m for m in imported_modules(path) if m.split(".")[:2] in (["trihedron", c] for c in COMPOSERS)}
+        if above:
+            lookups.add(str(name))
+    assert lookups == LOOKS_UP
+
+
+def test_only_the_rooms_that_make_numbers_use_the_core():
+    users = {
+        path.relative_to(PACKAGE)
+        for path in PACKAGE.rglob("*.py")
+        if any(m.split(".")[:2] == ["trihedron", "_core"] for m in imported_modules(path))
+    }
+    used = {room for room in MAY_USE_CORE for path in users if path.parts[0] == room or str(path) == room}
+    assert all(path.parts[0] in MAY_USE_CORE or str(path) in MAY_USE_CORE for path in users), users
+    assert used == MAY_USE_CORE, f"no longer needed: {MAY_USE_CORE - used}"
+
+
+def test_no_file_outgrows_its_reader():
+    sources = [*PACKAGE.rglob("*.py"), *(ROOT / "rust").rglob("*.rs")]
+    long = {str(p.relative_to(ROOT)): n for p in sources if (n := len(p.read_text().splitlines())) > LONGEST_FILE}
+    assert set(long) <= set(LONG_FILES), f"split: {sorted(set(long) - set(LONG_FILES))}"
+    assert not {name for name, n in long.items() if n > LONG_FILES[name]}, "these may only become shorter"
+
+
+def functions():
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                yield f"{path.relative_to(PACKAGE)}:{node.name}", node.end_lineno - node.lineno + 1
+
+
+def test_no_function_outgrows_its_reader():
+    assert {name for name, n in functions() if n > LONGEST_FUNCTION} <= LONG_FUNCTIONS
+
+
+def test_no_function_of_the_package_looks_like_a_test():
+    assert not {name for name, _ in functions() if name.rpartition(":")[2].startswith("test_")}
+
+
+# Ours; a number of three parts is another book's.
+EQUATION = re.compile(r"\b(?:eq|eqs|equation|equations)\.? ?\(?(\d+\.\d+[a-z]?)(?!\.\d)", re.IGNORECASE)
+
+
+def test_equations_that_the_code_cites_are_in_the_documents():
+    documents = "".join(p.read_text() for p in (ROOT / "docs").glob("*.md"))
+    stated = {*re.findall(r"\((\d+\.\d+[a-z]?)\)", documents), *re.findall(r"\\tag\{(\d+\.\d+[a-z]?)\}", documents)}
+    for path in [*PACKAGE.rglob("*.py"), *(ROOT / "rust").rglob("*.rs")]:
+        missing = set(EQUATION.findall(path.read_text())) - stated
+        assert not missing, f"{path.relative_to(ROOT)} cites {sorted(missing)}"

@@ -141,3 +141,11 @@ def test_faces_hold_their_bars_on_a_table_that_leans_with_headings_that_come_bac
     # 72 and 54 scores; the tilt of a table makes a dozen of the former free. Headings counted twice gave 1.4² = 2.
     assert np.mean(np.square(accelerometer)) < 1.7
     assert np.mean(np.square(gyro)) < 1.5
+
+
+def test_poses_that_go_on_settling_mark_the_calibration_and_firm_ones_do_not():
+    trusted = {}
+    for name, settle in (("soft", {"settle_deg": 1.0, "settle_s": 0.8}), ("firm", {})):
+        f, w, rate, _, _ = carried(5011, **settle)
+        trusted[name] = calibrate(recording_of(f, w, rate), gravity_m_s2=G).is_trustworthy
+    assert trusted == {"soft": False, "firm": True}

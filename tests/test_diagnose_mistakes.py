@@ -13,6 +13,7 @@ from trihedron.estimate.noise.of_zeros import PoseZeros, compare_slow
 from trihedron.pipeline.comparing_frames import sign_of_gravity
 from trihedron.records import Hold, Segments
 from trihedron.records.diagnosis import Stage, StageDomain
+from trihedron.records.sampling import Sampling, StampKind
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 N, HOLD_S, GAP_S, POSES = 9e-5, 4.5, 2.0, 26
@@ -132,6 +133,27 @@ def test_walks_of_two_sessions_of_one_unit_are_not_told_apart_and_a_walk_without
     assert sum(covered) >= 20
 
 
+def test_a_simulation_without_any_noise_has_less_walk_than_a_recording_and_no_number_fails():
+    silent = [replace(z, values=1e-18 * z.values, sigma=0.0 * z.sigma) for z in zeros(1, 0.0)]
+    exact = [replace(z, values=0.0 * z.values, sigma=0.0 * z.sigma) for z in silent]
+    for ideal in (silent, exact):
+        found = compare_slow(ideal, zeros(2, 1e-4))
+        assert found.p_value < 1e-3
+        assert all(np.isfinite([r.value for r in axis.values()]).all() for axis in found.ratio)
+        assert all(axis["K"].value < 1e-5 for axis in found.first)
+
+
+def test_poses_of_unlike_length_side_by_side_leave_every_strength_a_covariance():
+    # A first hold ten times as long as the others, and hardly a gap: an expansion in T over distance fails here.
+    length = np.r_[45.0, np.full(19, 4.5)]
+    t = np.cumsum(length + 0.2) - length / 2.0
+    rng = np.random.default_rng(1)
+    real = [PoseZeros(1e-3 * rng.standard_normal(20), np.full(20, 1e-6), t, length, scatters=True) for _ in range(3)]
+    ideal = [replace(z, values=np.zeros(20), sigma=np.zeros(20)) for z in real]
+    # What differs from pose to pose without memory is scatter, of which either side may have its own.
+    assert compare_slow(ideal, real).p_value > 0.01
+
+
 def test_slow_noise_is_not_compared_with_few_poses():
     short = [replace(z, values=z.values[:8], sigma=z.sigma[:8], time_s=z.time_s[:8], length_s=z.length_s[:8])
              for z in zeros(1, 1e-5)]  # fmt: skip
@@ -158,6 +180,25 @@ def test_the_noise_stage_falls_to_what_the_recordings_own_halves_differ_by():
     # Half of the figures are off by 6 dB: 4.3 rms; octaves of four holds are known to 1 dB.
     assert 3.5 < misfit["as-given"] == misfit["numbers"] < 5.5
     assert misfit["noise"] == misfit["effects"] < 1.5
+
+
+def test_stamps_that_reading_made_even_still_count_as_scattered():
+    from trihedron.pipeline.comparing_noise import compare_noise, sampled
+
+    rng = np.random.default_rng(4)
+    body, _, _ = session_with_world_rates(3)
+    readings = 1e-2 * rng.standard_normal((4000, 3))
+    clean = replace(body, time_s=np.arange(4000) / 100.0, accelerometer=readings, gyroscope=0.1 * readings[::-1],
+                    temperature_degc=None, supply_v=None, rate_hz=100.0)  # fmt: skip
+    late = replace(clean, sampling=Sampling(StampKind.LATE, 0.01, 0.0, 1.5e-3, is_even=True))
+    rounded = replace(clean, sampling=Sampling(StampKind.ROUNDED, 0.01, 0.0, 1.5e-3, is_even=True))
+    holds = tuple(Hold(k, 500 * k, 500 * k + 450, 500 * k, 500 * k + 450) for k in range(8))
+    given, fit = sampled(clean, holds, model(1.0, 1.0)), model(1.0, 1.0)
+    for log, expected in ((late, {"jitter"}), (rounded, set()), (clean, set())):
+        rows = compare_noise(given, sampled(log, holds, fit), alpha=0.01)
+        assert {n.term for n in rows if n.significant} == expected
+    jitter = next(n for n in compare_noise(given, sampled(late, holds, fit), alpha=0.01) if n.term == "jitter")
+    assert "1.5 ms" in jitter.remark
 
 
 def still(n):

@@ -9,13 +9,11 @@ SELF_EXPLANATORY = {-1, 0, 1, 2, 3}
 STILL_BARE = {
     "against/invariants.py": 2,
     "diagnosis.py": 1,
-    "effects/accel_hidden_drift.py": 1,
     "effects/accel_thermal_bias.py": 1,
     "effects/accel_thermal_scale.py": 1,
     "effects/axis_handedness.py": 1,
     "effects/disturbed_pose.py": 4,
     "effects/dropped_samples.py": 2,
-    "effects/gyro_hidden_drift.py": 1,
     "effects/gyro_thermal_bias.py": 1,
     "effects/gyro_thermal_scale.py": 1,
     "effects/late_readings.py": 1,

@@ -159,3 +159,17 @@ def test_an_axis_that_never_turned_is_named():
     short = ReferenceMotion(trial.motion.time_s[third], rate=trial.motion.rate[third], source="two.csv")
     with pytest.raises(ValueError, match="hardly turns"):
         fit_reference(trial.log, short, G)
+
+
+def test_the_second_derivative_of_a_window_is_that_of_its_own_weights_at_ten_samples_a_radian():
+    from trihedron.estimate.reference.windows import windows_on
+
+    step, n = 0.01, 600
+    windows = windows_on(np.ones(n, dtype=bool), step, 4)
+    for hz in (0.5, 1.0, 2.0, 4.0):
+        w = 2.0 * np.pi * hz
+        x = np.exp(1j * w * step * np.arange(n))
+        ratio = windows.of(windows.curvature, x.real) + 1j * windows.of(windows.curvature, x.imag)
+        ratio = ratio / (windows.of(windows.weight, x.real) + 1j * windows.of(windows.weight, x.imag))
+        # What is left is of fourth order: (ωT)⁴/240 by the next term of the series, times four for the others.
+        assert np.allclose(ratio / -(w**2), 1.0, atol=4.0 * (w * step) ** 4 / 240.0 + 1e-9)

@@ -189,7 +189,8 @@ pub fn descend<D: Descent>(
             ));
         }
         let gradient = local.gradient_cosine();
-        let step = local.length(&local.step(0.0)?);
+        let undamped = local.step(0.0)?;
+        let step = local.length(&undamped);
         // Whitened residuals are of order one; a root mean square of 1e-13 is rounding whatever the unit.
         let mut stop = if local.cost() <= 1e-26 * local.n_residuals() as f64 {
             Some(Stop::ZeroResidual)
@@ -203,7 +204,7 @@ pub fn descend<D: Descent>(
             None
         };
         if stop.is_none() {
-            match lower(problem, &point, &local, &mut damping)? {
+            match lower(problem, &point, &local, undamped, &mut damping)? {
                 Some(next) => point = next,
                 None => stop = Some(Stop::NoDescent),
             }
@@ -227,10 +228,15 @@ fn lower<D: Descent>(
     problem: &D,
     point: &D::Point,
     local: &D::Local,
+    undamped: DVector<f64>,
     damping: &mut f64,
 ) -> Result<Option<D::Point>> {
+    let mut known = Some(undamped);
     for _ in 0..60 {
-        let delta = local.step(*damping)?;
+        let delta = match known.take() {
+            Some(step) if *damping == 0.0 => step,
+            _ => local.step(*damping)?,
+        };
         let moved = problem.moved(point, &delta);
         let cost = problem.cost(&moved)?;
         let predicted = local.predicted(&delta);

@@ -19,6 +19,7 @@ mod gyro_alignment;
 mod kalman;
 mod kalman_norm;
 mod lent;
+mod move_signals;
 mod number_text;
 mod poisson;
 mod rotation;
@@ -40,6 +41,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     audit::register(module)?;
     chi_square::register(module)?;
     gyro_alignment::register(module)?;
+    move_signals::register(module)?;
     number_text::register(module)?;
     poisson::register(module)?;
     kalman::register(module)?;

@@ -6,6 +6,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::blocks::{add_product, solve};
 use super::factor::Factor;
 use crate::error::{Error, Result};
 
@@ -99,6 +100,27 @@ impl Rows {
         out
     }
 
+    /// `J x` of one step `x` `(n)`.
+    #[must_use]
+    pub fn image(&self, layout: Layout, x: &DVector<f64>) -> DVector<f64> {
+        let mut out = DVector::zeros(self.len());
+        if self.border.ncols() > 0 {
+            out.gemv(1.0, &self.border, &x.rows(0, layout.border), 1.0);
+        }
+        if let Some(pose) = self.pose {
+            out.gemv(1.0, &self.here, &x.rows(layout.at(pose), layout.pose), 1.0);
+            if self.next.ncols() > 0 {
+                out.gemv(
+                    1.0,
+                    &self.next,
+                    &x.rows(layout.at(pose + 1), layout.pose),
+                    1.0,
+                );
+            }
+        }
+        out
+    }
+
     /// Adds `Jᵀ y` for `y` `(r, k)`.
     pub fn add_transposed(&self, layout: Layout, y: &DMatrix<f64>, out: &mut DMatrix<f64>) {
         if self.border.ncols() > 0 {
@@ -168,18 +190,18 @@ impl Chain {
     fn add(&mut self, rows: &Rows) {
         let has_border = rows.border.ncols() > 0;
         if has_border {
-            self.corner.gemm_tr(1.0, &rows.border, &rows.border, 1.0);
+            add_product(&mut self.corner, 1.0, &rows.border, &rows.border);
         }
         let Some(pose) = rows.pose else { return };
-        self.diagonal[pose].gemm_tr(1.0, &rows.here, &rows.here, 1.0);
+        add_product(&mut self.diagonal[pose], 1.0, &rows.here, &rows.here);
         if has_border {
-            self.border[pose].gemm_tr(1.0, &rows.here, &rows.border, 1.0);
+            add_product(&mut self.border[pose], 1.0, &rows.here, &rows.border);
         }
         if rows.next.ncols() > 0 {
-            self.diagonal[pose + 1].gemm_tr(1.0, &rows.next, &rows.next, 1.0);
-            self.next[pose].gemm_tr(1.0, &rows.here, &rows.next, 1.0);
+            add_product(&mut self.diagonal[pose + 1], 1.0, &rows.next, &rows.next);
+            add_product(&mut self.next[pose], 1.0, &rows.here, &rows.next);
             if has_border {
-                self.border[pose + 1].gemm_tr(1.0, &rows.next, &rows.border, 1.0);
+                add_product(&mut self.border[pose + 1], 1.0, &rows.next, &rows.border);
             }
         }
     }
@@ -245,9 +267,9 @@ impl Chain {
                 let before = scale.rows(layout.at(i - 1), layout.pose).map(f64::recip);
                 let coupling = scaled(&self.next[i - 1], &before, &d);
                 // W = D⁻¹E of the pose before.
-                let along = diagonal[i - 1].solve(&coupling);
-                block.gemm_tr(-1.0, &coupling, &along, 1.0);
-                edge.gemm_tr(-1.0, &along, &border[i - 1], 1.0);
+                let along = solve(&diagonal[i - 1], &coupling);
+                add_product(&mut block, -1.0, &coupling, &along);
+                add_product(&mut edge, -1.0, &along, &border[i - 1]);
                 gain.push(along);
             }
             let half = block.cholesky().ok_or_else(|| {
@@ -255,8 +277,8 @@ impl Chain {
                     "the normal equations of the session are not positive definite: a noise figure is missing or zero",
                 )
             })?;
-            let inner = half.solve(&edge);
-            schur.gemm_tr(-1.0, &edge, &inner, 1.0);
+            let inner = solve(&half, &edge);
+            add_product(&mut schur, -1.0, &edge, &inner);
             diagonal.push(half);
             border.push(edge);
         }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use super::blocks::{add_product, solve};
 use super::chain::{Layout, Rows, scaled};
 
 /// A factored chain.
@@ -40,7 +41,7 @@ impl Factor {
         for i in 0..layout.n_poses {
             let mut y = x.rows(layout.at(i), layout.pose).into_owned();
             if i > 0 {
-                y.gemm_tr(-1.0, &self.gain[i - 1], &parts[i - 1], 1.0);
+                add_product(&mut y, -1.0, &self.gain[i - 1], &parts[i - 1]);
             }
             parts.push(y);
         }
@@ -48,10 +49,10 @@ impl Factor {
         let solved: Vec<DMatrix<f64>> = parts
             .iter()
             .zip(&self.diagonal)
-            .map(|(y, half)| half.solve(y))
+            .map(|(y, half)| solve(half, y))
             .collect();
         for (edge, z) in self.border.iter().zip(&solved) {
-            corner.gemm_tr(-1.0, edge, z, 1.0);
+            add_product(&mut corner, -1.0, edge, z);
         }
         if n_border > 0 {
             self.corner.solve_mut(&mut corner);
@@ -61,7 +62,7 @@ impl Factor {
         for i in (0..layout.n_poses).rev() {
             let mut z = solved[i].clone();
             if n_border > 0 {
-                z -= self.diagonal[i].solve(&(&self.border[i] * &corner));
+                z -= solve(&self.diagonal[i], &(&self.border[i] * &corner));
             }
             if let Some(next) = &after {
                 z -= &self.gain[i] * next;
@@ -97,7 +98,7 @@ impl Factor {
         let mut next: Vec<DMatrix<f64>> =
             vec![DMatrix::zeros(0, 0); layout.n_poses.saturating_sub(1)];
         for i in (0..layout.n_poses).rev() {
-            let mut x = self.diagonal[i].solve(&self.border[i]);
+            let mut x = solve(&self.diagonal[i], &self.border[i]);
             let mut p = self.diagonal[i].inverse();
             if i + 1 < layout.n_poses {
                 let gain = &self.gain[i];

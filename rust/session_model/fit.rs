@@ -1,12 +1,13 @@
 //! The fit of a session, and the strengths of the processes behind its zeros (docs/model-session.md, 11.9-11.12).
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 
 use nalgebra::{DMatrix, DVector};
 
 use super::chain::{Chain, Layout};
 use super::factor::Factor;
 use super::move_rows::{Passed, Weights};
+use super::moves::Carried;
 use super::rows::Group;
 use super::strengths::CORNER_GRID_S;
 use super::{Distortion, Session, State, Strengths};
@@ -113,6 +114,8 @@ struct Held<'a> {
     weights: &'a Weights,
     /// The moves at the state that the descent begins at, already carried.
     first: RefCell<Option<Vec<Passed>>>,
+    /// The state whose cost was asked for last, and the moves carried there.
+    tried: RefCell<Option<(State, Vec<Carried>)>>,
 }
 
 /// The linear problem of a state.
@@ -120,6 +123,8 @@ struct Here {
     groups: Vec<Group>,
     passed: Vec<Passed>,
     chain: Chain,
+    /// Its factors without damping, made when first asked for.
+    factor: OnceCell<Factor>,
     gradient: DMatrix<f64>,
     cost: f64,
     n: usize,
@@ -132,8 +137,12 @@ impl Descent for Held<'_> {
     fn linearise(&self, state: &State, _previous: Option<&Here>) -> Result<Here> {
         let known = self.first.borrow_mut().take();
         let passed = known.unwrap_or_else(|| {
+            let carried = match self.tried.borrow_mut().take() {
+                Some((at, carried)) if at == *state => carried.into_iter().map(Some).collect(),
+                _ => vec![None; self.session.moves.len()],
+            };
             self.session
-                .pass(state, self.distortion, &self.weights.plane)
+                .pass_carried(state, self.distortion, &self.weights.plane, carried)
         });
         let groups = self.session.groups(
             state,
@@ -151,6 +160,7 @@ impl Descent for Held<'_> {
             groups,
             passed,
             chain,
+            factor: OnceCell::new(),
         })
     }
 
@@ -159,8 +169,9 @@ impl Descent for Held<'_> {
             .session
             .chi2(state, &self.strengths, self.distortion, self.weights);
         // A triad that collapsed on the way is a wall, not an end.
-        Ok(chi2.map_or(f64::INFINITY, |value| {
+        Ok(chi2.map_or(f64::INFINITY, |(value, carried)| {
             if value.is_finite() {
+                *self.tried.borrow_mut() = Some((state.clone(), carried));
                 0.5 * value
             } else {
                 f64::INFINITY
@@ -174,11 +185,18 @@ impl Descent for Held<'_> {
 }
 
 impl Here {
-    fn image(&self, step: &DVector<f64>) -> impl Iterator<Item = (&Group, DMatrix<f64>)> {
-        let x = DMatrix::from_column_slice(step.len(), 1, step.as_slice());
+    fn image(&self, step: &DVector<f64>) -> impl Iterator<Item = (&Group, DVector<f64>)> {
         self.groups
             .iter()
-            .map(move |group| (group, group.rows.times(self.chain.layout, &x)))
+            .map(|group| (group, group.rows.image(self.chain.layout, step)))
+    }
+
+    fn undamped(&self) -> Result<&Factor> {
+        if let Some(factor) = self.factor.get() {
+            return Ok(factor);
+        }
+        let made = self.chain.factor(RIDGE, None)?;
+        Ok(self.factor.get_or_init(|| made))
     }
 }
 
@@ -207,17 +225,19 @@ impl Local for Here {
     }
 
     fn step(&self, lambda: f64) -> Result<DVector<f64>> {
-        let x = self
-            .chain
-            .factor(RIDGE + lambda, None)?
-            .solve(&self.gradient);
+        let x = if lambda == 0.0 {
+            self.undamped()?.solve(&self.gradient)
+        } else {
+            let factor = self.chain.factor(RIDGE + lambda, None)?;
+            factor.solve(&self.gradient)
+        };
         Ok(-x.column(0).into_owned())
     }
 
     fn predicted(&self, step: &DVector<f64>) -> f64 {
         let after: f64 = self
             .image(step)
-            .map(|(group, image)| (image.column(0) + &group.rows.residual).norm_squared())
+            .map(|(group, image)| (image + &group.rows.residual).norm_squared())
             .sum();
         self.cost - 0.5 * after
     }
@@ -258,14 +278,19 @@ pub fn fit(
             strengths,
             weights: &weights,
             first: RefCell::new(Some(passed)),
+            tried: RefCell::new(None),
         };
         let ended = descend(&held, state, &options)?;
         iterations += ended.iterations;
         state = ended.point;
-        passed = ended.local.passed;
+        let local = ended.local;
+        passed = local.passed;
         let is_settled = ended.iterations == 1 || session.moves.is_empty();
         if is_settled || renewal >= RENEWALS {
-            let factor = ended.local.chain.factor(RIDGE, None)?;
+            let factor = match local.factor.into_inner() {
+                Some(factor) => factor,
+                None => local.chain.factor(RIDGE, None)?,
+            };
             return Ok(Fit {
                 state,
                 strengths,
@@ -273,8 +298,8 @@ pub fn fit(
                 distortion: distortion.clone(),
                 weights,
                 passed,
-                groups: ended.local.groups,
-                chain: ended.local.chain,
+                groups: local.groups,
+                chain: local.chain,
                 factor,
                 stop: ended.stop,
                 iterations,

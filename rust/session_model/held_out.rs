@@ -103,7 +103,15 @@ impl Fit {
         // The training optimum is one linear step from that of all rows.
         let others = side - &jacobian_t * &residual;
         let solved = factor.solve(&jacobian_t);
-        let mut spread = jacobian_t.tr_mul(&solved);
+        let mut spread = DMatrix::zeros(n, n);
+        let mut at = 0;
+        for &g in fold {
+            let rows = &self.groups[g].rows;
+            spread
+                .rows_mut(at, rows.len())
+                .copy_from(&rows.times(layout, &solved));
+            at += rows.len();
+        }
         for i in 0..n {
             spread[(i, i)] += 1.0;
         }

@@ -5,6 +5,7 @@
 //! that no sensor can buy itself a smaller residual by shrinking. Rest rows speak of one pose, moves and walks of two
 //! neighbours: the normal equations are a chain with a border ([`chain`]).
 
+mod blocks;
 pub mod chain;
 pub mod factor;
 pub mod fit;

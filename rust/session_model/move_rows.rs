@@ -122,13 +122,25 @@ impl Session {
         distortion: &Distortion,
         planes: &[Matrix3x2<f64>],
     ) -> Vec<Passed> {
+        self.pass_carried(state, distortion, planes, vec![None; self.moves.len()])
+    }
+
+    /// The same of moves that may be carried there already.
+    pub(super) fn pass_carried(
+        &self,
+        state: &State,
+        distortion: &Distortion,
+        planes: &[Matrix3x2<f64>],
+        known: Vec<Option<Carried>>,
+    ) -> Vec<Passed> {
         let effects = Effects::at(distortion, state);
-        (0..self.moves.len())
+        known
             .into_par_iter()
-            .map(|m| {
+            .enumerate()
+            .map(|(m, known)| {
                 let one = &self.moves[m];
                 let sees = self.sees(state, m, planes[m], &effects);
-                let carried = carry(one, &sees);
+                let carried = known.unwrap_or_else(|| carry(one, &sees));
                 let response = respond(one, &sees, &carried, &self.noise);
                 let sums = sums(one, &sees, &response, &LOWER);
                 let loose = self
@@ -221,13 +233,11 @@ impl Session {
         let one = &self.moves[index];
         let width = 3 * distortion.k;
         let first = self.n_poses() + one.first_point;
-        let part = |values: Option<&'_ Vec<f64>>| -> Option<Vec<f64>> {
-            values.map(|v| v[first * width..(first + one.n_samples()) * width].to_vec())
-        };
+        let span = first * width..(first + one.n_samples()) * width;
         effect_columns(
             &passed.response,
-            part(distortion.force.as_ref()).as_deref(),
-            part(distortion.rate.as_ref()).as_deref(),
+            distortion.force.as_ref().map(|v| &v[span.clone()]),
+            distortion.rate.as_ref().map(|v| &v[span.clone()]),
             distortion.k,
         )
     }

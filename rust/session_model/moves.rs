@@ -8,7 +8,7 @@
 use nalgebra::{Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
 
 use crate::poisson::{RateModel, StepWeights, step_weights};
-use crate::rotation::exp_and_left_jacobian;
+use crate::rotation::exp;
 
 /// Residuals of a move: gravity across the vertical after it (2), velocity over it (3).
 pub const N_MOVE: usize = 5;
@@ -178,7 +178,7 @@ pub fn carry(one: &Move, sees: &Sees<'_>) -> Carried {
     let mut done = 0;
     for step in &one.steps {
         let (phi0, phi1) = step.moments(|k| rate[k]);
-        let (turn, _) = exp_and_left_jacobian(&(phi0 + phi0.cross(&phi1)));
+        let turn = exp(&(phi0 + phi0.cross(&phi1)));
         let here = turn.transpose() * attitude[step.from];
         // Samples that share a stamp share its attitude.
         for k in done + 1..step.to {

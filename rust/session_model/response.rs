@@ -1,7 +1,7 @@
 //! How the residuals of a move answer to every sample: one backward pass, and products with it (docs/model-session.md,
 //! equations 11.5-11.7).
 
-use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, SVector, Vector3};
 
 use super::moves::{Carried, Move, MoveCovariance, MoveNoise, N_MOVE, Sees};
 use crate::rotation::{exp_and_left_jacobian, skew};
@@ -209,27 +209,21 @@ pub fn effect_columns(
     k: usize,
 ) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(N_MOVE, k);
-    for (s, (r, f)) in response.by_rate.iter().zip(&response.by_force).enumerate() {
+    for c in 0..k {
+        let mut change = SVector::<f64, N_MOVE>::zeros();
+        let along = |row: &[f64]| Vector3::new(row[c], row[k + c], row[2 * k + c]);
         if let Some(rate) = rate {
-            let row = &rate[3 * k * s..3 * k * (s + 1)];
-            for c in 0..k {
-                let d = Vector3::new(row[c], row[k + c], row[2 * k + c]);
-                let change = r * d;
-                for i in 0..N_MOVE {
-                    out[(i, c)] -= change[i];
-                }
+            for (r, row) in response.by_rate.iter().zip(rate.chunks_exact(3 * k)) {
+                change -= r * along(row);
             }
         }
         if let Some(force) = force {
-            let row = &force[3 * k * s..3 * k * (s + 1)];
-            for c in 0..k {
-                let d = Vector3::new(row[c], row[k + c], row[2 * k + c]);
-                let change = f * d;
-                for i in 0..3 {
-                    out[(2 + i, c)] -= change[i];
-                }
+            let mut velocity = change.fixed_rows_mut::<3>(2);
+            for (f, row) in response.by_force.iter().zip(force.chunks_exact(3 * k)) {
+                velocity -= f * along(row);
             }
         }
+        out.column_mut(c).copy_from(&change);
     }
     out
 }

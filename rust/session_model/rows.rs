@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::chain::{Layout, Rows};
 use super::move_rows::{Effects, Passed, Weights};
-use super::moves::{N_MOVE, carry};
+use super::moves::{Carried, N_MOVE, carry};
 use super::rest_rows::{rest_columns, weight_of};
 use super::{Distortion, N_MODEL, Session, State, Strengths};
 use crate::error::{Error, Result};
@@ -100,7 +100,8 @@ impl Session {
         Ok(out)
     }
 
-    /// Residual parts that change between trial steps, without derivatives: the cost of a state.
+    /// Residual parts that change between trial steps, without derivatives: the cost of a state, and the moves carried
+    /// there.
     ///
     /// # Errors
     /// When a triad has collapsed.
@@ -110,24 +111,27 @@ impl Session {
         strengths: &Strengths,
         distortion: &Distortion,
         weights: &Weights,
-    ) -> Result<f64> {
+    ) -> Result<(f64, Vec<Carried>)> {
         let layout = self.layout(distortion.k);
         let mut rest = Vec::with_capacity(6 * layout.n_poses);
         self.rest_rows(state, distortion, layout, &mut rest)?;
         self.process_rows(state, strengths, layout, &mut rest);
         self.prior_rows(state, layout, &mut rest);
         let effects = Effects::at(distortion, state);
-        let moves: f64 = (0..self.moves.len())
+        let carried: Vec<Carried> = (0..self.moves.len())
             .into_par_iter()
             .map(|m| {
                 let sees = self.sees(state, m, weights.plane[m], &effects);
-                (weights.white[m] * carry(&self.moves[m], &sees).residual).norm_squared()
+                carry(&self.moves[m], &sees)
             })
-            .collect::<Vec<f64>>()
+            .collect();
+        let moves: f64 = carried
             .iter()
+            .zip(&weights.white)
+            .map(|(one, white)| (white * one.residual).norm_squared())
             .sum();
         let still: f64 = rest.iter().map(|g| g.rows.residual.norm_squared()).sum();
-        Ok(moves + still)
+        Ok((moves + still, carried))
     }
 
     fn prior_rows(&self, state: &State, layout: Layout, out: &mut Vec<Group>) {

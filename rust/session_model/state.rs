@@ -17,7 +17,7 @@ pub struct Distortion {
 }
 
 /// A point in the space of all unknowns.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct State {
     /// Accelerometer `S`, lower triangular.
     pub force_scale: Matrix3<f64>,

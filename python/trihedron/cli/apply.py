@@ -37,7 +37,7 @@ def apply(
         apply_stream(calibration, source, output, force=force)
         return
     from trihedron.files.calibration import read_calibration
-    from trihedron.files.recording import check_format, write_recording
+    from trihedron.files.log import check_format, write_recording
 
     check_format(output)
     known = read_calibration(calibration)
@@ -46,7 +46,7 @@ def apply(
     from trihedron.report.machine import recording_record
 
     done = pipeline.apply(known, recording)
-    write_recording(done, output, overwrite=force)
+    write_recording(done, output, is_corrected=True, overwrite=force)
     if str(output) != "-":
         say(f"{done.n_samples} samples: {output}")
     write_json(recording_record(done), json, force=force)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.ndimage import convolve1d, gaussian_filter1d, uniform_filter1d
 from scipy.signal import savgol_coeffs
 
+from trihedron import _core
 from trihedron.diagnose.session.observations import FloatArray, Observations
 from trihedron.diagnose.session.solve import Fit
 
@@ -42,6 +43,11 @@ class Context:
         return self.fitted.line.path.move_slices
 
     @cached_property
+    def move_edges(self) -> npt.NDArray[np.int64]:
+        """(moves, 2) first point of each move and the one behind its last."""
+        return np.array([(where.start, where.stop) for where in self.moves], dtype=np.int64).reshape(-1, 2)
+
+    @cached_property
     def time_s(self) -> FloatArray:
         """(points,) middle of each hold, time of each sample."""
         times: FloatArray = self.obs.time_s[self.fitted.line.path.point_samples].copy()
@@ -67,10 +73,7 @@ class Context:
 
     def derivative(self, values: FloatArray) -> FloatArray:
         """(points, 3) time derivative inside moves; zero in holds."""
-        out = np.zeros_like(values)
-        for where in self.moves:
-            out[where] = np.gradient(values[where], self.time_s[where], axis=0)
-        return out
+        return _core.move_derivative(self.time_s, np.ascontiguousarray(values), self.move_edges)
 
     @cached_property
     def force_rate(self) -> FloatArray:

@@ -13,9 +13,9 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.diagnose.laws.find import laws_of_rest
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
-from trihedron.diagnose.residuals.goodness_of_fit import hidden_zeros, test_rows
-from trihedron.diagnose.residuals.timing import test_timing
-from trihedron.diagnose.residuals.within_holds import test_within_static
+from trihedron.diagnose.residuals.goodness_of_fit import hidden_zeros, judge_rows
+from trihedron.diagnose.residuals.timing import judge_timing
+from trihedron.diagnose.residuals.within_holds import judge_within_holds
 from trihedron.diagnose.selection.accepted import accepted_effects
 from trihedron.diagnose.selection.evidence import with_evidence
 from trihedron.diagnose.selection.model import StepwiseModel, begin
@@ -31,8 +31,7 @@ from trihedron.diagnose.session.starting_point import is_open, linear_model, nom
 from trihedron.diagnose.session.twin import Prior, Twin
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Candidate, Diagnosis, DomainTest
-
-Progress = Callable[[float, str], None]
+from trihedron.records.progress import Progress
 
 
 def diagnose_recording(
@@ -203,7 +202,7 @@ def _widened(obs: Observations, remaining: tuple[DomainTest, ...]) -> Observatio
 
 def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) -> tuple[DomainTest, ...]:
     return (
-        *test_rows(context.fitted, alpha),
-        test_within_static(context.obs, alpha),
-        test_timing(context, alpha, refused),
+        *judge_rows(context.fitted, alpha),
+        judge_within_holds(context.obs, alpha),
+        judge_timing(context, alpha, refused),
     )

@@ -38,7 +38,7 @@ def verify_calibration(
     gravity_m_s2: float,
     gravity_source: str,
 ) -> Verification:
-    """Judge a calibration by the still poses and moves of another recording (equations 3.1 and 5.1, nothing fitted).
+    """Judge a calibration by the poses (docs/model.md, 10) and moves (equation 5.1) of another recording; no fit.
 
     Raises
     ------

@@ -1,9 +1,10 @@
-"""Recordings written as logs that :func:`trihedron.read` takes back without a question: CSV, npz, Parquet."""
+"""Recordings written as tables that :func:`trihedron.read` takes back without a question: CSV, npz, Parquet."""
 
 from __future__ import annotations
 
 import io
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,29 +15,49 @@ from trihedron.forked import check_tables
 from trihedron.records.recording import FloatArray, Recording
 
 LOG_SUFFIXES = (".csv", ".npz", ".parquet")
+_TIMES = ("t [s]", "time_s")
 
 
-def write_recording(recording: Recording, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+def check_format(path: str | os.PathLike[str]) -> None:
+    """Refuse a name whose ending tells no format, before the work; ``-`` is CSV on stdout.
+
+    Raises
+    ------
+    OutputError
+        Naming the endings there are.
+    """
+    if str(path) != "-" and Path(path).suffix.lower() not in LOG_SUFFIXES:
+        raise OutputError(f"{path}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
+
+
+def write_recording(
+    recording: Recording, path: str | os.PathLike[str], *, is_corrected: bool = False, overwrite: bool = False
+) -> None:
     """Write time [s], the sensors in their own units, temperature and supply where there are; units in the names.
+
+    What was corrected (``is_corrected``) is in SI: ``time_s``, ``acc_x … acc_z``, ``gyr_x … gyr_z``, all digits. ``-``
+    is CSV on stdout.
 
     Raises
     ------
     OutputError
         When the ending is none of .csv, .npz, .parquet, or the file exists and may not be replaced.
     """
-    target = Path(path)
+    check_format(path)
     check_tables()
-    columns = _columns(recording)
+    columns = _corrected_columns(recording) if is_corrected else _columns(recording)
+    if str(path) == "-":
+        sys.stdout.write(_frame(columns).write_csv())
+        return
+    target = Path(path)
     suffix = target.suffix.lower()
     buffer = io.BytesIO()
     if suffix == ".csv":
         _frame(columns).write_csv(buffer)
     elif suffix == ".parquet":
         _frame(columns).write_parquet(buffer)
-    elif suffix == ".npz":
-        np.savez(buffer, allow_pickle=False, **columns)
     else:
-        raise OutputError(f"{target}: a log is written as {', '.join(LOG_SUFFIXES)}; give it one of these endings.")
+        np.savez(buffer, allow_pickle=False, **columns)
     write_whole(target, buffer.getvalue(), overwrite=overwrite)
 
 
@@ -56,10 +77,18 @@ def _columns(recording: Recording) -> dict[str, FloatArray]:
     return columns
 
 
+def _corrected_columns(recording: Recording) -> dict[str, FloatArray]:
+    columns: dict[str, FloatArray] = {"time_s": recording.time_s}
+    for name, readings in (("acc", recording.accelerometer), ("gyr", recording.gyroscope)):
+        if readings is not None:
+            columns |= {f"{name}_{axis}": readings[:, k] for k, axis in enumerate("xyz")}
+    return columns
+
+
 def _frame(columns: dict[str, FloatArray]) -> pl.DataFrame:
     """Whole numbers as integers: a log of counts reads as one."""
     series = {}
     for name, values in columns.items():
         whole = bool(np.all(np.isfinite(values))) and bool(np.all(values == np.round(values)))
-        series[name] = values.astype(np.int64) if whole and not name.startswith("t ") else np.ascontiguousarray(values)
+        series[name] = values.astype(np.int64) if whole and name not in _TIMES else np.ascontiguousarray(values)
     return pl.DataFrame(series)

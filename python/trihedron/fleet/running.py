@@ -16,7 +16,7 @@ from trihedron.fleet.logs import Job, find_jobs
 from trihedron.fleet.summary import FleetResult, summarise
 from trihedron.fleet.table import write_tables
 from trihedron.fleet.work import Row, work
-from trihedron.pipeline.reading import Progress
+from trihedron.records.progress import Progress
 
 RESULTS = "results"
 DEATHS = 3

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from trihedron.pipeline.calibrating import calibrate
-from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segment
+from trihedron.pipeline.reading import AnyRecording, recording_of, segment
 from trihedron.pipeline.results import CheckResult
 from trihedron.records import Finding, FindingCode
+from trihedron.records.progress import Progress
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 

@@ -15,10 +15,14 @@ from trihedron.estimate.noise import noise_of_holds, ratio_of
 from trihedron.records import Hold, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.hold_noise import HoldNoise, Measured
+from trihedron.records.sampling import StampKind
 
 FloatArray = npt.NDArray[np.float64]
 Sensor = Literal["accelerometer", "gyroscope"]
 
+SHARE = 0.125
+"""Of alpha, for each kind of figure (white densities, corners, octaves of both sensors): half of alpha is spent on the
+numbers, a twelfth on slow noise."""
 LEAST_RATIO = 1.05
 """White noise of one part differs by 5 % over 30 K (its resistors' noise goes with the root of temperature)."""
 LEAST_STEP_RATIO = math.sqrt(2.0)
@@ -42,6 +46,7 @@ NORMAL_EXCESS, UNIFORM_EXCESS = 0.0, -0.6
 """Excess kurtosis of differences of two normal and of two uniform numbers."""
 
 _AXES = ("x", "y", "z")
+_SCATTERED = (StampKind.LATE, StampKind.SCATTERED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +88,17 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
     nominal = 1.0 / recording.rate_hz
     away = steps[np.abs(steps - nominal) < 0.9 * nominal] / nominal - 1.0
     jitter = float(np.std(away)) / math.sqrt(2.0) if len(away) else 0.0
+    clock = recording.sampling
+    if clock.is_even and clock.kind in _SCATTERED:
+        # Reading put the samples on the even clock behind their stamps: what these scattered by is in its report.
+        jitter = max(jitter, clock.stamp_error_s * recording.rate_hz)
     return Sampled(noise, excess, count, recording.rate_hz, jitter)
 
 
 def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
     """Every figure that both logs have, ratio model over recording; significant beyond chance and beyond what parts do.
 
-    ``alpha``: chance that any white density of two logs of one unit is called different.
+    ``alpha``: chance that anything of two logs of one unit is called different; three eighths of it are spent here.
     """
     out: list[NoiseDifference] = []
     sensors: tuple[Sensor, ...] = ("accelerometer", "gyroscope")
@@ -97,13 +106,13 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
         if sensor not in model.noise or sensor not in recording.noise:
             continue
         pairs = list(zip(_AXES, model.noise[sensor], recording.noise[sensor], strict=True))
-        n_tests = 6 + 6 * sum(len(r.octaves) for _, _, r in pairs) // 3
-        white = [_white(sensor, axis, m, r, alpha / 12.0) for axis, m, r in pairs]
+        n_octaves = 2 * sum(len(r.octaves) for _, _, r in pairs)
+        white = [_white(sensor, axis, m, r, alpha * SHARE / 6.0) for axis, m, r in pairs]
         out += _resembling(sensor, [w for w in white if w is not None], recording.rate_hz)
         for axis, m, r in pairs:
             out += _step(sensor, axis, m, r)
-            out += _corner(sensor, axis, m, r, alpha / 12.0)
-            out += _octaves(sensor, axis, m, r, alpha / n_tests)
+            out += _corner(sensor, axis, m, r, alpha * SHARE / 6.0)
+            out += _octaves(sensor, axis, m, r, alpha * SHARE / max(n_octaves, 1))
         out += _distribution(sensor, model, recording)
     out += _sampling(model, recording)
     return tuple(out)

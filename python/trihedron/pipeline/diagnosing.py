@@ -23,11 +23,12 @@ from trihedron.pipeline.comparing_slow import slow_noise
 from trihedron.pipeline.comparing_stages import with_noise_stage
 from trihedron.pipeline.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
 from trihedron.pipeline.improving import driven
-from trihedron.pipeline.reading import AnyRecording, Progress, read, recording_of, segment, segments_of
+from trihedron.pipeline.reading import AnyRecording, read, recording_of, segment, segments_of
 from trihedron.pipeline.referring import AnyReference
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
+from trihedron.records.progress import Progress
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.diagnosing import diagnose
-from trihedron.pipeline.reading import Progress
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
 from trihedron.records.diagnosis import Diagnosis, Domain
+from trihedron.records.progress import Progress
 
 
 def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress | None = None) -> CalibrationResult:

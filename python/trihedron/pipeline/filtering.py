@@ -18,7 +18,7 @@ from trihedron.estimate.noise.holds import SHORTEST as SHORTEST_HOLD
 from trihedron.estimate.noise.resolution import converter_step
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.choices import settle_gravity
-from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segments_of
+from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
 from trihedron.printable import one_line
 from trihedron.read import read_axis_noise, read_pose_table, read_recording
 from trihedron.records import (
@@ -34,6 +34,7 @@ from trihedron.records import (
 )
 from trihedron.records.noise import Noise
 from trihedron.records.presented import Presented
+from trihedron.records.progress import Progress
 
 NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]
 

@@ -77,7 +77,8 @@ def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
     for name, prefix, fit in fits:
         groups = {f"{prefix}-zero", f"{prefix}-scale", f"{prefix}-misalignment", "triad-alignment"}
         # S and b of both sensors are in one frame: where one of them is replaced, both are.
-        if fit is None or not moved & (groups | {"accel-misalignment", "gravity"}):
+        scaled = {n.sensor for n in found.noise_compared if n.term in ("range", "unit") and n.significant}
+        if fit is None or not (moved & (groups | {"accel-misalignment", "gravity"}) or scaled):
             continue
         tables[name] |= {"S": np.array(fit["S"]), "b": np.array(fit["b"]), "unit": str(fit["raw_unit"])}
         readings = getattr(found.recording, name)
@@ -109,3 +110,5 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
     for n in found.noise_compared:
         if n.significant and n.term == "rate" and n.recording is not None:
             tables["clock"]["rate_hz"] = n.recording
+        elif n.significant and n.term == "jitter" and n.recording is not None:
+            tables["clock"] |= {"stamp_jitter_s": n.recording, "jitter_s": 0.0}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -13,9 +12,9 @@ from trihedron.pipeline.wording import finding_in_python, in_python
 from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording, Segments
 from trihedron.records.checked import WrongTypeError, number_of
+from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
-Progress = Callable[[float, str], None]
 AnyRecording = object
 """A recording, a result that holds one, or what :func:`read` takes: a file, arrays, a dictionary, a data frame."""
 

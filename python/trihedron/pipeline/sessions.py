@@ -16,11 +16,12 @@ import numpy.typing as npt
 from trihedron.estimate.sessions import changes_among, repeated_parameters, thermal_model
 from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector, numbers_jacobian, numbers_of
 from trihedron.pipeline.calibrating import calibrate
-from trihedron.pipeline.reading import AnyRecording, Progress, recording_of
+from trihedron.pipeline.reading import AnyRecording, recording_of
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.pipeline.session_findings import findings_about
 from trihedron.records import Calibration, Frame, Recording, SensorCalibration
 from trihedron.records.presented import Presented
+from trihedron.records.progress import Progress
 from trihedron.records.sessions import PARAMETERS, By, Repeated, Session, SessionsModel, ThermalModel
 from trihedron.sensor_model import in_frame
 

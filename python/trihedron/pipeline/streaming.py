@@ -19,10 +19,10 @@ import numpy.typing as npt
 from trihedron.files.calibration import calibration_text
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units
 from trihedron.pipeline.calibrating import calibrate
-from trihedron.pipeline.reading import Progress
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.read import ChunkedLog, open_chunks
 from trihedron.records import Hold, Move, Recording, Segments
+from trihedron.records.progress import Progress
 from trihedron.segment import BlockSums, segment_blocks
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit

@@ -7,9 +7,10 @@ from dataclasses import replace
 from trihedron.estimate.verification import verify_calibration
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
 from trihedron.pipeline.choices import settle_gravity
-from trihedron.pipeline.reading import AnyRecording, Progress, recording_of, segments_of
+from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
 from trihedron.pipeline.results import VerificationResult
 from trihedron.records import Finding, FindingCode, Segments, Severity, Verification
+from trihedron.records.progress import Progress
 from trihedron.units import mg_from_m_s2
 
 

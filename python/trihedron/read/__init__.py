@@ -10,7 +10,7 @@ from trihedron.read.chunks import ChunkedLog, open_chunks
 from trihedron.read.errors import ReadError
 from trihedron.read.pose_table import read_pose_table
 from trihedron.read.recording import read_recording
-from trihedron.read.table import Progress
+from trihedron.records.progress import Progress
 
 __all__ = [
     "ChunkedLog",

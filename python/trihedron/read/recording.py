@@ -21,8 +21,9 @@ from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of, settled
 from trihedron.read.source import read_tables
-from trihedron.read.table import FloatArray, Progress, Table
+from trihedron.read.table import FloatArray, Table
 from trihedron.records import Finding, FindingCode, Recording
+from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
 STAMPS = "stamps as logged [s]"

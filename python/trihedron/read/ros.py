@@ -10,8 +10,9 @@ import numpy as np
 
 from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError
-from trihedron.read.table import FloatArray, Progress, Table, file_sha256
+from trihedron.read.table import FloatArray, Table, file_sha256
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
+from trihedron.records.progress import Progress
 
 _IMU = "sensor_msgs/msg/Imu"
 _NAMES = ("stamp.secs", "stamp.nsecs", *(f"linear_acceleration.{x} [m/s^2]" for x in "xyz"))

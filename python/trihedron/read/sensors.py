@@ -18,9 +18,10 @@ from trihedron.read.merge import merge
 from trihedron.read.names import parse_name
 from trihedron.read.rest import is_integer
 from trihedron.read.sensing import WHOLE, order_of_triads
-from trihedron.read.table import FloatArray, Progress, Table
+from trihedron.read.table import FloatArray, Table
 from trihedron.read.text.store import side_by_side
 from trihedron.records import Finding, FindingCode, Sampling
+from trihedron.records.progress import Progress
 from trihedron.records.sampling import UNJUDGED
 
 ASSUMED_RATE_HZ = 100.0

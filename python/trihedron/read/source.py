@@ -9,8 +9,9 @@ from trihedron.read.archive import read_npy
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, check_readable, from_os_error
 from trihedron.read.refused import refuse_foreign
-from trihedron.read.table import Progress, Table
+from trihedron.read.table import Table
 from trihedron.read.zipped import read_zip
+from trihedron.records.progress import Progress
 
 
 def read_table(path: Path, device: int | None = None, progress: Progress | None = None) -> Table:

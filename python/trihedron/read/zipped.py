@@ -12,8 +12,9 @@ from trihedron.read.archive import read_npz
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.room import check_unpacked
-from trihedron.read.table import Progress, Table, file_sha256
+from trihedron.read.table import Table, file_sha256
 from trihedron.records import Finding, FindingCode
+from trihedron.records.progress import Progress
 
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".log")
 _KINDS = {

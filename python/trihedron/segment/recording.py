@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 
 from trihedron.records import Finding, Hold, Move, Recording, Segments
+from trihedron.records.progress import Progress
 from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity
 from trihedron.segment.judge import judge_log, judge_runs
@@ -29,8 +29,6 @@ from trihedron.segment.runs import (
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks
 from trihedron.segment.turn_scale import centre_of, radians_per_reading
 from trihedron.units import AccelerationUnit
-
-Progress = Callable[[float, str], None]
 
 LONG_S = 4.0
 """A quiet stretch this long has a middle that still shows noise over seconds."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import enum
 import sys
 import types
@@ -129,7 +130,9 @@ def _tupled(value: Any) -> Any:
 def _refuse_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
     for key in values:
         if key not in known:
-            raise ValueError(f"{where} has no key {key!r}; it knows {', '.join(known)}")
+            near = difflib.get_close_matches(key, known, 1)
+            meant = f" (is {near[0]!r} meant?)" if near else ""
+            raise ValueError(f"{where} has no key {key!r}{meant}; it knows {', '.join(known)}")
 
 
 def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:

@@ -2,88 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.effects.drift_shapes import drift_variants, is_possible_drift, warm_up_variant
+from trihedron.diagnose.effects.hidden_drift import HiddenDrift
 from trihedron.diagnose.session.observations import FloatArray
-from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
+from trihedron.diagnose.session.twin import Distortion
+from trihedron.diagnose.zeros.curve import DriftCurve
 from trihedron.diagnose.zeros.of_session import SessionEvidence, accel_evidence, share_of_curve
-from trihedron.records.diagnosis import EffectParameter
 from trihedron.units import mm_s2_from_m_s2
 
-AXES = ("x", "y", "z")
-FEWEST_POSES = 25
-"""A free curve of three axes is told from the length of gravity with this many poses."""
 BEYOND_NOISE = 3.0
 """Rms of the curve over the error of a pose's mean."""
 
 
-class AccelHiddenDrift(DirectEffect):
-    """Warm-up exponential, straight line or slow curve per axis; where none of them fits, a free smooth curve."""
+class AccelHiddenDrift(HiddenDrift):
+    """Of the accelerometer: what the length of gravity shows from pose to pose."""
 
     id = "accel-hidden-drift"
     leaves_open = ("accel-zero",)
     mechanism = "accelerometer bias drifts smoothly in time though no logged channel explains it"
-    experiment = "log the temperature, or let the sensor warm up and repeat the first poses at the end"
-    is_late = True
+    sensor, domain, unit, shown_unit = "accelerometer", "static-accel", "m/s^2", "mm/s²"
+    fewest_poses = 25
 
-    def unavailable(self, context: Context) -> str | None:
-        return "fewer than six still poses" if context.obs.n_holds < 6 else None
+    def on_axes(self, context: Context) -> Callable[[FloatArray], FloatArray]:
+        return context.on_accelerometers
 
-    def variants(self, context: Context) -> list[Variant]:
-        return drift_variants(context, context.on_accelerometers, force_only, "m/s^2")
+    def only(self, columns: FloatArray) -> Distortion:
+        return force_only(columns)
 
-    def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
-        if variant.label != "warm-up":
-            return None
-        return warm_up_variant(context, context.on_accelerometers, force_only, "m/s^2", value)
+    def evidence(self, context: Context) -> SessionEvidence | None:
+        return accel_evidence(context)
 
-    def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
-        return is_possible_drift(variant, value)
-
-    def made_again(self, context: Context, variant: Variant) -> Variant | None:
-        if variant.label != "smooth":
-            return super().made_again(context, variant)
-        found = accel_evidence(context)
-        return None if found is None else _variant(context, _curve(context, found))
-
-    def find(self, context: Context) -> Evidence | None:
-        found = accel_evidence(context)
-        if found is None or found.evidence.n_poses < FEWEST_POSES or not found.evidence.kind:
-            return None
-        curve = _curve(context, found)
+    def is_beyond_noise(self, context: Context, found: SessionEvidence, curve: DriftCurve) -> bool:  # noqa: ARG002
         noise = float(np.sqrt(np.mean(found.zeros.readings.sigma**2) / 2.0))
-        if (curve.rms < BEYOND_NOISE * noise).all():
-            return None
-        spans = ", ".join(f"{mm_s2_from_m_s2(r):.2g}" for r in curve.range)
-        parameters = tuple(
-            EffectParameter(f"range_{axis}", float(r), float(np.hypot(s[v.argmax()], s[v.argmin()])), "m/s^2")
-            for axis, r, v, s in zip(AXES, curve.range, curve.values, curve.sigma, strict=True)
-        )
-        told = {"drift": "smoothly", "walk": "as a walk", "slow": "slowly"}[found.evidence.kind]
-        return Evidence(
-            found.evidence.p_slow, 0.0, parameters,
-            f"The accelerometer's zero drifts {told} through {spans} mm/s² (x, y, z); no logged channel explains it.",
-            "static-accel", variant=_variant(context, curve),
-            share=min(1.0, share_of_curve(found, curve.rms / np.sqrt(3.0))),
-            series={
-                "time_s": curve.time_s.tolist(), "value": curve.values.tolist(), "sigma": curve.sigma.tolist(),
-                "unit": "m/s^2",
-            },
-        )  # fmt: skip
+        return not bool((curve.rms < BEYOND_NOISE * noise).all())
 
+    def share(self, found: SessionEvidence, curve: DriftCurve) -> float:
+        return min(1.0, share_of_curve(found, curve.rms / np.sqrt(3.0)))
 
-def _curve(context: Context, found: SessionEvidence) -> DriftCurve:
-    readings = found.zeros.readings
-    every = list(range(readings.design.shape[1]))
-    return smooth_curve(found.evidence.process, every, found.evidence.sigma, context.obs.hold_time_s)
+    def shown(self, value: float) -> float:
+        return mm_s2_from_m_s2(value)
 
-
-def _variant(context: Context, curve: DriftCurve) -> Variant:
-    """The curve itself, one column an axis of the instrument: its factor is 1 where session and poses agree."""
-    values = np.stack([np.interp(context.time_s, curve.time_s, v) for v in curve.values], axis=1)
-    columns = np.eye(3)[None] * values[:, None, :]
-    return Variant(force_only(columns), per_axis("curve"), ("1",) * 3, label="smooth")
+    def curve_variant(self, context: Context, curve: DriftCurve) -> Variant:
+        values = np.stack([np.interp(context.time_s, curve.time_s, v) for v in curve.values], axis=1)
+        columns = np.eye(3)[None] * values[:, None, :]
+        return Variant(force_only(columns), per_axis("curve"), ("1",) * 3, label="smooth")

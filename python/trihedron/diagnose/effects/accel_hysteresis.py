@@ -6,26 +6,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
+from trihedron import _core
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
 from trihedron.diagnose.session.observations import FloatArray
 
 PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
 CREEP_TIMES_S = (5.0, 20.0, 60.0)
-
-
-def play(path: FloatArray, half_width: float) -> FloatArray:
-    """Play operator: follows the path with slack; output over half-width is in [-1, 1] and holds the last direction."""
-    out = np.empty_like(path)
-    # Only extremes move the follower: the running clip is sequential by nature; plain numbers are the quickest way.
-    for axis in range(path.shape[1]):
-        follower = float(path[0, axis])
-        column = []
-        for value in path[:, axis].tolist():
-            follower = min(max(follower, value - half_width), value + half_width)
-            column.append(follower)
-        out[:, axis] = column
-    return (path - out) / half_width
 
 
 class AccelHysteresis(Effect):
@@ -52,7 +39,7 @@ class AccelHysteresis(Effect):
     def _play(self, context: Context, width: float) -> Variant:
         coarse, index, _ = self._coarse(context)
         # The path's lead over its follower: reading minus this is what hysteresis adds.
-        memory = -play(coarse, width)[index]
+        memory = -_core.play(coarse, width)[index]
         columns = context.on_accelerometers(context.at_points(memory))
         shape = {"half_width": (width, "m/s^2")}
         return Variant(force_only(columns), per_axis("offset"), ("m/s^2",) * 3, shape, "play")

@@ -1,4 +1,4 @@
-"""Readings that come late: what a delay and a low-pass add, to all orders that a recording can tell (eq. 9.14).
+"""Readings that come late: what a delay and a low-pass add, to all orders that a recording can tell.
 
 A reading y that trails the truth x by a pure delay δ has x(t) = y(t + δ); behind a low-pass of first order
 x = y + τ y', of second order (Butterworth) x = y + τ y' + τ²/2 y''. All three begin with τ y': what tells them apart is
@@ -7,11 +7,9 @@ the next term. Columns are made for a time of a grid and scale with its paramete
 
 from __future__ import annotations
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
-from scipy.linalg import solve_banded
 
+from trihedron import _core
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import FloatArray
 
@@ -32,51 +30,9 @@ def shifted(context: Context, values: FloatArray, ahead_s: float) -> FloatArray:
 
     By the cubic spline with level ends of every move: a straight line between samples would be a low-pass of its own.
     """
-    out = values.copy()
-    if not context.moves:
-        return out
-    slope = _spline_slopes(context, values)
-    first = context.moves[0].start
-    t = context.time_s
-    for where in context.moves:
-        own = t[where]
-        at = np.clip(own + ahead_s, own[0], own[-1])
-        k = np.clip(np.searchsorted(own, at, side="right") - 1, 0, len(own) - 2) + where.start
-        h = (t[k + 1] - t[k])[:, None]
-        x = (at - t[k])[:, None] / h
-        d0, d1 = slope[k - first] * h, slope[k + 1 - first] * h
-        rise = values[k + 1] - values[k]
-        # Hermite's cubic about its left end.
-        out[where] = values[k] + x * (d0 + x * (3.0 * rise - 2.0 * d0 - d1 + x * (d0 + d1 - 2.0 * rise)))
-    return out
-
-
-_SLOPES: WeakKeyDictionary[Context, list[tuple[FloatArray, FloatArray]]] = WeakKeyDictionary()
-
-
-def _spline_slopes(context: Context, values: FloatArray) -> FloatArray:
-    """(move samples, 3) slopes of the splines at their knots, all moves in one banded system; kept for these values."""
-    known = _SLOPES.setdefault(context, [])
-    for given, slope in known:
-        if given is values:
-            return slope
-    first = context.moves[0].start
-    y, t = values[first:], context.time_s[first:]
-    n = len(y)
-    band, right = np.zeros((3, n)), np.zeros((n, 3))
-    band[1] = 1.0
-    h = np.diff(t)
-    inner = np.ones(n, dtype=bool)
-    for where in context.moves:
-        inner[[where.start - first, where.stop - 1 - first]] = False
-    k = np.flatnonzero(inner)
-    # Continuous curvature at inner knots; ends are level.
-    band[2, k - 1], band[1, k], band[0, k + 1] = h[k], 2.0 * (h[k - 1] + h[k]), h[k - 1]
-    left, after = (y[k] - y[k - 1]) / h[k - 1][:, None], (y[k + 1] - y[k]) / h[k][:, None]
-    right[k] = 3.0 * (h[k][:, None] * left + h[k - 1][:, None] * after)
-    found: FloatArray = solve_banded((1, 1), band, right)
-    known.append((values, found))
-    return found
+    return _core.move_shifted(
+        context.time_s, np.ascontiguousarray(np.asarray_chkfinite(values)), context.move_edges, ahead_s
+    )
 
 
 def by_delay(context: Context, values: FloatArray, delay_s: float) -> FloatArray:

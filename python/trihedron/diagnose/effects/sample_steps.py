@@ -58,7 +58,7 @@ def step_errors(context: Context) -> StepErrors:
 
 @lru_cache(maxsize=8)
 def _step_errors(obs: Observations) -> StepErrors:
-    """A step against the slope of a line through the samples around it (the two of the step left out), eq. 8.11.
+    """A step against the slope of a line through the samples around it (the two of the step left out).
 
     The slope comes from a wide window, so that shaking does not pass for motion; each sensor is judged for itself, so
     that only what both see at once is time.
@@ -130,7 +130,7 @@ def find_losses(context: Context) -> list[Loss]:
 
 @lru_cache(maxsize=8)
 def _losses(obs: Observations) -> list[Loss]:
-    """Intervals where the motion on either side joins smoothly only if samples are put between (eq. 8.12).
+    """Intervals where the motion on either side joins smoothly only if samples are put between (eq. 8.16).
 
     For a trial count n one cubic is laid through six samples before and six after, those after moved by n steps. The
     count that joins all channels best is taken if no sensor objects and what is left is ordinary.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.session.observations import FloatArray
 
 LEAST_SAMPLES = 9
 """Readings of a pose below which its thirds say nothing."""
@@ -12,13 +13,16 @@ FEWEST_POSES = 6
 IS_MOTION = 0.5
 """Share of the rates at rest from which they are motion and no zeros that scatter. Scatter of zeros leaves about
 1/(2 poses); creep of a soft support 0.7 and more where the accelerometer sees it at all."""
+PUSHED = 0.1
+"""Share of the poses that somebody may have pushed; a soft support gives under all of them."""
 
 
 def share_of_creep(context: Context) -> float:
     """Share of the variance of rates at rest, across the vertical, that the tilt inside the same poses accounts for.
 
     Between the mean of a pose's first third and that of its last the vertical turns by the rate, weighed with the
-    trapezoid that the two means make: exactly that if the pose moves, nothing if only the gyro's zero differs.
+    trapezoid that the two means make: exactly that if the pose moves, nothing if only the gyro's zero differs. At most
+    twice the share without the poses that tilt most: one that was pushed proves nothing of the others.
     """
     obs, twin = context.obs, context.fitted.twin
     if obs.raw_rate is None:
@@ -41,11 +45,18 @@ def share_of_creep(context: Context) -> float:
         across.append(flat)
     if len(turned) < FEWEST_POSES:
         return 0.0
-    y, x, constant = np.concatenate(turned), np.concatenate(tilted), np.vstack(across)
+    calm = np.argsort([np.linalg.norm(t) for t in tilted])[: len(tilted) - int(np.ceil(PUSHED * len(tilted)))]
+    y, x, flats = np.array(turned), np.array(tilted), np.array(across)
+    return min(_share(y, x, flats), 2.0 * _share(y[calm], x[calm], flats[calm]))
 
-    def left(columns: np.ndarray) -> float:
-        found, *_ = np.linalg.lstsq(columns, y, rcond=None)
-        return float(((y - columns @ found) ** 2).sum())
+
+def _share(y: FloatArray, x: FloatArray, flats: FloatArray) -> float:
+    """Share of the variance of ``y`` (poses, 3) about one zero for all (``flats`` (poses, 3, 3) of it) due to ``x``."""
+    constant = np.concatenate(flats)
+
+    def left(columns: FloatArray) -> float:
+        found, *_ = np.linalg.lstsq(columns, y.ravel(), rcond=None)
+        return float(((y.ravel() - columns @ found) ** 2).sum())
 
     without = left(constant)
-    return 1.0 - left(np.column_stack([constant, x])) / without if without > 0.0 else 0.0
+    return 1.0 - left(np.column_stack([constant, x.ravel()])) / without if without > 0.0 else 0.0

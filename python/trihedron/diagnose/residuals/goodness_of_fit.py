@@ -36,7 +36,7 @@ _CHANNELS = {
 }
 
 
-def test_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
+def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
     """Chi-square of every row domain against its degrees of freedom (eq. 8.9).
 
     ``alpha`` is the chance that a healthy recording disagrees in any domain; it is shared by six domains.

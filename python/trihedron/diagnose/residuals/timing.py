@@ -15,7 +15,7 @@ from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.records.diagnosis import DomainTest, Where
 
 
-def test_timing(context: Context, alpha: float, refused: Collection[str]) -> DomainTest:
+def judge_timing(context: Context, alpha: float, refused: Collection[str]) -> DomainTest:
     """Chi-square: squared z of the common time error, plus what lost samples explain; p of the sharper look.
 
     ``refused`` are ids of effects that did not predict held-out moves any better: jolts look like lost samples.

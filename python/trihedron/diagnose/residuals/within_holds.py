@@ -85,7 +85,7 @@ def _averaged_spectrum(pieces: list[tuple[int, FloatArray]], n: int) -> tuple[Fl
 
 @lru_cache(maxsize=4)
 def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
-    """Lines that stand out of the smooth spectrum of the holds, one at most per channel (eq. 8.12)."""
+    """Lines that stand out of the smooth spectrum of the holds, one at most per channel."""
     pieces = hold_pieces(obs)
     if not pieces:
         return []
@@ -210,7 +210,7 @@ def hold_scatter(obs: Observations) -> HoldScatter:
     return HoldScatter(relative, dof_array, np.asarray(p))
 
 
-def test_within_static(obs: Observations, alpha: float) -> DomainTest:
+def judge_within_holds(obs: Observations, alpha: float) -> DomainTest:
     """Lines and noisy poses, as one domain; the p-value is the smallest, paid for by the number of looks."""
     scatter = hold_scatter(obs)
     n_looks = scatter.p_value.size

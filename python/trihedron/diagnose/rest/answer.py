@@ -13,7 +13,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
-from trihedron.diagnose.residuals.within_holds import test_within_static
+from trihedron.diagnose.residuals.within_holds import judge_within_holds
 from trihedron.diagnose.rest.heat import Curve, branch_gap, thermal_curve
 from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.session.observations import FloatArray, Observations
@@ -331,7 +331,7 @@ def _lines(
     force = quick(recording.accelerometer, pieces.force)
     rate = None if recording.gyroscope is None or pieces.rate is None else quick(recording.gyroscope, pieces.rate)
     samples = cast(Observations, _Samples(recording, t, force, rate, SimpleNamespace(holds=holds)))
-    test = test_within_static(samples, alpha)
+    test = judge_within_holds(samples, alpha)
     S = [np.eye(3) if side is None else np.array(side["S"]) for side in (model.accelerometer, model.gyroscope)]
     fitted = cast(Fit, SimpleNamespace(twin=SimpleNamespace(accel_S=S[0], gyro_S=S[1])))
     effect = PeriodicInterference()

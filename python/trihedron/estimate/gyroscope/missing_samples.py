@@ -42,7 +42,7 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     shorter.
 
     One quintic is laid through four samples on either side of a step, in all channels at once, as they stand and with
-    one sample put between (docs/diagnosis-method.md, 8.12 with one count): a step is long if that joins them, by as
+    one sample put between (docs/diagnosis-method.md, 8.16 with one count): a step is long if that joins them, by as
     much as the motion's slope says. Steps that are as much too short are jolts, and so are as many of the long ones;
     the rest was lost: each takes the angle of one step from its turn. ``sigma_scale`` is the relative standard error
     of the gyro's scale: a share beyond it is serious.

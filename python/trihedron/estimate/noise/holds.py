@@ -31,6 +31,8 @@ LAGS = 8
 LINE_CHANCE = 1e-4
 """Probability that the holds of one axis show a line by chance."""
 LONGEST_SEGMENT = 4096
+FEWEST_HOLDS = 3
+"""Holds that must show an octave, where there are as many: the scatter of one is not known."""
 
 
 def noise_of_holds(
@@ -173,6 +175,9 @@ def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, 
             dofs.append(float(n))
     out = []
     for octave in sorted(found):
+        # One long hold, perhaps with the hand still on it, is not the sensor's low octave.
+        if len(found[octave][0]) < min(FEWEST_HOLDS, len(parts)):
+            continue
         pooled = pooled_logarithm(np.array(found[octave][0]), np.array(found[octave][1]))
         if pooled.sigma > 1.0 or not math.isfinite(pooled.mean):
             continue

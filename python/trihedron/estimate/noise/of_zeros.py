@@ -6,7 +6,7 @@ zeros y of poses at t with lengths T have the covariance
     V = σ² + s² I + K² [min(t, t') - δ T/6] - (B²/π) L
 
 where σ² are the variances of the means by white noise, s the scatter of zeros from pose to pose where that is known to
-be there, and L the mean of ln|t - t'| over both windows: ln T - 3/2 on the diagonal, ln Δ - T²/12Δ² off it (1/f noise
+be there, and L the mean of ln|t - t'| over both windows, by its second integral x²/2 ln|x| - 3x²/4 (1/f noise
 of two-sided density B²/2πf has no variance, only the variogram (2B²/π) ln; constants drop out beside the free mean).
 The likelihood is restricted; B and K have flat priors in their logarithms and a weight on zero.
 docs/noise.md, section 9.
@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -33,11 +33,12 @@ SPACING = 1.3
 """Levels of B and of K are this factor apart, half of what an interval of 30 poses spans."""
 LOWEST, HIGHEST = 0.03, 8.0
 """Range of the levels in parts of what the zeros spread by: a tenth of it is not seen, three times it is refuted."""
+LEAST_SIDE = 0.02
+"""A side whose zeros spread by less than this share of the other's is silent, as a simulation without noise is: how
+silent says nothing more."""
 SHOWS = 6.63
 """Twice the log-likelihood that a term must win over its absence: χ² of one degree of freedom passes it in 1 %, half
 of that on the edge."""
-WINDOW_LOG = 1.5
-"""Mean of ln(T/|u - v|) over a window of length T."""
 MIDDLE_OF_WALK = 6.0
 """A walk's mean square about its mean over a span: K² span/6."""
 
@@ -97,8 +98,10 @@ def compare_slow(first: Sequence[PoseZeros], second: Sequence[PoseZeros]) -> Slo
     won, by_b, by_k = 0.0, 0.0, 0.0
     tables = []
     for one, other in zip(first, second, strict=True):
-        b = _levels([one.spread, other.spread])
-        k = _levels([z.spread / math.sqrt(z.span_s / MIDDLE_OF_WALK) for z in (one, other)])
+        least = LEAST_SIDE * max(one.spread, other.spread)
+        one, other = (replace(z, sigma=np.hypot(z.sigma, LOWEST * least)) for z in (one, other))
+        b = _levels([max(z.spread, least) for z in (one, other)])
+        k = _levels([max(z.spread, least) / math.sqrt(z.span_s / MIDDLE_OF_WALK) for z in (one, other)])
         p, q = _table(one, b, k), _table(other, b, k)
         tables.append((b, k, p, q))
         together = float((p + q).max())
@@ -175,13 +178,20 @@ def _ratios(b: FloatArray, k: FloatArray, p: FloatArray, q: FloatArray) -> dict[
 def _kernels(zeros: PoseZeros) -> tuple[FloatArray, FloatArray]:
     """(n, n) covariance of the means per B² and per K², beside a free constant."""
     t, length = zeros.time_s - zeros.time_s[0], zeros.length_s
-    apart = np.abs(np.subtract.outer(t, t))
-    np.fill_diagonal(apart, 1.0)
-    wide = np.add.outer(length**2, length**2) / 2.0
-    mean_log = np.log(apart) - wide / (12.0 * apart**2)
-    np.fill_diagonal(mean_log, np.log(length) - WINDOW_LOG)
+    begin, end = t - length / 2.0, t + length / 2.0
+    mean_log = (
+        _twice_integrated(np.subtract.outer(end, begin)) - _twice_integrated(np.subtract.outer(end, end))
+        - _twice_integrated(np.subtract.outer(begin, begin)) + _twice_integrated(np.subtract.outer(begin, end))
+    ) / np.multiply.outer(length, length)  # fmt: skip
     walk = np.minimum.outer(t, t) + 0.5 * float(length[0]) - np.diag(length / 6.0)
     return -mean_log / math.pi, walk
+
+
+def _twice_integrated(x: FloatArray) -> FloatArray:
+    """The second integral of ln|x|: x²/2 ln|x| - 3x²/4."""
+    size = np.maximum(np.abs(x), 1e-300)
+    out: FloatArray = size**2 * (0.5 * np.log(size) - 0.75)
+    return out
 
 
 def _log_likelihood(

@@ -117,7 +117,10 @@ def moves_along(recording: Recording, motion: ReferenceMotion) -> float:
     found = align(grid, reference, _stamped(recording, motion))
     time = grid.time_s * (1.0 + found.rate) + found.offset_s
     windows = _windows(grid, reference, grid.is_valid & reference.covers(time))
-    _refuse_strangers(fit_gyroscope(grid, reference, windows, found.offset_s, found.rate, clock=1), motion)
+    gyro = fit_gyroscope(grid, reference, windows, found.offset_s, found.rate, clock=1)
+    _refuse_strangers(gyro, motion)
+    # Laid over each other where hardly anything turns, two logs resemble each other by chance.
+    _refuse_still(gyro, motion)
     return found.correlation
 
 

@@ -49,6 +49,10 @@ def windows_on(is_valid: Mask, step_s: float, spacing: int) -> Windows:
     h = np.where(a <= 1.0, 2.0 / 3.0 - a**2 + a**3 / 2.0, np.where(a < 2.0, (2.0 - a) ** 3 / 6.0, 0.0))
     slope = np.sign(x) * np.where(a <= 1.0, -2.0 * a + 1.5 * a**2, np.where(a < 2.0, -((2.0 - a) ** 2) / 2.0, 0.0))
     curvature = np.where(a <= 1.0, -2.0 + 3.0 * a, np.where(a < 2.0, 2.0 - a, 0.0))
+    # Sampled, the second derivative's spectrum repeats at the rate and adds (ωT)²/12 of itself, by which a lever arm
+    # would come out short (0.05 % at 1 Hz and 100 samples/s); its own second difference takes that off again.
+    padded = np.pad(curvature, 1)
+    curvature = curvature + (padded[2:] - 2.0 * curvature + padded[:-2]) / 12.0
     spacing_s = m * step_s
     n = len(is_valid)
     start = np.arange(0, max(n - 4 * m, 0), m)

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from trihedron.read.errors import ReadError, refuse_after_fork
 from trihedron.read.room import check_memory
-from trihedron.read.table import Progress, Table
+from trihedron.read.table import Table
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks
 from trihedron.read.text.dialect import Rewritten, rewrite
 from trihedron.read.text.reader import TextReader
 from trihedron.read.text.records import split_records
 from trihedron.records import Finding, FindingCode
+from trihedron.records.progress import Progress
 
 _SAMPLE_BYTES = 1 << 17
 

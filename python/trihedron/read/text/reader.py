@@ -16,7 +16,7 @@ from trihedron.read.columns import find_columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.room import check_memory
-from trihedron.read.table import FloatArray, Progress, Table, file_sha256
+from trihedron.read.table import FloatArray, Table, file_sha256
 from trihedron.read.text.ahead import Bytes, blocks_ahead
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks, has_semicolon_remarks, with_hash_remarks
 from trihedron.read.text.cells import MAX_WORDS, TextColumn, find_text_columns, numbers, parse, refuse_words
@@ -25,6 +25,7 @@ from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, 
 from trihedron.read.text.lines import Lines, RowLines, data_lines, offset_of_line, regular
 from trihedron.read.text.store import Store
 from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records.progress import Progress
 
 _SAMPLE_BYTES = 1 << 18
 _ROWS_CHECKED = 1_000_000

@@ -17,6 +17,7 @@ ENTRIES = (
         "reads {worst_sigmas:.1f} standard errors from the first (hold {which:first 8}).",
         "The support gives way, the case settles after being let go, or the sensor warms up.",
         "Wait until the case has settled, hold for less time, or put it on a firmer support.",
+        or_severity=SERIOUS,
     ),
     Entry(
         Code.HOLD_BUMPED,

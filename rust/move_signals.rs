@@ -1,0 +1,109 @@
+//! Signals that effects are made of, along the samples of a session: play, time derivatives and shifts inside moves.
+
+/// Half-open range of the samples of a move.
+type Edges = [usize; 2];
+
+/// Play operator: how far a path leads a follower that it drags with slack, in half-widths: within -1 and 1.
+///
+/// `path` has rows of `columns` numbers.
+#[must_use]
+pub fn play(path: &[f64], columns: usize, half_width: f64) -> Vec<f64> {
+    let mut follower: Vec<f64> = path.iter().take(columns).copied().collect();
+    let mut out = Vec::with_capacity(path.len());
+    for row in path.chunks_exact(columns.max(1)) {
+        for (follower, value) in follower.iter_mut().zip(row) {
+            *follower = follower.max(value - half_width).min(value + half_width);
+            out.push((value - *follower) / half_width);
+        }
+    }
+    out
+}
+
+/// Time derivative inside moves, nothing outside: by the parabola through three samples, at ends by two.
+#[must_use]
+pub fn derivative(time: &[f64], values: &[[f64; 3]], moves: &[Edges]) -> Vec<[f64; 3]> {
+    let mut out = vec![[0.0; 3]; values.len()];
+    for &[start, stop] in moves {
+        if stop < start + 2 {
+            continue;
+        }
+        let slope =
+            |k: usize, c: usize| (values[k + 1][c] - values[k][c]) / (time[k + 1] - time[k]);
+        for c in 0..3 {
+            out[start][c] = slope(start, c);
+            out[stop - 1][c] = slope(stop - 2, c);
+        }
+        for k in start + 1..stop - 1 {
+            let (before, after) = (time[k] - time[k - 1], time[k + 1] - time[k]);
+            let whole = before + after;
+            let weights = [
+                -after / (before * whole),
+                (after - before) / (before * after),
+                before / (after * whole),
+            ];
+            for c in 0..3 {
+                out[k][c] = weights[0] * values[k - 1][c]
+                    + weights[1] * values[k][c]
+                    + weights[2] * values[k + 1][c];
+            }
+        }
+    }
+    out
+}
+
+/// Values read `ahead` later inside moves, their ends held, by the cubic spline of every move with level ends; unchanged
+/// outside.
+#[must_use]
+pub fn shifted(time: &[f64], values: &[[f64; 3]], moves: &[Edges], ahead: f64) -> Vec<[f64; 3]> {
+    let mut out = values.to_vec();
+    for &[start, stop] in moves {
+        if stop < start + 2 {
+            continue;
+        }
+        let (t, y) = (&time[start..stop], &values[start..stop]);
+        let slopes = spline_slopes(t, y);
+        let last = t.len() - 1;
+        let mut k = 0;
+        for (i, row) in out[start..stop].iter_mut().enumerate() {
+            let at = (t[i] + ahead).clamp(t[0], t[last]);
+            while k + 1 < last && t[k + 1] <= at {
+                k += 1;
+            }
+            let h = t[k + 1] - t[k];
+            let x = (at - t[k]) / h;
+            for c in 0..3 {
+                let (d0, d1) = (slopes[k][c] * h, slopes[k + 1][c] * h);
+                let rise = y[k + 1][c] - y[k][c];
+                // Hermite's cubic about its left end.
+                let bend = 3.0 * rise - 2.0 * d0 - d1 + x * (d0 + d1 - 2.0 * rise);
+                row[c] = y[k][c] + x * (d0 + x * bend);
+            }
+        }
+    }
+    out
+}
+
+/// Slopes of the spline at its knots: continuous curvature inside, level ends.
+fn spline_slopes(t: &[f64], y: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let n = t.len();
+    let mut slope = vec![[0.0; 3]; n];
+    // Forward elimination of the tridiagonal system; `upper` is what couples a knot to the next one.
+    let mut upper = vec![0.0; n];
+    for k in 1..n.saturating_sub(1) {
+        let (before, after) = (t[k] - t[k - 1], t[k + 1] - t[k]);
+        let pivot = 2.0 * (before + after) - after * upper[k - 1];
+        upper[k] = before / pivot;
+        for c in 0..3 {
+            let left = (y[k][c] - y[k - 1][c]) / before;
+            let right = (y[k + 1][c] - y[k][c]) / after;
+            let side = 3.0 * (after * left + before * right);
+            slope[k][c] = (side - after * slope[k - 1][c]) / pivot;
+        }
+    }
+    for k in (1..n.saturating_sub(1)).rev() {
+        for c in 0..3 {
+            slope[k][c] -= upper[k] * slope[k + 1][c];
+        }
+    }
+    slope
+}

@@ -1,0 +1,54 @@
+"""What cannot be held against a recording is refused in one sentence: which file, which place, what to do."""
+
+import numpy as np
+import pytest
+
+from small_session import G, made_once
+from trihedron.cli import main
+
+GOOD = 'name = "mine"\nprofile = "mpu"\n[session]\nkind = "hand"\n[gyroscope]\nb = [0.0, 0.0, 0.0]\n'
+
+
+def refused(given, capsys):
+    """The one sentence on stderr."""
+    log = made_once() / "log.csv"
+    assert main(["diagnose", str(log), "--gravity", G, "--against", str(given)]) == 1
+    said = capsys.readouterr().err.strip()
+    assert "Traceback" not in said
+    return " ".join(said.split())
+
+
+@pytest.mark.parametrize(
+    ("wrong", "place", "remedy"),
+    [
+        (GOOD.replace("profile", "profil"), "mine.toml: the file has no key 'profil'", "is 'profile' meant?"),
+        (GOOD.replace("[gyroscope]", "[gyroscop]"), "the file has no key 'gyroscop'", "is 'gyroscope' meant?"),
+        (GOOD.replace("b = [0.0", "bb = [0.0"), "gyroscope has no key 'bb'", "it knows S, b"),
+        (GOOD.replace("[0.0, 0.0, 0.0]", "[0.0, 0.0]"), "gyroscope.b must hold 3 values", "got [0.0, 0.0]"),
+        (GOOD.replace('"hand"', '"hands"'), "no session is of kind 'hands'", "there are"),
+        (GOOD.replace('"mpu"', '"mpu'), "mine.toml is not a TOML file", "line 2"),
+        (GOOD + '[[effect]]\nid = "gyro-g-sensitivty"\n', "no effect is called 'gyro-g-sensitivty'", "there are"),
+        (GOOD + '[[effect]]\nid = "accel-quadratic"\nk3 = 1.0\n', "effect accel-quadratic", "'k3'"),
+    ],
+)
+def test_a_scenario_with_a_typing_error_is_refused_with_its_place(tmp_path, capsys, wrong, place, remedy):
+    given = tmp_path / "mine.toml"
+    given.write_text(wrong)
+    said = refused(given, capsys)
+    assert place in said
+    assert remedy in said
+
+
+def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, capsys):
+    assert "no such file" in refused(tmp_path / "absent.csv", capsys)
+    empty = tmp_path / "words.csv"
+    empty.write_text("nothing,here\n")
+    assert "words.csv" in refused(empty, capsys)
+    rng = np.random.default_rng(3)
+    rows = np.column_stack([np.arange(2000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (2000, 6))])
+    still = tmp_path / "still.csv"
+    head = "t [s],ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]\n"
+    still.write_text(head + "\n".join(",".join(f"{v:.6g}" for v in row) for row in rows) + "\n")
+    said = refused(still, capsys)
+    assert "the simulated recording cannot be calibrated" in said
+    assert "pose" in said
