@@ -11,12 +11,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.printable import one_line
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
-
-FloatArray = npt.NDArray[np.float64]
 
 AllanKind = Literal["overlapping", "non-overlapping", "modified", "hadamard", "total"]
 

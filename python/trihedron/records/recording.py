@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.printable import one_line
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
 from trihedron.records.finding import Finding
@@ -15,8 +16,6 @@ from trihedron.records.frozen import freeze
 from trihedron.records.presented import Presented
 from trihedron.records.sampling import UNJUDGED, Sampling
 from trihedron.units import AccelerationUnit, RateUnit
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def _is_frozen(array: object) -> bool:

@@ -6,14 +6,11 @@ from itertools import pairwise
 from typing import cast
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import median_filter
 
 from trihedron import _core
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.period import PAUSE_STEPS
-from trihedron.read.table import FloatArray
-
-IntArray = npt.NDArray[np.int64]
 
 LOST = 0.6
 """Part of a period by which the earliest stamps must move, and stay moved, for a sample to be lost."""

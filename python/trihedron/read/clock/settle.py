@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.even import EvenClock, find_even_clock
 from trihedron.read.clock.followed import followed
 from trihedron.read.clock.steps import steps_of
-from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode
 from trihedron.records.sampling import Sampling, StampKind
-
-IntArray = npt.NDArray[np.int64]
 
 WORTH = 0.03
 """Stamps this part of a step (rms) about an even clock are as good as even (those rounded to a tenth of a step are):
