@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.of_zeros import PoseZeros, SlowDifference, compare_slow
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, NoiseTerm
 from trihedron.segment import resegment
-
-FloatArray = npt.NDArray[np.float64]
 
 LEAST_SLOW_RATIO = 2.0
 """Bias instability differs by half from one part of a reel to the next and with the day; makers state no spread."""

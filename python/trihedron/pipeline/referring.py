@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron.diagnose.against import FittedModel, compare_numbers, model_of_calibration
 from trihedron.estimate.reference import fit_reference
@@ -33,7 +32,6 @@ from trihedron.records.reference import AgainstReference, Estimate, ReferenceMot
 from trihedron.sensor_model import in_frame
 from trihedron.units import acceleration_to_si
 
-FloatArray = npt.NDArray[np.float64]
 AnyReference = ReferenceMotion | Recording | str | os.PathLike[str]
 
 LEAST_SIGMAS = 3.0

@@ -11,8 +11,8 @@ from types import MappingProxyType
 from typing import Any, get_args
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.sessions import changes_among, repeated_parameters, thermal_model
 from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector, numbers_jacobian, numbers_of
 from trihedron.pipeline.calibrating import calibrate
@@ -24,8 +24,6 @@ from trihedron.records.presented import Presented
 from trihedron.records.progress import Progress
 from trihedron.records.sessions import PARAMETERS, By, Repeated, Session, SessionsModel, ThermalModel
 from trihedron.sensor_model import in_frame
-
-FloatArray = npt.NDArray[np.float64]
 
 BYS: tuple[By, ...] = get_args(By)
 ALPHA = 0.01

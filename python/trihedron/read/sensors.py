@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz, settle_clock
 from trihedron.read.clock.steps import steps_of
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
@@ -18,7 +19,7 @@ from trihedron.read.merge import merge
 from trihedron.read.names import parse_name
 from trihedron.read.rest import is_integer
 from trihedron.read.sensing import WHOLE, order_of_triads
-from trihedron.read.table import FloatArray, Table
+from trihedron.read.table import Table
 from trihedron.read.text.store import side_by_side
 from trihedron.records import Finding, FindingCode, Sampling
 from trihedron.records.progress import Progress

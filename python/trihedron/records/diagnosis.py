@@ -6,13 +6,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Literal, get_args
 
-import numpy as np
-import numpy.typing as npt
-
+from trihedron.arrays import FloatArray
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, said
 from trihedron.records.frozen import Frozen, freeze, thawed
-
-FloatArray = npt.NDArray[np.float64]
 
 Verdict = Literal["consistent", "parameters-differ", "missing-physics", "unexplained", "not-testable"]
 Domain = Literal["static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing", "numbers", "noise"]

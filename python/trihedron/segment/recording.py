@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.records import Finding, Hold, Move, Recording, Segments
 from trihedron.records.progress import Progress
-from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, split_into_blocks
+from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity
 from trihedron.segment.judge import judge_log, judge_runs
 from trihedron.segment.means import average_holds

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
-from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, rolling_mean
+from trihedron.arrays import BoolArray, FloatArray
+from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.floor import Activity
 from trihedron.segment.noise import MeanNoise, Range
 

@@ -11,8 +11,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.twin import Distortion
 from trihedron.records.diagnosis import Domain, EffectParameter
 

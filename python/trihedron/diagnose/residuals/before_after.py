@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.diagnose.session.observations import FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records.diagnosis import DomainResiduals, LinearModel
 

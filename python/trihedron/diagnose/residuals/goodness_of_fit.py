@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import fdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.jumps import jumps_in_poses
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import Fit, leverage
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.records.diagnosis import Domain, DomainTest, Where

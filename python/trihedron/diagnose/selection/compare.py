@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms, weighted_rms
 from trihedron.diagnose.selection.model import StepwiseModel, held_out
 from trihedron.diagnose.selection.score import Scored, dispersion
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import (
     N_DOMAINS,
     Fit,

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.selection.model import StepwiseModel
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.twin import stacked
 from trihedron.diagnose.zeros.of_session import (

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtrc, chdtri
 
 from trihedron._core import Moves
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.rounding import (
@@ -21,10 +21,6 @@ from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 BLOCK_S = 0.5
 """Length of the blocks whose scatter gives the angle random walk: moves last of this order, and it is long against

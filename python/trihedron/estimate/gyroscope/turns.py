@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import chdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.turn_angles import (
     AMBIGUOUS,
     MIN_SPREAD,
@@ -38,7 +39,6 @@ from trihedron.records.segments import Segments
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import rate_to_si
 
-FloatArray = npt.NDArray[np.float64]
 Route = Literal["least-squares", "zero-turn-first"]
 
 TILT = 0.05

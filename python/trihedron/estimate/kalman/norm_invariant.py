@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
 from trihedron.estimate.kalman.guide import Goal, Guide
 from trihedron.estimate.kalman.per_axis import noise_per_axis
@@ -18,7 +19,6 @@ from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, LiveEstimate, NormKalmanCalibration
 
-FloatArray = npt.NDArray[np.float64]
 NormFrame = Literal["lower", "symmetric"]
 
 ENTRIES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
