@@ -62,7 +62,7 @@ Stream = Annotated[
     bool,
     typer.Option(
         "--stream",
-        help="Read a .npy or Parquet log in pieces, in bounded memory and without audit: --columns, "
+        help="Read a .npy or Parquet log in pieces, in at most 1.4 GB and without audit: --columns, "
         "--rate and the units say what it holds.",
     ),
 ]

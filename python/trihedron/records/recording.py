@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.printable import one_line
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
 from trihedron.records.finding import Finding
 from trihedron.records.frozen import freeze
@@ -215,4 +216,4 @@ class Recording(Presented):
             if value is not None
         )
         size = f"{self.n_samples} samples, {self.duration_s:.1f} s at {self.rate_hz:.4g} Hz"
-        return f"<Recording {self.source}: {size}, {sensors}>"
+        return f"<Recording {one_line(self.source)}: {size}, {sensors}>"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.printable import one_line
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.presented import Presented
 
@@ -51,4 +52,6 @@ class Verification(Presented):
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
     def __repr__(self) -> str:
-        return f"<Verification on {self.source}: {self.norm_rms:.3g} m/s² rms in {len(self.norm_error)} poses>"
+        return (
+            f"<Verification on {one_line(self.source)}: {self.norm_rms:.3g} m/s² rms in {len(self.norm_error)} poses>"
+        )

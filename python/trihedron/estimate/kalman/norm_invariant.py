@@ -13,7 +13,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
 from trihedron.estimate.kalman.guide import Goal, Guide
 from trihedron.estimate.kalman.norm_start import NormStart
-from trihedron.estimate.kalman.per_axis import noise_per_axis
+from trihedron.estimate.kalman.per_axis import noise_per_axis, pose_arrays
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
@@ -222,22 +222,8 @@ def calibrate_without_references(
     ValueError
         When shapes disagree, values are not finite, poses are out of order, or there are fewer than nine.
     """
-    a = np.array(readings, dtype=np.float64)
-    if a.ndim != 2 or a.shape[1] != 3:
-        raise ValueError(f"readings must have shape (n, 3), got {a.shape}")
-    n = len(a)
-    if n < N_PARAMETERS:
-        raise ValueError(f"{n} poses give {n} equations for nine unknowns: hold at least nine, better eighteen")
-    if not np.all(np.isfinite(a)):
-        raise ValueError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
-    begin = np.array(start_s, dtype=np.float64)
-    hold = np.array(np.broadcast_to(np.asarray(hold_s, dtype=np.float64), (n,)))
-    if begin.shape != (n,):
-        raise ValueError(f"start_s must have one entry per pose ({n}), got shape {begin.shape}")
-    if not (np.all(np.isfinite(hold)) and np.all(hold > 0)):
-        raise ValueError("hold_s must be finite and positive: every pose needs a positive length")
-    extra = np.asarray(extra_variance, dtype=np.float64)
-    extra = np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (n, 3)))
+    a = _mean_readings(readings)
+    begin, hold, extra = pose_arrays(len(a), start_s, hold_s, extra_variance)
 
     def fresh() -> LiveNormCalibration:
         return LiveNormCalibration(
@@ -282,6 +268,18 @@ def calibrate_without_references(
         consistency=seen,
         findings=tuple(findings),
     )
+
+
+def _mean_readings(readings: npt.ArrayLike) -> FloatArray:
+    a = np.array(readings, dtype=np.float64)
+    if a.ndim != 2 or a.shape[1] != 3:
+        raise ValueError(f"readings must have shape (n, 3), got {a.shape}")
+    n = len(a)
+    if n < N_PARAMETERS:
+        raise ValueError(f"{n} poses give {n} equations for nine unknowns: hold at least nine, better eighteen")
+    if not np.all(np.isfinite(a)):
+        raise ValueError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
+    return a
 
 
 def _flat(S: FloatArray, b: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -188,7 +188,7 @@ def behind_late_rows(tick: IntArray, error: FloatArray, period: float) -> IntArr
     if not len(at):
         return tick
     early = -0.1 * period
-    shift = np.zeros(len(tick), dtype=np.int64)
+    shift = np.zeros_like(tick)
     moved = False
     for i in at:
         k, count = int(i), int(tick[i] - tick[i - 1] - 1)
@@ -196,4 +196,4 @@ def behind_late_rows(tick: IntArray, error: FloatArray, period: float) -> IntArr
             shift[k] += count
             k += 1
         moved = moved or k > int(i)
-    return tick - shift if moved else tick
+    return np.subtract(tick, shift, out=shift) if moved else tick

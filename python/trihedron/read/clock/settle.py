@@ -75,8 +75,11 @@ def settle_clock(
     told = lost if clock.counts_losses else None
     if not is_even:
         return Settled(time_s, start_s, sampling, told, findings)
-    even = clock.even_s - clock.even_s[0]
-    return Settled(np.maximum.accumulate(even), start_s + float(clock.even_s[0]), sampling, told, findings)
+    start = float(clock.even_s[0])
+    even = clock.even_s - start
+    del clock
+    # In its own place: a long log has no room for a second.
+    return Settled(np.maximum.accumulate(even, out=even), start_s + start, sampling, told, findings)
 
 
 def sample_numbers(counter: FloatArray) -> IntArray | None:
