@@ -1,6 +1,7 @@
 """Mistakes that simulators have made: units, axes, slow noise; each told by its numbers."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ from trihedron.diagnose.against import FittedModel, compare_numbers
 from trihedron.estimate.gyroscope.world_rates import carried_gravity
 from trihedron.estimate.noise.of_zeros import PoseZeros, compare_slow
 from trihedron.pipeline.comparing_frames import sign_of_gravity
+from trihedron.pipeline.comparing_slow import gyro_zeros
 from trihedron.records import Hold, Segments
 from trihedron.records.diagnosis import Stage, StageDomain
 from trihedron.records.sampling import Sampling, StampKind
+from trihedron.segment import resegment
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 N, HOLD_S, GAP_S, POSES = 9e-5, 4.5, 2.0, 26
@@ -207,3 +210,33 @@ def still(n):
             "accelerometer_sigma_mean", "gyroscope_sigma_mean")  # fmt: skip
     return {"moves": (), "n_averaged": np.full(n, 450), "time_mid_s": np.arange(n), "duration_s": np.full(n, 4.5),
             **dict.fromkeys(none)}  # fmt: skip
+
+
+@pytest.mark.parametrize("is_cut", [True, False])
+def test_pieces_of_a_bumped_pose_have_lengths_of_their_own_and_zeros_a_covariance(is_cut):
+    recording = simulate(replace(scenario_by_name("hand-session"), motion=hand_session(14, hold_s=3.0, layout=4)), 8)[0]
+    found = trihedron.segment(recording)
+    holds = list(found.holds)
+    for k in (3, 7, 8):
+        a, n = holds[k].start, holds[k].stop - holds[k].start
+        holds[k] = replace(holds[k], disturbed=((a + n // 5, a + n // 5 + 2), (a + n // 2, a + n // 2 + 5)))
+    segments = replace(found, holds=tuple(holds))
+    poses = resegment(recording, segments).holds if is_cut else segments.holds
+    assert len(poses) == 14 + 6 * is_cut
+    t = recording.time_s
+    begin, end = (
+        np.array([t[i] for i in index]) for index in zip(*((h.start, h.stop - 1) for h in poses), strict=True)
+    )
+    rng = np.random.default_rng(3)
+    shown = SimpleNamespace(
+        domain="static-gyro", after=1e-3 * rng.standard_normal((len(poses), 3)), time_after_s=0.5 * (begin + end)
+    )
+    diagnosis = SimpleNamespace(noise={"gyroscope_density": (N, N, N)}, residuals=(shown,))
+    seen = gyro_zeros(diagnosis, recording, segments)
+    assert len(seen) == 3
+    # A sample lasts a step; stamps are written to some nanoseconds.
+    assert np.allclose(seen[0].length_s, end - begin + 1.0 / recording.rate_hz, atol=1e-7)
+    starts, stops = seen[0].time_s - seen[0].length_s / 2.0, seen[0].time_s + seen[0].length_s / 2.0
+    assert (starts[1:] >= stops[:-1] - 1e-7).all()
+    ideal = [replace(z, values=0.0 * z.values, sigma=1e-10 * z.sigma) for z in seen]
+    assert np.isfinite(compare_slow(ideal, seen).p_value)

@@ -14,7 +14,8 @@ from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
 from trihedron.diagnose.selection import verdict
 from trihedron.pipeline import extending
 from trihedron.records import Hold
-from trihedron.records.diagnosis import DomainTest, Stage, StageDomain
+from trihedron.records.diagnosis import Stage, StageDomain
+from trihedron.records.domains import DomainTest
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
 RATE_HZ = 100.0

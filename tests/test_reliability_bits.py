@@ -3,10 +3,17 @@
 import os
 import re
 import shutil
+import subprocess
+import sys
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from small_session import G, copied, run
+from trihedron.simulate import hand_session, scenario_by_name, simulate
+
+THREADED_ROWS = 20_000
 
 WORDS = {
     "calibrate": ["calibrate", "log.csv", "--gravity", G, "--json", "OUT"],
@@ -39,3 +46,57 @@ def test_outputs_do_not_depend_on_threads_or_cores(tmp_path, name):
         shutil.move(out, folder / f"{case}{ending}")
     assert made["one"] == made["three"]
     assert made["one"] == made["one core"]
+
+
+LONG = {name: WORDS[name] for name in ("calibrate", "allan", "check", "segment")}
+
+
+@pytest.fixture(scope="module")
+def long_logs(tmp_path_factory):
+    """A session and a rest of more than 20 000 readings, beyond which sums are shared between threads."""
+    folder = tmp_path_factory.mktemp("long")
+    rng = np.random.default_rng(2)
+    motion = hand_session(n_poses=26, hold_s=8.0, move_s=2.0, first_hold_s=10.0)
+    recording = simulate(replace(scenario_by_name("hand-session"), motion=motion), 3)[0]
+    assert recording.n_samples > THREADED_ROWS
+    rows = np.column_stack([recording.time_s, recording.accelerometer, recording.gyroscope])
+    rest = np.column_stack([np.arange(60_000) / 100.0, rng.normal([0, 0, 9.8, 0, 0, 0], 0.01, (60_000, 6))])
+    for name, table in (("log", rows), ("rest", rest)):
+        np.savetxt(folder / f"{name}.csv", table, "%.10g", ",", header="time_s,ax,ay,az,gx,gy,gz", comments="")
+    return folder
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_outputs_of_long_logs_do_not_depend_on_threads(long_logs, name):
+    made = []
+    for threads in ("1", "3"):
+        out = long_logs / f"{name}-{threads}.json"
+        words = [str(out) if word == "OUT" else word for word in LONG[name]]
+        status, _, err = run(*words, cwd=long_logs, env=dict.fromkeys(LIBRARIES, threads))
+        assert status in (0, 2), err
+        made.append(re.sub(r'"(made_at|created)": "[^"]*"', "", out.read_text()))
+    assert made[0] == made[1]
+
+
+FIT = """
+import hashlib
+import numpy as np
+from trihedron import _core
+rng = np.random.default_rng(3)
+d = rng.standard_normal((60_000, 3))
+raw = 9.81 * d / np.linalg.norm(d, axis=1)[:, None] * [1.01, 0.99, 1.02] + 0.1 + rng.normal(0.0, 1e-2, d.shape)
+fit = _core.fit_norm(raw, 1e-4 * np.eye(3)[None], _core.NormSettings(9.81))
+deviation = _core.allan_variance(raw, [1, 8, 512], _core.AllanKind.Overlapping)[0]
+found = (fit.S, fit.b, fit.covariance, deviation)
+print([hashlib.sha256(np.ascontiguousarray(x).tobytes()).hexdigest() for x in found])
+"""
+
+
+def test_sums_shared_between_threads_have_the_same_bits():
+    assert len({_printed(threads) for threads in ("1", "2", "3")}) == 1
+
+
+def _printed(threads):
+    path = os.pathsep.join(p for p in sys.path if p)
+    environment = {**os.environ, **dict.fromkeys(LIBRARIES, threads), "PYTHONPATH": path}
+    return subprocess.run([sys.executable, "-c", FIT], env=environment, capture_output=True, check=True).stdout

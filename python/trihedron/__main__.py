@@ -7,12 +7,16 @@ import sys
 
 from trihedron.interruption import SENTENCE, Interrupted, install, status_of
 
+_FIRST_FREE = 3
+"""After standard input, output and error."""
+
 
 def main() -> int:
     """Run the command line; interrupted while it still loads, it ends as it would later."""
     # The allocator of the library of tables complains aloud where threads are short, and goes on without one.
     os.environ.setdefault("_RJEM_MALLOC_CONF", "background_thread:false")
     try:
+        _fill_standard_places()
         install()
         from trihedron.cli import main as run
 
@@ -20,6 +24,14 @@ def main() -> int:
     except (Interrupted, KeyboardInterrupt) as error:
         print(f"trihedron: {SENTENCE}", file=sys.stderr)
         return status_of(error)
+
+
+def _fill_standard_places() -> None:
+    """Something behind the numbers 0, 1 and 2: a pipe or an output that got one would take what is said there."""
+    place = os.open(os.devnull, os.O_RDWR)
+    while place < _FIRST_FREE:
+        place = os.open(os.devnull, os.O_RDWR)
+    os.close(place)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.records.calibration import FloatArray
+from trihedron.arrays import FloatArray
 
 # accelerometer
 ANCHOR: float

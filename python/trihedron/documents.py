@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import os
 import stat
+from collections import Counter
 from pathlib import Path
 from typing import Any
+
+from trihedron.printable import one_line
 
 MOST_BYTES = 64_000_000
 """A diagnosis of a day's log with all its curves has 3 MB."""
@@ -57,7 +60,7 @@ def read_text(path: str | os.PathLike[str], what: str) -> str:
 
 
 def parse_json(text: str) -> Any:
-    """JSON with finite numbers and sane depth.
+    """JSON with finite numbers, sane depth and every key once: of two values neither may win silently.
 
     Raises
     ------
@@ -65,7 +68,9 @@ def parse_json(text: str) -> Any:
         When it is not; the line is said where the text breaks.
     """
     try:
-        document = json.loads(text, parse_constant=_constant, parse_int=_whole, parse_float=_real)
+        document = json.loads(
+            text, object_pairs_hook=_object, parse_constant=_constant, parse_int=_whole, parse_float=_real
+        )
     except DocumentError:
         raise
     except json.JSONDecodeError as error:
@@ -103,6 +108,14 @@ def check_values(document: Any) -> None:
 def of_path(path: str | os.PathLike[str], error: DocumentError) -> str:
     """The whole sentence."""
     return f"{Path(path)}: {error}"
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    made = dict(pairs)
+    if len(made) < len(pairs):
+        twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
+        raise DocumentError(f"this gives '{one_line(twice)[:40]}' twice; keep one of them")
+    return made
 
 
 def _constant(name: str) -> float:

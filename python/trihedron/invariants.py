@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from trihedron.arrays import FloatArray
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 STEP = 1e-6

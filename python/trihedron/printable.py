@@ -18,6 +18,15 @@ def printable(text: str) -> str:
     return _UNSEEN.sub(lambda found: _spelled(found[0], "\\x{:02x}"), text)
 
 
+def one_line(text: str) -> str:
+    r"""As :func:`printable`, line ends and tabs too: for a name inside a line.
+
+    >>> one_line("a\nb")
+    'a\\nb'
+    """
+    return printable(text).replace("\n", "\\n").replace("\t", "\\t")
+
+
 def printable_json(text: str) -> str:
     """JSON text with the same characters as the escapes of JSON: the document stays the same."""
     return _UNSEEN.sub(lambda found: _spelled(found[0], "\\u{:04x}"), text)

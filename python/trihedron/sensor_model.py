@@ -17,7 +17,8 @@ from itertools import product
 
 import numpy as np
 
-from trihedron.records.calibration import Calibration, FloatArray, Frame, SensorCalibration
+from trihedron.arrays import FloatArray
+from trihedron.records.calibration import Calibration, Frame, SensorCalibration
 
 
 def correct(readings: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:

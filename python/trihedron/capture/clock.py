@@ -6,9 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
-
-FloatArray = npt.NDArray[np.float64]
 
 MOST_POINTS = 100_000
 MOST_BINS = 200

@@ -12,7 +12,8 @@ from itertools import product
 
 import numpy as np
 
-from trihedron.capture.stillness import FloatArray, Stillness
+from trihedron.arrays import FloatArray
+from trihedron.capture.stillness import Stillness
 from trihedron.records.guiding import Accuracy, Examination, GuideView, Phase
 
 Examine = Callable[[], Examination]

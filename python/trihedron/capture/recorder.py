@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.capture.account import Count, clock_sentence
 from trihedron.capture.clock import ClockLine, Timeline
 from trihedron.capture.errors import CaptureError, SourceEndedError, SourceLostError
@@ -20,8 +21,6 @@ from trihedron.capture.reading import ReadingThread, SourceReturned, Stopped
 from trihedron.capture.rows import Rows
 from trihedron.capture.sequence import Placed, Sequence, Tally
 from trihedron.capture.sources import Source
-
-FloatArray = npt.NDArray[np.float64]
 
 SETTLE_S = 0.6
 """Without a device clock, rows wait this long at the start of a connection, until arrivals tell their rate."""

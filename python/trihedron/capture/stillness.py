@@ -6,9 +6,8 @@ The segmentation of the whole log decides later which poses count; this is for t
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from trihedron.arrays import FloatArray
 
 WINDOW_S = 0.25
 LOUDER = 3.0

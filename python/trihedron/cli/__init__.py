@@ -166,6 +166,9 @@ def _make_writable() -> None:
     """Output that any result can be written to: names of files may hold what the terminal's encoding does not."""
     if sys.stdout is None:
         sys.stdout = _Closed()
+    if sys.stderr is None:
+        # What would be said to nobody must not end a command that can give its result.
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

@@ -17,63 +17,76 @@ if TYPE_CHECKING:
 FIRST_SCREEN = 2
 
 
+GyroLsb = Annotated[
+    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+    typer.Option("--gyro-lsb", metavar="SIZE", help="Size of the gyro's count, as in '0.05 deg/s'."),
+]
+AccelLsb = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--accel-lsb", metavar="SIZE", help="Size of the accelerometer's count, as in '3.33 mg'."),
+]
+Exclude = Annotated[
+    Optional[list[str]],  # noqa: UP045
+    typer.Option(
+        "--exclude",
+        metavar="FROM:TO",
+        help="Leave out this stretch [s]; :TO from the start, FROM: to the end; may be given more than once.",
+    ),
+]
+KeepEvents = Annotated[
+    bool, typer.Option("--keep-events", help="Leave nothing out by itself: knocks, shaking and steps stay in.")
+]
+Accuracy = Annotated[
+    float,
+    typer.Option("--accuracy", metavar="PERCENT", help="How long to record to know each term this well; --full."),
+]
+Plot = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--plot", metavar="FILE.png", help="Draw the Allan curves (the report holds them as well)."),
+]
+Csv = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--csv", metavar="FILE", help="Write the Allan curve as a table."),
+]
+Curve = Annotated[
+    bool,
+    typer.Option(
+        "--curve", help="LOG is a table of Allan deviations (--csv of another run, or published): terms from it."
+    ),
+]
+Samples = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option("--samples", metavar="N", help="Readings of the log behind --curve, where the table is silent."),
+]
+Stream = Annotated[
+    bool,
+    typer.Option(
+        "--stream",
+        help="Read a .npy or Parquet log in pieces, in at most 1.4 GB and without audit: --columns, "
+        "--rate and the units say what it holds.",
+    ),
+]
+Full = Annotated[
+    bool, typer.Option("--full", help="Print customary units, how long to record and Kalibr's names as well.")
+]
+
+
 @with_options(source=LogSource)
 def allan(
     source: LogSource,
-    gyro_lsb: Annotated[
-        Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Option("--gyro-lsb", metavar="SIZE", help="Size of the gyro's count, as in '0.05 deg/s'."),
-    ] = None,
-    accel_lsb: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--accel-lsb", metavar="SIZE", help="Size of the accelerometer's count, as in '3.33 mg'."),
-    ] = None,
-    exclude: Annotated[
-        Optional[list[str]],  # noqa: UP045
-        typer.Option(
-            "--exclude",
-            metavar="FROM:TO",
-            help="Leave out this stretch [s]; :TO from the start, FROM: to the end; may be given more than once.",
-        ),
-    ] = None,
-    keep_events: Annotated[
-        bool, typer.Option("--keep-events", help="Leave nothing out by itself: knocks, shaking and steps stay in.")
-    ] = False,
-    accuracy: Annotated[
-        float,
-        typer.Option("--accuracy", metavar="PERCENT", help="How long to record to know each term this well; --full."),
-    ] = 10.0,
-    plot: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--plot", metavar="FILE.png", help="Draw the Allan curves (the report holds them as well)."),
-    ] = None,
-    csv: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--csv", metavar="FILE", help="Write the Allan curve as a table."),
-    ] = None,
-    curve: Annotated[
-        bool,
-        typer.Option(
-            "--curve", help="LOG is a table of Allan deviations (--csv of another run, or published): terms from it."
-        ),
-    ] = False,
-    samples: Annotated[
-        Optional[int],  # noqa: UP045
-        typer.Option("--samples", metavar="N", help="Readings of the log behind --curve, where the table is silent."),
-    ] = None,
-    stream: Annotated[
-        bool,
-        typer.Option(
-            "--stream",
-            help="Read a .npy or Parquet log in pieces, in bounded memory and without audit: --columns, "
-            "--rate and the units say what it holds.",
-        ),
-    ] = False,
+    gyro_lsb: GyroLsb = None,
+    accel_lsb: AccelLsb = None,
+    exclude: Exclude = None,
+    keep_events: KeepEvents = False,
+    accuracy: Accuracy = 10.0,
+    plot: Plot = None,
+    csv: Csv = None,
+    curve: Curve = False,
+    samples: Samples = None,
+    stream: Stream = False,
     json: Json = None,
     report: Report = None,
-    full: Annotated[
-        bool, typer.Option("--full", help="Print customary units, how long to record and Kalibr's names as well.")
-    ] = False,
+    full: Full = False,
     force: Force = False,
 ) -> None:
     """Identify the noise terms of a long static log: how large, how certain, how long to average."""

@@ -15,65 +15,73 @@ from trihedron.cli.streamed import Stream, calibrate_stream
 FIRST_SCREEN = 2
 
 
+Method = Annotated[
+    str,
+    typer.Option(help="joint: any poses, both sensors in one fit. separate: one after the other. faces: six faces."),
+]
+Frame = Annotated[
+    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+    typer.Option(help="Instrument trihedron: lower, symmetric, or case (with --method faces)."),
+]
+Faces = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(metavar="LIST", help="With --method faces: axis up in each pose, '1,-1,2,-2,3,-3'; 0 leaves one out."),
+]
+Turns = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(
+        metavar="LIST",
+        help="Angle of each turn on a table in degrees, '90,-90,360', in any pose; 0 leaves one out.",
+    ),
+]
+AxisSigns = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option(metavar="+++", help="Sign with which each raw axis follows its documented direction, e.g. '-++'."),
+]
+Loss = Annotated[str, typer.Option(help="How far outlying poses count: linear, huber, soft_l1, cauchy.")]
+GyroNominal = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option(metavar="X", help="Nominal rad/s per gyro unit, where counts and few moves cannot tell it."),
+]
+Reference = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."),
+]
+ReferenceColumns = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz', 't,wx [deg/s],...'."),
+]
+Extended = Annotated[
+    bool, typer.Option("--extended", help="Diagnose the log too, and store the effects it demands; for apply.")
+]
+Output = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON)."),
+]
+Full = Annotated[bool, typer.Option("--full", help="Print the whole report, with every pose and move.")]
+
+
 @with_options(sources=LogsSource, place=GravitySource)
 def calibrate(
     sources: LogsSource,
     place: GravitySource,
-    method: Annotated[
-        str,
-        typer.Option(
-            help="joint: any poses, both sensors in one fit. separate: one after the other. faces: six faces."
-        ),
-    ] = "joint",
-    frame: Annotated[
-        Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Option(help="Instrument trihedron: lower, symmetric, or case (with --method faces)."),
-    ] = None,
-    faces: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(
-            metavar="LIST", help="With --method faces: axis up in each pose, '1,-1,2,-2,3,-3'; 0 leaves one out."
-        ),
-    ] = None,
-    turns: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(
-            metavar="LIST",
-            help="Angle of each turn on a table in degrees, '90,-90,360', in any pose; 0 leaves one out.",
-        ),
-    ] = None,
-    axis_signs: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(metavar="+++", help="Sign with which each raw axis follows its documented direction, e.g. '-++'."),
-    ] = None,
-    loss: Annotated[str, typer.Option(help="How far outlying poses count: linear, huber, soft_l1, cauchy.")] = "linear",
-    gyro_nominal: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option(metavar="X", help="Nominal rad/s per gyro unit, where counts and few moves cannot tell it."),
-    ] = None,
-    reference: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option(
-            "--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."
-        ),
-    ] = None,
-    reference_columns: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz', 't,wx [deg/s],...'."),
-    ] = None,
-    extended: Annotated[
-        bool, typer.Option("--extended", help="Diagnose the log too, and store the effects it demands; for apply.")
-    ] = False,
+    method: Method = "joint",
+    frame: Frame = None,
+    faces: Faces = None,
+    turns: Turns = None,
+    axis_signs: AxisSigns = None,
+    loss: Loss = "linear",
+    gyro_nominal: GyroNominal = None,
+    reference: Reference = None,
+    reference_columns: ReferenceColumns = None,
+    extended: Extended = False,
     stream: Stream = False,
     by: By = None,
     labels: Labels = None,
-    output: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("-o", "--output", metavar="FILE", help="Write the calibration file (JSON)."),
-    ] = None,
+    output: Output = None,
     json: Json = None,
     report: Report = None,
-    full: Annotated[bool, typer.Option("--full", help="Print the whole report, with every pose and move.")] = False,
+    full: Full = False,
     force: Force = False,
 ) -> None:
     """Calibrate both sensors from a log of still poses and moves.

@@ -23,57 +23,74 @@ LOSSES_NOT_TRUSTED = 0.05
 """Share of lost frames above which `read` calls a log's gaps serious."""
 
 
+Port = Annotated[
+    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+    typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin)."),
+]
+Output = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--output", "-o", metavar="LOG", help="Log to write (text; every command reads it)."),
+]
+Protocol = Annotated[
+    str, typer.Option("--protocol", metavar="NAME", help="Protocol, or a .toml that declares a frame; else found.")
+]
+Baud = Annotated[
+    Optional[int],  # noqa: UP045
+    typer.Option("--baud", metavar="N", min=1, help="Baud rate; found by trying otherwise."),
+]
+Seconds = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--seconds", metavar="S", min=0.0, help="Stop after so long; Ctrl-C stops any time."),
+]
+Rate = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--rate", metavar="HZ", help="Rate of a board that sends no time."),
+]
+Columns = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--columns", metavar="LIST", help="Columns of text lines, as in the other commands."),
+]
+TimeUnit = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--time-unit", metavar="UNIT", help="Unit of the board's time: s, ms, us or ns."),
+]
+Wait = Annotated[
+    float, typer.Option("--wait", metavar="S", min=0.0, help="How long to wait for a board that was unplugged.")
+]
+Guide = Annotated[bool, typer.Option("--guide", help="Lead through a calibration on a live screen.")]
+Browser = Annotated[bool, typer.Option("--browser", help="The guide as a page in the browser.")]
+NoOpen = Annotated[bool, typer.Option("--no-open", help="With --browser: print the link, open nothing.")]
+Accuracy = Annotated[str, typer.Option("--accuracy", metavar="TEXT", help='Of the guide: "accel 0.05 %, gyro 0.1 %".')]
+Gravity = Annotated[
+    Optional[float],  # noqa: UP045
+    typer.Option("--gravity", metavar="M/S2", help="|g| where the board is, for the guide's calibration."),
+]
+Calibration = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--calibration", metavar="FILE", help="Of the guide: calibration to write at the end."),
+]
+Bell = Annotated[bool, typer.Option("--bell", help="Of the guide: ring when a pose is taken.")]
+ListThem = Annotated[bool, typer.Option("--list", help="List the protocols and stop.")]
+
+
 def capture(
-    port: Annotated[
-        Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Argument(metavar="PORT", help="Port, tcp://host:port, a file of bytes, or - (stdin)."),
-    ] = None,
-    output: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--output", "-o", metavar="LOG", help="Log to write (text; every command reads it)."),
-    ] = None,
-    protocol: Annotated[
-        str, typer.Option("--protocol", metavar="NAME", help="Protocol, or a .toml that declares a frame; else found.")
-    ] = "auto",
-    baud: Annotated[
-        Optional[int],  # noqa: UP045
-        typer.Option("--baud", metavar="N", min=1, help="Baud rate; found by trying otherwise."),
-    ] = None,
-    seconds: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--seconds", metavar="S", min=0.0, help="Stop after so long; Ctrl-C stops any time."),
-    ] = None,
-    rate: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--rate", metavar="HZ", help="Rate of a board that sends no time."),
-    ] = None,
-    columns: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--columns", metavar="LIST", help="Columns of text lines, as in the other commands."),
-    ] = None,
-    time_unit: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--time-unit", metavar="UNIT", help="Unit of the board's time: s, ms, us or ns."),
-    ] = None,
-    wait: Annotated[
-        float, typer.Option("--wait", metavar="S", min=0.0, help="How long to wait for a board that was unplugged.")
-    ] = 60.0,
-    guide: Annotated[bool, typer.Option("--guide", help="Lead through a calibration on a live screen.")] = False,
-    browser: Annotated[bool, typer.Option("--browser", help="The guide as a page in the browser.")] = False,
-    no_open: Annotated[bool, typer.Option("--no-open", help="With --browser: print the link, open nothing.")] = False,
-    accuracy: Annotated[
-        str, typer.Option("--accuracy", metavar="TEXT", help='Of the guide: "accel 0.05 %, gyro 0.1 %".')
-    ] = DEFAULT_ACCURACY,
-    gravity: Annotated[
-        Optional[float],  # noqa: UP045
-        typer.Option("--gravity", metavar="M/S2", help="|g| where the board is, for the guide's calibration."),
-    ] = None,
-    calibration: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--calibration", metavar="FILE", help="Of the guide: calibration to write at the end."),
-    ] = None,
-    bell: Annotated[bool, typer.Option("--bell", help="Of the guide: ring when a pose is taken.")] = False,
-    list_them: Annotated[bool, typer.Option("--list", help="List the protocols and stop.")] = False,
+    port: Port = None,
+    output: Output = None,
+    protocol: Protocol = "auto",
+    baud: Baud = None,
+    seconds: Seconds = None,
+    rate: Rate = None,
+    columns: Columns = None,
+    time_unit: TimeUnit = None,
+    wait: Wait = 60.0,
+    guide: Guide = False,
+    browser: Browser = False,
+    no_open: NoOpen = False,
+    accuracy: Accuracy = DEFAULT_ACCURACY,
+    gravity: Gravity = None,
+    calibration: Calibration = None,
+    bell: Bell = False,
+    list_them: ListThem = False,
     force: Force = False,
 ) -> None:
     """Record what a board sends into a log: nothing lost silently, on disk as it comes."""

@@ -10,49 +10,54 @@ import typer
 from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
 from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
 
+Calibration = Annotated[
+    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+    typer.Option(
+        "--calibration", metavar="FILE", help="Calibration to hold against the log; otherwise one is fitted to it."
+    ),
+]
+Against = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option(
+        "--against",
+        metavar="SIM",
+        help="Your simulation as model: a log or a scenario (.toml).",
+    ),
+]
+Reference = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."),
+]
+ReferenceColumns = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz', 't,wx [deg/s],...'."),
+]
+Improved = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says."),
+]
+Updated = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--updated", metavar="FILE", help="Write the calibration that this log itself gives."),
+]
+Alpha = Annotated[float, typer.Option(metavar="P", help="Chance that a healthy log is called anything but consistent.")]
+Full = Annotated[bool, typer.Option("--full", help="Print the whole report, with every candidate.")]
+
 
 @with_options(source=LogSource, place=GravitySource)
 def diagnose(
     source: LogSource,
     place: GravitySource,
-    calibration: Annotated[
-        Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Option(
-            "--calibration", metavar="FILE", help="Calibration to hold against the log; otherwise one is fitted to it."
-        ),
-    ] = None,
-    against: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option(
-            "--against",
-            metavar="SIM",
-            help="Your simulation as model: a log or a scenario (.toml).",
-        ),
-    ] = None,
-    reference: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option(
-            "--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."
-        ),
-    ] = None,
-    reference_columns: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--reference-columns", metavar="LIST", help="Its columns: 't,qw,qx,qy,qz', 't,wx [deg/s],...'."),
-    ] = None,
-    improved: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--improved", metavar="FILE.toml", help="Write the scenario with what the log says."),
-    ] = None,
-    updated: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--updated", metavar="FILE", help="Write the calibration that this log itself gives."),
-    ] = None,
-    alpha: Annotated[
-        float, typer.Option(metavar="P", help="Chance that a healthy log is called anything but consistent.")
-    ] = 0.01,
+    calibration: Calibration = None,
+    against: Against = None,
+    reference: Reference = None,
+    reference_columns: ReferenceColumns = None,
+    improved: Improved = None,
+    updated: Updated = None,
+    alpha: Alpha = 0.01,
     json: Json = None,
     report: Report = None,
-    full: Annotated[bool, typer.Option("--full", help="Print the whole report, with every candidate.")] = False,
+    full: Full = False,
     force: Force = False,
 ) -> None:
     """Where a log and its model differ, which physics was left out, and does adding it help. Status 0 if it ran."""

@@ -10,7 +10,8 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from trihedron.records.guiding import Examination, FloatArray, GuideView, Phase, Uncertain
+from trihedron.arrays import FloatArray
+from trihedron.records.guiding import Examination, GuideView, Phase, Uncertain
 
 # Names of the sixteen ANSI colours: the terminal's own theme decides what is readable on its background.
 GOOD, BAD, DIM, STRONG = "green", "red", "dim", "bold"

@@ -10,54 +10,69 @@ import typer
 from trihedron.cli.options import Force, Report
 from trihedron.cli.output import check_outputs, leave, say, write_report
 
+Scenario = Annotated[
+    Optional[str],  # noqa: UP045 -- typer evaluates it at run time
+    typer.Argument(metavar="SCENARIO", help="A .toml file, or the name of a ready-made scenario (--list)."),
+]
+Output = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--output", "-o", metavar="LOG", help="Log to write: .csv, .npz or .parquet."),
+]
+Truth = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--truth", metavar="FILE", help="Truth to write: .npz, or .json without the samples."),
+]
+Seed = Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Which accident of noise.")]
+Like = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--like", metavar="LOG", help="Twin: repeat this recording, with --calibration."),
+]
+Calibration = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--calibration", metavar="FILE", help="Calibration of the recording to repeat."),
+]
+WithEffects = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--with-effects", metavar="DIAGNOSIS", help="Add the effects that this diagnosis accepted."),
+]
+Serve = Annotated[
+    Optional[str],  # noqa: UP045
+    typer.Option("--serve", metavar="PTY|TCP", help="Send it as a board would; prints what to open. TCP:PORT too."),
+]
+Protocol = Annotated[
+    str, typer.Option("--protocol", metavar="NAME", help="With --serve: what the board speaks, or a .toml.")
+]
+Faults = Annotated[
+    str, typer.Option("--faults", metavar="LIST", help="With --serve: '1%' or 'cut=1%,drift=50ppm,disconnect=20'.")
+]
+Speed = Annotated[
+    float, typer.Option("--speed", metavar="X", min=0.0, help="With --serve: times real time; 0 is at once.")
+]
+Baud = Annotated[
+    int, typer.Option("--baud", metavar="N", min=0, help="With --serve PTY: garbage for readers at another baud.")
+]
+Link = Annotated[
+    Optional[Path],  # noqa: UP045
+    typer.Option("--link", metavar="PATH", help="With --serve PTY: a name that outlives disconnections."),
+]
+ListThem = Annotated[bool, typer.Option("--list", help="List the ready-made scenarios.")]
+
 
 def simulate(
-    scenario: Annotated[
-        Optional[str],  # noqa: UP045 -- typer evaluates it at run time
-        typer.Argument(metavar="SCENARIO", help="A .toml file, or the name of a ready-made scenario (--list)."),
-    ] = None,
-    output: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--output", "-o", metavar="LOG", help="Log to write: .csv, .npz or .parquet."),
-    ] = None,
-    truth: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--truth", metavar="FILE", help="Truth to write: .npz, or .json without the samples."),
-    ] = None,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Which accident of noise.")] = 0,
-    like: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--like", metavar="LOG", help="Twin: repeat this recording, with --calibration."),
-    ] = None,
-    calibration: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--calibration", metavar="FILE", help="Calibration of the recording to repeat."),
-    ] = None,
-    with_effects: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--with-effects", metavar="DIAGNOSIS", help="Add the effects that this diagnosis accepted."),
-    ] = None,
-    serve: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option("--serve", metavar="PTY|TCP", help="Send it as a board would; prints what to open. TCP:PORT too."),
-    ] = None,
-    protocol: Annotated[
-        str, typer.Option("--protocol", metavar="NAME", help="With --serve: what the board speaks, or a .toml.")
-    ] = "lines",
-    faults: Annotated[
-        str, typer.Option("--faults", metavar="LIST", help="With --serve: '1%' or 'cut=1%,drift=50ppm,disconnect=20'.")
-    ] = "",
-    speed: Annotated[
-        float, typer.Option("--speed", metavar="X", min=0.0, help="With --serve: times real time; 0 is at once.")
-    ] = 1.0,
-    baud: Annotated[
-        int, typer.Option("--baud", metavar="N", min=0, help="With --serve PTY: garbage for readers at another baud.")
-    ] = 0,
-    link: Annotated[
-        Optional[Path],  # noqa: UP045
-        typer.Option("--link", metavar="PATH", help="With --serve PTY: a name that outlives disconnections."),
-    ] = None,
-    list_them: Annotated[bool, typer.Option("--list", help="List the ready-made scenarios.")] = False,
+    scenario: Scenario = None,
+    output: Output = None,
+    truth: Truth = None,
+    seed: Seed = 0,
+    like: Like = None,
+    calibration: Calibration = None,
+    with_effects: WithEffects = None,
+    serve: Serve = None,
+    protocol: Protocol = "lines",
+    faults: Faults = "",
+    speed: Speed = 1.0,
+    baud: Baud = 0,
+    link: Link = None,
+    list_them: ListThem = False,
     report: Report = None,
     force: Force = False,
 ) -> None:

@@ -14,10 +14,11 @@ from typing import Any, cast
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect, Variant
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records import Recording
 

@@ -11,7 +11,8 @@ from scipy.ndimage import convolve1d, gaussian_filter1d, uniform_filter1d
 from scipy.signal import savgol_coeffs
 
 from trihedron import _core
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 
 TEMPERATURE_WINDOW_S = 10.0

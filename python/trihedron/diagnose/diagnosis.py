@@ -30,7 +30,8 @@ from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
 from trihedron.diagnose.session.twin import Prior, Twin
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import Candidate, Diagnosis, DomainTest
+from trihedron.records.diagnosis import Candidate, Diagnosis
+from trihedron.records.domains import DomainTest
 from trihedron.records.progress import Progress
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.records.calibration import FloatArray
+from trihedron.arrays import FloatArray
 
 Form = Literal["matrices", "quaternions", "vectors"]
 """How attitudes are written."""

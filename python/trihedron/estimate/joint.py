@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.verdict import covariance_scale
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align_screened
 from trihedron.estimate.gyroscope.findings import findings_of
@@ -25,8 +25,6 @@ from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.sensor_model import in_frame, reframing
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def calibrate_joint(

@@ -4,9 +4,9 @@ moves."""
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy import special
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried
 from trihedron.records import (
@@ -20,8 +20,6 @@ from trihedron.records import (
     Verification,
 )
 from trihedron.units import degrees_from_radians
-
-FloatArray = npt.NDArray[np.float64]
 
 FALSE_ALARM = 1e-3
 """Chance that a calibration that holds is said to be exceeded."""

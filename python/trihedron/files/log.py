@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from trihedron.arrays import FloatArray
 from trihedron.files.output import OutputError, write_whole
 from trihedron.forked import check_tables
-from trihedron.records.recording import FloatArray, Recording
+from trihedron.records.recording import Recording
 
 LOG_SUFFIXES = (".csv", ".npz", ".parquet")
 _TIMES = ("t [s]", "time_s")

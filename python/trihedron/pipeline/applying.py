@@ -7,9 +7,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Protocol
 
-import numpy as np
-import numpy.typing as npt
-
+from trihedron.arrays import FloatArray
 from trihedron.files.calibration import read_calibration
 from trihedron.files.calibration import write_calibration as write_file
 from trihedron.files.plausible import require_plausible
@@ -20,8 +18,6 @@ from trihedron.pipeline.temperature import check_range, thermally_corrected
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class HasCalibration(Protocol):

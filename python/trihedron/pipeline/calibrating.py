@@ -130,14 +130,19 @@ def calibrate(
             recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
         )
     calibration = in_frame(calibration, wanted)
-    scale = [] if calibration.gyroscope is None else scale_findings(calibration.gyroscope.S, recording.gyroscope_unit)
-    missing = []
-    if calibration.gyroscope is not None:
-        gyro = calibration.gyroscope
-        relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
-        missing = missing_samples(recording, segments, float(np.median(relative)))
-    findings = (*said, *recording.findings, *_as_they_weigh(segments), *calibration.findings, *scale, *missing)
+    about_gyro = _about_gyro(calibration, recording, segments)
+    findings = (*said, *recording.findings, *_as_they_weigh(segments), *calibration.findings, *about_gyro)
     return CalibrationResult(replace(calibration, findings=findings), segments, recording)
+
+
+def _about_gyro(calibration: Calibration, recording: Recording, segments: Segments) -> Found:
+    """A gyro's scale that its unit does not explain, and samples that its log lost."""
+    gyro = calibration.gyroscope
+    if gyro is None:
+        return ()
+    relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
+    missing = missing_samples(recording, segments, float(np.median(relative)))
+    return (*scale_findings(gyro.S, recording.gyroscope_unit), *missing)
 
 
 def _as_they_weigh(segments: Segments) -> Found:

@@ -17,16 +17,8 @@ from trihedron.diagnose.against import (
 from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import (
-    Diagnosis,
-    DomainTest,
-    NoiseDifference,
-    ParameterDifference,
-    Stage,
-    StageDomain,
-    Verdict,
-    Where,
-)
+from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage, StageDomain, Verdict
+from trihedron.records.domains import DomainTest, Where
 
 
 def compared(

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.against import FittedModel
 from trihedron.estimate.noise import noise_of_holds, ratio_of
 from trihedron.records import Hold, Recording
@@ -17,7 +17,6 @@ from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.hold_noise import HoldNoise, Measured
 from trihedron.records.sampling import StampKind
 
-FloatArray = npt.NDArray[np.float64]
 Sensor = Literal["accelerometer", "gyroscope"]
 
 SHARE = 0.125

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.of_zeros import PoseZeros, SlowDifference, compare_slow
 from trihedron.records import Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, NoiseTerm
-
-FloatArray = npt.NDArray[np.float64]
+from trihedron.segment import resegment
 
 LEAST_SLOW_RATIO = 2.0
 """Bias instability differs by half from one part of a reel to the next and with the day; makers state no spread."""
@@ -32,10 +31,7 @@ def slow_noise(
     zeros = gyro_zeros(*model), gyro_zeros(*recording)
     if not zeros[0] or not zeros[1]:
         return ()
-    try:
-        found = compare_slow(*zeros)
-    except np.linalg.LinAlgError:
-        return ()  # zeros that no covariance of the model fits: nothing is compared
+    found = compare_slow(*zeros)
     if found is None:
         return ()
     rate_hz = model[1].rate_hz
@@ -66,16 +62,32 @@ def gyro_zeros(found: Diagnosis, recording: Recording, segments: Segments) -> tu
     shown = next((r for r in found.residuals if r.domain == "static-gyro" and len(r.after) > 1), None)
     if density is None or shown is None:
         return ()
-    t = recording.time_s
-    begin = np.array([t[hold.start] for hold in segments.holds])
-    end = np.array([t[hold.stop - 1] for hold in segments.holds])
-    nearest = np.argmin(np.abs(np.subtract.outer(shown.time_after_s, 0.5 * (begin + end))), axis=1)
-    length = (end - begin)[nearest] + 1.0 / recording.rate_hz
+    length = _lengths(shown.time_after_s, recording, segments)
     white: FloatArray = np.asarray(density, dtype=np.float64)
     return tuple(
         PoseZeros(shown.after[:, k], white[k] / np.sqrt(length), shown.time_after_s, length, scatters=True)
         for k in range(3)
     )
+
+
+def _lengths(shown_s: FloatArray, recording: Recording, segments: Segments) -> FloatArray:
+    """Lengths (n,) [s] of the poses that a diagnosis shows: cut where they were bumped, or left whole.
+
+    Pieces of a pose with the length of all of it would overlap: no covariance of means then, and too small an error.
+    """
+    cut = resegment(recording, segments)
+    t = recording.time_s
+    best: tuple[float, FloatArray] | None = None
+    for poses in (cut, segments if cut.whole is None else cut.whole):
+        begin = np.array([t[hold.start] for hold in poses.holds])
+        end = np.array([t[hold.stop - 1] for hold in poses.holds])
+        away = np.abs(np.subtract.outer(shown_s, 0.5 * (begin + end)))
+        nearest = np.argmin(away, axis=1)
+        missed = float(away[np.arange(len(nearest)), nearest].max())
+        if best is None or missed < best[0]:
+            best = missed, (end - begin)[nearest] + 1.0 / recording.rate_hz
+    assert best is not None
+    return best[1]
 
 
 def _remark(found: SlowDifference, common: float, rate_hz: float) -> str:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.files.calibration import plain, write_calibration
 from trihedron.files.output import write_whole
 from trihedron.gravity import normal_gravity
@@ -30,7 +30,6 @@ from trihedron.units import STANDARD_GRAVITY_M_S2
 if TYPE_CHECKING:
     from trihedron.pipeline.disagreeing import Disagreement
 
-FloatArray = npt.NDArray[np.float64]
 
 LATITUDE_DEG = 59.94
 SEED = 2020

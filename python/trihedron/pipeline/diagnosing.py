@@ -153,17 +153,8 @@ def _of_poses(
         given = replace(known, gravity_m_s2=gravity)
         noise: tuple[NoiseDifference, ...] = ()
         if simulated is not None:
-            ours = sampled(recording_used, segments_used.holds, model_of_diagnosis(found))
-            noise = (
-                *simulated.frames,
-                *_frames((simulated.segments, simulated.calibration), (segments, used)),
-                *compare_noise(simulated.sampled, ours, alpha=alpha),
-                *slow_noise(
-                    (simulated.diagnosis, simulated.recording, simulated.segments),
-                    (found, recording_used, segments_used),
-                    alpha=alpha,
-                ),
-            )
+            frames = _frames((simulated.segments, simulated.calibration), (segments, used))
+            noise = (*simulated.frames, *frames, *_noise(simulated, found, recording_used, segments_used, alpha))
         free_simulation = None if simulated is None else simulated.diagnosis
         fit = model_of_diagnosis(found)
         found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
@@ -263,3 +254,15 @@ def _gyroscope_left_out() -> Finding:
 def _accelerometer_only(recording: Recording, segments: Segments) -> tuple[Recording, Segments]:
     bare = replace(segments, gyroscope_sigma=None, gyroscope_mean=None, gyroscope_sigma_mean=None)
     return replace(recording, gyroscope=None), bare
+
+
+def _noise(
+    simulated: _Free, found: Diagnosis, recording: Recording, segments: Segments, alpha: float
+) -> tuple[NoiseDifference, ...]:
+    """Noise and slow noise of the simulation against those of the recording."""
+    ours = sampled(recording, segments.holds, model_of_diagnosis(found))
+    theirs = (simulated.diagnosis, simulated.recording, simulated.segments)
+    return (
+        *compare_noise(simulated.sampled, ours, alpha=alpha),
+        *slow_noise(theirs, (found, recording, segments), alpha=alpha),
+    )

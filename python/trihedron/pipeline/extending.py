@@ -13,7 +13,8 @@ from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.diagnosing import diagnose
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration
-from trihedron.records.diagnosis import Diagnosis, Domain
+from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.domains import Domain
 from trihedron.records.progress import Progress
 
 

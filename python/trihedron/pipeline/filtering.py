@@ -19,6 +19,7 @@ from trihedron.estimate.noise.resolution import converter_step
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
+from trihedron.printable import one_line
 from trihedron.read import read_axis_noise, read_pose_table, read_recording
 from trihedron.records import (
     AxisNoise,
@@ -58,7 +59,7 @@ class KalmanResult(Presented):
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
     def __repr__(self) -> str:
-        return f"<KalmanResult of {self.recording.source}: {self.calibration.accelerometer.method}>"
+        return f"<KalmanResult of {one_line(self.recording.source)}: {self.calibration.accelerometer.method}>"
 
     def __str__(self) -> str:
         from trihedron.report import kalman_report, to_text

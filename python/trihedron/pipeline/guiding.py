@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import ENTRIES, NAMES, design_rows, pose_in_words
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.planning_poses import (
@@ -34,8 +34,6 @@ from trihedron.units import (
     mg_from_m_s2,
     rate_to_si,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 PRIOR = 0.1
 """What is believed of a board before its first pose: scales within 10 %, axes within 0.1 rad, zeros within 0.1 g."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import CANDIDATES, design_rows
 from trihedron.records import Recording, Segments
-
-FloatArray = npt.NDArray[np.float64]
 
 NEAR = 0.9
 """Cosine above which a pose is no move from the one before."""

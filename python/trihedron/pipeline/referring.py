@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron.diagnose.against import FittedModel, compare_numbers, model_of_calibration
 from trihedron.estimate.reference import fit_reference
@@ -20,20 +19,18 @@ from trihedron.records.diagnosis import (
     AcceptedEffect,
     Candidate,
     Diagnosis,
-    DomainTest,
     EffectParameter,
-    HeldOut,
     LinearModel,
     ParameterDifference,
     Stage,
     StageDomain,
     Verdict,
 )
+from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceMotion
 from trihedron.sensor_model import in_frame
 from trihedron.units import acceleration_to_si
 
-FloatArray = npt.NDArray[np.float64]
 AnyReference = ReferenceMotion | Recording | str | os.PathLike[str]
 
 LEAST_SIGMAS = 3.0

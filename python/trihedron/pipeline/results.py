@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from trihedron.printable import one_line
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration, Severity, Verification
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.presented import Presented
@@ -42,7 +43,9 @@ class CalibrationResult(Presented):
 
     def __repr__(self) -> str:
         sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
-        return f"<CalibrationResult of {self.recording.source}: {sensors}, {self.segments.n_holds} still poses>"
+        return (
+            f"<CalibrationResult of {one_line(self.recording.source)}: {sensors}, {self.segments.n_holds} still poses>"
+        )
 
     def __str__(self) -> str:
         from trihedron.report import calibration_report, to_text
@@ -70,7 +73,7 @@ class VerificationResult(Presented):
         return self.verification.is_passed
 
     def __repr__(self) -> str:
-        return f"<VerificationResult on {self.recording.source}: {self.verification.norm_rms:.3g} m/s² rms>"
+        return f"<VerificationResult on {one_line(self.recording.source)}: {self.verification.norm_rms:.3g} m/s² rms>"
 
     def __str__(self) -> str:
         from trihedron.report import to_text, verification_report
@@ -94,7 +97,9 @@ class CheckResult(Presented):
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
     def __repr__(self) -> str:
-        return f"<CheckResult of {self.recording.source}: {'fit' if self.is_fit else 'not fit'} for calibration>"
+        return (
+            f"<CheckResult of {one_line(self.recording.source)}: {'fit' if self.is_fit else 'not fit'} for calibration>"
+        )
 
     def __str__(self) -> str:
         from trihedron.report import check_report, to_text
@@ -135,7 +140,7 @@ class DiagnosisResult(Diagnosis, Presented):
 
     def __repr__(self) -> str:
         named = ", ".join(effect.id for effect in self.effects)
-        return f"<DiagnosisResult of {self.recording.source}: {self.verdict}{': ' + named if named else ''}>"
+        return f"<DiagnosisResult of {one_line(self.recording.source)}: {self.verdict}{': ' + named if named else ''}>"
 
     def __str__(self) -> str:
         from trihedron.report import diagnosis_report, to_text

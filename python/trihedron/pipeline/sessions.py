@@ -4,32 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.estimate.sessions import changes_among, repeated_parameters, thermal_model
-from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector, numbers_jacobian, numbers_of
+from trihedron.arrays import FloatArray
+from trihedron.invariants import Anchor, anchor_of, numbers_jacobian, numbers_of
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.reading import AnyRecording, recording_of
 from trihedron.pipeline.results import CalibrationResult
-from trihedron.pipeline.session_findings import findings_about
+from trihedron.pipeline.sessions_combined import ALPHA, combine
 from trihedron.records import Calibration, Frame, Recording, SensorCalibration
 from trihedron.records.presented import Presented
 from trihedron.records.progress import Progress
-from trihedron.records.sessions import PARAMETERS, By, Repeated, Session, SessionsModel, ThermalModel
+from trihedron.records.sessions import By, Session, SessionsModel
 from trihedron.sensor_model import in_frame
 
-FloatArray = npt.NDArray[np.float64]
-
 BYS: tuple[By, ...] = get_args(By)
-ALPHA = 0.01
-"""Chance that any number of a unit that did not change is called changed."""
 MEDIAN_CHI2 = 0.4549
 """Median of a squared standard normal number."""
 HEATING_DEGC = 1.0
@@ -262,138 +256,3 @@ def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:
         return math.nan, math.nan, math.nan, 0
     rise = means[-1] - means[0]
     return float(np.mean(means)), min(means), max(means), 0 if abs(rise) < HEATING_DEGC else int(np.sign(rise))
-
-
-def combine(
-    sessions: Sequence[Session],
-    by: By,
-    reference: Calibration,
-    *,
-    frame: Frame = "lower",
-    alpha: float = ALPHA,
-    left_out: tuple[tuple[str, str], ...] = (),
-) -> SessionsModel:
-    """One model of all sessions; ``reference`` is the first one's calibration: units, gravity and axes."""
-    first = in_frame(reference, "lower")
-    anchor = anchor_of(first.accelerometer.S, None if first.gyroscope is None else first.gyroscope.S)
-    plain = [replace(session, group=session.name) for session in sessions]
-    repeated = repeated_parameters(sessions if by in ("date", "device") else plain)
-    thermal = thermal_model(sessions) if by == "temperature" else None
-    if by == "device":
-        units = [[s for s in sessions if s.group == name] for name in dict.fromkeys(s.group for s in sessions)]
-    else:
-        units = [] if by == "temperature" else [list(sessions)]
-    changes = changes_among(units, alpha=alpha)
-    calibration = _common(sessions, repeated, thermal, first, anchor)
-    model = SessionsModel(by, tuple(sessions), repeated, changes, thermal, calibration, left_out)
-    findings = findings_about(model)
-    calibration = replace(
-        in_frame(calibration, frame), findings=findings, extensions=MappingProxyType(_extensions(model, anchor))
-    )
-    return replace(model, calibration=calibration, findings=findings)
-
-
-def _common(
-    sessions: Sequence[Session],
-    repeated: Sequence[Repeated],
-    thermal: ThermalModel | None,
-    first: Calibration,
-    anchor: Anchor,
-) -> Calibration:
-    """The common numbers as S and b, with the covariance of the next session."""
-    value = np.array([one.value for one in repeated])
-    error = np.array([one.std for one in repeated])
-    spread = np.array([math.hypot(_sd(one.within), _sd(one.between)) for one in repeated])
-    if thermal is not None:
-        for term in thermal.terms:
-            picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == term.id]
-            value[picked] = term.coefficients[0]
-            error[picked] = np.sqrt(term.covariance[:, 0, 0])
-            spread[picked] = [one.sd for one in term.remaining]
-    total = sum(session.covariance for session in sessions) + len(sessions) * np.diag(spread**2)
-    root = np.sqrt(np.maximum(np.diag(total), 1e-300))
-    covariance = total / np.outer(root, root) * np.outer(error, error) + np.diag(spread**2)
-    parameters = model_vector(value, anchor)
-    J = model_jacobian(value, anchor)
-    full = J @ covariance @ J.T
-    full = 0.5 * (full + full.T)
-    # Frame lower fixes three entries of S: their rows are zero, not rounding.
-    for fixed in (1, 2, 5):
-        full[fixed], full[:, fixed] = 0.0, 0.0
-    sensors: list[SensorCalibration | None] = []
-    for k, sensor in enumerate((first.accelerometer, first.gyroscope)):
-        if sensor is None:
-            sensors.append(None)
-            continue
-        own = slice(12 * k, 12 * k + 12)
-        sensors.append(
-            replace(
-                sensor,
-                S=parameters[own][:9].reshape(3, 3),
-                b=parameters[own][9:],
-                covariance=full[own, own],
-                method=f"{len(sessions)} recordings, random effects",
-                quality=None,
-                observability=None,
-            )
-        )
-    assert sensors[0] is not None
-    return replace(
-        first,
-        accelerometer=sensors[0],
-        gyroscope=sensors[1],
-        covariance=full,
-        recording_source=", ".join(session.name for session in sessions),
-        recording_sha256="",
-    )
-
-
-def _sd(spread: Any) -> float:
-    return 0.0 if spread is None else float(spread.sd)
-
-
-def _extensions(model: SessionsModel, anchor: Anchor) -> dict[str, Any]:
-    """What the calibration file keeps beside S and b (docs/calibration-file.md)."""
-    out: dict[str, Any] = {
-        "sessions": [
-            {
-                "name": s.name,
-                "group": s.group,
-                "sha256": s.sha256,
-                "temperature_degc": s.temperature_degc,
-            }
-            for s in model.sessions
-        ],
-        "repeatability": [
-            {
-                "id": one.parameter.id,
-                "name": one.parameter.name,
-                "unit": one.parameter.unit,
-                "value": one.value,
-                "std": one.std,
-                "within": None if one.within is None else vars(one.within),
-                "between": None if one.between is None else vars(one.between),
-            }
-            for one in model.repeated
-        ],
-    }
-    ranges = [session.temperature_range_degc for session in model.sessions]
-    if all(math.isfinite(low) for low, _ in ranges):
-        out["valid_range"] = {"temperature_degc": [min(low for low, _ in ranges), max(high for _, high in ranges)]}
-    if model.thermal is not None:
-        out["thermal"] = {
-            "reference_degc": model.thermal.reference_degc,
-            "axis_signs": anchor.signs,
-            "triad": anchor.triad,
-            "terms": [
-                {
-                    "id": term.id,
-                    "order": term.order,
-                    "coefficients": term.coefficients,
-                    "hysteresis": term.hysteresis,
-                    "remaining": [one.sd for one in term.remaining],
-                }
-                for term in model.thermal.terms
-            ],
-        }
-    return out

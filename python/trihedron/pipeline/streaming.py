@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.files.calibration import calibration_text
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units
 from trihedron.pipeline.calibrating import calibrate
@@ -26,8 +26,6 @@ from trihedron.records.progress import Progress
 from trihedron.segment import BlockSums, segment_blocks
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit
-
-FloatArray = npt.NDArray[np.float64]
 
 PIECE_ROWS = 1 << 18
 KEPT_S = 60.0

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.invariants import Anchor, model_vector, numbers_of
 from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.sessions import PARAMETERS
 from trihedron.sensor_model import in_frame, reframing
-
-FloatArray = npt.NDArray[np.float64]
 
 KNOTS = 257
 """S and b are exact at so many temperatures of the range and linear between: a cubic over the whole range is followed

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.documents import DocumentError, of_path, read_text
 from trihedron.read.errors import ReadError, check_readable
-
-FloatArray = npt.NDArray[np.float64]
 
 _TAU = {"tau", "taus", "tau_s", "taus_s", "level", "averaging_time", "averaging_time_s", "cluster_time"}
 _DEVIATION = {"adev", "oadev", "deviation", "allan_deviation", "dev", "sigma", "sigma_tau"}

@@ -13,9 +13,10 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.room import check_memory, check_unpacked
-from trihedron.read.table import FloatArray, Table, file_sha256
+from trihedron.read.table import Table, file_sha256
 
 _BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
 # NumPy evaluates a header as Python text, so a damaged one fails in the ways of a parser.

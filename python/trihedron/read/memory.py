@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.read.errors import ReadError
-from trihedron.read.table import FloatArray, Table
+from trihedron.read.table import Table
 
 _ACCEPTED = "a file name, an array (n, columns), a dictionary of arrays, or a data frame"
 

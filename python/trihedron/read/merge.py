@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.errors import ReadError
-from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Severity
 
 SAME_TICK = 0.02

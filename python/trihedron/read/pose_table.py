@@ -7,15 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron.read.errors import ReadError
 from trihedron.read.source import read_table
 from trihedron.read.table import Table
 from trihedron.records import PoseTable
 from trihedron.units import degrees_from_radians, radians_from_degrees
-
-FloatArray = npt.NDArray[np.float64]
 
 _NAMES: dict[str, tuple[str, ...]] = {
     "pitch": ("pitch", "theta"),

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
@@ -19,9 +20,10 @@ from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.memory import table_of
 from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
-from trihedron.read.sensors import Options, Sensors, merge_sensors, sensors_of, settled
+from trihedron.read.sensors import Options, Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
-from trihedron.read.table import FloatArray, Table
+from trihedron.read.table import Table
+from trihedron.read.two_files import merge_sensors
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.read.table import FloatArray
+from trihedron.arrays import FloatArray
 
 WINDOW_S = 0.5
 MAX_WINDOWS = 2000

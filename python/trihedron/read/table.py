@@ -10,10 +10,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.read.errors import from_os_error
 from trihedron.records import Finding
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.read.rest import Windows
-from trihedron.read.table import FloatArray
 from trihedron.units import RateUnit, rate_to_si
 
 MIN_TURN_RAD = 0.5

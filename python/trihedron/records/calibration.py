@@ -7,14 +7,13 @@ from types import MappingProxyType
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
+from trihedron.printable import one_line
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, numbers_of, said
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
-
-FloatArray = npt.NDArray[np.float64]
 
 Frame = Literal["lower", "symmetric", "case"]
 """Instrument trihedron Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
@@ -164,5 +163,5 @@ class Calibration(Presented):
     def __repr__(self) -> str:
         sensors = "accelerometer" if self.gyroscope is None else "accelerometer and gyroscope"
         trusted = "" if self.is_trustworthy else ", NOT TO BE TRUSTED"
-        source = self.recording_source or "an unnamed recording"
+        source = one_line(self.recording_source or "an unnamed recording")
         return f"<Calibration of {source}: {sensors}, frame {self.frame}{trusted}>"

@@ -7,10 +7,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-
+from trihedron.arrays import FloatArray
 
 LEAST_POSES = 12
 """Nine numbers of the accelerometer, and three poses more than numbers: residuals that can contradict it."""

@@ -9,7 +9,8 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.records.calibration import FloatArray, SensorCalibration
+from trihedron.arrays import FloatArray
+from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen
 from trihedron.units import radians_from_degrees

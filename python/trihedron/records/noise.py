@@ -11,11 +11,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
+from trihedron.printable import one_line
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
-
-FloatArray = npt.NDArray[np.float64]
 
 AllanKind = Literal["overlapping", "non-overlapping", "modified", "hadamard", "total"]
 
@@ -301,7 +301,7 @@ class Noise(Presented):
     extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))
 
     def __repr__(self) -> str:
-        return f"<Noise of {self.source or 'a log'}: {', '.join(axis.name for axis in self.axes)}>"
+        return f"<Noise of {one_line(self.source or 'a log')}: {', '.join(axis.name for axis in self.axes)}>"
 
     def axis(self, name: str) -> NoiseAxis:
         """The axis of that name.

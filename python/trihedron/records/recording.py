@@ -8,14 +8,14 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
+from trihedron.printable import one_line
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
 from trihedron.records.finding import Finding
 from trihedron.records.frozen import freeze
 from trihedron.records.presented import Presented
 from trihedron.records.sampling import UNJUDGED, Sampling
 from trihedron.units import AccelerationUnit, RateUnit
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def _is_frozen(array: object) -> bool:
@@ -216,4 +216,4 @@ class Recording(Presented):
             if value is not None
         )
         size = f"{self.n_samples} samples, {self.duration_s:.1f} s at {self.rate_hz:.4g} Hz"
-        return f"<Recording {self.source}: {size}, {sensors}>"
+        return f"<Recording {one_line(self.source)}: {size}, {sensors}>"

@@ -7,12 +7,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.records.checked import all_of, kind_of, numbers_of
 from trihedron.records.finding import Finding
 from trihedron.records.frozen import freeze
 from trihedron.records.presented import Presented
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

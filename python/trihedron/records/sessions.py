@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numpy as np
-import numpy.typing as npt
-
+from trihedron.arrays import FloatArray
 from trihedron.records.calibration import Calibration
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen
-
-FloatArray = npt.NDArray[np.float64]
 
 By = Literal["session", "date", "device", "temperature"]
 """How sessions are grouped: not at all, by the day they began, by the device, or along their temperature."""

@@ -9,9 +9,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.records.frozen import Frozen
-
-FloatArray = npt.NDArray[np.float64]
 
 SegmentKind = Literal["hold", "move", "turn", "disturbance", "vibration", "oscillation", "table-turn"]
 """What the body did: stood still; went to another pose; turned about a body axis; was pushed; was shaken; swung;

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
+from trihedron.printable import one_line
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.presented import Presented
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,4 +52,6 @@ class Verification(Presented):
         return not any(finding.severity is Severity.SERIOUS for finding in self.findings)
 
     def __repr__(self) -> str:
-        return f"<Verification on {self.source}: {self.norm_rms:.3g} m/s² rms in {len(self.norm_error)} poses>"
+        return (
+            f"<Verification on {one_line(self.source)}: {self.norm_rms:.3g} m/s² rms in {len(self.norm_error)} poses>"
+        )

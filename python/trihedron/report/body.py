@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
+from trihedron.arrays import FloatArray
 from trihedron.report.figures import AXIS_COLOURS, DPI, INK
-
-FloatArray = npt.NDArray[np.float64]
 
 # Unequal edges, so that a reader sees which way the case is turned.
 HALF_EDGES = np.array([0.75, 0.55, 0.3])

@@ -6,15 +6,13 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.records import PARAMETER_NAMES, Calibration, FitQuality, Segments, SensorCalibration
 from trihedron.report.chart import Band, Bars, Chart, Disc, Level, Panel, Points, Scale
 from trihedron.report.disc import equal_area
 from trihedron.report.drawn import said
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
-
-FloatArray = npt.NDArray[np.float64]
 
 LIMIT_SIGMAS = 3.0
 """A pose or move beyond it happens by chance once in 370."""

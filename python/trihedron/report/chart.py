@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from trihedron.arrays import FloatArray
 
 Colour = Literal["c1", "c2", "c3", "accent", "ink", "soft", "shade", "warn", "grey"]
 """Names, not values: the page gives each a colour for light, dark and paper. c1, c2, c3 are the axes x, y, z."""

@@ -7,17 +7,28 @@ from collections.abc import Iterable
 from functools import partial
 
 from trihedron.records import Finding
-from trihedron.records.diagnosis import AcceptedEffect, Diagnosis, DomainResiduals, DomainTest, HeldOut
+from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
+from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration import figures_in_words
 from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
 from trihedron.report.diagnosis_laws import laws_blocks
+from trihedron.report.diagnosis_models import models_blocks
 from trihedron.report.diagnosis_numbers import (
-    differing_in_short,
     differing_noise,
     differing_numbers,
     noise_blocks,
     numbers_blocks,
     stages_blocks,
+)
+from trihedron.report.diagnosis_words import (
+    MEANING,
+    p_in_words,
+    printed_unit,
+    rms_in_words,
+    size_in_words,
+    value_in_words,
+    verdict_in_words,
+    where_in_words,
 )
 from trihedron.report.document import Block, Document, Facts, Headline, Level, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
@@ -28,22 +39,9 @@ from trihedron.report.numbers import (
     listed,
     plain_number,
     power_of_ten,
-    unit_in_print,
-    with_sigma,
 )
 from trihedron.report.reference import reference_blocks
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
-MEANING = {
-    "static-accel": "gravity at rest",
-    "static-gyro": "gyro at rest",
-    "moves": "gravity after a move",
-    "dynamics": "velocity over a move",
-    "within-static": "inside still poses",
-    "timing": "sampling instants",
-    "numbers": "numbers of the model",
-    "noise": "noise and sampling",
-}
 _CAPTIONS = {
     "static-accel": "Length of gravity in every still pose.",
     "static-gyro": "Rate that the gyro reads in every still pose, about its mean.",
@@ -58,7 +56,6 @@ _LEVELS: dict[str, Level] = {
     "unexplained": "bad",
 }
 """A diagnosis that names what is missing has done its work; one that cannot is no base for anything."""
-MOST_NAMED = 4
 MOST_PARAMETERS = 9
 
 
@@ -79,7 +76,7 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         Section("What remains", (Paragraph(_remaining(diagnosis)), *laws_blocks(diagnosis))),
         Section("Held out: before and after", _held_out(diagnosis)),
         Section("Candidates", (_candidates(diagnosis),)),
-        Section("Calibration and noise", _models(diagnosis)),
+        Section("Calibration and noise", models_blocks(diagnosis)),
     ]
     if diagnosis.parameters:
         sections.append(Section("Stage by stage", stages_blocks(diagnosis, MEANING)))
@@ -107,56 +104,15 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
     )
 
 
-def verdict_in_words(diagnosis: Diagnosis) -> str:
-    """The verdict and what carries it, in one sentence."""
-    off: list[str] = [d.domain for d in diagnosis.domains if d.disagrees]
-    left: list[str] = [d.domain for d in diagnosis.remaining if d.disagrees]
-    numbers = differing_in_short(diagnosis)
-    if diagnosis.verdict == "consistent":
-        return "CONSISTENT: the model and its noise account for this recording; nothing is missing that it could show."
-    if diagnosis.verdict == "unexplained":
-        named = [effect.id for effect in diagnosis.effects if effect.side == "recording"]
-        off = left if named else off
-        beside = f" ({listed(list(dict.fromkeys(named)))} is there too, and explains little)" if named else ""
-        return (
-            f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
-            f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it{beside}"
-            + (f"; numbers differ too ({listed(numbers)})." if numbers else ".")
-        )
-    if diagnosis.verdict == "not-testable":
-        tested = listed([d.domain for d in diagnosis.domains]) if diagnosis.domains else "nothing"
-        return (
-            f"NOT TESTABLE: this recording does not carry the question ({tested} looked at, nothing named); hold 18 or "
-            "more poses of 3 to 5 s in different directions."
-        )
-    if diagnosis.verdict == "parameters-differ":
-        return f"PARAMETERS DIFFER: {listed(numbers)}; nothing else, no physics is missing."
-    missing = [effect.id for effect in diagnosis.effects if effect.side == "recording"]
-    surplus = [effect.id for effect in diagnosis.effects if effect.side == "model"]
-    tail = (
-        f"; {listed(left)} still {'disagree' if len(left) > 1 else 'disagrees'}."
-        if left
-        else "; nothing else disagrees."
-    )
-    said = []
-    if missing:
-        said.append(f"{listed(missing)} {'was' if len(missing) == 1 else 'were'} left out of the model")
-    if surplus:
-        said.append(f"the model has {listed(surplus)}, which the recording lacks")
-    if numbers:
-        said.append(f"numbers differ ({listed(numbers)})")
-    return f"MISSING PHYSICS: {'; '.join(said)}{tail}"
-
-
 def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     after = {d.domain: d for d in diagnosis.remaining}
     rows: tuple[tuple[str, ...], ...] = tuple(
         (
             MEANING[d.domain],
             d.domain,
-            _rms(d),
+            rms_in_words(d),
             plain_number(d.chi2_per_dof),
-            _probability(d.p_value),
+            p_in_words(d.p_value),
             "disagrees" if d.disagrees else "agrees",
             _after(d, after.get(d.domain)) if diagnosis.effects else "",
         )
@@ -182,51 +138,6 @@ def _after(before: DomainTest, test: DomainTest | None) -> str:
         # An effect explains it without changing the residual: poses that were not still, a line of interference.
         return "accounted for"
     return f"{plain_number(test.chi2_per_dof)} {'disagrees' if test.disagrees else 'agrees'}"
-
-
-def _rms(test: DomainTest) -> str:
-    return _size(test.rms, test.unit) if test.unit else "–"
-
-
-def _size(value: float, unit: str) -> str:
-    """A residual in the unit that people use for errors of this kind."""
-    if unit == "m/s^2":
-        return f"{plain_number(mm_s2_from_m_s2(value))} mm/s²"
-    if unit == "rad/s":
-        return f"{plain_number(degrees_from_radians(value))} °/s"
-    if unit == "s":
-        return f"{plain_number(ms_from_s(value))} ms"
-    return plain_number(value) + ("" if unit in ("", "1", "raw") else f" {_printed(unit)}")
-
-
-def _printed(unit: str) -> str:
-    return {"deg": "°", "1": ""}.get(unit, unit_in_print(unit))
-
-
-def _probability(p: float) -> str:
-    return "< 1e−99" if p < 1e-99 else plain_number(p, 2)
-
-
-def where_in_words(test: DomainTest) -> str:
-    """Channels, poses or moves, times and frequencies that carry a disagreement."""
-    where = test.where
-    parts = []
-    if where.channels:
-        parts.append("channel " + ", ".join(where.channels))
-    if where.segments:
-        spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]
-        named = [
-            f"{name} ({span})"
-            for name, span in zip(where.segments, spans + [""] * len(where.segments), strict=False)
-            if span
-        ] or list(where.segments)
-        parts.append("most in " + ", ".join(named[:MOST_NAMED]))
-    elif where.times_s:
-        spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]
-        parts.append("at " + ", ".join(spans[:MOST_NAMED]))
-    if where.frequencies_hz:
-        parts.append("at " + ", ".join(f"{plain_number(f, 4)} Hz" for f in where.frequencies_hz))
-    return "; ".join(parts)
 
 
 def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -264,23 +175,19 @@ def _parameters(effect: AcceptedEffect) -> str:
     for unit in units:
         members = [p for p in effect.parameters if p.unit == unit]
         exponent = engineering_exponent(max(abs(p.value) for p in members))
-        printed = _printed(unit)
+        printed = printed_unit(unit)
         if printed == "°" or -3 < exponent <= 3:
             exponent = 0
         scale = 10.0**-exponent
-        words = [f"{p.name} {_value(scale * p.value, scale * p.std)}" for p in members[:MOST_PARAMETERS]]
+        words = [f"{p.name} {value_in_words(scale * p.value, scale * p.std)}" for p in members[:MOST_PARAMETERS]]
         more = len(members) - MOST_PARAMETERS
         shared = " ".join(word for word in (power_of_ten(exponent), printed) if word)
         groups.append(", ".join(words) + (f", {more} more" if more > 0 else "") + (f" [{shared}]" if shared else ""))
     return "; ".join(groups)
 
 
-def _value(value: float, sigma: float) -> str:
-    return with_sigma(value, sigma) if sigma > 0.0 else plain_number(value, 4)
-
-
 def _evidence(effect: AcceptedEffect) -> str:
-    words = f"p {_probability(effect.p_adjusted)} after paying for the search, ΔBIC {plain_number(effect.delta_bic)}"
+    words = f"p {p_in_words(effect.p_adjusted)} after paying for the search, ΔBIC {plain_number(effect.delta_bic)}"
     if effect.held_out:
         words += "; held out, " + _improvement(effect.held_out[0])
     return words + "."
@@ -292,7 +199,8 @@ def _improvement(held: HeldOut) -> str:
             f"{held.domain} χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)}"
         )
     return (
-        f"{held.domain} from {_size(held.rms_before, held.unit)} to {_size(held.rms_after, held.unit)} rms "
+        f"{held.domain} from {size_in_words(held.rms_before, held.unit)} "
+        f"to {size_in_words(held.rms_after, held.unit)} rms "
         f"(χ²/dof {plain_number(held.chi2_per_dof_before)} → {plain_number(held.chi2_per_dof_after)})"
     )
 
@@ -314,7 +222,10 @@ def _held_out(diagnosis: Diagnosis) -> tuple[Block, ...]:
         (
             effect.id,
             held.domain,
-            *("–" if held.rms_before == held.rms_after == 0.0 else _size(v, held.unit) for v in _both_rms(held)),
+            *(
+                "–" if held.rms_before == held.rms_after == 0.0 else size_in_words(v, held.unit)
+                for v in _both_rms(held)
+            ),
             plain_number(held.chi2_per_dof_before),
             plain_number(held.chi2_per_dof_after),
         )
@@ -337,66 +248,15 @@ def _candidates(diagnosis: Diagnosis) -> Block:
     tried = [c for c in diagnosis.candidates if c.applicable]
     tried.sort(key=lambda c: 2.0 if c.p_value is None else c.p_value)
     rows = [
-        (c.id, "–" if c.p_value is None else _probability(c.p_value), "accepted" if c.id in accepted else c.reason)
+        (
+            c.id,
+            "–" if c.p_value is None else p_in_words(c.p_value),
+            "accepted" if c.id in accepted else c.reason,
+        )
         for c in tried
     ]
     rows += [(c.id, "–", f"not applicable: {c.reason}") for c in diagnosis.candidates if not c.applicable]
     return Table(("effect", "p against the linear model", ""), tuple(rows), "Every effect of the catalogue")
-
-
-def _models(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    blocks: list[Block] = []
-    for name in ("accelerometer", "gyroscope"):
-        before, after = getattr(diagnosis.baseline, name), getattr(diagnosis.extended, name)
-        if before is None or after is None or before["raw_unit"] == "none":
-            continue
-        rows = [
-            (f"S{i + 1}{j + 1}", _both(before, "S", (i, j)), _both(after, "S", (i, j)))
-            for i in range(3)
-            for j in range(3)
-            if before["sigma_S"][i][j] > 0.0
-        ]
-        rows += [(f"b{i + 1}", _both(before, "b", (i,)), _both(after, "b", (i,))) for i in range(3)]
-        unit = before["raw_unit"]
-        blocks.append(
-            Table(("", "linear", "with the effects"), tuple(rows), f"{name.capitalize()}, raw in {unit_in_print(unit)}")
-        )
-    gravity = getattr(diagnosis, "gravity_source", "")
-    facts = [("gravity", f"{diagnosis.gravity_m_s2:.5f} m/s²" + (f", {gravity}" if gravity else ""))]
-    for name in ("accelerometer", "gyroscope"):
-        density = diagnosis.noise.get(f"{name}_density")
-        if density is not None:
-            unit = str(diagnosis.noise.get(f"{name}_unit", ""))
-            words = ", ".join(plain_number(float(d)) for d in density)
-            words += f" {unit_in_print(unit).replace('sqrt(Hz)', '√Hz')}"
-            corner = diagnosis.noise[f"{name}_corner_s"]
-            if corner is not None:
-                words += f"; bias walk from {plain_number(float(corner))} s on"
-            facts.append((f"{name} noise", words))
-        hidden = diagnosis.noise.get(f"{name}_zero")
-        if hidden:
-            unit = "m/s^2" if name == "accelerometer" else "rad/s"
-            words = f"{_size(hidden['rms'], unit)} rms from pose to pose taken up by its walk"
-            words += f"; a pose's mean is good to {_size(hidden['noise'], unit)}"
-            words += "; the walk is as strong as the model allows" if hidden["is_at_edge"] else ""
-            facts.append((f"{name} zero", words))
-    blocks.append(Facts(tuple(facts)))
-    return tuple(blocks)
-
-
-def _both(model: object, key: str, place: tuple[int, ...]) -> str:
-    value, sigma = model[key], model["sigma_" + key]  # type: ignore[index]
-    for k in place:
-        value, sigma = value[k], sigma[k]
-    return _number_with_sigma(float(value), float(sigma))
-
-
-def _number_with_sigma(value: float, sigma: float) -> str:
-    exponent = engineering_exponent(max(abs(value), sigma))
-    if sigma <= 0.0 or -3 < exponent <= 3:
-        return _value(value, sigma)
-    scale = 10.0**-exponent
-    return f"({_value(scale * value, scale * sigma)}) {power_of_ten(exponent)}"
 
 
 def _pictures(diagnosis: Diagnosis) -> list[Picture]:
@@ -437,8 +297,8 @@ def _headlines(diagnosis: Diagnosis) -> list[Headline]:
     for effect in diagnosis.effects:
         if effect.held_out:
             held = effect.held_out[0]
-            after, _, unit = _size(held.rms_after, held.unit).partition(" ")
-            before = _size(held.rms_before, held.unit)
+            after, _, unit = size_in_words(held.rms_after, held.unit).partition(" ")
+            before = size_in_words(held.rms_before, held.unit)
             if effect.share is not None:
                 words = f"{plain_number(100.0 * effect.share, 2)}"
                 return [
@@ -450,5 +310,5 @@ def _headlines(diagnosis: Diagnosis) -> list[Headline]:
     if not tests:
         return []
     worst = min(tests, key=lambda d: (not d.disagrees, d.p_value))
-    beside = f"χ² per degree of freedom, 1 by noise alone; p {_probability(worst.p_value)}"
+    beside = f"χ² per degree of freedom, 1 by noise alone; p {p_in_words(worst.p_value)}"
     return [Headline(MEANING[worst.domain], plain_number(worst.chi2_per_dof), "", beside)]

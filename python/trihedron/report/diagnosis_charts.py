@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import AcceptedEffect, DomainResiduals
+from trihedron.records.diagnosis import AcceptedEffect
+from trihedron.records.domains import DomainResiduals
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.drawn import said
 from trihedron.report.numbers import plain_number
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
-
-FloatArray = npt.NDArray[np.float64]
 
 PRINTED = {
     "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),

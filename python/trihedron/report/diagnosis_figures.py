@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from trihedron.records.diagnosis import DomainResiduals
+from trihedron.arrays import FloatArray
+from trihedron.records.domains import DomainResiduals
 from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
-
-FloatArray = npt.NDArray[np.float64]
 
 _PRINTED = {
     "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),

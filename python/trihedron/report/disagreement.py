@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from trihedron.records.diagnosis import Diagnosis
-from trihedron.report.diagnosis import MEANING, effects_blocks, verdict_in_words
+from trihedron.report.diagnosis import effects_blocks
 from trihedron.report.diagnosis_numbers import differing_numbers, stages_blocks
+from trihedron.report.diagnosis_words import MEANING, verdict_in_words
 from trihedron.report.document import Block, Document, Facts, Paragraph, Section
 from trihedron.report.numbers import listed, plain_number
 

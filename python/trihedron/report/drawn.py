@@ -8,12 +8,11 @@ from html import escape
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.report.chart import Band, Bars, Chart, Disc, Level, Line, Mark, Note, Panel, Points, Span, limits_of
 from trihedron.report.disc import drawn_disc
 from trihedron.report.numbers import plain_number
 from trihedron.report.ticks import ticks
-
-FloatArray = npt.NDArray[np.float64]
 
 UNITS = 10000
 """Across a panel, both ways. Marks are in these; a page of 4 k is a third as fine."""

@@ -6,16 +6,14 @@ import io
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from trihedron.arrays import FloatArray
 from trihedron.records import FitQuality, Recording, Segments, SensorCalibration, Verification
 from trihedron.report.numbers import unit_in_print
 from trihedron.units import mm_s2_from_m_s2
-
-FloatArray = npt.NDArray[np.float64]
 
 # Distinct for colour-blind readers and in grey (Okabe and Ito).
 AXIS_COLOURS = ("#0072B2", "#E69F00", "#009E73")

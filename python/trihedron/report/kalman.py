@@ -6,8 +6,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.files.calibration import calibration_document
 from trihedron.records import (
     CONSTANT_NAMES,
@@ -31,7 +31,6 @@ from trihedron.report.kalman_charts import (
 from trihedron.report.numbers import how_many, plain_number, unit_in_print, with_sigma
 from trihedron.units import mm_s2_from_m_s2
 
-FloatArray = npt.NDArray[np.float64]
 AXES = "xyz"
 CLOSE = 0.01
 """A track has arrived when every sensitivity stays within this part of the axis' own of its last value."""

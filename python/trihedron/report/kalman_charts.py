@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy import stats
 
+from trihedron.arrays import FloatArray
 from trihedron.records import CONSTANT_NAMES, AxisKalmanResult, NormKalmanCalibration
 from trihedron.report.calibration_charts import mm_s2
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Colour, Level, Line, Panel, Points, Scale
 from trihedron.report.drawn import said
 from trihedron.report.numbers import unit_in_print
-
-FloatArray = npt.NDArray[np.float64]
 
 WINDOW = 15
 """Poses of a running mean of NIS: its 99 % interval is then 0.31 to 2.19 (χ² with 15 degrees of freedom)."""

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
+from trihedron.arrays import FloatArray
 from trihedron.records import CONSTANT_NAMES, AxisKalmanResult, NormKalmanCalibration
 from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, mm_s2, panels
-
-FloatArray = npt.NDArray[np.float64]
 
 WINDOW = 15
 STYLES = (

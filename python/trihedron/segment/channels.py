@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.records import Recording
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 BLOCK_S = 0.1
 """Shorter than any motion of a hand (a few hertz), long enough for a variance at 50 Hz and more."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, rolling_mean
+from trihedron.arrays import BoolArray, FloatArray
+from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 
 SEED_FRACTION = 0.02
 SEED_S = 1.0

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import special
 
+from trihedron.arrays import BoolArray
 from trihedron.records import Finding, FindingCode, Hold, Recording
-from trihedron.segment.channels import BoolArray, Channels
+from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.runs import MIN_HOLD_S, Run, ranges_of
 

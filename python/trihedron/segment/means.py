@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.records import Hold, Recording
-from trihedron.segment.channels import Channels, FloatArray
+from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise, split_by_halves
 from trihedron.segment.runs import Run
 

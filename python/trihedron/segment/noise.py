@@ -6,13 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import special
 
-from trihedron.segment.channels import Channels, FloatArray
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.segment.channels import Channels
 
 Range = tuple[int, int]
-IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.records import Finding, Hold, Move, Recording, Segments
 from trihedron.records.progress import Progress
-from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, split_into_blocks
+from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity
 from trihedron.segment.judge import judge_log, judge_runs
 from trihedron.segment.means import average_holds
@@ -23,11 +24,11 @@ from trihedron.segment.runs import (
     loose_blocks,
     ranges_of,
     trim_edges,
-    turning_blocks,
     widen,
 )
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks
 from trihedron.segment.turn_scale import centre_of, radians_per_reading
+from trihedron.segment.turning import turning_blocks
 from trihedron.units import AccelerationUnit
 
 LONG_S = 4.0

@@ -6,11 +6,10 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.records import Hold, Move, Recording, Segments
 
-FloatArray = npt.NDArray[np.float64]
 RESTING = 1e-3
 """A mean rate of a thousandth of the moves' rms, five times over, is rest: below 1 °/s after moves of 3 rad/s."""
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
-from trihedron.segment.channels import WINDOW_BLOCKS, BoolArray, Channels, FloatArray, rolling_mean
+from trihedron.arrays import BoolArray, FloatArray
+from trihedron.segment.channels import WINDOW_BLOCKS, Channels
 from trihedron.segment.floor import Activity
 from trihedron.segment.noise import MeanNoise, Range
 
@@ -28,8 +29,6 @@ SWAY_RAD = 0.02
 ONE_WAY = 0.5
 """Share of a hand's mean square rate above which its mean makes it a turn: all of it in a slow move, next to nothing in
 a tremor of several swings."""
-TURN_SIGMAS = 6.0
-"""A quiet gyro that reads further than this from the common zero, in robust standard deviations, is turning."""
 
 
 @dataclass(frozen=True)
@@ -95,61 +94,7 @@ def widen(quiet: BoolArray, is_valid: BoolArray) -> BoolArray:
     return out
 
 
-def turning_blocks(
-    channels: Channels, quiet: BoolArray, gravity: float | None, radians_per_reading: float | None
-) -> BoolArray:
-    """Quiet blocks in which the gyro reads far from its common zero: a slow steady turn, gravity says nothing of.
-
-    The zero is where the windows of one second are densest, for turns may take most of the time; its scatter is theirs,
-    or that of the holds' nearest windows where that is larger: a zero that depends on the pose is no turn. Where the
-    accelerometer sees the tilt too, and the whole turn stays within ``SWAY_RAD`` by both sensors, the hold creeps and
-    remains a hold: a table that leans a little shows as small a tilt, but the gyro tells how far it turns.
-    """
-    out = np.zeros(len(quiet), dtype=bool)
-    gyro = np.flatnonzero(channels.is_gyroscope)
-    if not len(gyro) or not quiet.any():
-        return out
-    centre = np.median(channels.mean[quiet][:, gyro], axis=0)
-    reading = np.where(channels.is_valid[:, None], channels.mean[:, gyro] - centre, 0.0)
-    second = np.zeros_like(reading)
-    ranges = ranges_of(quiet)
-    for a, b in ranges:
-        # Inside the quiet stretch only: the move next to it has its own say.
-        second[a:b] = rolling_mean(reading[a:b], channels.blocks(1.0))
-    zero, scatter = _densest(second[quiet])
-    nearest = [np.abs(second[a:b] - zero).min(axis=0) for a, b in ranges if b - a >= channels.blocks(MIN_HOLD_S)]
-    if len(nearest) > 1:
-        scatter = np.maximum(scatter, 1.4826 * np.median(nearest, axis=0))
-    # A few short holds hold a few independent seconds: the shortest interval among them flatters. No window is known
-    # better than the white noise of its blocks.
-    steps = [np.diff(reading[a:b], axis=0) for a, b in ranges if b - a >= 2]
-    if steps:
-        white = np.sqrt(np.median([(step**2).mean(axis=0) / 2.0 for step in steps], axis=0) / channels.blocks(1.0))
-        scatter = np.maximum(scatter, white)
-    scatter = np.maximum(scatter, channels.quantum[gyro] / np.sqrt(12.0))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = np.nan_to_num(np.abs(second - zero) / scatter, nan=0.0)
-    top = _speed_of_moves(channels, quiet)
-    out[:] = quiet & (distance > TURN_SIGMAS).any(axis=1)
-    for a, b in ranges:
-        flagged = a + np.flatnonzero(out[a:b])
-        if not len(flagged):
-            continue
-        is_slow = bool((np.abs(second[flagged] - zero).max(axis=0) < CREEP_PART * top).all())
-        if radians_per_reading is not None:
-            # Within a factor of two, which is what is known of the scale.
-            turned = (reading[flagged] - zero).sum(axis=0) * channels.step_s * radians_per_reading
-            is_slow = is_slow and float(np.linalg.norm(turned)) < 2.0 * SWAY_RAD
-        if gravity is not None and is_slow and _tilts_a_little(channels, flagged[0], flagged[-1] + 1, gravity):
-            out[a:b] = False
-        for first, last in ranges_of(out[a:b]):
-            # A turn of any length fills a whole second of windows; at the ends of the stretch it may run on outside.
-            if last - first < WINDOW_BLOCKS and first > 0 and last < b - a:
-                out[a + first : a + last] = False
-    return out
-
-
-def _speed_of_moves(channels: Channels, quiet: BoolArray) -> float:
+def speed_of_moves(channels: Channels, quiet: BoolArray) -> float:
     """Gyro reading of the log's faster moves about its zero, raw unit; infinite in a log without moves."""
     moving = ~quiet & channels.is_valid
     gyro = channels.is_gyroscope
@@ -159,40 +104,11 @@ def _speed_of_moves(channels: Channels, quiet: BoolArray) -> float:
     return float(np.quantile(np.abs(channels.mean[moving][:, gyro] - zero), 0.9, axis=0).max())
 
 
-def _tilts_a_little(channels: Channels, first: int, last: int, gravity: float) -> bool:
-    """The accelerometer too sees a drift over the stretch, of no more than a hand's sway."""
-    attitude = channels.mean[first:last, ~channels.is_gyroscope]
-    half = len(attitude) // 2
-    if half < 1 or not attitude.shape[1]:
-        return False
-    drift = attitude[-half:].mean(axis=0) - attitude[:half].mean(axis=0)
-    steps = np.diff(attitude, axis=0)
-    variance = (steps**2).mean(axis=0) / half
-    live = variance > 0.0
-    statistic = float((drift[live] ** 2 / variance[live]).sum())
-    # The halves' means are half of the whole drift apart.
-    is_small = 2.0 * float(np.linalg.norm(drift)) / gravity < SWAY_RAD
-    return is_small and statistic > float(special.chdtri(max(int(live.sum()), 1), SAME_POSE))
-
-
-def _densest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Middle of the shortest interval that holds a quarter of the values of each axis, and the deviation it implies."""
-    ordered = np.sort(values, axis=0)
-    n = len(ordered)
-    quarter = max(n // 4, 1)
-    width = ordered[quarter:] - ordered[: n - quarter] if n > quarter else np.zeros((1, values.shape[1]))
-    at = width.argmin(axis=0)
-    axes = np.arange(values.shape[1])
-    middle: FloatArray = ordered[at + quarter // 2, axes]
-    deviation: FloatArray = width[at, axes] / (2.0 * float(special.ndtri(0.5 + 0.25 / 2.0)))
-    return middle, deviation
-
-
 def join_quiet(channels: Channels, quiet: BoolArray, loose: BoolArray, noise: MeanNoise) -> list[Run]:
     """Holds from quiet stretches: neighbours in one pose, with only a bump between, are one hold."""
     runs: list[Run] = []
     shortest = channels.blocks(MIN_HOLD_S)
-    creeping = CREEP_PART * _speed_of_moves(channels, quiet)
+    creeping = CREEP_PART * speed_of_moves(channels, quiet)
     for first, last in ranges_of(quiet):
         piece = Run(first, last)
         if runs:

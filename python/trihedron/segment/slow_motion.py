@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from trihedron.segment.channels import BoolArray, Channels, FloatArray
+from trihedron.arrays import BoolArray, FloatArray
+from trihedron.segment.channels import Channels
 from trihedron.segment.noise import Range
 
 HALVES_S = (0.5, 1.0, 2.0)

@@ -6,8 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.records import Recording
-from trihedron.segment.channels import BoolArray, Channels, FloatArray
+from trihedron.segment.channels import Channels
 from trihedron.segment.noise import Range
 from trihedron.units import rate_to_si
 

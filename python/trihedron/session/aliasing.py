@@ -8,9 +8,8 @@ quarter of the sampling frequency over that around half of it (the last that is 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from trihedron.arrays import FloatArray
 
 _AT_HALF = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 16.0
 """Unit gain at half the sampling frequency, fourth-order zero at rest: smooth motion does not pass."""

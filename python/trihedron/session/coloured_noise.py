@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from trihedron.arrays import FloatArray
+
 QUIET, QUIET_OF_NORMAL = 0.3, 0.3853
 """Quantile over the poses of the change from first half to second, and that of |x| for a normal x: slow noise is in all
 poses alike, a zero that jumps only in those where it did."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.coloured_noise import coloured_variance
 
-FloatArray = npt.NDArray[np.float64]
 LEAST_SHARE = 1e-9
 """Where nothing scatters (a simulation without noise) a billionth of a unit stands for the rounding of the log."""
 START_STRENGTHS = ((160.0, 160.0), (1e-3, 1e-3), (1.0, 1.0))

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.records import Recording, Truth
 from trihedron.simulate.motion import Hold, Motion, MoveTo, Step, attitude_with_up
 from trihedron.simulate.noise import stream
 from trihedron.simulate.run import simulate
 from trihedron.simulate.scenario import Scenario
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class FollowingHand:

@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.simulate.noise import NoiseTerms
 from trihedron.simulate.readout import IDENTITY, NO_MATRIX, NONE, Adc, Electronics, Matrix, Smoother, Triple, sense_axes
 from trihedron.units import RateUnit
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

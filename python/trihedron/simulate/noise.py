@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 Triple: TypeAlias = tuple[float, float, float]
 
 _NONE: Triple = (0.0, 0.0, 0.0)

@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter, lfilter_zi
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 Triple: TypeAlias = tuple[float, float, float]
 Matrix: TypeAlias = tuple[Triple, Triple, Triple]
 

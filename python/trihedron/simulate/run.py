@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.records.recording import Recording
 from trihedron.records.truth import TrueSegment, Truth
 from trihedron.simulate.accelerometer import Accelerometer
@@ -20,7 +21,6 @@ from trihedron.simulate.readout import Triple, sense_axes
 from trihedron.simulate.scenario import Clock, Environment, Scenario
 from trihedron.simulate.zero_scatter import zero_of_poses
 
-FloatArray = npt.NDArray[np.float64]
 Sensor = Accelerometer | Gyroscope
 
 _DEFAULT_OVERSAMPLE = 8

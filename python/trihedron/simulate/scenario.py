@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.gravity import earth_rate_north_up, normal_gravity
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion import Motion
 from trihedron.units import STANDARD_GRAVITY_M_S2, radians_from_degrees
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

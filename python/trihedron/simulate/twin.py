@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import solveh_banded
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.sensor_model import correct
 from trihedron.simulate.accelerometer import Accelerometer
@@ -22,8 +22,6 @@ from trihedron.simulate.motion import Hold, Motion, Quaternion, Replay, Step, at
 from trihedron.simulate.readout import Adc, Matrix, Triple, sense_axes
 from trihedron.simulate.scenario import Clock, Environment, Scenario
 from trihedron.simulate.twin_noise import noise_of_holds
-
-FloatArray = npt.NDArray[np.float64]
 
 # Knots of a replayed move: wider ones would blunt the jolt of setting the case down. The price is that the recording's
 # noise inside moves is replayed as motion and the simulation's own comes on top.

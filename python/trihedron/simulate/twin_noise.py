@@ -8,14 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import nnls
 
+from trihedron.arrays import FloatArray
 from trihedron.simulate.noise import NoiseTerms, Triple
 from trihedron.simulate.readout import Smoother
-
-FloatArray = npt.NDArray[np.float64]
-
 
 _FREQUENCIES = np.pi * (np.arange(1 << 13) + 0.5) / (1 << 13)
 # Corners in parts of the sampling rate, and orders, that are tried.

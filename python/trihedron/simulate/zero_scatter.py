@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.simulate.motion.plan import Label
-from trihedron.simulate.noise import FloatArray, Triple
+from trihedron.simulate.noise import Triple
 
 RESTS = frozenset({"hold", "disturbance", "vibration"})
 """Kinds of steps that leave the attitude: a knocked pose is the same pose."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.records import Calibration
-from trihedron.records.diagnosis import Diagnosis, Domain, DomainTest
-
-FloatArray = npt.NDArray[np.float64]
+from trihedron.records.diagnosis import Diagnosis
+from trihedron.records.domains import Domain, DomainTest
 
 PUBLISHED_DIGITS = 1e-6
 """A calibration without error bars is taken at its last printed digits: this share of each number."""

@@ -11,7 +11,8 @@ import numpy as np
 from scipy.stats import norm
 
 from trihedron.diagnose.effects import catalogue
-from trihedron.records.diagnosis import AcceptedEffect, Candidate, Domain, ParameterDifference
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, ParameterDifference
+from trihedron.records.domains import Domain
 
 FRAME_TOLERANCE = 0.03
 """Parameters of one effect are stated along the axes of each side's own fit: 3 % (the angle between the two frames and

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import f as f_distribution
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.against.fitted import FittedModel
 from trihedron.invariants import (
     PAIRS,
@@ -25,7 +26,6 @@ from trihedron.invariants import (
 from trihedron.records.diagnosis import ParameterDifference
 from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
 
-FloatArray = npt.NDArray[np.float64]
 Sensor = Literal["accelerometer", "gyroscope", "both"]
 
 SPREAD_DOF = 100.0

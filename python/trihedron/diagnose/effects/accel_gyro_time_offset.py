@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only
 from trihedron.diagnose.effects.late_readings import by_delay, is_confirmed, times_for
-from trihedron.diagnose.session.observations import FloatArray
 
 
 class AccelGyroTimeOffset(Effect):

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.hidden_drift import HiddenDrift
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.twin import Distortion
 from trihedron.diagnose.zeros.curve import DriftCurve
 from trihedron.diagnose.zeros.of_session import SessionEvidence, accel_evidence, share_of_curve

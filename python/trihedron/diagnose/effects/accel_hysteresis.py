@@ -7,9 +7,9 @@ import numpy.typing as npt
 from scipy.signal import lfilter
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
-from trihedron.diagnose.session.observations import FloatArray
 
 PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
 CREEP_TIMES_S = (5.0, 20.0, 60.0)

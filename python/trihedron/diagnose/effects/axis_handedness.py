@@ -7,7 +7,8 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.records.diagnosis import EffectParameter, Where
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Where
 
 
 class AxisHandedness(DirectEffect):

@@ -11,10 +11,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.twin import Distortion
-from trihedron.records.diagnosis import Domain, EffectParameter
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Domain
 
 AXES = ("x", "y", "z")
 SHAPE_NAMES = ("time_constant", "half_width", "pose")

@@ -13,7 +13,8 @@ import numpy.typing as npt
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.session.observations import Observations
-from trihedron.records.diagnosis import Domain, EffectParameter, HeldOut, Where
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Domain, HeldOut, Where
 
 NOWHERE = Where()
 

@@ -15,7 +15,8 @@ from trihedron.diagnose.residuals.within_holds import LOUD, hold_scatter
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, folds_of, leverage, predict_held_out
 from trihedron.diagnose.session.twin import NO_DISTORTION, STATIC_ACCEL
-from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import HeldOut, Where
 
 MOST = 0.25
 """If more than a quarter of the poses are restless it is not a pose that was disturbed but the place that shakes."""

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant, per_axis
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.twin import Distortion
 
 MOST_M_S2, MOST_RAD_S = 0.6, 0.09

@@ -14,7 +14,8 @@ from trihedron.diagnose.effects.sample_steps import MAX_LOST, Loss, find_losses
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import fit, move_misfit
 from trihedron.diagnose.session.twin import NO_DISTORTION, Twin
-from trihedron.records.diagnosis import EffectParameter, Where
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Where
 
 CLEAR_COUNT = 3.0
 """Standard errors by which a count must differ from none."""

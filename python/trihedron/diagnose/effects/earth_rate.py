@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, rate_only
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.records.diagnosis import EffectParameter
 
 EARTH_RATE_RAD_S = 7.292115e-5

@@ -8,15 +8,16 @@ from typing import ClassVar
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.drift_shapes import drift_variants, is_possible_drift, warm_up_variant
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.twin import Distortion
 from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
 from trihedron.diagnose.zeros.of_session import SessionEvidence
-from trihedron.records.diagnosis import Domain, EffectParameter
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Domain
 
 AXES = ("x", "y", "z")
 FEWEST_HOLDS = 6

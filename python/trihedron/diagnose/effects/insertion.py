@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.records import Recording, Segments
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def bridge(values: FloatArray, k: int, n: int) -> FloatArray:

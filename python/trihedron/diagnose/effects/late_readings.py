@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.session.observations import FloatArray
 
 TIMES_S = (0.004, 0.008, 0.016, 0.032, 0.064)
 """Times tried, each twice the one before: a parameter between 1/√2 and √2 of its own covers all between."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import fdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.session.observations import FloatArray
-from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import HeldOut, Where
 
 MIN_SHARE = 0.5
 """One arm must predict at least this share of the motion of moves it was not fitted to: a hand also just travels."""

@@ -7,7 +7,8 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.residuals.within_holds import MIN_LINE_SHARE, find_lines
-from trihedron.records.diagnosis import EffectParameter, HeldOut, Where
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import HeldOut, Where
 
 
 class PeriodicInterference(DirectEffect):

@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.session.observations import Observations
 
 BAND_SIGMA = 4.0
 """A plateau is a run of samples within four standard deviations of the limit."""

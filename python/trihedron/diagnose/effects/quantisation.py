@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtr
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.residuals.within_holds import CHANNELS
-from trihedron.diagnose.session.observations import FloatArray, Observations
-from trihedron.records.diagnosis import EffectParameter, Where
+from trihedron.diagnose.session.observations import Observations
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Where
 
 COARSE = 0.45
 """Noise below this share of a step leaves readings on two or three codes: their mean sits on a staircase."""

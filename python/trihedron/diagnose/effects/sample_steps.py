@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import percentile_filter
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.plateaus import plateaus_of
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.observations import Observations
 
 HALF_WINDOW = 6
 """Samples on either side from which the local motion is learnt."""

@@ -9,13 +9,15 @@ from typing import ClassVar
 import numpy as np
 from scipy.special import chdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
 from trihedron.diagnose.effects.plateaus import BAND_SIGMA, MIN_PLATEAUS, Plateau, plateaus_of, shared_levels
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES
-from trihedron.records.diagnosis import EffectParameter, Where
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Where
 
 NEAR_LIMIT = 0.97
 """Moves that come this close to a known limit on any axis are left out: the limit is the sensor's, not one axis's."""

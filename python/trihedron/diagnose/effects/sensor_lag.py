@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
 from trihedron.diagnose.effects.late_readings import NEAR_ONE, by_low_pass, times_for
-from trihedron.diagnose.session.observations import FloatArray
 
 SIGMAS = 3.0
 """How far below zero a lag may come out by chance; a filter that answers before it is asked does not exist."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.session.observations import Observations
 
 WINDOW_S = 4.0
 """An even clock may drift over longer times than this."""

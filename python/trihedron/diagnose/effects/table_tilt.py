@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtrc, ndtr, stdtrit
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.table_turns import meant_as_multiples, table_turns
-from trihedron.diagnose.session.observations import FloatArray
-from trihedron.records.diagnosis import EffectParameter, Where
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Where
 
 FEWEST_TO_SCATTER = 3
 """Turns from which their own scatter says anything."""

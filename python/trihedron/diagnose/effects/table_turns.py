@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import trapezoid
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.session.observations import FloatArray
 
 NEAR_DEG = 12.0
 """A turn meant to be a multiple of 90° lands within this; hand moves land anywhere."""

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.table_turns import NEAR_DEG, TableTurn, meant_as_multiples, table_turns
-from trihedron.diagnose.session.observations import FloatArray
-from trihedron.records.diagnosis import EffectParameter, Where
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Where
 
 
 class TurnAngleError(DirectEffect):

@@ -16,7 +16,8 @@ from trihedron.diagnose.laws.poses import Zeros, accel_misfits, gyro_misfits
 from trihedron.diagnose.laws.room import RoomLaw, search_room
 from trihedron.diagnose.laws.search import Accepted, search
 from trihedron.diagnose.zeros.of_session import accel_evidence, gyro_evidence
-from trihedron.records.diagnosis import Domain, DomainTest, EffectParameter, HeldOut, Law
+from trihedron.records.diagnosis import EffectParameter, Law
+from trihedron.records.domains import Domain, DomainTest, HeldOut
 
 Sensor = Literal["accelerometer", "gyroscope"]
 OUT: dict[Sensor, str] = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import fdtrc
 
-from trihedron.diagnose.session.observations import FloatArray
+from trihedron.arrays import FloatArray
 
 N_BLOCKS = 6
 """Blocks of neighbouring poses or moves that are left out in turn."""

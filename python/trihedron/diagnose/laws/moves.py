@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.laws.misfit import Columns, Misfit
 from trihedron.diagnose.laws.search import Candidate
 from trihedron.diagnose.laws.signals import AXES
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import Reduced, leverage, reduce
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, Distortion
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.laws.misfit import Misfit, misfit_of
 from trihedron.diagnose.laws.search import Candidate
 from trihedron.diagnose.laws.signals import AXES, Signal, pose_signals, room_vectors
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.zeros.curve import covariance_of
 from trihedron.diagnose.zeros.evidence import ALL
 from trihedron.diagnose.zeros.process import ZeroProcess

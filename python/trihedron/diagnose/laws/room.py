@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.laws.misfit import Judged, Misfit
 from trihedron.diagnose.laws.search import MIN_GAIN, MIN_SHARE, NESTED_GAIN, SHIFT_P, SHIFT_SQUARES
-from trihedron.diagnose.session.observations import FloatArray
 
 INCLINATION_STEP_DEG, HEADING_STEP_DEG = 3.0, 5.0
 WITHIN = 4.0

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import fdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.laws.misfit import Columns, Judged, Misfit
-from trihedron.diagnose.session.observations import FloatArray
 
 MAX_P = 1e-4
 """Largest p-value of a law, paid for by the number of candidates: structured noise passes 1 % with ease."""

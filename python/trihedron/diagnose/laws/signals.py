@@ -7,8 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.session.observations import FloatArray
 
 AXES = ("x", "y", "z")
 

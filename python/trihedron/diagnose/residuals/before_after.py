@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.diagnose.session.observations import FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.solve import Fit
-from trihedron.records.diagnosis import DomainResiduals, LinearModel
+from trihedron.records.diagnosis import LinearModel
+from trihedron.records.domains import DomainResiduals
 
 _ROWS: tuple[tuple[str, str, str, str, tuple[str, ...]], ...] = (
     ("static-accel", "|f| − |g| at rest", "m/s^2", "hold", ("norm",)),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.session.observations import FloatArray
 
 LEAST_SAMPLES = 9
 """Readings of a pose below which its thirds say nothing."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import fdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.jumps import jumps_in_poses
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import Fit, leverage
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
-from trihedron.records.diagnosis import Domain, DomainTest, Where
+from trihedron.records.domains import Domain, DomainTest, Where
 
 ROW_DOMAINS: dict[int, Domain] = {
     STATIC_ACCEL: "static-accel",

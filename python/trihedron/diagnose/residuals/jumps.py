@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.session.observations import Observations
 
 N_BLOCKS, EDGE = 16, 3
 """A pose is seen as so many block means; a step leaves at least so many on either side, so that what the hand's jolt

@@ -12,7 +12,7 @@ from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.sample_steps import step_errors
 from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
-from trihedron.records.diagnosis import DomainTest, Where
+from trihedron.records.domains import DomainTest, Where
 
 
 def judge_timing(context: Context, alpha: float, refused: Collection[str]) -> DomainTest:

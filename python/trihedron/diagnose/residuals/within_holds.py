@@ -10,9 +10,10 @@ import numpy.typing as npt
 from scipy.ndimage import median_filter
 from scipy.special import chdtrc, gammaincc
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
-from trihedron.diagnose.session.observations import FloatArray, Observations
-from trihedron.records.diagnosis import DomainTest, Where
+from trihedron.diagnose.session.observations import Observations
+from trihedron.records.domains import DomainTest, Where
 
 CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 

@@ -9,6 +9,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.periodic_interference import PeriodicInterference
@@ -16,23 +17,14 @@ from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.residuals.within_holds import judge_within_holds
 from trihedron.diagnose.rest.heat import Curve, branch_gap, thermal_curve
 from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import CORNER_GRID_S, Fit
 from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
 from trihedron.diagnose.zeros.evidence import KIND_LIMIT, examine
 from trihedron.diagnose.zeros.process import ZeroReadings
 from trihedron.records import Hold, Recording
-from trihedron.records.diagnosis import (
-    AcceptedEffect,
-    Candidate,
-    Diagnosis,
-    Domain,
-    DomainTest,
-    EffectParameter,
-    HeldOut,
-    LinearModel,
-    Where,
-)
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
+from trihedron.records.domains import Domain, DomainTest, HeldOut, Where
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, rate_to_si
 
 Sensor = Literal["accelerometer", "gyroscope"]

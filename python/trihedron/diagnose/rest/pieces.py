@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
-from trihedron.diagnose.zeros.process import FloatArray, ZeroReadings
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.zeros.process import ZeroReadings
 from trihedron.records import Recording
 
 N_PIECES = 80

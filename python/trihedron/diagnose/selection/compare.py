@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms, weighted_rms
 from trihedron.diagnose.selection.model import StepwiseModel, held_out
 from trihedron.diagnose.selection.score import Scored, dispersion
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import (
     N_DOMAINS,
     Fit,
@@ -32,7 +32,7 @@ from trihedron.diagnose.session.twin import (
     Distortion,
     stacked,
 )
-from trihedron.records.diagnosis import HeldOut
+from trihedron.records.domains import HeldOut
 
 VISIBLE = 0.98
 """An effect must lower the held-out misfit of some domain by at least this factor to be worth a name."""

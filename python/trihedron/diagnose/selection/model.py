@@ -12,7 +12,7 @@ from trihedron.diagnose.effects.direct import Evidence
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import N_DOMAINS, Fit, Prediction, folds_of, predict_held_out, tune_noise
 from trihedron.diagnose.session.twin import Distortion, Prior, Twin, stacked
-from trihedron.records.diagnosis import HeldOut
+from trihedron.records.domains import HeldOut
 
 
 @dataclass(frozen=True, eq=False)

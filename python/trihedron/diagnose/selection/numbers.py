@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.selection.model import StepwiseModel
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.twin import stacked
 from trihedron.diagnose.zeros.of_session import (
@@ -17,7 +17,7 @@ from trihedron.diagnose.zeros.of_session import (
     with_accel_scatter,
     with_gyro_scatter,
 )
-from trihedron.records.diagnosis import DomainTest
+from trihedron.records.domains import DomainTest
 
 SCATTERS = 0.01
 """p-value from which poses scatter enough for their error bars, though too little for a name."""

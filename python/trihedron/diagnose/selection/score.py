@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import Effect, catalogue
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.diagnose.session.solve import N_DOMAINS, Fit, leverage, reduce, score
 from trihedron.diagnose.session.twin import PRIOR
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.compare import Refit, refined, refit
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel
 from trihedron.diagnose.selection.score import Scored, score_all
-from trihedron.diagnose.session.observations import FloatArray
 from trihedron.records.diagnosis import Candidate
 
 MAX_EFFECTS = 4

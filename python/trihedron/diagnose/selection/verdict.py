@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from trihedron.diagnose.selection.accepted import are_footnotes
 from trihedron.diagnose.selection.model import StepwiseModel
-from trihedron.records.diagnosis import DomainTest, Verdict
+from trihedron.records.diagnosis import Verdict
+from trihedron.records.domains import DomainTest
 
 SAMPLE_DOMAINS = ("within-static", "timing")
 """Domains of the samples themselves, which no parameter of the model is fitted to."""

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.records import Recording, Segments
 from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.noise import measure_noise
 
-FloatArray = npt.NDArray[np.float64]
 LONGEST_MOVE_S = 180.0
 """A hand move takes seconds, a careful change of fixture minutes; over longer the bias decides what is integrated."""
 

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import trapezoid
 
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.session.twin import _LOWER, Prior, Twin
 from trihedron.records import Calibration, SensorCalibration

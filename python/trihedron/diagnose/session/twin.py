@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.session.observations import Observations
 from trihedron.session.noise import START_STRENGTHS, scatter_unit
 
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.diagnose.zeros.process import INITIAL_SLOPE, FloatArray, ZeroProcess, unit_kernels
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.zeros.process import INITIAL_SLOPE, ZeroProcess, unit_kernels
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 from scipy.special import chdtrc
 
-from trihedron.diagnose.zeros.process import DRIFT, SCATTER, WALK, FloatArray, ZeroProcess, ZeroReadings
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.zeros.process import DRIFT, SCATTER, WALK, ZeroProcess, ZeroReadings
 
 FEWEST_POSES = 15
 """With fewer poses the size of the scatter can be told, nothing else."""

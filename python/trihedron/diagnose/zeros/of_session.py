@@ -7,8 +7,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.session.observations import FloatArray, Observations
+from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import CORNER_GRID_S
 from trihedron.diagnose.zeros.evidence import FEWEST_POSES, ZeroEvidence, examine
 from trihedron.diagnose.zeros.readings import SessionZeros, accel_zeros, gyro_zeros

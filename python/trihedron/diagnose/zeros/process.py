@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 SCATTER, WALK, DRIFT = 0, 1, 2
 INITIAL_SLOPE = 1.0
 """Variance of the drift's slope at the start over what it gains in the session: a straight line is a drift too."""

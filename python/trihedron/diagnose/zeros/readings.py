@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.zeros.process import FloatArray, ZeroReadings
+from trihedron.diagnose.zeros.process import ZeroReadings
 
 LEAST_SWING_K = 0.2
 """A logged temperature that changes by less explains no zero."""

@@ -8,10 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.accelerometer import face_poses, verdict
-from trihedron.records.calibration import FloatArray
-
-IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

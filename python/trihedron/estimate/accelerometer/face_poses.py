@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.records.calibration import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.units import AccelerationUnit, acceleration_to_si
-
-IntArray = npt.NDArray[np.int64]
 
 LARGEST_TILT_DEG = 20.0
 """A pose further than this from every face is no face: between misplaced by hand (a few degrees) and an edge (45°)."""

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special
 
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.accelerometer import face_poses, inputs, verdict
 from trihedron.estimate.accelerometer.face_placements import placements
-from trihedron.estimate.accelerometer.face_poses import IntArray
 from trihedron.estimate.accelerometer.norm import norm_residual
-from trihedron.records.calibration import FitQuality, FloatArray, Frame, Observability, SensorCalibration
+from trihedron.records.calibration import FitQuality, Frame, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.sensor_model import other_form, other_form_jacobian, reframing
 from trihedron.units import AccelerationUnit, degrees_from_radians

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.records.calibration import FloatArray
+from trihedron.arrays import FloatArray
 
 
 def pose_means(means: npt.ArrayLike, sigma_means: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -8,9 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer import inputs, verdict
 from trihedron.estimate.accelerometer.poses import ENTRIES, PoseDesign
-from trihedron.records.calibration import FitQuality, FloatArray, Frame, SensorCalibration
+from trihedron.records.calibration import FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.sensor_model import reframing
 from trihedron.units import AccelerationUnit

@@ -12,7 +12,8 @@ from itertools import product
 
 import numpy as np
 
-from trihedron.records.calibration import FloatArray, Observability
+from trihedron.arrays import FloatArray
+from trihedron.records.calibration import Observability
 
 ENTRIES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
 """Rows and columns of M's six entries."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import special
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import NAMES, PoseDesign
-from trihedron.records.calibration import FloatArray
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.units import AccelerationUnit, acceleration_to_si
 

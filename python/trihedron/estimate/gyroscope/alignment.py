@@ -6,15 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtrc, chdtri
 
 from trihedron._core import AlignmentFit
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.calibration import SensorCalibration
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 RateDegree = Literal[0, 1, 3]
 """Degree of the rate polynomial over a sample: 0 constant, 1 linear, 3 coning-corrected."""

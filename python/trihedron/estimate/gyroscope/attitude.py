@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import fdtrc
 
-FloatArray = npt.NDArray[np.float64]
+from trihedron.arrays import FloatArray
 
 FALSE_ALARM = 1e-4
 """Chance that a sensor without it is treated for it: the price of removing nothing is small, but it is a decision."""

@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-IntArray = npt.NDArray[np.int64]
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 
 LONGEST_BRIDGE_S = 0.15
 """A hand turns smoothly over this long; a peak cut for longer may have had any shape."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.alignment import FALSE_ALARM, Aligned
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, audit_moves
 from trihedron.estimate.gyroscope.observability import describe, observability_findings
@@ -13,7 +13,6 @@ from trihedron.estimate.gyroscope.verification import Prediction
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, rate_to_si
 
-FloatArray = npt.NDArray[np.float64]
 MAX_SCALE_RATIO = 1.5
 """Untrimmed MEMS gyros are within 10 % of their data sheet; half as much again is a wrong unit or rate."""
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.alignment import MoveOptions
 from trihedron.estimate.gyroscope.moves import calibrate_moves
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-
-FloatArray = npt.NDArray[np.float64]
 
 LARGEST_DOUBT = 0.1
 """Relative standard error above which a scale by gravity is not used: three of them still exclude half and twice."""

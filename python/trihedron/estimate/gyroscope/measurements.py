@@ -5,26 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
-from scipy.special import chdtrc, chdtri
+from scipy.special import chdtrc
 
 from trihedron._core import Moves
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
-from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, bridge_clipping, clipped_time
+from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.rounding import (
     common_zero,
     density_without_rounding,
     rounding_variance,
     undithered_axes,
 )
+from trihedron.estimate.gyroscope.zeros import excess_variance, pool_zeros, shrink
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
-from trihedron.records.segments import Segments
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
+from trihedron.records.segments import Move, Segments
 
 BLOCK_S = 0.5
 """Length of the blocks whose scatter gives the angle random walk: moves last of this order, and it is long against
@@ -153,14 +150,7 @@ def measure_moves(
     raw_force = _required(recording.accelerometer, "accelerometer")
     if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
         raise ValueError("method 2 needs the hold means of both sensors: segment a recording that has both")
-    moves = [move for move in segments.moves if move.stop - move.start >= 2]
-    if not moves:
-        raise ValueError(
-            "no move between two still poses was found: turn the sensor by hand between poses and hold each for some "
-            "seconds"
-        )
-    if moves[-1].stop > recording.n_samples or segments.holds[-1].stop > recording.n_samples:
-        raise ValueError("the segments reach beyond the recording: they belong to another log")
+    moves = _moves_of(recording, segments)
     edges = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
     links = np.array([[move.hold_before, move.hold_after] for move in moves], dtype=np.int64)
     anchors = segments.time_mid_s[links]
@@ -181,17 +171,8 @@ def measure_moves(
     clipped = bridge_clipping(recording.time_s, gyroscope)
     extra = rounding_variance(gyroscope, quantum, np.median(segments.gyroscope_mean, axis=0), undithered)
     if clipped is not None:
-        rate = np.where(clipped.is_clipped, rate + clipped.readings - gyroscope, rate)
-        extra = clipped.variance if extra is None else clipped.variance + np.where(clipped.is_clipped, 0.0, extra)
-    prepared = Moves(
-        recording.time_s,
-        rate,
-        edges,
-        np.ascontiguousarray(anchors),
-        links,
-        rate_degree,
-        extra,
-    )
+        rate, extra = _bridged(rate, extra, clipped, gyroscope)
+    prepared = Moves(recording.time_s, rate, edges, np.ascontiguousarray(anchors), links, rate_degree, extra)
 
     var_reading = _mean_variance(segments.accelerometer_sigma_mean, segments.accelerometer_sigma, raw_force)
     var_reading_noise, zero_read, var_zero_read = var_reading, zero, var_zero
@@ -200,15 +181,12 @@ def measure_moves(
     weights, mean, var_mean, excess, _ = pool_zeros(zero, var_zero)
     zero, var_zero = shrink(zero, var_zero, mean)
     if np.any(undithered):
-        # Rounding hides the same part of every hold's zero: what it hides is fitted to the moves, as one offset.
-        hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
-        own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
-        zero, var_zero = common_zero(zero, np.where(undithered, own, var_zero), undithered)
+        zero, var_zero = _with_hidden_zero(zero, var_zero, segments, quantum, undithered)
+    density = rate_noise_density(recording, segments)
+    density = density_without_rounding(density, quantum, 1.0 / recording.rate_hz, undithered)
     if attitude is not None:
         var_mean = np.maximum(var_mean, attitude.var_zero)
-    steps = np.diff(recording.time_s)
-    nominal = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 1.0 / recording.rate_hz
-    jitter = float(np.median(np.abs(steps - nominal))) * 1.4826 / np.sqrt(2.0)
+    steps, nominal, jitter = _steps_of(recording)
     return MoveMeasurements(
         moves=prepared,
         links=links,
@@ -222,9 +200,7 @@ def measure_moves(
         zero_mean=mean,
         var_zero_mean=var_mean,
         var_zero_walk=walk,
-        noise_density=density_without_rounding(
-            rate_noise_density(recording, segments), quantum, 1.0 / recording.rate_hz, undithered
-        ),
+        noise_density=density,
         sigma_time_s=jitter,
         nominal_step_s=nominal,
         clipped_s=clipped_time(clipped, edges, nominal),
@@ -238,6 +214,42 @@ def measure_moves(
         var_reading_noise=var_reading_noise,
         reading_variance=extra,
     )
+
+
+def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
+    moves = [move for move in segments.moves if move.stop - move.start >= 2]
+    if not moves:
+        raise ValueError(
+            "no move between two still poses was found: turn the sensor by hand between poses and hold each for some "
+            "seconds"
+        )
+    if moves[-1].stop > recording.n_samples or segments.holds[-1].stop > recording.n_samples:
+        raise ValueError("the segments reach beyond the recording: they belong to another log")
+    return moves
+
+
+def _bridged(
+    rate: FloatArray, extra: FloatArray | None, clipped: Clipped, gyroscope: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Rates with the readings at the gyro's limit replaced, and the variance of what replaced them."""
+    rate = np.where(clipped.is_clipped, rate + clipped.readings - gyroscope, rate)
+    return rate, clipped.variance if extra is None else clipped.variance + np.where(clipped.is_clipped, 0.0, extra)
+
+
+def _with_hidden_zero(
+    zero: FloatArray, var_zero: FloatArray, segments: Segments, quantum: FloatArray, undithered: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    # Rounding hides the same part of every hold's zero: what it hides is fitted to the moves, as one offset.
+    hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
+    own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
+    return common_zero(zero, np.where(undithered, own, var_zero), undithered)
+
+
+def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
+    """Steps between samples, the usual one, and the standard deviation of a stamp, s."""
+    steps = np.diff(recording.time_s)
+    nominal = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 1.0 / recording.rate_hz
+    return steps, nominal, float(np.median(np.abs(steps - nominal))) * 1.4826 / np.sqrt(2.0)
 
 
 def audit_moves(measured: MoveMeasurements) -> list[Finding]:
@@ -307,58 +319,3 @@ def _unexplained_reading_variance(accelerometer: SensorCalibration) -> FloatArra
     excess = max(quality.rms_dof**2 - quality.floor**2, 0.0)
     gains: FloatArray = np.sum(accelerometer.S**2, axis=0)
     return excess / gains
-
-
-def pool_zeros(
-    zero: FloatArray, var_zero: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Random-effects mean of zero readings (n, 3) of variance (n, 3) (DerSimonian & Laird 1986).
-
-    Returns weights (n, 3), mean (3,), its variance (3,), χ² against constancy (3,) with n − 1 degrees of freedom, and
-    the variance (3,) of the true zero between holds, nothing where χ² is within chance.
-    """
-    floor = np.maximum(var_zero, 1e-30 + 1e-24 * zero**2)
-    weight = 1.0 / floor
-    total = weight.sum(axis=0)
-    mean = (weight * zero).sum(axis=0) / total
-    chi2 = (weight * (zero - mean) ** 2).sum(axis=0)
-    dof = len(zero) - 1
-    spread = np.maximum(chi2 - dof, 0.0) / np.maximum(total - (weight**2).sum(axis=0) / total, 1e-300)
-    # Only a change beyond chance counts: a spread fitted to pure noise would spoil the weights of long holds.
-    spread = np.where(chi2 > dof + 4.0 * np.sqrt(2.0 * max(dof, 1)), spread, 0.0)
-    weight = 1.0 / (floor + spread)
-    weight /= weight.sum(axis=0)
-    mean = (weight * zero).sum(axis=0)
-    variance = (weight**2 * (floor + spread)).sum(axis=0)
-    return np.ascontiguousarray(weight), mean, variance, chi2, spread
-
-
-def excess_variance(values: FloatArray, noise: FloatArray) -> FloatArray:
-    """Variance (3,) beyond ``noise`` (n, 3) in ``values`` (n, 3) about zero, from the median: deaf to single bad holds.
-
-    Solves ``median(x²/(v + τ²)) = median of χ²(1)`` for τ² of each column; zero where noise alone explains the median.
-    """
-    target = float(chdtri(1, 0.5))
-    out = np.zeros(values.shape[1])
-    for axis, (x2, v) in enumerate(zip((values**2).T, noise.T, strict=True)):
-        low, high = 0.0, float(np.max(x2)) / target
-        if np.median(x2 / np.maximum(v, 1e-300)) <= target:
-            continue
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if np.median(x2 / (v + middle)) > target else (low, middle)
-        out[axis] = high
-    return out
-
-
-def shrink(zero: FloatArray, var_zero: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Zero readings of the holds drawn to the session's by their noise: ``(z/v + z̄/τ²)/(1/v + 1/τ²)`` and its variance.
-
-    With a zero that changes (τ² ≫ v) each hold keeps its own; with a steady one a short hold borrows from the others.
-    """
-    n = len(zero)
-    tau2 = excess_variance((zero - mean) * np.sqrt(n / max(n - 1, 1)), var_zero)
-    gain = tau2 / np.maximum(tau2 + var_zero, 1e-300)
-    pooled = 1.0 / np.sum(1.0 / np.maximum(var_zero + tau2, 1e-300), axis=0)
-    variance = gain * var_zero + (1.0 - gain) ** 2 * pooled
-    return np.ascontiguousarray(mean + gain * (zero - mean)), np.ascontiguousarray(variance)

@@ -9,9 +9,8 @@ import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, median_filter
 from scipy.special import bdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
-
-FloatArray = npt.NDArray[np.float64]
 
 HALF_WINDOW = 4
 """Samples on either side through which one curve is laid: 80 ms of a 100 Hz log, less than a tremor's period."""

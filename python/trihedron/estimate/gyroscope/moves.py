@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron.estimate.gyroscope.alignment import Aligned, MoveOptions, align_screened, given_accelerometer
 from trihedron.estimate.gyroscope.findings import findings_of
@@ -15,8 +14,6 @@ from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def calibrate_moves(

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron._core import AlignmentFit
+from trihedron.arrays import FloatArray
 from trihedron.records.calibration import PARAMETER_NAMES, Observability
 from trihedron.records.finding import Finding, FindingCode
-
-FloatArray = npt.NDArray[np.float64]
 
 WEAK = 0.03
 """Relative standard error of a direction in ``S_ω`` above which it is called weak: data sheets promise this much."""

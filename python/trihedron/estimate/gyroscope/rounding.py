@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from trihedron.arrays import BoolArray, FloatArray
 
 UNDITHERED = 0.5
 """Noise below this part of a step does not dither it: the mean of a rounded reading is off by up to half a step,

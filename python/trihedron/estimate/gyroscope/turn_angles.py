@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron._core import integrate_raw_rate
-from trihedron.estimate.gyroscope.measurements import BLOCK_S, pool_zeros, resolution_of
+from trihedron.arrays import FloatArray
+from trihedron.estimate.gyroscope.measurements import BLOCK_S, resolution_of
+from trihedron.estimate.gyroscope.zeros import pool_zeros
 from trihedron.records.recording import Recording
 from trihedron.units import rate_to_si
-
-FloatArray = npt.NDArray[np.float64]
 
 QUARTER = math.pi / 2.0
 

@@ -6,15 +6,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron._core import integrate_raw_rate
+from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
-
-FloatArray = npt.NDArray[np.float64]
 
 SAME_POSE_RAD = math.radians(5.0)
 """A turn on a table leaves gravity where it was, but for twice the table's tilt: a table leans two degrees at most."""

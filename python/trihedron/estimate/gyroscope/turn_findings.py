@@ -6,14 +6,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.turn_angles import KnownTurn
 from trihedron.estimate.gyroscope.turn_system import FALSE_ALARM, Screened
 from trihedron.records.finding import Finding, FindingCode
-
-FloatArray = npt.NDArray[np.float64]
 
 LOOSE_TURN_RAD = math.radians(1.0)
 """A square case pushed against a wall repeats within some tenths of a degree."""

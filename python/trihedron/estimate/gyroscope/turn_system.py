@@ -6,13 +6,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtrc, chdtri
 
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 FALSE_ALARM = 1e-3
 """Chance that sound turns raise a statistical finding of one kind."""

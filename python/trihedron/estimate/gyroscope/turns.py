@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import chdtrc
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.turn_angles import (
     AMBIGUOUS,
     MIN_SPREAD,
@@ -38,7 +39,6 @@ from trihedron.records.segments import Segments
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import rate_to_si
 
-FloatArray = npt.NDArray[np.float64]
 Route = Literal["least-squares", "zero-turn-first"]
 
 TILT = 0.05
@@ -127,9 +127,7 @@ def calibrate_turns(
     fit = solve_zero_first(system, used) if route == "zero-turn-first" else solve(system, used)
     S, b = other_form(fit.S_w, fit.b_w)
     jacobian = other_form_jacobian(fit.S_w, fit.b_w)
-    inflation = 1.0
-    if fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM:
-        inflation = fit.chi2 / fit.dof
+    inflation = _inflation(fit)
     inverse_covariance = inflation * fit.covariance
     if shared_errors is not None:
         pull = system.pull(fit, used, shared_errors)
@@ -149,6 +147,12 @@ def calibrate_turns(
     return calibration, turn_findings(
         known, screened, deviation, S, inflation, fit.dof, quantum_rad, is_sigma_given=sigma_turn_rad is not None
     )
+
+
+def _inflation(fit: Solution) -> float:
+    """χ² per degree of freedom where it is beyond chance, else 1."""
+    is_beyond_chance = fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM
+    return fit.chi2 / fit.dof if is_beyond_chance else 1.0
 
 
 def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_], recording_is_counts: bool) -> None:

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align, assemble
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.calibration import FitQuality
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from trihedron.records import Recording, Segments
 from trihedron.units import rate_to_si
-
-FloatArray = npt.NDArray[np.float64]
 
 FEWEST_MOVES = 4
 """Three unknown angles of the first attitude and some moves to spare."""

@@ -4,12 +4,8 @@ from trihedron.estimate.kalman.consistency import check_innovations, normalised_
 from trihedron.estimate.kalman.guide import Goal
 from trihedron.estimate.kalman.identified import check_same_converter, noise_from_identified
 from trihedron.estimate.kalman.live import LiveCalibration
-from trihedron.estimate.kalman.norm_invariant import (
-    LiveNormCalibration,
-    NormFrame,
-    NormStart,
-    calibrate_without_references,
-)
+from trihedron.estimate.kalman.norm_invariant import LiveNormCalibration, NormFrame, calibrate_without_references
+from trihedron.estimate.kalman.norm_start import NormStart
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
 from trihedron.estimate.kalman.session import (
     calibrate_session,

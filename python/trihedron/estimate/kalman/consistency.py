@@ -6,10 +6,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from trihedron.arrays import FloatArray
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import Consistency
-
-FloatArray = npt.NDArray[np.float64]
 
 CONFIDENCE = 0.99
 DIFFUSE_RATIO = 30.0

@@ -8,12 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.kalman.guide import Goal, Guide
 from trihedron.estimate.kalman.per_axis import Prior, noise_per_axis
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.kalman import AxisNoise, LiveEstimate
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class LiveCalibration:

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
 from trihedron.estimate.kalman.guide import Goal, Guide
-from trihedron.estimate.kalman.per_axis import noise_per_axis
+from trihedron.estimate.kalman.norm_start import NormStart
+from trihedron.estimate.kalman.per_axis import noise_per_axis, pose_arrays
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, LiveEstimate, NormKalmanCalibration
 
-FloatArray = npt.NDArray[np.float64]
 NormFrame = Literal["lower", "symmetric"]
 
 ENTRIES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
@@ -26,54 +26,6 @@ ENTRIES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
 
 MOST_RUNS = 50
 N_PARAMETERS = 9
-
-
-@dataclass(frozen=True, eq=False)
-class NormStart:
-    """Where the filter starts: ``f = S (raw − zero)`` with S (3, 3) and zero (3,).
-
-    S is good to ``sigma_relative`` of its size, the zero reading to ``sigma_zero_m_s2``. The signs of S decide
-    the signs of the result: the length of a vector cannot.
-    """
-
-    S: FloatArray
-    zero: FloatArray
-    sigma_relative: float = 0.1
-    sigma_zero_m_s2: float = 1.0
-
-    def __post_init__(self) -> None:
-        S, zero = np.array(self.S, dtype=np.float64), np.array(self.zero, dtype=np.float64)
-        if S.shape != (3, 3) or zero.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(zero))):
-            raise ValueError(f"a start needs finite S (3, 3) and zero (3,), got shapes {S.shape} and {zero.shape}")
-        if np.linalg.matrix_rank(S) < 3:
-            raise ValueError(
-                "a start needs three independent axes: S = 0 is no calibration, but the filter would stay there"
-            )
-        if not (self.sigma_relative > 0 and self.sigma_zero_m_s2 > 0):
-            raise ValueError("the uncertainty of a start must be positive")
-        object.__setattr__(self, "S", S)
-        object.__setattr__(self, "zero", zero)
-
-    @classmethod
-    def nominal(cls, si_per_raw: float, zero: npt.ArrayLike = (0.0, 0.0, 0.0)) -> NormStart:
-        """The data sheet: one scale [m/s² per raw unit] for all axes, and the zero reading."""
-        return cls(si_per_raw * np.eye(3), np.asarray(zero, dtype=np.float64))
-
-    @classmethod
-    def from_range(cls, readings: npt.ArrayLike, gravity_m_s2: float) -> NormStart:
-        """A guess from mean readings (n, 3) alone: each axis has been near the vertical, both ways up.
-
-        Raises
-        ------
-        ValueError
-            When an axis did not move.
-        """
-        a = np.asarray(readings, dtype=np.float64)
-        half = (a.max(axis=0) - a.min(axis=0)) / 2.0
-        if np.any(half <= 0):
-            raise ValueError(f"axis {'xyz'[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
-        zero = (a.max(axis=0) + a.min(axis=0)) / 2.0
-        return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_zero_m_s2=3.0)
 
 
 class LiveNormCalibration:
@@ -270,22 +222,8 @@ def calibrate_without_references(
     ValueError
         When shapes disagree, values are not finite, poses are out of order, or there are fewer than nine.
     """
-    a = np.array(readings, dtype=np.float64)
-    if a.ndim != 2 or a.shape[1] != 3:
-        raise ValueError(f"readings must have shape (n, 3), got {a.shape}")
-    n = len(a)
-    if n < N_PARAMETERS:
-        raise ValueError(f"{n} poses give {n} equations for nine unknowns: hold at least nine, better eighteen")
-    if not np.all(np.isfinite(a)):
-        raise ValueError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
-    begin = np.array(start_s, dtype=np.float64)
-    hold = np.array(np.broadcast_to(np.asarray(hold_s, dtype=np.float64), (n,)))
-    if begin.shape != (n,):
-        raise ValueError(f"start_s must have one entry per pose ({n}), got shape {begin.shape}")
-    if not (np.all(np.isfinite(hold)) and np.all(hold > 0)):
-        raise ValueError("hold_s must be finite and positive: every pose needs a positive length")
-    extra = np.asarray(extra_variance, dtype=np.float64)
-    extra = np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (n, 3)))
+    a = _mean_readings(readings)
+    begin, hold, extra = pose_arrays(len(a), start_s, hold_s, extra_variance)
 
     def fresh() -> LiveNormCalibration:
         return LiveNormCalibration(
@@ -330,6 +268,18 @@ def calibrate_without_references(
         consistency=seen,
         findings=tuple(findings),
     )
+
+
+def _mean_readings(readings: npt.ArrayLike) -> FloatArray:
+    a = np.array(readings, dtype=np.float64)
+    if a.ndim != 2 or a.shape[1] != 3:
+        raise ValueError(f"readings must have shape (n, 3), got {a.shape}")
+    n = len(a)
+    if n < N_PARAMETERS:
+        raise ValueError(f"{n} poses give {n} equations for nine unknowns: hold at least nine, better eighteen")
+    if not np.all(np.isfinite(a)):
+        raise ValueError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
+    return a
 
 
 def _flat(S: FloatArray, b: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:

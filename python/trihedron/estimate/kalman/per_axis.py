@@ -9,13 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.kalman.consistency import check_innovations, consistency_findings, is_settled
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack, KalmanCalibration, PoseTable
-
-FloatArray = npt.NDArray[np.float64]
 
 DIFFUSE = 1e8
 """Width of a diffuse start in standard deviations of one reading: its information is 1e-16 of one pose's."""
@@ -99,14 +98,7 @@ def calibrate_with_references(
     z = np.array(readings, dtype=np.float64)
     if z.shape != f.shape:
         raise ValueError(f"there are {len(f)} reference poses, but the readings have shape {z.shape}: one row per pose")
-    start = np.array(start_s, dtype=np.float64)
-    hold = np.array(np.broadcast_to(np.asarray(hold_s, dtype=np.float64), (len(f),)))
-    if start.shape != (len(f),):
-        raise ValueError(f"start_s must have one entry per pose ({len(f)}), got shape {start.shape}")
-    extra = np.asarray(extra_variance, dtype=np.float64)
-    extra = np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (len(f), 3)))
-    if not (np.all(np.isfinite(hold)) and np.all(hold > 0)):
-        raise ValueError("hold_s must be finite and positive: every pose needs a positive length")
+    start, hold, extra = pose_arrays(len(f), start_s, hold_s, extra_variance)
     noises = noise_per_axis(noise)
     options = options or ShapingOptions()
     session = float(start[-1] + hold[-1] - start[0])
@@ -137,6 +129,26 @@ def calibrate_with_references(
     return KalmanCalibration(
         tuple(axes), accelerometer, inverse_S, inverse_b, f, z, start, hold, residual, tuple(findings)
     )
+
+
+def pose_arrays(
+    n: int, start_s: npt.ArrayLike, hold_s: npt.ArrayLike, extra_variance: npt.ArrayLike
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Starts (n,), lengths (n,) and extra variances (n, 3) of n poses.
+
+    Raises
+    ------
+    ValueError
+        When there is not one start per pose, or a length is not positive.
+    """
+    start = np.array(start_s, dtype=np.float64)
+    hold = np.array(np.broadcast_to(np.asarray(hold_s, dtype=np.float64), (n,)))
+    if start.shape != (n,):
+        raise ValueError(f"start_s must have one entry per pose ({n}), got shape {start.shape}")
+    if not (np.all(np.isfinite(hold)) and np.all(hold > 0)):
+        raise ValueError("hold_s must be finite and positive: every pose needs a positive length")
+    extra = np.asarray(extra_variance, dtype=np.float64)
+    return start, hold, np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (n, 3)))
 
 
 def _sensitivity(z: FloatArray, f: FloatArray) -> FloatArray:

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from trihedron.estimate.kalman.norm_invariant import NormFrame, NormStart, calibrate_without_references
+from trihedron.arrays import FloatArray
+from trihedron.estimate.kalman.norm_invariant import NormFrame, calibrate_without_references
+from trihedron.estimate.kalman.norm_start import NormStart
 from trihedron.estimate.kalman.per_axis import Prior, calibrate_with_references
 from trihedron.estimate.kalman.shaping import ShapingOptions
 from trihedron.records import (
@@ -21,8 +22,6 @@ from trihedron.records import (
     Recording,
     Segments,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 MOST_SAMPLES_FOR_RESOLUTION = 200_000
 

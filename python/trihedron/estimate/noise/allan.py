@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.degrees import KINDS, bias_along, edf_along
 from trihedron.estimate.noise.gaps import true_share
-from trihedron.records.noise import AllanCurve, AllanKind, FloatArray
+from trihedron.records.noise import AllanCurve, AllanKind
 
 _LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
 

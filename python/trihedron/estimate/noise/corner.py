@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.records.hold_noise import Measured
-from trihedron.records.noise import FloatArray
 
 EARNED = 16.0
 """Drop of the deviance that a corner must earn: it is searched over a grid and two orders."""

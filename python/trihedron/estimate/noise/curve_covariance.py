@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.records.noise import FloatArray
+from trihedron.arrays import FloatArray
 
 _DIFFERENCE = ((0, 1.0), (1, -2.0), (2, 1.0))
 _GRID_RATIO = 1.12

@@ -16,9 +16,10 @@ from itertools import combinations
 import numpy as np
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.curve_covariance import CurveCovariance
 from trihedron.estimate.noise.terms import allan_variance_of_terms
-from trihedron.records.noise import FloatArray, TermName
+from trihedron.records.noise import TermName
 
 TERMS = tuple(TermName)
 _RAMP = TERMS.index(TermName.RATE_RAMP)

@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.isotonic import never_falling
-from trihedron.records.noise import AllanKind, FloatArray
+from trihedron.records.noise import AllanKind
 
 KINDS = {
     "overlapping": _core.AllanKind.Overlapping,

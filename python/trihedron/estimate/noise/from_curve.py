@@ -10,13 +10,14 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import check_question, curve_with_intervals
 from trihedron.estimate.noise.axis import LEAST_EDF
 from trihedron.estimate.noise.curve_terms import LEAST_EDF as LEAST_EDF_OF_A_POINT
 from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints, chi_square_above
 from trihedron.records.finding import Finding
-from trihedron.records.noise import AllanCurve, FloatArray, Noise, NoiseAxis, NoiseTerm, TermName
+from trihedron.records.noise import AllanCurve, Noise, NoiseAxis, NoiseTerm, TermName
 
 FEWEST_POINTS = 6
 STEP = 1.9

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.isotonic import never_falling
-from trihedron.records.noise import FloatArray
 
 MOST_BRIDGED = 0.02
 """Share of missing readings up to which their place is bridged by a line: 2 % of white noise, given back."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.records import Recording
-from trihedron.records.noise import FloatArray
 from trihedron.units import acceleration_to_si, rate_to_si
 
 AXES = ("x", "y", "z")

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.records.hold_noise import Measured, Ratio
-from trihedron.records.noise import FloatArray
 
 MOST_LEFT_OUT = 0.25
 """Share of holds that may be left out for noise far above the rest's: a disturbed hold, not another sensor."""

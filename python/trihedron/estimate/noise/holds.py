@@ -15,12 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.corner import filter_corner
 from trihedron.estimate.noise.hold_statistics import as_measured, pooled_logarithm, robust_holds
 from trihedron.estimate.noise.resolution import converter_step
 from trihedron.estimate.noise.spectrum import cosine_transform
 from trihedron.records.hold_noise import HoldLine, HoldNoise, Measured, OctaveNoise
-from trihedron.records.noise import FloatArray
 
 SHORTEST = 32
 """Readings of a hold that is used: fewer hold no octave below the uppermost two."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import as_readings, check_question, curve_of_columns
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
@@ -18,7 +19,7 @@ from trihedron.estimate.noise.gaps import bridged
 from trihedron.estimate.noise.screening import Event, readout, repeated_rows, shaken, steps_and_knocks
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.finding import Finding
-from trihedron.records.noise import AllanCurve, FloatArray, Noise, NoiseAxis
+from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
 
 MOST_DISTURBED = 0.25
 """Share of an axis that may be left out by itself."""

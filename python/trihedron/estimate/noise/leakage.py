@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.records.noise import FloatArray
+from trihedron.arrays import FloatArray
 
 _ORDERS = 32
 

@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
-from trihedron.records.noise import FloatArray, SpectralLine
+from trihedron.records.noise import SpectralLine
 
 FALSE_ALARM = 1e-4
 TOLERANCE = 0.05

@@ -20,12 +20,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 
+from trihedron.arrays import FloatArray
 from trihedron.records.hold_noise import Measured, Ratio
-
-FloatArray = npt.NDArray[np.float64]
 
 FEWEST_CONTRASTS = 11
 """A variance from eleven differences is known to a factor of 1.5, its root to 1.25: with fewer nothing is compared."""

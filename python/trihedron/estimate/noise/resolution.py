@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.records.noise import FloatArray
+from trihedron.arrays import FloatArray
 
 MOST_READINGS = 200_000
 LEAST_REPEATS = 4

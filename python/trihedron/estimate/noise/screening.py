@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.records.noise import FloatArray
+from trihedron.arrays import FloatArray
 
 FALSE_ALARM = 1e-4
 """Probability that a clean log shows an event of one kind."""

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
-from trihedron.records.noise import FloatArray
 
 EVIDENCE = 8.0
 """Drop of the deviance that a term must earn. An absent term earns it by chance with a probability of 0.25 % (half a

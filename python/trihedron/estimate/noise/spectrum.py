@@ -15,6 +15,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.gaps import (
     MOST_BRIDGED,
     MOST_SLOW,
@@ -26,7 +27,6 @@ from trihedron.estimate.noise.gaps import (
     slow_over_fast,
 )
 from trihedron.estimate.noise.leakage import flicker_leakage
-from trihedron.records.noise import FloatArray
 
 LONGEST_TRANSFORM = 1 << 17
 """Longest transform; a longer stretch is averaged to block means first."""

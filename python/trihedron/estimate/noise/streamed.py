@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import (
     STREAM_BUDGET_BYTES,
@@ -21,7 +22,7 @@ from trihedron.estimate.noise.allan import (
 from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_between
 from trihedron.estimate.noise.screening import readout, steps_and_knocks
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
-from trihedron.records.noise import AllanCurve, FloatArray, Noise, NoiseAxis
+from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
 
 HEAD = 1 << 20
 """Readings kept as they are, from the start of the log: they show what is faster than the means."""

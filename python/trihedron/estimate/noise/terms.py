@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from trihedron.records.noise import FloatArray
+from trihedron.arrays import FloatArray
 
 SYMBOLS = ("Q", "N", "B", "K")
 """Order of the terms in every basis; the ramp R is a line, not a spectrum."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.coloured import Solution, solve
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
 from trihedron.sensor_model import other_form, other_form_jacobian
 
-FloatArray = npt.NDArray[np.float64]
 TURNS = 4
 """Steps of the direction of gravity: it starts within a degree or two, and each squares the error."""
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.together import Grid, Reference
-
-FloatArray = npt.NDArray[np.float64]
 
 LEAST_CORRELATION = 0.7
 """Below this the two motions are not taken for one: of 7140 pairs of unrelated hand motions of 30 to 60 s one in a

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+from trihedron.arrays import FloatArray, IntArray
+
 Mask = npt.NDArray[np.bool_]
 
 ORDERS = (0, 2, 12)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import f as f_distribution
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.accelerometer import ForceFit, fit_accelerometer
 from trihedron.estimate.reference.clocks import align
 from trihedron.estimate.reference.coloured import BLOCKS, Solution
@@ -23,7 +24,6 @@ from trihedron.records.reference import AgainstReference, Estimate, FitToReferen
 from trihedron.sensor_model import reframing
 from trihedron.units import rate_to_si
 
-FloatArray = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 MOST_WINDOWS = 20_000

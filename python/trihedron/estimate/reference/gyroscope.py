@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.coloured import NoiseModel, Solution, solve
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
 
-FloatArray = npt.NDArray[np.float64]
 TURNS = 6
 """Gauss-Newton steps of the clock: from a sample off, three reach a microsecond."""
 

@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron._core import rotation_from_vector
+from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.records.reference import ReplayStage
 
-FloatArray = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 HORIZON_S = 10.0

@@ -9,10 +9,10 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from trihedron.arrays import FloatArray
 from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
 
-FloatArray = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 LONGEST_GAP = 3.5

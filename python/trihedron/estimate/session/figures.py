@@ -8,15 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.session.carried import Carried, carried
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, SessionSolution
 from trihedron.estimate.session.observed import Observed
 from trihedron.records.calibration import FitQuality
-
-FloatArray = npt.NDArray[np.float64]
 
 N_ACCELEROMETER, N_GYROSCOPE = 9, 9
 

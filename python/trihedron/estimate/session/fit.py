@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import fdtrc
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.estimate.session.observed import Observed
 from trihedron.session.noise import START_STRENGTHS
-
-FloatArray = npt.NDArray[np.float64]
 
 FALSE_ALARM = 1e-3
 """Chance that the moves of a sound session are taken for noisier than their samples."""

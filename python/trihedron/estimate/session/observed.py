@@ -8,13 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.session.noise import measure_noise, scatter_unit
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

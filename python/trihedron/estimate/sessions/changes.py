@@ -12,12 +12,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import f as f_distribution
 
+from trihedron.arrays import FloatArray
 from trihedron.records.sessions import PARAMETERS, Change, ChangeKind, Session
-
-FloatArray = npt.NDArray[np.float64]
 
 SPREAD_DOF, WANDER_DOF = 25.0, 5.0
 """Degrees of freedom a session that its covariance and its wander bring: some 25 poses, and half of what was measured

@@ -16,15 +16,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2
 from scipy.stats import t as student
 
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.records.sessions import Spread
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 LEVEL = 0.95
 QUANTILES = 60

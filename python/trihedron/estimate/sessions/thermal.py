@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import f as f_distribution
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.sessions.spread import spread_within
 from trihedron.records.sessions import PARAMETERS, Session, Spread, ThermalModel, ThermalTerm
-
-FloatArray = npt.NDArray[np.float64]
 
 MAX_ORDER = 3
 SPARE = 2

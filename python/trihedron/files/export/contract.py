@@ -20,8 +20,6 @@ from trihedron.units import (
     rate_to_si,
 )
 
-FloatArray = npt.NDArray[np.float64]
-
 NO_GYRO = "no gyroscope in this calibration"
 
 

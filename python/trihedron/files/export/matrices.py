@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.files.plausible import named_sensors
 from trihedron.records import Calibration, SensorCalibration
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def lower_orthogonal(A: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,8 +8,8 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.files.export.contract import (
     NO_GYRO,
     ExportOptions,
@@ -26,7 +26,6 @@ from trihedron.files.export.matrices import lower_orthogonal
 from trihedron.records import Calibration
 from trihedron.sensor_model import in_frame, other_form
 
-FloatArray = npt.NDArray[np.float64]
 _AXES = ("x", "y", "z")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
-from trihedron.read.table import FloatArray
+from trihedron.arrays import FloatArray
 from trihedron.records import Finding, FindingCode
 
 Place = Callable[[int], str]

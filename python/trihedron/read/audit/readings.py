@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.read.audit.clipping import AXES, audit_clipping, find_walls, quantum, short
 from trihedron.read.audit.repeats import Repeats, longest_by_chance
 from trihedron.read.rest import Windows
-from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Severity
 
 Place = Callable[[int], str]

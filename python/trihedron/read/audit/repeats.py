@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from trihedron import _core
-from trihedron.read.table import FloatArray
+from trihedron.arrays import FloatArray
 
 CHUNK = 1 << 20
 """Rows after which windows begin anew."""

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.read.audit.clipping import AXES, quantum, short
-from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,

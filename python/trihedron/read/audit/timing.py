@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.read.clock.rate import usual_step
 from trihedron.read.clock.steps import steps_of
-from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode, Sampling, Severity, StampKind
 from trihedron.records.sampling import UNJUDGED
 

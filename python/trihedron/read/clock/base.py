@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.read.clock.order import order_of_rows, unwrap
 from trihedron.read.clock.steps import steps_of
 from trihedron.read.clock.unit import SECONDS, Witness, time_unit
 from trihedron.read.errors import ReadError
-from trihedron.read.table import FloatArray, Table
+from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 
 _SHORTEST_STEP_S = 1e-9

@@ -7,16 +7,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import median_filter
 
 from trihedron import _core
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, earliest, lateness, track
 from trihedron.read.clock.period import find_period
-from trihedron.read.table import FloatArray
 from trihedron.records.sampling import StampKind
-
-IntArray = npt.NDArray[np.int64]
 
 FEWEST_ROWS = 100
 """Fewer stamps tell no kind of clock."""

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import uniform_filter1d
 
-from trihedron.read.table import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from trihedron.arrays import FloatArray, IntArray
 
 CONTRAST = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
 """A sample against the cubic through its four neighbours, on an even grid."""

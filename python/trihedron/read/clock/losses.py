@@ -6,14 +6,11 @@ from itertools import pairwise
 from typing import cast
 
 import numpy as np
-import numpy.typing as npt
 from scipy.ndimage import median_filter
 
 from trihedron import _core
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.period import PAUSE_STEPS
-from trihedron.read.table import FloatArray
-
-IntArray = npt.NDArray[np.int64]
 
 LOST = 0.6
 """Part of a period by which the earliest stamps must move, and stay moved, for a sample to be lost."""
@@ -191,7 +188,7 @@ def behind_late_rows(tick: IntArray, error: FloatArray, period: float) -> IntArr
     if not len(at):
         return tick
     early = -0.1 * period
-    shift = np.zeros(len(tick), dtype=np.int64)
+    shift = np.zeros_like(tick)
     moved = False
     for i in at:
         k, count = int(i), int(tick[i] - tick[i - 1] - 1)
@@ -199,4 +196,4 @@ def behind_late_rows(tick: IntArray, error: FloatArray, period: float) -> IntArr
             shift[k] += count
             k += 1
         moved = moved or k > int(i)
-    return tick - shift if moved else tick
+    return np.subtract(tick, shift, out=shift) if moved else tick

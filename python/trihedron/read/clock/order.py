@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.read.errors import ReadError
-from trihedron.read.table import FloatArray, Table
+from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 
 MAX_DISPLACEMENT = 64

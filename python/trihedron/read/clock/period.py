@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import fft, special
 
-from trihedron.read.table import FloatArray
-
-IntArray = npt.NDArray[np.int64]
+from trihedron.arrays import FloatArray, IntArray
 
 WINDOW = 2048
 """Rows of one phase sum: a rate that wanders by 10⁻⁴ within it turns the phase by a fifth of a period."""

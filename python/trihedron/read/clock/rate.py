@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.read.clock.steps import steps_of
-from trihedron.read.table import FloatArray
 
 
 def usual_step(time_s: FloatArray) -> float:

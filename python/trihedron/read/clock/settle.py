@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.even import EvenClock, find_even_clock
 from trihedron.read.clock.followed import followed
 from trihedron.read.clock.steps import steps_of
-from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode
 from trihedron.records.sampling import Sampling, StampKind
-
-IntArray = npt.NDArray[np.int64]
 
 WORTH = 0.03
 """Stamps this part of a step (rms) about an even clock are as good as even (those rounded to a tenth of a step are):
@@ -78,8 +75,11 @@ def settle_clock(
     told = lost if clock.counts_losses else None
     if not is_even:
         return Settled(time_s, start_s, sampling, told, findings)
-    even = clock.even_s - clock.even_s[0]
-    return Settled(np.maximum.accumulate(even), start_s + float(clock.even_s[0]), sampling, told, findings)
+    start = float(clock.even_s[0])
+    even = clock.even_s - start
+    del clock
+    # In its own place: a long log has no room for a second.
+    return Settled(np.maximum.accumulate(even, out=even), start_s + start, sampling, told, findings)
 
 
 def sample_numbers(counter: FloatArray) -> IntArray | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron import _core
-from trihedron.read.table import FloatArray
+from trihedron.arrays import FloatArray
 
 
 @dataclass(frozen=True)

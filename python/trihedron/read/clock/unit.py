@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.read.clock.rate import usual_step
 from trihedron.read.clock.steps import steps_of
 from trihedron.read.errors import ReadError
-from trihedron.read.table import FloatArray
 from trihedron.records import Finding, FindingCode
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "100us": 1e-4}

@@ -6,11 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from trihedron.arrays import FloatArray
 from trihedron.read.errors import ReadError
 from trihedron.read.reference.roles import WAYS, Role
 from trihedron.read.table import Table
-
-FloatArray = npt.NDArray[np.float64]
 
 ROUNDING = 0.02
 """Matrices and quaternions printed with three digits are off by less than this."""

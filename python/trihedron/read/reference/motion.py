@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.read.clock import build_clock, settle_clock
 from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError
@@ -19,8 +20,6 @@ from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.reference import ReferenceMotion
 from trihedron.units import acceleration_to_si, rate_to_si
-
-FloatArray = npt.NDArray[np.float64]
 
 LONG_ROW_S = 0.5
 """Rows of rate further apart than this are commands that hold until the next: no logger of a table is so slow."""

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.arrays import FloatArray
 from trihedron.read.errors import ReadError
 from trihedron.read.panics import panics_unprinted
-from trihedron.read.table import FloatArray
 from trihedron.read.text.dates import form_of, seconds
 from trihedron.read.text.layout import MISSING, Layout
 

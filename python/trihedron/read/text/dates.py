@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from trihedron.read.table import FloatArray
+from trihedron.arrays import FloatArray
 
 if TYPE_CHECKING:
     import polars as pl

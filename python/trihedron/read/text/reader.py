@@ -12,11 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.read.columns import find_columns
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.room import check_memory
-from trihedron.read.table import FloatArray, Table, file_sha256
+from trihedron.read.table import Table, file_sha256
 from trihedron.read.text.ahead import Bytes, blocks_ahead
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks, has_semicolon_remarks, with_hash_remarks
 from trihedron.read.text.cells import MAX_WORDS, TextColumn, find_text_columns, numbers, parse, refuse_words

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from trihedron.read.table import FloatArray
+from trihedron.arrays import FloatArray
 
 _SPARE = 1.02
 """Room made beyond the rows expected; memory that is never written to is never taken."""

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.simulate.motion.steps import LEVEL, FloatArray, Quaternion
+from trihedron.arrays import FloatArray
+from trihedron.simulate.motion.steps import LEVEL, Quaternion
 
 
 def quaternion_product(p: Quaternion, q: Quaternion) -> Quaternion:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from trihedron import _core
+from trihedron.arrays import FloatArray
 from trihedron.records.truth import SegmentKind
 from trihedron.simulate.motion.attitude import (
     quaternion_from_vector,
@@ -19,7 +20,6 @@ from trihedron.simulate.motion.attitude import (
 )
 from trihedron.simulate.motion.steps import (
     NOWHERE,
-    FloatArray,
     Hold,
     Motion,
     MoveTo,

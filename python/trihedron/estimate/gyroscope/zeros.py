@@ -1,0 +1,63 @@
+"""Zero readings of the holds: their common value, how far the true zero changes, and what each hold then has."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import chdtri
+
+from trihedron.arrays import FloatArray
+
+
+def pool_zeros(
+    zero: FloatArray, var_zero: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Random-effects mean of zero readings (n, 3) of variance (n, 3) (DerSimonian & Laird 1986).
+
+    Returns weights (n, 3), mean (3,), its variance (3,), χ² against constancy (3,) with n − 1 degrees of freedom, and
+    the variance (3,) of the true zero between holds, nothing where χ² is within chance.
+    """
+    floor = np.maximum(var_zero, 1e-30 + 1e-24 * zero**2)
+    weight = 1.0 / floor
+    total = weight.sum(axis=0)
+    mean = (weight * zero).sum(axis=0) / total
+    chi2 = (weight * (zero - mean) ** 2).sum(axis=0)
+    dof = len(zero) - 1
+    spread = np.maximum(chi2 - dof, 0.0) / np.maximum(total - (weight**2).sum(axis=0) / total, 1e-300)
+    # Only a change beyond chance counts: a spread fitted to pure noise would spoil the weights of long holds.
+    spread = np.where(chi2 > dof + 4.0 * np.sqrt(2.0 * max(dof, 1)), spread, 0.0)
+    weight = 1.0 / (floor + spread)
+    weight /= weight.sum(axis=0)
+    mean = (weight * zero).sum(axis=0)
+    variance = (weight**2 * (floor + spread)).sum(axis=0)
+    return np.ascontiguousarray(weight), mean, variance, chi2, spread
+
+
+def excess_variance(values: FloatArray, noise: FloatArray) -> FloatArray:
+    """Variance (3,) beyond ``noise`` (n, 3) in ``values`` (n, 3) about zero, from the median: deaf to single bad holds.
+
+    Solves ``median(x²/(v + τ²)) = median of χ²(1)`` for τ² of each column; zero where noise alone explains the median.
+    """
+    target = float(chdtri(1, 0.5))
+    out = np.zeros(values.shape[1])
+    for axis, (x2, v) in enumerate(zip((values**2).T, noise.T, strict=True)):
+        low, high = 0.0, float(np.max(x2)) / target
+        if np.median(x2 / np.maximum(v, 1e-300)) <= target:
+            continue
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if np.median(x2 / (v + middle)) > target else (low, middle)
+        out[axis] = high
+    return out
+
+
+def shrink(zero: FloatArray, var_zero: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Zero readings of the holds drawn to the session's by their noise: ``(z/v + z̄/τ²)/(1/v + 1/τ²)`` and its variance.
+
+    With a zero that changes (τ² ≫ v) each hold keeps its own; with a steady one a short hold borrows from the others.
+    """
+    n = len(zero)
+    tau2 = excess_variance((zero - mean) * np.sqrt(n / max(n - 1, 1)), var_zero)
+    gain = tau2 / np.maximum(tau2 + var_zero, 1e-300)
+    pooled = 1.0 / np.sum(1.0 / np.maximum(var_zero + tau2, 1e-300), axis=0)
+    variance = gain * var_zero + (1.0 - gain) ** 2 * pooled
+    return np.ascontiguousarray(mean + gain * (zero - mean)), np.ascontiguousarray(variance)

@@ -1,0 +1,58 @@
+"""Where the calibration without reference attitudes starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.arrays import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class NormStart:
+    """Where the filter starts: ``f = S (raw − zero)`` with S (3, 3) and zero (3,).
+
+    S is good to ``sigma_relative`` of its size, the zero reading to ``sigma_zero_m_s2``. The signs of S decide
+    the signs of the result: the length of a vector cannot.
+    """
+
+    S: FloatArray
+    zero: FloatArray
+    sigma_relative: float = 0.1
+    sigma_zero_m_s2: float = 1.0
+
+    def __post_init__(self) -> None:
+        S, zero = np.array(self.S, dtype=np.float64), np.array(self.zero, dtype=np.float64)
+        if S.shape != (3, 3) or zero.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(zero))):
+            raise ValueError(f"a start needs finite S (3, 3) and zero (3,), got shapes {S.shape} and {zero.shape}")
+        if np.linalg.matrix_rank(S) < 3:
+            raise ValueError(
+                "a start needs three independent axes: S = 0 is no calibration, but the filter would stay there"
+            )
+        if not (self.sigma_relative > 0 and self.sigma_zero_m_s2 > 0):
+            raise ValueError("the uncertainty of a start must be positive")
+        object.__setattr__(self, "S", S)
+        object.__setattr__(self, "zero", zero)
+
+    @classmethod
+    def nominal(cls, si_per_raw: float, zero: npt.ArrayLike = (0.0, 0.0, 0.0)) -> NormStart:
+        """The data sheet: one scale [m/s² per raw unit] for all axes, and the zero reading."""
+        return cls(si_per_raw * np.eye(3), np.asarray(zero, dtype=np.float64))
+
+    @classmethod
+    def from_range(cls, readings: npt.ArrayLike, gravity_m_s2: float) -> NormStart:
+        """A guess from mean readings (n, 3) alone: each axis has been near the vertical, both ways up.
+
+        Raises
+        ------
+        ValueError
+            When an axis did not move.
+        """
+        a = np.asarray(readings, dtype=np.float64)
+        half = (a.max(axis=0) - a.min(axis=0)) / 2.0
+        if np.any(half <= 0):
+            raise ValueError(f"axis {'xyz'[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
+        zero = (a.max(axis=0) + a.min(axis=0)) / 2.0
+        return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_zero_m_s2=3.0)

@@ -1,0 +1,115 @@
+"""Domains in which residuals are looked at, their tests, and how well each is predicted where no fit looked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from trihedron.arrays import FloatArray
+from trihedron.records.frozen import Frozen
+
+Domain = Literal["static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing", "numbers", "noise"]
+DOMAINS: tuple[Domain, ...] = ("static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing")
+
+
+@dataclass(frozen=True)
+class Where:
+    """What carries a disagreement: channels, segments (``hold 3``, ``move 7``), stretches of time, frequencies."""
+
+    channels: tuple[str, ...] = ()
+    segments: tuple[str, ...] = ()
+    times_s: tuple[tuple[float, float], ...] = ()
+    frequencies_hz: tuple[float, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        return {
+            "channels": list(self.channels),
+            "segments": list(self.segments),
+            "times_s": [list(pair) for pair in self.times_s],
+            "frequencies_hz": list(self.frequencies_hz),
+        }
+
+
+@dataclass(frozen=True)
+class DomainTest:
+    """Residuals of one domain, whitened by the predicted noise, against what a healthy recording gives."""
+
+    domain: Domain
+    chi2_per_dof: float
+    dof: float
+    p_value: float
+    disagrees: bool
+    where: Where = Where()
+    rms: float = 0.0
+    unit: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types (the ``domains`` and ``remaining`` entries of the schema)."""
+        return {
+            "domain": self.domain,
+            "chi2_per_dof": self.chi2_per_dof,
+            "dof": self.dof,
+            "p_value": self.p_value,
+            "disagrees": self.disagrees,
+            "where": self.where.to_dict(),
+            "rms": self.rms,
+            "unit": self.unit,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class DomainResiduals(Frozen):
+    """What one domain looks like before and after the accepted effects, pose by pose or move by move, SI or degrees.
+
+    ``before`` (n, k) and ``after`` (m, k) at ``time_before_s`` (n,), ``time_after_s`` (m,) (middle of pose or move),
+    with ``sigma_before`` (n,), ``sigma_after`` (m,) the noise predicted for one number. An effect that leaves moves
+    out or splits poses makes n and m differ. ``channels`` (k,) names the columns, ``kind`` is ``hold`` or ``move``.
+    """
+
+    domain: Domain
+    quantity: str
+    unit: str
+    kind: Literal["hold", "move"]
+    channels: tuple[str, ...]
+    time_before_s: FloatArray
+    before: FloatArray
+    sigma_before: FloatArray
+    time_after_s: FloatArray
+    after: FloatArray
+    sigma_after: FloatArray
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        arrays = ("time_before_s", "before", "sigma_before", "time_after_s", "after", "sigma_after")
+        return {
+            "domain": self.domain,
+            "quantity": self.quantity,
+            "unit": self.unit,
+            "kind": self.kind,
+            "channels": list(self.channels),
+            **{name: getattr(self, name).tolist() for name in arrays},
+        }
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Prediction of poses and moves the fit did not see, without and with the effect, in the domain it helps most."""
+
+    domain: Domain
+    chi2_per_dof_before: float
+    chi2_per_dof_after: float
+    rms_before: float
+    rms_after: float
+    unit: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        return {
+            "domain": self.domain,
+            "chi2_per_dof_before": self.chi2_per_dof_before,
+            "chi2_per_dof_after": self.chi2_per_dof_after,
+            "rms_before": self.rms_before,
+            "rms_after": self.rms_after,
+            "unit": self.unit,
+        }

@@ -1,0 +1,71 @@
+"""The models of a diagnosis: S and b without and with the effects, gravity and noise."""
+
+from __future__ import annotations
+
+from trihedron.records.diagnosis import Diagnosis
+from trihedron.report.diagnosis_words import (
+    size_in_words,
+    value_in_words,
+)
+from trihedron.report.document import Block, Facts, Table
+from trihedron.report.numbers import (
+    engineering_exponent,
+    plain_number,
+    power_of_ten,
+    unit_in_print,
+)
+
+
+def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    blocks: list[Block] = []
+    for name in ("accelerometer", "gyroscope"):
+        before, after = getattr(diagnosis.baseline, name), getattr(diagnosis.extended, name)
+        if before is None or after is None or before["raw_unit"] == "none":
+            continue
+        rows = [
+            (f"S{i + 1}{j + 1}", _both(before, "S", (i, j)), _both(after, "S", (i, j)))
+            for i in range(3)
+            for j in range(3)
+            if before["sigma_S"][i][j] > 0.0
+        ]
+        rows += [(f"b{i + 1}", _both(before, "b", (i,)), _both(after, "b", (i,))) for i in range(3)]
+        unit = before["raw_unit"]
+        blocks.append(
+            Table(("", "linear", "with the effects"), tuple(rows), f"{name.capitalize()}, raw in {unit_in_print(unit)}")
+        )
+    gravity = getattr(diagnosis, "gravity_source", "")
+    facts = [("gravity", f"{diagnosis.gravity_m_s2:.5f} m/s²" + (f", {gravity}" if gravity else ""))]
+    for name in ("accelerometer", "gyroscope"):
+        density = diagnosis.noise.get(f"{name}_density")
+        if density is not None:
+            unit = str(diagnosis.noise.get(f"{name}_unit", ""))
+            words = ", ".join(plain_number(float(d)) for d in density)
+            words += f" {unit_in_print(unit).replace('sqrt(Hz)', '√Hz')}"
+            corner = diagnosis.noise[f"{name}_corner_s"]
+            if corner is not None:
+                words += f"; bias walk from {plain_number(float(corner))} s on"
+            facts.append((f"{name} noise", words))
+        hidden = diagnosis.noise.get(f"{name}_zero")
+        if hidden:
+            unit = "m/s^2" if name == "accelerometer" else "rad/s"
+            words = f"{size_in_words(hidden['rms'], unit)} rms from pose to pose taken up by its walk"
+            words += f"; a pose's mean is good to {size_in_words(hidden['noise'], unit)}"
+            words += "; the walk is as strong as the model allows" if hidden["is_at_edge"] else ""
+            facts.append((f"{name} zero", words))
+    blocks.append(Facts(tuple(facts)))
+    return tuple(blocks)
+
+
+def _both(model: object, key: str, place: tuple[int, ...]) -> str:
+    value, sigma = model[key], model["sigma_" + key]  # type: ignore[index]
+    for k in place:
+        value, sigma = value[k], sigma[k]
+    return _number_with_sigma(float(value), float(sigma))
+
+
+def _number_with_sigma(value: float, sigma: float) -> str:
+    exponent = engineering_exponent(max(abs(value), sigma))
+    if sigma <= 0.0 or -3 < exponent <= 3:
+        return value_in_words(value, sigma)
+    scale = 10.0**-exponent
+    return f"({value_in_words(scale * value, scale * sigma)}) {power_of_ten(exponent)}"

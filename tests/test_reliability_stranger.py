@@ -1,0 +1,137 @@
+"""What a stranger's system does to a command: closed streams, odd locales, two writers, a log that still grows."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+import trihedron
+from small_session import G, copied, leftovers, run, started
+from trihedron.documents import DocumentError, parse_json
+from trihedron.read import read_recording
+
+ENVIRONMENTS = {
+    "C without UTF-8": {"LC_ALL": "C", "LANG": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    "unknown locale, no home, dumb terminal": {"LC_ALL": "xx_YY.foo", "HOME": "", "TERM": "dumb", "COLUMNS": "0"},
+}
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_the_answer_does_not_depend_on_locale_home_or_terminal(tmp_path, name):
+    folder = copied(tmp_path)
+    plain = run("check", "log.csv", "--json", "-", cwd=folder)
+    odd = run("check", "log.csv", "--json", "-", cwd=folder, env=ENVIRONMENTS[name])
+    made = [re.sub(r'"(made_at|created)": "[^"]*"', "", out) for _, out, _ in (plain, odd)]
+    assert plain[0] == odd[0] == 0
+    assert json.loads(plain[1])
+    assert made[0] == made[1]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell closes the streams")
+@pytest.mark.parametrize(
+    ("closed", "status", "is_written"),
+    [("2>&-", 0, True), ("<&- 2>&-", 0, True), ("<&-", 0, True), (">&-", 1, None), ("<&- >&- 2>&-", 1, None)],
+)
+def test_closed_streams_lose_no_result_and_reach_no_file(tmp_path, closed, status, is_written):
+    folder = copied(tmp_path)
+    line = f"{sys.executable} -m trihedron calibrate log.csv --gravity {G} -o new.json {closed}"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    done = subprocess.run(line, shell=True, cwd=folder, env=environment, capture_output=True, timeout=120)
+    assert done.returncode == status
+    if is_written:
+        assert b"Calibration" in done.stdout
+    new = folder / "new.json"
+    # Whole where it is there: what is said to a closed stream never lands in a file that took its number.
+    assert not is_written or new.exists()
+    assert not new.exists() or json.loads(new.read_text())["is_trustworthy"] is not None
+    assert leftovers(folder) == []
+
+
+@pytest.mark.parametrize("options", [[], ["--force"]])
+def test_of_writers_of_one_output_each_says_whether_it_wrote(tmp_path, options):
+    folder = copied(tmp_path)
+    line = ["calibrate", "log.csv", "--gravity", G, "-o", "one.json", *options]
+    writers = [started(*line, cwd=folder) for _ in range(3)]
+    said = [writer.communicate(timeout=120)[1].decode() for writer in writers]
+    written = [writer.returncode == 0 for writer in writers]
+    assert sum(written) == (3 if options else 1)
+    assert all("left alone" in text for text, wrote in zip(said, written, strict=True) if not wrote)
+    assert json.loads((folder / "one.json").read_text())
+    assert leftovers(folder) == []
+
+
+def test_a_log_that_grows_while_it_is_read_is_what_it_was_at_some_moment(tmp_path):
+    folder = copied(tmp_path)
+    log = folder / "log.csv"
+    head, *rows = log.read_text().splitlines(keepends=True)
+    log.write_text(head + "".join(rows[:1000]))
+    with log.open("a") as stream:
+        for k in range(1000, len(rows), 400):
+            # The last line is cut in its middle, as a logger's buffer leaves it.
+            text = "".join(rows[k : k + 400])
+            stream.write(text[:-7])
+            stream.flush()
+            recording = read_recording(log)
+            assert recording.rows_read + recording.rows_reported == recording.rows_in_file
+            assert abs(recording.rows_in_file - min(k + 400, len(rows))) <= 1
+            stream.write(text[-7:])
+            stream.flush()
+
+
+@pytest.mark.parametrize("text", ['{"a": 1, "a": 2}', '[{"b": {"a": 1, "a": 1}}]', '{"\\u0061": 1, "a": 2}'])
+def test_a_key_given_twice_is_refused_and_not_the_last_taken(text):
+    with pytest.raises(DocumentError, match="gives 'a' twice"):
+        parse_json(text)
+
+
+def test_a_calibration_that_says_twice_whether_to_trust_it_is_refused(tmp_path):
+    folder = copied(tmp_path)
+    text = (folder / "c.json").read_text()
+    (folder / "twice.json").write_text(text.replace('"is_trustworthy":', '"is_trustworthy": false, "is_trustworthy":'))
+    status, _, err = run("apply", "twice.json", "log.csv", "-o", "out.csv", cwd=folder)
+    assert (status, (folder / "out.csv").exists()) == (1, False)
+    assert "'is_trustworthy' twice" in err
+
+
+@pytest.mark.parametrize(
+    "text", ["a = " + "[" * 5000 + "]" * 5000, ".".join("a" * 5000) + " = 1", "a = " + "{b=" * 3000 + "1" + "}" * 3000]
+)
+def test_toml_nested_beyond_reason_is_refused(tmp_path, text):
+    from trihedron.simulate.scenario_file import read_scenario
+
+    (tmp_path / "s.toml").write_text(text + "\n")
+    with pytest.raises(ValueError, match="nested too deeply"):
+        read_scenario(tmp_path / "s.toml")
+
+
+def test_names_of_files_do_not_break_the_line_of_a_repr(tmp_path):
+    folder = copied(tmp_path)
+    log = folder / "a\nb\x1b[2J\t.csv"
+    (folder / "log.csv").rename(log)
+    recording = trihedron.read(log)
+    results = [recording, trihedron.calibrate(recording, gravity_m_s2=float(G)), trihedron.check(recording)]
+    results += [
+        results[1].calibration,
+        trihedron.noise(recording),
+        trihedron.diagnose(recording, gravity_m_s2=float(G)),
+    ]
+    for result in results:
+        assert repr(result).isprintable(), result
+        assert "a\\nb\\x1b[2J\\t.csv" in repr(result)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes")
+def test_names_that_are_no_text_are_read_written_and_spelled_out(tmp_path):
+    folder = copied(tmp_path)
+    os.rename(folder / "log.csv", os.fsencode(folder) + b"/\xff\xfe.csv")
+    out = os.fsencode(folder) + b"/\xff.json"
+    status, said, _ = run(
+        "calibrate", os.fsdecode(b"\xff\xfe.csv"), "--gravity", G, "-o", os.fsdecode(b"\xff.json"), cwd=folder
+    )
+    assert status == 0
+    assert "\\udcff\\udcfe.csv" in said
+    with open(out, encoding="utf-8") as stream:
+        assert json.load(stream)
