@@ -11,10 +11,10 @@ from scipy.ndimage import median_filter
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaincc
 
+from trihedron.arrays import FloatArray
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 
-FloatArray = npt.NDArray[np.float64]
 SURE = 1e-8
 """Chance of such a line in noise, all frequencies of a pose counted. A fainter one of six cycles or more moves the
 plain mean by less than a quarter of its standard error, and need not be fitted."""
