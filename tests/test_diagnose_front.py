@@ -254,7 +254,7 @@ def test_every_accepted_effect_is_simulated_or_left_out_with_a_reason():
     numbers = {"K2_x": 1e-4, "offset_x": 0.01, "half_width": 2.0, "warm_up_x": 0.1, "time_constant": 50.0}
     numbers |= {"bias_per_kelvin_x": 1e-3, "jitter": 1e-4, "accelerometer_delay": 1e-3, "accelerometer_lag": 1e-3}
     numbers |= {"lost_at_90.00s": 12.0, "frequency": 17.0, "amplitude_ax": 0.05, "latitude": 55.0, "r_x": 0.1}
-    numbers |= {"limit_x+": 4.0, "accel_bias_per_power_x": 1e-3, "G_xx": 1e-4}
+    numbers |= {"limit_x+": 4.0, "accel_bias_per_power_x": 1e-3, "G_xx": 1e-4, "sigma": 0.003, "sigma_x": 1e-3}
     parameters = [{"name": k, "value": v, "std": 0.0, "unit": ""} for k, v in numbers.items()]
     for effect in catalogue():
         entry = {"id": effect.id, "parameters": parameters, "model": {"variant": "warm-up"}}
