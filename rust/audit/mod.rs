@@ -70,6 +70,8 @@ pub fn extremes(rows: &[[f64; 3]]) -> [Extremes; 3] {
     })
 }
 
+// The extremes are readings themselves: equal is equal to the last bit.
+#[allow(clippy::float_cmp)]
 fn extremes_of_axis(rows: &[[f64; 3]], axis: usize) -> Extremes {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for row in rows {

@@ -117,6 +117,8 @@ fn part(rows: &[[f64; 3]], first: usize, stop: usize) -> Part {
         for i in at..end {
             let (before, row) = (rows[i - 1], rows[i]);
             let bit = 1_u64 << (i - at);
+            // Repeated means to the last bit.
+            #[allow(clippy::float_cmp)]
             let equal: [bool; 3] = std::array::from_fn(|axis| row[axis] == before[axis]);
             for axis in 0..3 {
                 same[axis] |= if equal[axis] { bit } else { 0 };
@@ -134,6 +136,8 @@ fn part(rows: &[[f64; 3]], first: usize, stop: usize) -> Part {
         for k in 0..KINDS {
             follow(&mut out, k, same[k], at as u64, len as u64, &mut run[k]);
         }
+        // At most 64 ones.
+        #[allow(clippy::cast_possible_truncation)]
         out.windows.push(same.map(|bits| bits.count_ones() as u8));
         at = end;
     }

@@ -47,7 +47,9 @@ pub(super) fn solve(half: &Cholesky<f64, Dyn>, rhs: &DMatrix<f64>) -> DMatrix<f6
             add_scaled(own, -lower[(i, j)], other);
         }
         let inverse = lower[(i, i)].recip();
-        own.iter_mut().for_each(|value| *value *= inverse);
+        for value in own.iter_mut() {
+            *value *= inverse;
+        }
     }
     for i in (0..n).rev() {
         let (upto, after) = data.split_at_mut((i + 1) * m);
@@ -56,7 +58,9 @@ pub(super) fn solve(half: &Cholesky<f64, Dyn>, rhs: &DMatrix<f64>) -> DMatrix<f6
             add_scaled(own, -lower[(i + 1 + j, i)], other);
         }
         let inverse = lower[(i, i)].recip();
-        own.iter_mut().for_each(|value| *value *= inverse);
+        for value in own.iter_mut() {
+            *value *= inverse;
+        }
     }
     rows.transpose()
 }

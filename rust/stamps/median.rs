@@ -16,7 +16,7 @@ pub fn median(values: &mut [f64]) -> f64 {
         return upper;
     }
     let lower = below.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    (lower + upper) / 2.0
+    f64::midpoint(lower, upper)
 }
 
 /// Median of the steps forward of stamps; NaN where there is none.
@@ -48,7 +48,7 @@ pub fn usual_step(time: &[f64]) -> f64 {
         });
         below.into_iter().max().unwrap_or(upper.bits)
     };
-    (f64::from_bits(lower) + f64::from_bits(upper.bits)) / 2.0
+    f64::midpoint(f64::from_bits(lower), f64::from_bits(upper.bits))
 }
 
 struct Found {
@@ -67,7 +67,10 @@ fn at_rank(time: &[f64], rank: usize, least: u64, most: u64) -> Found {
             for bits in steps {
                 let place = bits.wrapping_sub(from);
                 if place <= width {
-                    counts[(place >> shift) as usize] += 1;
+                    // Shifted to DIGIT bits.
+                    #[allow(clippy::cast_possible_truncation)]
+                    let digit = (place >> shift) as usize;
+                    counts[digit] += 1;
                 }
             }
             counts

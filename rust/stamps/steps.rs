@@ -19,6 +19,7 @@ pub struct Steps {
 
 /// What steps there are; those at a missing stamp are of no kind.
 #[must_use]
+#[allow(clippy::float_cmp)] // the same stamp is the same to the last bit
 pub fn steps(time: &[f64]) -> Steps {
     shares(time)
         .map(|(first, stamps)| {
