@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
+from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.segment.channels import Channels
 from trihedron.segment.noise import Range
@@ -77,7 +77,7 @@ def drifting_blocks(
             variance = _noise_of_change(channels, windows, half, white_variance)
             live = variance > 0.0
             statistic = (windows.change[:, live] ** 2 / variance[live]).sum(axis=1)
-            limit = float(special.chdtri(max(int(live.sum()), 1), FALSE_ALARM))
+            limit = float(probability.chdtri(max(int(live.sum()), 1), FALSE_ALARM))
             moving[windows.first[statistic > limit] + half] = True
         out.append(moving)
     return out
@@ -119,7 +119,7 @@ def _noise_of_change(channels: Channels, windows: _Windows, half: int, white_var
         # A channel that never changes has no noise to be weighed by.
         scale = np.sqrt(np.where(white > 0.0, white, max(float(white.max()), 1.0)))
         rest = windows.left(_share_of_gyroscope(windows.some(MOST_FITTED), scale))
-    seen = np.median(rest**2, axis=0) / float(special.chdtri(1, 0.5))
+    seen = np.median(rest**2, axis=0) / float(probability.chdtri(1, 0.5))
     floor = 2.0 * channels.quantisation_variance[accelerometer] / (half * channels.length)
     out: FloatArray = np.maximum(np.maximum(seen, white), floor)
     return out

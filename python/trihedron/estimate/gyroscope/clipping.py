@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 
 LONGEST_BRIDGE_S = 0.15
@@ -64,7 +65,7 @@ def _is_cut(column: FloatArray, at: BoolArray) -> bool:
     it has fallen by at most 4 q n/(n − 1)² more; rounding may add a step, and noise its own jumps.
     """
     finite = column[np.isfinite(column)]
-    gaps = np.diff(np.unique(finite))
+    gaps = np.diff(_core.levels_of(column)[0])
     if not len(gaps):
         return False
     quantum = float(np.median(gaps[gaps <= 1.5 * np.quantile(gaps, 0.25)]))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import chdtri
 
 from trihedron.arrays import FloatArray
+from trihedron.probability import chdtri
 
 
 def pool_zeros(
