@@ -1,7 +1,7 @@
 """Outputs: whole or not at all, never over an input, never in the place of a device, and cleared up after a kill."""
 
-import json
 import contextlib
+import json
 import os
 import shutil
 import signal
