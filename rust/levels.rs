@@ -5,14 +5,55 @@ use rayon::prelude::*;
 /// Different values up to which a table finds them; more are no converter's codes, and sorting is as fast.
 const MOST_IN_TABLE: usize = 1 << 16;
 
+/// Span of whole numbers up to which a bit each finds them: the codes of 24-bit converters in two megabytes.
+const MOST_CODES: f64 = (1 << 24) as f64;
+
 /// Different values that are numbers, in ascending order, and how many readings are numbers.
 #[must_use]
-pub fn levels(readings: impl Iterator<Item = f64>) -> (Vec<f64>, usize) {
+pub fn levels(readings: &[f64]) -> (Vec<f64>, usize) {
+    let (mut low, mut high, mut finite, mut is_whole) = (f64::INFINITY, f64::NEG_INFINITY, 0, true);
+    for &v in readings {
+        let is_finite = v.is_finite();
+        finite += usize::from(is_finite);
+        low = if is_finite && v < low { v } else { low };
+        high = if is_finite && v > high { v } else { high };
+        is_whole &= !is_finite || v.trunc() == v;
+    }
+    if finite == 0 {
+        return (Vec::new(), 0);
+    }
+    let numbers = readings.iter().copied().filter(|v| v.is_finite());
+    if is_whole && high - low < MOST_CODES {
+        return (codes(numbers, low, high), finite);
+    }
+    (different(numbers), finite)
+}
+
+/// Whole numbers from `low` to `high` that occur.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "whole numbers from 0 to MOST_CODES"
+)]
+fn codes(numbers: impl Iterator<Item = f64>, low: f64, high: f64) -> Vec<f64> {
+    let mut seen = vec![0_u64; (high - low) as usize / 64 + 1];
+    for v in numbers {
+        let code = (v - low) as usize;
+        seen[code / 64] |= 1 << (code % 64);
+    }
+    let mut found = Vec::new();
+    for (word, mut bits) in (0_u32..).zip(seen) {
+        while bits != 0 {
+            found.push(low + f64::from(word * 64 + bits.trailing_zeros()));
+            bits &= bits - 1;
+        }
+    }
+    found
+}
+
+fn different(mut numbers: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut table = Table::new();
-    let mut finite = 0;
-    let mut numbers = readings.filter(|v| v.is_finite());
     for value in &mut numbers {
-        finite += 1;
         // Minus zero equals zero.
         table.add((value + 0.0).to_bits());
         if table.held > MOST_IN_TABLE {
@@ -20,12 +61,10 @@ pub fn levels(readings: impl Iterator<Item = f64>) -> (Vec<f64>, usize) {
         }
     }
     let mut found = table.values();
-    let before = found.len();
     found.extend(numbers.map(|v| v + 0.0));
-    finite += found.len() - before;
     found.par_sort_unstable_by(f64::total_cmp);
     found.dedup_by_key(|v| v.to_bits());
-    (found, finite)
+    found
 }
 
 /// A set of bit patterns by open addressing; never more than half full.

@@ -7,6 +7,7 @@ pub mod allan;
 pub mod attitude;
 pub mod audit;
 pub mod banded;
+pub mod block_motion;
 pub mod chi_square;
 pub mod ellipsoid;
 pub mod error;

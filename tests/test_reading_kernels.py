@@ -169,8 +169,7 @@ def jolted_motion(seed, channels):
     motion = 300.0 * np.sin(2 * np.pi * rng.uniform(0.3, 1.5, channels) * t + rng.uniform(0.0, 6.0, channels))
     readings = motion + rng.normal(size=motion.shape)
     readings = np.delete(readings, [100, 250, 251, 400], axis=0)
-    readings = np.insert(readings, [200, 300, 500], readings[[200, 300, 500]], axis=0)
-    return readings
+    return np.insert(readings, [200, 300, 500], readings[[200, 300, 500]], axis=0)
 
 
 @pytest.mark.parametrize("channels", [3, 6])

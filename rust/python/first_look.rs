@@ -20,9 +20,8 @@ fn levels_of<'py>(
     py: Python<'py>,
     readings: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<(Bound<'py, PyArray1<f64>>, usize)> {
-    // Columns of a triad lie apart: they are walked over where they are.
-    let view = readings.as_array();
-    let (found, finite) = super::run(py, || Ok(levels::levels(view.iter().copied())))?;
+    let flat = flat1(&readings);
+    let (found, finite) = super::run(py, || Ok(levels::levels(&flat)))?;
     Ok((PyArray1::from_vec(py, found), finite))
 }
 

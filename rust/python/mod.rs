@@ -13,6 +13,7 @@ mod allan;
 mod arrays;
 mod attitude;
 mod audit;
+mod block_motion;
 mod chi_square;
 mod doorway;
 mod first_look;
@@ -41,6 +42,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     allan::register(module)?;
     attitude::register(module)?;
     audit::register(module)?;
+    block_motion::register(module)?;
     chi_square::register(module)?;
     first_look::register(module)?;
     gyro_alignment::register(module)?;

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron import probability
+from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels
 from trihedron.segment.floor import Activity
@@ -252,17 +252,13 @@ def trim_edges(channels: Channels, run: Run, noise: MeanNoise) -> Run:
 
 
 def _clean_from(off: FloatArray, core_variance: FloatArray, channels: Channels, noise: MeanNoise, most: int) -> int:
-    total = np.vstack([np.zeros(off.shape[1]), np.cumsum(off, axis=0)])
     sizes = [2**k for k in range(16) if 2**k <= most]
     live = np.flatnonzero(noise.variance(1.0) > 0.0)
     limit = float(probability.chdtri(len(live), CLEAN_EDGE))
-    dirty = np.zeros(most + 1, dtype=bool)
-    for size in sizes:
-        variance = noise.variance(size * channels.step_s) + core_variance + channels.quantisation_variance
-        mean = (total[size : size + most + 1] - total[: most + 1][: len(total) - size]) / size
-        statistic = (mean[:, live] ** 2 / variance[live]).sum(axis=1)
-        dirty[: len(statistic)] |= statistic > limit
-    clean = np.flatnonzero(~dirty)
+    duration_s = np.array(sizes, dtype=np.float64)[:, None] * channels.step_s
+    variance = np.zeros((len(sizes), off.shape[1]))
+    variance[:, live] = (noise.variance(duration_s) + core_variance + channels.quantisation_variance)[:, live]
+    clean = _core.first_clean(off, most, sizes, variance, limit)
     # A soft beginning goes on below what can be seen: as much again is given away; and one block, which may be the
     # one the motion begins in.
-    return min(2 * int(clean[0]) + 1, most) if len(clean) else most
+    return most if clean is None else min(2 * clean + 1, most)

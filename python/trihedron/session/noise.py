@@ -79,8 +79,12 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
 
 
 def _second_half_minus_first(values: FloatArray) -> FloatArray:
-    first, second = np.array_split(values, 2)
-    out: FloatArray = np.nanmean(second, axis=0) - np.nanmean(first, axis=0)
+    half = -(-len(values) // 2)
+    first, second = values[:half], values[half:]
+    out: FloatArray = second.mean(axis=0) - first.mean(axis=0)
+    if not np.isfinite(out).all():
+        # The mean that passes over missing readings takes several times as long.
+        out = np.nanmean(second, axis=0) - np.nanmean(first, axis=0)
     return out
 
 
