@@ -46,6 +46,14 @@ def test_counts(count, trials):
     assert probability.bdtrc(count, trials, 0.5) == pytest.approx(float(expected), rel=RTOL)
 
 
+@pytest.mark.parametrize(("k", "n"), [(1, 20), (7, 20), (20, 20), (150, 2000)])
+def test_shares(k, n):
+    for below in (0.025, 0.5, 0.975):
+        assert probability.betaincinv(k, n - k + 1, below) == pytest.approx(
+            special.betaincinv(k, n - k + 1, below), rel=RTOL
+        )
+
+
 def test_no_number_is_made_of_what_is_none():
     assert np.isnan(probability.chdtri(3, 1.5))
     assert np.isnan(probability.chdtrc(-1, 2.0))

@@ -28,6 +28,12 @@ def fdtri(top: float, bottom: float, below: float) -> float:
     return _core.f_upper(1.0 - below, top, bottom)
 
 
+def betaincinv(a: float, b: float, below: float) -> float:
+    """Value that a beta variate stays below with probability ``below``: an F variate in other words."""
+    ratio = a * fdtri(2.0 * a, 2.0 * b, below)
+    return ratio / (b + ratio)
+
+
 def stdtrit(dof: float, below: float) -> float:
     """Value that a Student variate stays below with probability ``below``."""
     return -_core.student_upper(below, dof)
