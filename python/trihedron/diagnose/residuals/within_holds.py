@@ -190,6 +190,7 @@ class HoldScatter:
     p_value: FloatArray
 
 
+@lru_cache(maxsize=4)
 def hold_scatter(obs: Observations) -> HoldScatter:
     """Variance of first differences per hold over the median of all: blind to slow drift, sharp on shaking."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
