@@ -1,16 +1,15 @@
 //! The Kalman filter across the seam.
 
+mod least_squares;
+mod poses;
+
 use nalgebra::DMatrix;
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
-    ToPyArray,
-};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::rotation::rows3;
+use self::poses::poses;
 use crate::kalman::axis::{self, AxisFilter, N_CONSTANTS, Pose, Prior};
-use crate::kalman::least_squares;
 use crate::kalman::shaping::{NoiseTerms, ShapingModel};
 use crate::kalman::smoother;
 
@@ -22,9 +21,18 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<AxisKalman>()?;
     module.add_function(wrap_pyfunction!(kalman_track, module)?)?;
     module.add_function(wrap_pyfunction!(kalman_smooth, module)?)?;
-    module.add_function(wrap_pyfunction!(kalman_noise_covariance, module)?)?;
-    module.add_function(wrap_pyfunction!(kalman_least_squares, module)?)?;
-    module.add_function(wrap_pyfunction!(kalman_generalised_least_squares, module)?)?;
+    module.add_function(wrap_pyfunction!(
+        least_squares::kalman_noise_covariance,
+        module
+    )?)?;
+    module.add_function(wrap_pyfunction!(
+        least_squares::kalman_least_squares,
+        module
+    )?)?;
+    module.add_function(wrap_pyfunction!(
+        least_squares::kalman_generalised_least_squares,
+        module
+    )?)?;
     Ok(())
 }
 
@@ -51,45 +59,6 @@ pub(super) fn matrix<'py>(py: Python<'py>, m: &DMatrix<f64>) -> PyResult<Array2<
         .as_slice()
         .to_pyarray(py)
         .reshape([m.nrows(), m.ncols()])
-}
-
-fn poses(
-    readings: &PyReadonlyArray1<'_, f64>,
-    references: &PyReadonlyArray2<'_, f64>,
-    start_s: &PyReadonlyArray1<'_, f64>,
-    hold_s: &PyReadonlyArray1<'_, f64>,
-    extra_variance: &PyReadonlyArray1<'_, f64>,
-) -> PyResult<Vec<Pose>> {
-    let rows = rows3("references", references)?;
-    let n = rows.len();
-    for (name, array) in [
-        ("readings", readings),
-        ("start_s", start_s),
-        ("hold_s", hold_s),
-        ("extra_variance", extra_variance),
-    ] {
-        if array.len() != n {
-            return Err(PyValueError::new_err(format!(
-                "{name} must have shape ({n},) like the references, got ({},)",
-                array.len()
-            )));
-        }
-    }
-    let (z, t, hold, extra) = (
-        readings.as_array(),
-        start_s.as_array(),
-        hold_s.as_array(),
-        extra_variance.as_array(),
-    );
-    Ok((0..n)
-        .map(|i| Pose {
-            reading: z[i],
-            reference: rows[i].into(),
-            start: t[i],
-            hold: hold[i],
-            extra_variance: extra[i],
-        })
-        .collect())
 }
 
 /// Noise of one axis and how it is shaped.
@@ -339,124 +308,5 @@ fn kalman_smooth(
         rows4(py, &out.sigma)?,
         column(out.drift.iter().map(|d| d.0).collect()),
         column(out.drift.iter().map(|d| d.1).collect()),
-    ))
-}
-
-/// Covariance of the readings under the noise model.
-#[pyfunction]
-fn kalman_noise_covariance<'py>(
-    py: Python<'py>,
-    model: &AxisKalmanModel,
-    start_s: PyReadonlyArray1<'py, f64>,
-    hold_s: PyReadonlyArray1<'py, f64>,
-    extra_variance: PyReadonlyArray1<'py, f64>,
-) -> PyResult<Array2<'py>> {
-    if hold_s.len() != start_s.len() || extra_variance.len() != start_s.len() {
-        return Err(PyValueError::new_err(
-            "start_s, hold_s and extra_variance must have the same length",
-        ));
-    }
-    let (t, hold, extra) = (
-        start_s.as_array(),
-        hold_s.as_array(),
-        extra_variance.as_array(),
-    );
-    let poses: Vec<Pose> = (0..t.len())
-        .map(|i| Pose {
-            reading: 0.0,
-            reference: [0.0; 3],
-            start: t[i],
-            hold: hold[i],
-            extra_variance: extra[i],
-        })
-        .collect();
-    let model = &model.inner;
-    let c = super::run_long(py, || least_squares::noise_covariance(model, &poses))?;
-    matrix(py, &c)
-}
-
-type Recursion = (Py<PyArray2<f64>>, Py<PyArray2<f64>>);
-
-/// Recursive ordinary least squares: constants, stated sigma.
-#[pyfunction]
-fn kalman_least_squares(
-    py: Python<'_>,
-    readings: PyReadonlyArray1<'_, f64>,
-    references: PyReadonlyArray2<'_, f64>,
-    variance: f64,
-    prior_mean: PyReadonlyArray1<'_, f64>,
-    prior_sigma: PyReadonlyArray1<'_, f64>,
-) -> PyResult<Recursion> {
-    let rows = rows3("references", &references)?;
-    if rows.len() != readings.len() {
-        return Err(PyValueError::new_err(format!(
-            "readings must have shape ({},) like the references, got ({},)",
-            rows.len(),
-            readings.len()
-        )));
-    }
-    let poses: Vec<Pose> = rows
-        .iter()
-        .zip(readings.as_array())
-        .map(|(f, z)| Pose {
-            reading: *z,
-            reference: (*f).into(),
-            start: 0.0,
-            hold: 1.0,
-            extra_variance: 0.0,
-        })
-        .collect();
-    let (mean, sigma) = (
-        four("prior_mean", &prior_mean)?,
-        four("prior_sigma", &prior_sigma)?,
-    );
-    let out = super::run(py, || {
-        Ok(least_squares::recursive(&poses, variance, &mean, &sigma))
-    })?;
-    Ok((rows4(py, &out.constants)?, rows4(py, &out.sigma)?))
-}
-
-type Generalised = (
-    Py<PyArray1<f64>>,
-    Py<PyArray2<f64>>,
-    Py<PyArray1<f64>>,
-    Py<PyArray2<f64>>,
-    Py<PyArray2<f64>>,
-    Py<PyArray2<f64>>,
-);
-
-/// Batch ordinary (constants, covariance), batch generalised (constants, covariance), recursive generalised.
-#[pyfunction]
-#[allow(clippy::too_many_arguments)]
-fn kalman_generalised_least_squares(
-    py: Python<'_>,
-    model: &AxisKalmanModel,
-    prior_mean: PyReadonlyArray1<'_, f64>,
-    prior_sigma: PyReadonlyArray1<'_, f64>,
-    readings: PyReadonlyArray1<'_, f64>,
-    references: PyReadonlyArray2<'_, f64>,
-    start_s: PyReadonlyArray1<'_, f64>,
-    hold_s: PyReadonlyArray1<'_, f64>,
-    extra_variance: PyReadonlyArray1<'_, f64>,
-) -> PyResult<Generalised> {
-    let poses = poses(&readings, &references, &start_s, &hold_s, &extra_variance)?;
-    let (mean, sigma) = (
-        four("prior_mean", &prior_mean)?,
-        four("prior_sigma", &prior_sigma)?,
-    );
-    let model = &model.inner;
-    let (ordinary, generalised, recursion) = super::run(py, || {
-        let noise = least_squares::noise_covariance(model, &poses)?;
-        let ordinary = least_squares::ordinary(&poses, &noise)?;
-        let (batch, recursion) = least_squares::generalised(&poses, noise, &mean, &sigma)?;
-        Ok((ordinary, batch, recursion))
-    })?;
-    Ok((
-        ordinary.constants.to_pyarray(py).unbind(),
-        matrix(py, &ordinary.covariance)?.unbind(),
-        generalised.constants.to_pyarray(py).unbind(),
-        matrix(py, &generalised.covariance)?.unbind(),
-        rows4(py, &recursion.constants)?,
-        rows4(py, &recursion.sigma)?,
     ))
 }
