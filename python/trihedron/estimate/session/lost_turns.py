@@ -35,7 +35,7 @@ def lost_share(measured: MoveMeasurements, solution: SessionSolution, seen: Carr
     missed2 = np.minimum(np.radians(seen.angle_deg) ** 2, MOST_STEPS**2 * room / length)
 
     def share(which: BoolArray, dof: float) -> float:
-        n = 2.0 * np.count_nonzero(which)
+        n = 2.0 * float(np.count_nonzero(which))
         excess = float(np.sum(missed2[which]) * n / max(dof, 1.0) - np.sum(seen.floor2[which]) / g2)
         total = float(np.sum(room[which]))
         # The scatter of few losses is known to about a part in the root of half the moves.
@@ -43,6 +43,6 @@ def lost_share(measured: MoveMeasurements, solution: SessionSolution, seen: Carr
 
     is_used, is_known = np.asarray(used, dtype=bool), ~measured.is_lost
     among_used = share(is_used, solution.moves_dof) if solution.inflation[0] > 1.0 else 0.0
-    n_out = np.count_nonzero(is_known & ~is_used)
+    n_out = int(np.count_nonzero(is_known & ~is_used))
     each = among_used * float(np.mean(length)) + float(np.log(measured.n_moves / max(measured.n_moves - n_out, 1)))
     return share(is_known, solution.moves_dof + 2.0 * n_out) if each > MANY else among_used
