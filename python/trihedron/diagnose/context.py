@@ -18,6 +18,10 @@ TEMPERATURE_WINDOW_S = 10.0
 """Over which a logged temperature is smoothed before its rate of change is taken: its steps are a tenth of a kelvin."""
 VIBRATION_WINDOW_S = 0.25
 """Stretch over which a parabola follows the motion while vibration is measured in a move."""
+LEAST_SWING_K = 0.2
+"""A logged temperature that changes by less explains nothing: thermometers of chips step by 0.002 to 0.1 °C."""
+LEAST_SWING_V = 1e-4
+"""A logged supply that changes by less is digits: a tenth of a millivolt is far below any regulator's noise."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,13 @@ HALF_WINDOW = 6
 MAX_LOST = 60
 AGREEMENT = 30.0
 """Chi-square that one sensor may lose by the count both share."""
+AGREEMENT_SHARE = 0.01
+"""The same as a share of the joint's own chi-square: a large gap is no exact cubic."""
+LEAST_GAIN = 40.0
+"""Chi-square a count must win: by chance once in 4·10⁹, once in 650 sessions of 10⁵ intervals and 60 counts each."""
+OVER_USUAL, LEFT_SHARE = 5.0, 0.1
+"""It must also win five times what joints nearby cost anyway, and leave little: none was found in 48
+healthy sessions (benches/diagnosis_thresholds.py)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +79,7 @@ def _step_errors(obs: Observations) -> StepErrors:
     index, moves, extra, sigma = [], [], [], []
     for m, (a, b) in enumerate(obs.move_ranges):
         n = b - a
-        if n < 2 * w + 6:
+        if n < 2 * w + HALF_WINDOW:
             continue
         step_s = float(np.median(np.diff(obs.time_s[a:b])))
         k = np.arange(w, n - w - 1)
@@ -187,13 +194,13 @@ def _losses(obs: Observations) -> list[Loss]:
             gains = zero[s] - left
             usual = np.maximum(ordinary[s], dof)
             # The gain must also exceed what a trial count wins where the signal is merely rough (shaking, jitter).
-            clear = (gains > 40.0) & (gains > 5.0 * usual) & (left < 0.1 * zero[s] + 3.0 * usual)
+            clear = (gains > LEAST_GAIN) & (gains > OVER_USUAL * usual) & (left < LEFT_SHARE * zero[s] + 3.0 * usual)
             # A sensor that sees nothing of it must at least not object; one that sees it must see the same count.
             silent = ~clear & (left < 2.0 * usual)
             good = bool(clear.any() and (clear | silent).all())
             # A count that suits one sensor much better than the common one is no loss of samples.
             agree = all(
-                trial[row, n, c] - trial[row, :, c].min() <= max(AGREEMENT, 0.01 * zero[s, c])
+                trial[row, n, c] - trial[row, :, c].min() <= max(AGREEMENT, AGREEMENT_SHARE * zero[s, c])
                 for c in range(len(windows))
                 if clear[c]
             )
