@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::lent::flat1;
+use super::arrays::flat1;
 use crate::sinusoid;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
