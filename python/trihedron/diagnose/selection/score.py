@@ -66,7 +66,7 @@ class _Rest:
 
 
 def _by_domain(domain: npt.NDArray[np.int8], values: FloatArray) -> FloatArray:
-    return np.bincount(domain, values, minlength=PRIOR + 1)
+    return np.asarray(np.bincount(domain, values, minlength=PRIOR + 1), dtype=np.float64)
 
 
 def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored], list[tuple[str, str]]]:
