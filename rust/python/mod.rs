@@ -24,6 +24,7 @@ mod rotation;
 mod screening;
 mod session_model;
 mod simulate;
+mod sinusoid;
 mod spectral_likelihood;
 mod stamps;
 mod stillness;
@@ -48,6 +49,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     screening::register(module)?;
     session_model::register(module)?;
     simulate::register(module)?;
+    sinusoid::register(module)?;
     spectral_likelihood::register(module)?;
     stamps::register(module)?;
     stillness::register(module)?;

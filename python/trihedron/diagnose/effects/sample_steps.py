@@ -131,6 +131,17 @@ def _joints(w: int, order: int) -> FloatArray:
     return np.stack(projectors)
 
 
+def _unjoined(projector: FloatArray, windows: FloatArray) -> FloatArray:
+    """(k,) squares of what a join leaves of ``windows`` (2w, k, axes): a projector is its own square."""
+    left = (projector @ windows.reshape(len(windows), -1)).reshape(windows.shape)
+    return np.asarray(np.einsum("ikc,ikc->k", left, left))
+
+
+def _trials(projectors: FloatArray, windows: FloatArray) -> FloatArray:
+    """(k, counts) the same for every count of missing samples."""
+    return np.stack([_unjoined(one, windows) for one in projectors], axis=1)
+
+
 def find_losses(context: Context) -> list[Loss]:
     """The losses of the recording as it is now observed, found once."""
     return list(_losses(context.obs))
@@ -155,8 +166,8 @@ def _losses(obs: Observations) -> list[Loss]:
         k = k[~clipped[a + k]]
         if len(k) == 0:
             continue
-        windows = [np.stack([x[a + k + o] for o in range(1 - w, w + 1)], axis=1) for x in sensors]
-        zero = np.stack([np.einsum("kic,ij,kjc->k", v, stack[0], v) for v in windows], axis=1)
+        windows = [np.stack([x[a + k + o] for o in range(1 - w, w + 1)]) for x in sensors]
+        zero = np.stack([_unjoined(stack[0], v) for v in windows], axis=1)
         dof = 3 * (2 * w - 4)
         # What a join costs anyway where the motion is as quick as here: jitter and curvature are no losses.
         ordinary = np.stack(
@@ -166,16 +177,12 @@ def _losses(obs: Observations) -> list[Loss]:
         suspect = np.flatnonzero((zero > 3.0 * np.maximum(ordinary, dof)).any(axis=1))
         if len(suspect) == 0:
             continue
-        trial = np.stack(
-            [np.einsum("kic,nij,kjc->kn", v[suspect], stack, v[suspect], optimize=True) for v in windows], axis=2
-        )
+        trial = np.stack([_trials(stack, v[:, suspect]) for v in windows], axis=2)
         # Quick motion over a wide gap is no cubic: a quintic where the cubic leaves too much.
         quick = (trial.min(axis=1) > 3.0 * np.maximum(ordinary[suspect], dof)).any(axis=1)
         if quick.any():
             rows = suspect[quick]
-            trial[quick] = np.stack(
-                [np.einsum("kic,nij,kjc->kn", v[rows], stiffer, v[rows], optimize=True) for v in windows], axis=2
-            )
+            trial[quick] = np.stack([_trials(stiffer, v[:, rows]) for v in windows], axis=2)
         total = trial.sum(axis=2)
         # Where the minimum is flat the smallest count that joins as well: gravity after the move tells more exactly.
         best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)
