@@ -53,23 +53,28 @@ def test_a_record_comes_back_from_plain_types_with_the_same_bits():
     back = from_plain(json.loads(json.dumps(as_plain(given))), FitQuality)
     for field in fields(FitQuality):
         a, b = getattr(given, field.name), getattr(back, field.name)
-        assert np.array_equal(a, b) and type(a) is type(b), field.name
+        assert np.array_equal(a, b), field.name
+        assert type(a) is type(b), field.name
     assert not back.residual.flags.writeable
     seen = Observability(2, 3, 4.0, np.ones(2), "tilt", ("turn it",), (("a", "b", 0.95),))
     again = from_plain(json.loads(json.dumps(as_plain(seen))), Observability)
-    assert again.correlated == seen.correlated and again.advice == seen.advice
+    assert again.correlated == seen.correlated
+    assert again.advice == seen.advice
 
 
 def test_null_is_no_finite_number_and_what_may_be_absent_stays_so():
     back = from_plain(as_plain(quality()) | {"chi2": None, "residual": [None, 1.0]}, FitQuality)
-    assert math.isnan(back.chi2) and math.isnan(back.residual[0])
-    assert back.held_out is None and back.held_out_rms is None
+    assert math.isnan(back.chi2)
+    assert math.isnan(back.residual[0])
+    assert back.held_out is None
+    assert back.held_out_rms is None
 
 
 def test_a_finding_comes_back_with_its_code():
     given = Finding(next(iter(FindingCode)), "note", "seen", numbers={"x": math.nan})  # type: ignore[arg-type]
     back = from_plain(given.to_dict() | {"numbers": {"x": None}}, Finding)
-    assert back.code is given.code and math.isnan(back.numbers["x"])
+    assert back.code is given.code
+    assert math.isnan(back.numbers["x"])
 
 
 @pytest.mark.parametrize("harm", [{"surprise": 1}, {"dof": None}, {"chi2": "much"}, {"residual": "x"}])
