@@ -85,6 +85,7 @@ class AllanStream:
     def means(self, channel: int, readings: int) -> tuple[FloatArray, int]: ...
 
 # chi-square
+<<<<<<< HEAD
 def chi_square_quantile(probability: float, dof: FloatArray) -> FloatArray: ...
 def chi_square_above(value: float, dof: float) -> float: ...
 def chi_square_upper(above: float, dof: float) -> float: ...
@@ -94,6 +95,8 @@ def f_above(value: float, top: float, bottom: float) -> float: ...
 def f_upper(above: float, top: float, bottom: float) -> float: ...
 def student_upper(above: float, dof: float) -> float: ...
 def binomial_above(count: float, trials: float, chance: float) -> float: ...
+=======
+>>>>>>> main
 
 # screening
 def find_jumps(x: FloatArray, scales: Sequence[tuple[int, int, float]]) -> list[tuple[float, int, int, float]]: ...
@@ -164,6 +167,10 @@ def rotation_from_vector(vectors: FloatArray) -> FloatArray: ...
 def vector_from_rotation(rotations: FloatArray) -> FloatArray: ...
 
 # poisson
+@final
+class RateNoise:
+    def __new__(cls, density: FloatArray, sigma_time_s: float, nominal_step_s: float) -> RateNoise: ...
+
 def integrate_moves(
     time_s: FloatArray,
     gyroscope: FloatArray,
@@ -173,9 +180,7 @@ def integrate_moves(
     bias_before: FloatArray,
     bias_after: FloatArray,
     rate_degree: int,
-    noise_density: FloatArray,
-    sigma_time_s: float,
-    nominal_step_s: float,
+    noise: RateNoise,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 def integrate_raw_rate(
     time_s: FloatArray,
@@ -289,10 +294,23 @@ class AxisKalmanModel:
     def fast_variance(self, hold_s: float) -> float: ...
 
 @final
-class AxisKalman:
+class KalmanStart:
+    def __new__(cls, mean: FloatArray, sigma: FloatArray, walk: FloatArray) -> KalmanStart: ...
+
+@final
+class KalmanPoses:
     def __new__(
-        cls, model: AxisKalmanModel, prior_mean: FloatArray, prior_sigma: FloatArray, walk: FloatArray
-    ) -> AxisKalman: ...
+        cls,
+        readings: FloatArray,
+        references: FloatArray,
+        start_s: FloatArray,
+        hold_s: FloatArray,
+        extra_variance: FloatArray,
+    ) -> KalmanPoses: ...
+
+@final
+class AxisKalman:
+    def __new__(cls, model: AxisKalmanModel, start: KalmanStart) -> AxisKalman: ...
     def add(
         self,
         reading: float,
@@ -355,26 +373,10 @@ class NormKalman:
     def end_s(self) -> float | None: ...
 
 def kalman_track(
-    model: AxisKalmanModel,
-    prior_mean: FloatArray,
-    prior_sigma: FloatArray,
-    walk: FloatArray,
-    readings: FloatArray,
-    references: FloatArray,
-    start_s: FloatArray,
-    hold_s: FloatArray,
-    extra_variance: FloatArray,
+    model: AxisKalmanModel, start: KalmanStart, poses: KalmanPoses
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 def kalman_smooth(
-    model: AxisKalmanModel,
-    prior_mean: FloatArray,
-    prior_sigma: FloatArray,
-    walk: FloatArray,
-    readings: FloatArray,
-    references: FloatArray,
-    start_s: FloatArray,
-    hold_s: FloatArray,
-    extra_variance: FloatArray,
+    model: AxisKalmanModel, start: KalmanStart, poses: KalmanPoses
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]: ...
 def kalman_noise_covariance(
     model: AxisKalmanModel, start_s: FloatArray, hold_s: FloatArray, extra_variance: FloatArray
@@ -387,17 +389,29 @@ def kalman_least_squares(
     prior_sigma: FloatArray,
 ) -> tuple[FloatArray, FloatArray]: ...
 def kalman_generalised_least_squares(
-    model: AxisKalmanModel,
-    prior_mean: FloatArray,
-    prior_sigma: FloatArray,
-    readings: FloatArray,
-    references: FloatArray,
-    start_s: FloatArray,
-    hold_s: FloatArray,
-    extra_variance: FloatArray,
+    model: AxisKalmanModel, start: KalmanStart, poses: KalmanPoses
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 
 # gyro alignment
+@final
+class AlignmentPoses:
+    def __new__(
+        cls,
+        *,
+        reading: FloatArray,
+        var_reading: FloatArray,
+        zero: FloatArray,
+        var_zero: FloatArray,
+        zero_weights: FloatArray,
+        var_zero_walk: FloatArray,
+    ) -> AlignmentPoses: ...
+
+@final
+class AlignmentAccelerometer:
+    def __new__(
+        cls, scale: FloatArray, bias: FloatArray, basis: FloatArray, is_given: bool
+    ) -> AlignmentAccelerometer: ...
+
 @final
 class Moves:
     def __new__(
@@ -415,22 +429,12 @@ class Moves:
     def align(
         self,
         *,
-        reading: FloatArray,
-        var_reading: FloatArray,
-        zero: FloatArray,
-        var_zero: FloatArray,
-        zero_weights: FloatArray,
+        poses: AlignmentPoses,
+        noise: RateNoise,
+        accelerometer: AlignmentAccelerometer,
+        gravity_m_s2: float,
         used: npt.NDArray[np.bool_],
         starts: FloatArray,
-        accelerometer_scale: FloatArray,
-        accelerometer_bias: FloatArray,
-        accelerometer_basis: FloatArray,
-        gravity_m_s2: float,
-        noise_density: FloatArray,
-        sigma_time_s: float,
-        nominal_step_s: float,
-        var_zero_walk: FloatArray,
-        is_accelerometer_given: bool,
         is_offset_free: bool,
         loss_scale: float | None,
         is_near: bool = False,
@@ -662,6 +666,11 @@ def zero_process_grams(
     direction: FloatArray,
     strengths: FloatArray,
 ) -> tuple[FloatArray, FloatArray]: ...
+
+# sinusoid
+def sinusoid_power(
+    time_s: FloatArray, readings: FloatArray, *, start_hz: float, step_hz: float, count: int
+) -> FloatArray: ...
 
 # signals of effects
 def play(path: FloatArray, half_width: float) -> FloatArray: ...

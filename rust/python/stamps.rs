@@ -6,8 +6,13 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+<<<<<<< HEAD
 use super::lent::flat1;
 use crate::stamps::{self, Course, phase_sum};
+=======
+use super::arrays::flat1;
+use crate::stamps::{self, Course};
+>>>>>>> main
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stamp_steps, module)?)?;

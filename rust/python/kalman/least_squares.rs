@@ -6,11 +6,11 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::super::rotation::rows3;
 use super::super::{run, run_long};
-use super::{Array2, AxisKalmanModel, four, matrix, poses, rows4};
+use super::{Array2, AxisKalmanModel, KalmanPoses, KalmanStart, four, rows4};
 use crate::kalman::axis::Pose;
 use crate::kalman::least_squares;
+use crate::python::arrays::{matrix, rows3};
 
 /// Covariance of the readings under the noise model.
 #[pyfunction]
@@ -97,28 +97,18 @@ type Generalised = (
 
 /// Batch ordinary (constants, covariance), batch generalised (constants, covariance), recursive generalised.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
 pub(super) fn kalman_generalised_least_squares(
     py: Python<'_>,
     model: &AxisKalmanModel,
-    prior_mean: PyReadonlyArray1<'_, f64>,
-    prior_sigma: PyReadonlyArray1<'_, f64>,
-    readings: PyReadonlyArray1<'_, f64>,
-    references: PyReadonlyArray2<'_, f64>,
-    start_s: PyReadonlyArray1<'_, f64>,
-    hold_s: PyReadonlyArray1<'_, f64>,
-    extra_variance: PyReadonlyArray1<'_, f64>,
+    start: &KalmanStart,
+    poses: &KalmanPoses,
 ) -> PyResult<Generalised> {
-    let poses = poses(&readings, &references, &start_s, &hold_s, &extra_variance)?;
-    let (mean, sigma) = (
-        four("prior_mean", &prior_mean)?,
-        four("prior_sigma", &prior_sigma)?,
-    );
-    let model = &model.inner;
+    let (model, prior, poses) = (&model.inner, &start.prior, &poses.poses);
     let (ordinary, generalised, recursion) = run(py, || {
-        let noise = least_squares::noise_covariance(model, &poses)?;
-        let ordinary = least_squares::ordinary(&poses, &noise)?;
-        let (batch, recursion) = least_squares::generalised(&poses, noise, &mean, &sigma)?;
+        let noise = least_squares::noise_covariance(model, poses)?;
+        let ordinary = least_squares::ordinary(poses, &noise)?;
+        let (batch, recursion) =
+            least_squares::generalised(poses, noise, &prior.mean, &prior.sigma)?;
         Ok((ordinary, batch, recursion))
     })?;
     Ok((

@@ -3,15 +3,15 @@
 mod least_squares;
 mod poses;
 
-use nalgebra::DMatrix;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use self::poses::poses;
+use self::poses::KalmanPoses;
 use crate::kalman::axis::{self, AxisFilter, N_CONSTANTS, Pose, Prior};
 use crate::kalman::shaping::{NoiseTerms, ShapingModel};
 use crate::kalman::smoother;
+use crate::python::arrays::matrix;
 
 type Array1<'py> = Bound<'py, PyArray1<f64>>;
 type Array2<'py> = Bound<'py, PyArray2<f64>>;
@@ -19,6 +19,8 @@ type Array2<'py> = Bound<'py, PyArray2<f64>>;
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<AxisKalmanModel>()?;
     module.add_class::<AxisKalman>()?;
+    module.add_class::<KalmanStart>()?;
+    module.add_class::<KalmanPoses>()?;
     module.add_function(wrap_pyfunction!(kalman_track, module)?)?;
     module.add_function(wrap_pyfunction!(kalman_smooth, module)?)?;
     module.add_function(wrap_pyfunction!(
@@ -52,13 +54,6 @@ fn rows4(py: Python<'_>, rows: &[[f64; N_CONSTANTS]]) -> PyResult<Py<PyArray2<f6
         .to_pyarray(py)
         .reshape([rows.len(), N_CONSTANTS])?
         .unbind())
-}
-
-pub(super) fn matrix<'py>(py: Python<'py>, m: &DMatrix<f64>) -> PyResult<Array2<'py>> {
-    m.transpose()
-        .as_slice()
-        .to_pyarray(py)
-        .reshape([m.nrows(), m.ncols()])
 }
 
 /// Noise of one axis and how it is shaped.
@@ -121,16 +116,28 @@ impl AxisKalmanModel {
     }
 }
 
-fn prior(
-    mean: &PyReadonlyArray1<'_, f64>,
-    sigma: &PyReadonlyArray1<'_, f64>,
-    walk: &PyReadonlyArray1<'_, f64>,
-) -> PyResult<Prior> {
-    Ok(Prior {
-        mean: four("prior_mean", mean)?,
-        sigma: four("prior_sigma", sigma)?,
-        walk: four("walk", walk)?,
-    })
+/// Where a filter starts: constants of one axis, their standard errors, how they walk.
+#[pyclass(module = "trihedron._core", frozen)]
+pub(super) struct KalmanStart {
+    pub(super) prior: Prior,
+}
+
+#[pymethods]
+impl KalmanStart {
+    #[new]
+    fn new(
+        mean: PyReadonlyArray1<'_, f64>,
+        sigma: PyReadonlyArray1<'_, f64>,
+        walk: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            prior: Prior {
+                mean: four("mean", &mean)?,
+                sigma: four("sigma", &sigma)?,
+                walk: four("walk", &walk)?,
+            },
+        })
+    }
 }
 
 /// The filter of one axis, fed a pose at a time.
@@ -142,17 +149,10 @@ struct AxisKalman {
 #[pymethods]
 impl AxisKalman {
     #[new]
-    fn new(
-        py: Python<'_>,
-        model: &AxisKalmanModel,
-        prior_mean: PyReadonlyArray1<'_, f64>,
-        prior_sigma: PyReadonlyArray1<'_, f64>,
-        walk: PyReadonlyArray1<'_, f64>,
-    ) -> PyResult<Self> {
-        let prior = prior(&prior_mean, &prior_sigma, &walk)?;
-        let model = model.inner.clone();
+    fn new(py: Python<'_>, model: &AxisKalmanModel, start: &KalmanStart) -> PyResult<Self> {
+        let (model, prior) = (model.inner.clone(), &start.prior);
         Ok(Self {
-            inner: super::run(py, || AxisFilter::new(model, &prior))?,
+            inner: super::run(py, || AxisFilter::new(model, prior))?,
         })
     }
 
@@ -247,23 +247,14 @@ type Track = (
 
 /// Constants, sigma, final covariance, innovations, their variances, drift, its sigma.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
 fn kalman_track(
     py: Python<'_>,
     model: &AxisKalmanModel,
-    prior_mean: PyReadonlyArray1<'_, f64>,
-    prior_sigma: PyReadonlyArray1<'_, f64>,
-    walk: PyReadonlyArray1<'_, f64>,
-    readings: PyReadonlyArray1<'_, f64>,
-    references: PyReadonlyArray2<'_, f64>,
-    start_s: PyReadonlyArray1<'_, f64>,
-    hold_s: PyReadonlyArray1<'_, f64>,
-    extra_variance: PyReadonlyArray1<'_, f64>,
+    start: &KalmanStart,
+    poses: &KalmanPoses,
 ) -> PyResult<Track> {
-    let poses = poses(&readings, &references, &start_s, &hold_s, &extra_variance)?;
-    let prior = prior(&prior_mean, &prior_sigma, &walk)?;
-    let model = &model.inner;
-    let out = super::run_long(py, || axis::track(model, &prior, &poses))?;
+    let (model, prior, poses) = (&model.inner, &start.prior, &poses.poses);
+    let out = super::run_long(py, || axis::track(model, prior, poses))?;
     let column = |values: Vec<f64>| values.to_pyarray(py).unbind();
     Ok((
         rows4(py, &out.constants)?,
@@ -285,23 +276,14 @@ type SmoothedArrays = (
 
 /// Smoothed constants, sigma, drift, its sigma.
 #[pyfunction]
-#[allow(clippy::too_many_arguments)]
 fn kalman_smooth(
     py: Python<'_>,
     model: &AxisKalmanModel,
-    prior_mean: PyReadonlyArray1<'_, f64>,
-    prior_sigma: PyReadonlyArray1<'_, f64>,
-    walk: PyReadonlyArray1<'_, f64>,
-    readings: PyReadonlyArray1<'_, f64>,
-    references: PyReadonlyArray2<'_, f64>,
-    start_s: PyReadonlyArray1<'_, f64>,
-    hold_s: PyReadonlyArray1<'_, f64>,
-    extra_variance: PyReadonlyArray1<'_, f64>,
+    start: &KalmanStart,
+    poses: &KalmanPoses,
 ) -> PyResult<SmoothedArrays> {
-    let poses = poses(&readings, &references, &start_s, &hold_s, &extra_variance)?;
-    let prior = prior(&prior_mean, &prior_sigma, &walk)?;
-    let model = &model.inner;
-    let out = super::run_long(py, || smoother::smooth(model, &prior, &poses))?;
+    let (model, prior, poses) = (&model.inner, &start.prior, &poses.poses);
+    let out = super::run_long(py, || smoother::smooth(model, prior, poses))?;
     let column = |values: Vec<f64>| values.to_pyarray(py).unbind();
     Ok((
         rows4(py, &out.constants)?,
