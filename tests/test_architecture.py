@@ -15,18 +15,8 @@ COMPOSERS = {"pipeline", "cli", "fleet", "__init__", "__main__"}
 # Records ask for how they are shown (to_dict, plot, a page) and for the reader of plain arrays only when asked.
 LOOKS_UP = {"records/presented.py", "records/recording.py"}
 # Where numbers are made.
-<<<<<<< HEAD
 MAY_USE_CORE = {"read", "segment", "estimate", "diagnose", "simulate", "session", "probability.py"}
-LONGEST_FILE, LONGEST_FUNCTION = 350, 80
-# Functions over the limit.
-LONG_FUNCTIONS = {
-    "estimate/gyroscope/measurements.py:measure_moves",
-    "estimate/gyroscope/turns.py:calibrate_turns",
-}
-=======
-MAY_USE_CORE = {"read", "segment", "estimate", "diagnose", "simulate"}
 LONGEST_FILE, LONGEST_FUNCTION, MOST_ARGUMENTS = 350, 80, 9
->>>>>>> main
 
 
 def imported_modules(path: Path) -> set[str]:

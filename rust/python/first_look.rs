@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArra
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::lent::{as_rows, flat1, flat3};
+use super::arrays::{as_rows, flat1, flat3};
 use crate::{first_look, levels, running};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -6,7 +6,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::lent::flat1;
+use super::arrays::flat1;
 use crate::joints::{self, Contrasts, FREE, HALF, Limits};
 use crate::noise_law;
 
@@ -76,10 +76,10 @@ fn mean_noise_law(
     n: PyReadonlyArray1<'_, f64>,
     chosen: Vec<usize>,
 ) -> PyResult<(f64, [f64; 3])> {
-    let design = super::lent::flat3("design", &design)?;
+    let design = super::arrays::flat3("design", &design)?;
     let (seen, n) = (flat1(&seen), flat1(&n));
     let found = super::run(py, || {
-        noise_law::law(super::lent::as_rows(&design), &seen, &n, &chosen)
+        noise_law::law(super::arrays::as_rows(&design), &seen, &n, &chosen)
     })?;
     Ok((found.deviance, found.terms))
 }

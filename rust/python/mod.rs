@@ -13,11 +13,8 @@ mod allan;
 mod arrays;
 mod attitude;
 mod audit;
-<<<<<<< HEAD
 mod block_motion;
 mod chi_square;
-=======
->>>>>>> main
 mod doorway;
 mod first_look;
 mod gyro_alignment;
@@ -45,12 +42,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     allan::register(module)?;
     attitude::register(module)?;
     audit::register(module)?;
-<<<<<<< HEAD
     block_motion::register(module)?;
     chi_square::register(module)?;
     first_look::register(module)?;
-=======
->>>>>>> main
     gyro_alignment::register(module)?;
     joints::register(module)?;
     move_signals::register(module)?;

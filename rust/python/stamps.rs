@@ -6,13 +6,8 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-<<<<<<< HEAD
-use super::lent::flat1;
-use crate::stamps::{self, Course, phase_sum};
-=======
 use super::arrays::flat1;
-use crate::stamps::{self, Course};
->>>>>>> main
+use crate::stamps::{self, Course, phase_sum};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stamp_steps, module)?)?;

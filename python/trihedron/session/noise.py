@@ -79,19 +79,10 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
 
 
 def _second_half_minus_first(values: FloatArray) -> FloatArray:
-<<<<<<< HEAD
-    half = -(-len(values) // 2)
-    first, second = values[:half], values[half:]
-    out: FloatArray = second.mean(axis=0) - first.mean(axis=0)
-    if not np.isfinite(out).all():
-        # The mean that passes over missing readings takes several times as long.
-        out = np.nanmean(second, axis=0) - np.nanmean(first, axis=0)
-=======
     middle = (len(values) + 1) // 2
     out: FloatArray = values[middle:].mean(axis=0) - values[:middle].mean(axis=0)
     if np.isnan(out).any():
         out = np.nanmean(values[middle:], axis=0) - np.nanmean(values[:middle], axis=0)
->>>>>>> main
     return out
 
 

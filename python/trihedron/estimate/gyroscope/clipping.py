@@ -85,13 +85,6 @@ def _is_cut(column: FloatArray, at: BoolArray, quantum: float, is_known: bool) -
     otherwise, or two peaks end at it.
     """
     finite = column[np.isfinite(column)]
-<<<<<<< HEAD
-    gaps = np.diff(_core.levels_of(column)[0])
-    if not len(gaps):
-        return False
-    quantum = float(np.median(gaps[gaps <= 1.5 * np.quantile(gaps, 0.25)]))
-=======
->>>>>>> main
     noise = 1.4826 * float(np.median(np.abs(np.diff(finite)))) / np.sqrt(2.0)
     pairs = 0
     for first, last in _runs(at):
@@ -113,7 +106,7 @@ def _is_cut(column: FloatArray, at: BoolArray, quantum: float, is_known: bool) -
 
 def _quantum(column: FloatArray) -> float:
     """Step of the converter as neighbouring values show it, 0 where the readings never change."""
-    gaps = np.diff(np.unique(column[np.isfinite(column)]))
+    gaps = np.diff(_core.levels_of(column)[0])
     return float(np.median(gaps[gaps <= 1.5 * np.quantile(gaps, 0.25)])) if len(gaps) else 0.0
 
 
