@@ -47,7 +47,9 @@ def run(name: str, said: list[str], out: Path) -> None:
 def killed(said: list[str], target: Path, size: int) -> None:
     """Start a command that writes ``target`` and kill it (SIGKILL) when a third of ``size`` bytes is on disk."""
     part = Path(f"{target}.part")
-    child = subprocess.Popen([sys.executable, "-c", COMMAND, *said], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    child = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, *said], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     while child.poll() is None:
         if part.exists() and os.stat(part).st_blocks * 512 > size / 3:
             child.send_signal(signal.SIGKILL)
@@ -70,7 +72,10 @@ def main() -> None:
         log, unit, corrected = place / "log.npy", place / "unit.json", place / "corrected.npy"
         began = time.perf_counter()
         make_log(log, rows, given.rate)
-        print(f"{rows:.0e} rows, {log.stat().st_size / 1e9:.1f} GB, made in {time.perf_counter() - began:.0f} s", flush=True)
+        print(
+            f"{rows:.0e} rows, {log.stat().st_size / 1e9:.1f} GB, made in {time.perf_counter() - began:.0f} s",
+            flush=True,
+        )
         common = ["--stream", "--rate", str(given.rate)]
         for step in given.steps:
             if step == "apply":
