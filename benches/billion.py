@@ -1,4 +1,4 @@
-"""10⁹ rows of six columns through ``segment``, ``allan``, ``calibrate`` and ``apply``: time, processor time, peak memory.
+"""10⁹ rows of six columns through segment, allan, calibrate and apply: time, processor time, peak memory.
 
     python benches/billion.py --rows 1e9 --rate 4000 --folder /where/50/GB/are/free
     python benches/billion.py --rows 2e6 --rate 1000                                  some seconds
@@ -28,8 +28,8 @@ from pathlib import Path
 from trihedron.cli import main
 status = main(sys.argv[1:])
 peak = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
-spent = os.times()
-print(f"peak {int(peak.split()[1]) / 2**20:.2f} GiB, {spent.user + spent.system:.0f} s of processor time", file=sys.stderr)
+spent = sum(os.times()[:2])
+print(f"peak {int(peak.split()[1]) / 2**20:.2f} GiB, {spent:.0f} s of processor time", file=sys.stderr)
 sys.exit(status)
 """
 SIX, THREE = "ax,ay,az,gx,gy,gz", "ax,ay,az,-,-,-"

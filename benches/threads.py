@@ -67,9 +67,8 @@ def main() -> None:
     for name, action in (("calibrate", calibrate), ("allan", allan)):
         action()
         ratios = [in_turn(action, given.repeats) / in_two_threads(action, given.repeats) for _ in range(given.rounds)]
-        print(
-            f"{name:10s} two threads {statistics.median(ratios):.2f} times one after the other; load {os.getloadavg()[0]:.1f}"
-        )
+        ratio, load = statistics.median(ratios), os.getloadavg()[0]
+        print(f"{name:10s} two threads {ratio:.2f} times one after the other; load {load:.1f}")
 
 
 if __name__ == "__main__":
