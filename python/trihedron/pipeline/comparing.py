@@ -24,7 +24,7 @@ from trihedron.records.domains import DomainTest, Where
 def compared(
     found: Diagnosis,
     given: Calibration,
-    simulated: Diagnosis | None,
+    simulated: tuple[Diagnosis, Recording] | None,
     noise: tuple[NoiseDifference, ...],
     recording: Recording,
     segments: Segments,
@@ -32,11 +32,11 @@ def compared(
 ) -> Diagnosis:
     """The free diagnosis of a recording as the answer to: where does the given model differ?
 
-    ``simulated`` is the free diagnosis of the user's simulated log, where that is the model; else ``given`` is.
+    ``simulated`` is the user's simulated log with its free diagnosis, where that is the model; else ``given`` is.
     ``noise`` is what was compared of noise and sampling beside it.
     """
-    model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated)
-    given_effects = () if simulated is None else simulated.effects
+    model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated[0])
+    given_effects = () if simulated is None else simulated[0].effects
     unexplained = {test.domain for test in found.remaining if test.disagrees}
     effects = compare_effects(given_effects, found.effects, found.candidates, alpha=alpha, unexplained=unexplained)
     numbers = compare_numbers(
@@ -45,7 +45,7 @@ def compared(
         alpha=alpha,
         # A linear calibration was fitted beside effects that it does not know: it is also held against such a fit.
         linear=model_of_diagnosis(found, with_effects=False) if simulated is None and found.effects else None,
-        left_open=left_open_by((*effects.missing, *effects.surplus)),
+        left_open=left_open_by((*found.effects, *given_effects), _span_k(recording, simulated)),
     )
     parameters = (*numbers.parameters, *effects.parameters)
     noise = (*noise, *(_factor(one) for one in numbers.factors))
@@ -67,6 +67,16 @@ def compared(
         noise_compared=noise,
         stages=(_as_given(given, recording, segments), *found.stages),
     )
+
+
+def _span_k(recording: Recording, simulated: tuple[Diagnosis, Recording] | None) -> float | None:
+    """From the lowest to the highest temperature of both logs [K]; ``None`` where one has none."""
+    logs = (recording,) if simulated is None else (recording, simulated[1])
+    seen = [log.temperature_degc[np.isfinite(log.temperature_degc)] for log in logs if log.temperature_degc is not None]
+    if simulated is None or len(seen) < len(logs) or not all(len(one) for one in seen):
+        return None
+    every = np.concatenate(seen)
+    return float(every.max() - every.min())
 
 
 def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
