@@ -246,6 +246,7 @@ def test_a_level_that_both_logs_count_from_their_own_temperature_is_open_by_what
     bias = [thermal(2e-3, "m/s^2/K", "accel-thermal-bias"), thermal(1e-3, "1/K")]
     assert left_open_by(bias, 2.0)["accel-zero"] == pytest.approx(4e-3 + 2e-3 * 9.80665)
     assert left_open_by([thermal(0.004, "m/s^2", "accel-hidden-drift")])["accel-zero"] == pytest.approx(0.004)
+    assert left_open_by([thermal(0.004, "rad/s", "gyro-hidden-drift")])["gyro-zero"] == pytest.approx(0.004)
 
 
 def test_an_effect_of_temperature_that_both_logs_have_makes_no_scale_at_other_temperatures(unit):
@@ -259,7 +260,9 @@ def test_an_effect_of_temperature_that_both_logs_have_makes_no_scale_at_other_te
         temperature = replace(
             scenario.environment.temperature, start_degc=start, warm_up_k=8.0, warm_up_tau_s=60.0, logged=True
         )
-        logs.append(simulate(replace(scenario, environment=replace(scenario.environment, temperature=temperature)), seed)[0])
+        logs.append(
+            simulate(replace(scenario, environment=replace(scenario.environment, temperature=temperature)), seed)[0]
+        )
     found = trihedron.diagnose(logs[1], against=logs[0], gravity_m_s2=9.80665)
     scale = max(abs(p.difference) for p in found.parameters if p.id == "accel-scale")
     # Nine kelvins of 6e-4 are there, and belong to the effect that both have.

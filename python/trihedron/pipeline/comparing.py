@@ -17,7 +17,15 @@ from trihedron.diagnose.against import (
 from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage, StageDomain, Verdict
+from trihedron.records.diagnosis import (
+    AcceptedEffect,
+    Diagnosis,
+    NoiseDifference,
+    ParameterDifference,
+    Stage,
+    StageDomain,
+    Verdict,
+)
 from trihedron.records.domains import DomainTest, Where
 
 
@@ -36,7 +44,7 @@ def compared(
     ``noise`` is what was compared of noise and sampling beside it.
     """
     model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated[0])
-    given_effects = () if simulated is None else simulated[0].effects
+    given_effects = () if simulated is None else _without_walk(simulated[0].effects, noise)
     unexplained = {test.domain for test in found.remaining if test.disagrees}
     effects = compare_effects(given_effects, found.effects, found.candidates, alpha=alpha, unexplained=unexplained)
     numbers = compare_numbers(
@@ -67,6 +75,16 @@ def compared(
         noise_compared=noise,
         stages=(_as_given(given, recording, segments), *found.stages),
     )
+
+
+def _without_walk(
+    effects: tuple[AcceptedEffect, ...], noise: tuple[NoiseDifference, ...]
+) -> tuple[AcceptedEffect, ...]:
+    """Effects of a simulation less a free curve through its zeros where its slow noise is the larger: that draws it."""
+    slow = [n.ratio for n in noise if n.significant and n.sensor == "gyroscope" and n.term in ("B", "K") and n.ratio]
+    if not slow or min(slow) < 1.0:
+        return effects
+    return tuple(e for e in effects if (e.id, e.model.get("variant")) != ("gyro-hidden-drift", "curve"))
 
 
 def _span_k(recording: Recording, simulated: tuple[Diagnosis, Recording] | None) -> float | None:

@@ -21,7 +21,7 @@ FRAME_TOLERANCE = 0.03
 the first order of the mechanisms) is no difference."""
 
 LARGEST_READ: Mapping[str, float] = MappingProxyType({"accel-zero": STANDARD_GRAVITY_M_S2, "gyro-zero": 1.0})
-"""What a scale that follows temperature is a share of, where it is mistaken for a zero: gravity; a turn by hand [rad/s]."""
+"""What a scale that follows temperature is a share of where it is taken for a zero: gravity; a turn by hand [rad/s]."""
 
 
 def left_open_by(effects: Iterable[AcceptedEffect], span_k: float | None = None) -> dict[str, float]:
