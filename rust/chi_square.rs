@@ -76,42 +76,6 @@ pub fn chi_square_tails(value: f64, dof: f64) -> (f64, f64) {
     (1.0 - above, above)
 }
 
-/// Value that a chi-square variate of `dof` degrees of freedom stays below with `probability`.
-#[must_use]
-pub fn chi_square_quantile(probability: f64, dof: f64) -> f64 {
-    if !(dof > 0.0 && (0.0..=1.0).contains(&probability)) {
-        return f64::NAN;
-    }
-    let excess = |x: f64| {
-        let (below, above) = chi_square_tails(x, dof);
-        if probability < 0.5 {
-            below - probability
-        } else {
-            (1.0 - probability) - above
-        }
-    };
-    let (mut low, mut high) = (0.0, dof + 1.0);
-    while excess(high) < 0.0 {
-        low = high;
-        high *= 2.0;
-        if high > 1e300 {
-            return f64::INFINITY;
-        }
-    }
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if high - low <= 1e-13 * high {
-            break;
-        }
-        if excess(middle) < 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
-}
-
 /// Probability that a standard normal variate exceeds `z`.
 #[must_use]
 pub fn normal_above(z: f64) -> f64 {

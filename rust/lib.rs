@@ -23,6 +23,7 @@ pub mod screening;
 pub mod session_model;
 pub mod simd;
 pub mod simulate;
+pub mod sinusoid;
 pub mod spectral_likelihood;
 pub mod stamps;
 pub mod stillness;

@@ -85,8 +85,6 @@ class AllanStream:
     def means(self, channel: int, readings: int) -> tuple[FloatArray, int]: ...
 
 # chi-square
-def chi_square_quantile(probability: float, dof: FloatArray) -> FloatArray: ...
-def chi_square_above(value: float, dof: float) -> float: ...
 
 # screening
 def find_jumps(x: FloatArray, scales: Sequence[tuple[int, int, float]]) -> list[tuple[float, int, int, float]]: ...
@@ -157,6 +155,10 @@ def rotation_from_vector(vectors: FloatArray) -> FloatArray: ...
 def vector_from_rotation(rotations: FloatArray) -> FloatArray: ...
 
 # poisson
+@final
+class RateNoise:
+    def __new__(cls, density: FloatArray, sigma_time_s: float, nominal_step_s: float) -> RateNoise: ...
+
 def integrate_moves(
     time_s: FloatArray,
     gyroscope: FloatArray,
@@ -166,9 +168,7 @@ def integrate_moves(
     bias_before: FloatArray,
     bias_after: FloatArray,
     rate_degree: int,
-    noise_density: FloatArray,
-    sigma_time_s: float,
-    nominal_step_s: float,
+    noise: RateNoise,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 def integrate_raw_rate(
     time_s: FloatArray,
@@ -249,10 +249,23 @@ class AxisKalmanModel:
     def fast_variance(self, hold_s: float) -> float: ...
 
 @final
-class AxisKalman:
+class KalmanStart:
+    def __new__(cls, mean: FloatArray, sigma: FloatArray, walk: FloatArray) -> KalmanStart: ...
+
+@final
+class KalmanPoses:
     def __new__(
-        cls, model: AxisKalmanModel, prior_mean: FloatArray, prior_sigma: FloatArray, walk: FloatArray
-    ) -> AxisKalman: ...
+        cls,
+        readings: FloatArray,
+        references: FloatArray,
+        start_s: FloatArray,
+        hold_s: FloatArray,
+        extra_variance: FloatArray,
+    ) -> KalmanPoses: ...
+
+@final
+class AxisKalman:
+    def __new__(cls, model: AxisKalmanModel, start: KalmanStart) -> AxisKalman: ...
     def add(
         self,
         reading: float,
@@ -315,26 +328,10 @@ class NormKalman:
     def end_s(self) -> float | None: ...
 
 def kalman_track(
-    model: AxisKalmanModel,
-    prior_mean: FloatArray,
-    prior_sigma: FloatArray,
-    walk: FloatArray,
-    readings: FloatArray,
-    references: FloatArray,
-    start_s: FloatArray,
-    hold_s: FloatArray,
-    extra_variance: FloatArray,
+    model: AxisKalmanModel, start: KalmanStart, poses: KalmanPoses
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 def kalman_smooth(
-    model: AxisKalmanModel,
-    prior_mean: FloatArray,
-    prior_sigma: FloatArray,
-    walk: FloatArray,
-    readings: FloatArray,
-    references: FloatArray,
-    start_s: FloatArray,
-    hold_s: FloatArray,
-    extra_variance: FloatArray,
+    model: AxisKalmanModel, start: KalmanStart, poses: KalmanPoses
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]: ...
 def kalman_noise_covariance(
     model: AxisKalmanModel, start_s: FloatArray, hold_s: FloatArray, extra_variance: FloatArray
@@ -347,17 +344,29 @@ def kalman_least_squares(
     prior_sigma: FloatArray,
 ) -> tuple[FloatArray, FloatArray]: ...
 def kalman_generalised_least_squares(
-    model: AxisKalmanModel,
-    prior_mean: FloatArray,
-    prior_sigma: FloatArray,
-    readings: FloatArray,
-    references: FloatArray,
-    start_s: FloatArray,
-    hold_s: FloatArray,
-    extra_variance: FloatArray,
+    model: AxisKalmanModel, start: KalmanStart, poses: KalmanPoses
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 
 # gyro alignment
+@final
+class AlignmentPoses:
+    def __new__(
+        cls,
+        *,
+        reading: FloatArray,
+        var_reading: FloatArray,
+        zero: FloatArray,
+        var_zero: FloatArray,
+        zero_weights: FloatArray,
+        var_zero_walk: FloatArray,
+    ) -> AlignmentPoses: ...
+
+@final
+class AlignmentAccelerometer:
+    def __new__(
+        cls, scale: FloatArray, bias: FloatArray, basis: FloatArray, is_given: bool
+    ) -> AlignmentAccelerometer: ...
+
 @final
 class Moves:
     def __new__(
@@ -375,22 +384,12 @@ class Moves:
     def align(
         self,
         *,
-        reading: FloatArray,
-        var_reading: FloatArray,
-        zero: FloatArray,
-        var_zero: FloatArray,
-        zero_weights: FloatArray,
+        poses: AlignmentPoses,
+        noise: RateNoise,
+        accelerometer: AlignmentAccelerometer,
+        gravity_m_s2: float,
         used: npt.NDArray[np.bool_],
         starts: FloatArray,
-        accelerometer_scale: FloatArray,
-        accelerometer_bias: FloatArray,
-        accelerometer_basis: FloatArray,
-        gravity_m_s2: float,
-        noise_density: FloatArray,
-        sigma_time_s: float,
-        nominal_step_s: float,
-        var_zero_walk: FloatArray,
-        is_accelerometer_given: bool,
         is_offset_free: bool,
         loss_scale: float | None,
         is_near: bool = False,
@@ -622,6 +621,11 @@ def zero_process_grams(
     direction: FloatArray,
     strengths: FloatArray,
 ) -> tuple[FloatArray, FloatArray]: ...
+
+# sinusoid
+def sinusoid_power(
+    time_s: FloatArray, readings: FloatArray, *, start_hz: float, step_hz: float, count: int
+) -> FloatArray: ...
 
 # signals of effects
 def play(path: FloatArray, half_width: float) -> FloatArray: ...

@@ -6,7 +6,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::lent::flat1;
+use super::arrays::flat1;
 use crate::stamps::{self, Course};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

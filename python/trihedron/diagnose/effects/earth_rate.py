@@ -10,6 +10,7 @@ from trihedron.diagnose.effects.contract import Effect, Variant, rate_only
 from trihedron.records.diagnosis import EffectParameter
 
 EARTH_RATE_RAD_S = 7.292115e-5
+"""WGS 84."""
 
 
 class EarthRate(Effect):

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
@@ -217,7 +218,7 @@ def curve_with_intervals(
     edf = np.column_stack([edf_along(n, clusters, variance[:, c], weight[:, c], kind) for c in range(channels)])
     bias = np.column_stack([bias_along(n, clusters, variance[:, c], kind) for c in range(channels)])
     tail = (1.0 - confidence) / 2.0
-    high, low = (_core.chi_square_quantile(share, edf.ravel()).reshape(edf.shape) for share in (1.0 - tail, tail))
+    high, low = (chdtri(edf, above) for above in (tail, 1.0 - tail))
     return AllanCurve(
         kind=kind,
         rate_hz=float(rate_hz),
