@@ -53,9 +53,10 @@ def _moved(parameter: EffectParameter, number: str, unit: str, span_k: float | N
         return size
     if span_k is None:
         return None
-    powers = {f"{unit}/K": 1.0, f"{unit}/K^2": 2.0}
-    if parameter.unit in powers:
-        return size * span_k ** powers[parameter.unit]
+    if parameter.unit == f"{unit}/K":
+        return size * span_k
+    if parameter.unit == f"{unit}/K^2":
+        return size * span_k * span_k
     if parameter.unit == "1/K" and number in LARGEST_READ:
         return size * span_k * LARGEST_READ[number]
     return None
