@@ -90,7 +90,7 @@ def spectra_chart(diagnosis: Diagnosis) -> Chart:
     for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
         unit = _unit(sensor) + "/√Hz"
         x = np.concatenate([edges, np.full((len(edges), 1), np.nan)], axis=1).ravel()
-        marks = _both(x, *(np.repeat(v, 3) for v in (model, own)), "xyz".index(axis))
+        marks = _both(x, np.repeat(model, 3), np.repeat(own, 3), "xyz".index(axis))
         panels.append(_panel("frequency [Hz]", "Hz", f"density [{unit}]", unit, marks, f"{_said(sensor)} {axis}"))
     return Chart(tuple(panels), columns=3)
 
