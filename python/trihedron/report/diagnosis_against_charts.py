@@ -98,12 +98,13 @@ def spectra_chart(diagnosis: Diagnosis) -> Chart:
 def allan_chart(diagnosis: Diagnosis) -> Chart:
     """A panel per sensor and axis: Allan deviation of a spectrum that is even within its octaves.
 
-    ``σ²(τ) = 4 ∫ S sin⁴(πτf)/(πτf)² df``, S two-sided, from half a period of the highest octave to that of the lowest.
+    ``σ²(τ) = 4 ∫ S sin⁴(πτf)/(πτf)² df``, S two-sided, from half a period of the highest frequency to a quarter of
+    the lowest's: what lies below the octaves would be missed beyond.
     """
     panels = []
     for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
         unit = _unit(sensor)
-        tau = np.geomspace(0.5 / edges[-1, 1], 0.5 / edges[0, 0], 60)
+        tau = np.geomspace(0.5 / edges[-1, 1], 0.25 / edges[0, 0], 60)
         marks = _both(tau, allan_of(edges, model, tau), allan_of(edges, own, tau), "xyz".index(axis))
         panels.append(
             _panel("averaging time τ [s]", "s", f"Allan deviation [{unit}]", unit, marks, f"{_said(sensor)} {axis}")
