@@ -201,6 +201,17 @@ def test_help_loads_none_of_the_heavy_libraries():
     assert done.stdout.rstrip().endswith("LOADED []")
 
 
+def test_calibrating_a_plain_log_loads_no_scipy(session):
+    # Which takes as long to load as a calibration does.
+    script = (
+        "import sys\nfrom trihedron.cli import main\n"
+        f"main(['calibrate', {str(session / 'log.csv')!r}, '--gravity', '9.81'])\n"
+        "print('LOADED', sorted({'scipy', 'polars', 'matplotlib'} & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.rstrip().endswith("LOADED []")
+
+
 def test_the_command_as_a_process_ends_with_the_status_and_no_traceback(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "trihedron", "calibrate", str(tmp_path / "none.csv")], capture_output=True, text=True

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.ndimage import median_filter
 
+from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 
 UNDITHERED = 0.5
@@ -55,7 +55,7 @@ def _of_runs(codes: FloatArray, quantum: float, rest: float) -> FloatArray:
     is_passed[1:-1] = step[1:] * step[:-1] > 0.0
     out = np.repeat(np.where(is_passed, 1.0 / count, count).astype(np.float64), count)
     # A little noise makes readings toggle where they pass from code to code: the runs there say nothing of the time.
-    steady = np.asarray(median_filter(codes, CHATTER, mode="nearest"))
+    steady = _core.running_median(codes, CHATTER)
     away = np.abs(steady - rest)
     # Between the two nearest codes a zero may toggle.
     is_rest, is_next = away < 0.75 * quantum, away < 1.75 * quantum
