@@ -131,7 +131,10 @@ def calibrate(
         )
     calibration = in_frame(calibration, wanted)
     about_gyro = _about_gyro(calibration, recording, segments)
-    findings = (*said, *recording.findings, *_as_they_weigh(segments), *calibration.findings, *about_gyro)
+    # Losses that were seen leave none to be guessed.
+    is_seen = any(finding.code is FindingCode.SAMPLES_LOST for finding in about_gyro)
+    of_fit = (f for f in calibration.findings if not (is_seen and f.code is FindingCode.SAMPLES_LOST))
+    findings = (*said, *recording.findings, *_as_they_weigh(segments), *of_fit, *about_gyro)
     return CalibrationResult(replace(calibration, findings=findings), segments, recording)
 
 

@@ -12,10 +12,10 @@ from trihedron.arrays import BoolArray, FloatArray
 UNDITHERED = 0.5
 """Noise below this part of a step does not dither it: the mean of a rounded reading is off by up to half a step,
 however long it is taken."""
-EXPONENTIAL, PARABOLIC = (0.50, 2.5), (0.68, 1.25)
-"""Of a body that settles as exp(-t/τ), and of one that starts as t² does: time for the second step beside its zero's in
-that for the first, and the samples over which what it still turns, rms over where in its step the zero may lie, is a
-step's uniform error, for each sample that the first step took."""
+SETTLING = (0.50, 0.68), (2.5, 1.25)
+"""Of a body that settles as exp(-t/τ), then of one that starts as t² does: time for the second step beside its zero's
+in that for the first, and the samples over which what it still turns, rms over where in its step the zero may lie, is
+a step's uniform error, for each sample that the first step took."""
 CHATTER = 9
 """Readings whose median is free of toggling between neighbouring codes."""
 LEAST_WHITE = 1e-2
@@ -85,7 +85,7 @@ def _of_runs(codes: FloatArray, quantum: float, rest: float) -> FloatArray:
 def _hidden(first_step: int, second_step: int) -> int:
     """Samples charged next to the step of the zero, by how long the two steps beside it took."""
     ratio = second_step / max(first_step, 1)
-    return math.ceil(first_step * float(np.interp(ratio, *zip(EXPONENTIAL, PARABOLIC, strict=True))))
+    return math.ceil(first_step * float(np.interp(ratio, *SETTLING)))
 
 
 def _stretches(mask: BoolArray) -> list[tuple[int, int]]:
