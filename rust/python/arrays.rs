@@ -152,10 +152,10 @@ pub(super) fn dmatrix(array: &PyReadonlyArray2<'_, f64>) -> DMatrix<f64> {
 }
 
 /// Matrices as an `(m, 3, 3)` array.
-pub(super) fn stack3<'py>(
-    py: Python<'py>,
+pub(super) fn stack3(
+    py: Python<'_>,
     matrices: impl ExactSizeIterator<Item = Matrix3<f64>>,
-) -> PyResult<Bound<'py, PyArray3<f64>>> {
+) -> PyResult<Bound<'_, PyArray3<f64>>> {
     let m = matrices.len();
     let flat: Vec<f64> = matrices
         .flat_map(|matrix| matrix.transpose().as_slice().to_vec())

@@ -121,6 +121,7 @@ class Loss:
     per_sensor: tuple[float, ...]
 
 
+@lru_cache(maxsize=4)
 def _joints(w: int, order: int) -> FloatArray:
     """(counts, 2w, 2w) projectors onto what no polynomial of so many coefficients joins across n missing samples."""
     projectors = []
@@ -129,6 +130,19 @@ def _joints(w: int, order: int) -> FloatArray:
         q, _ = np.linalg.qr(np.vander(t - t.mean(), order))
         projectors.append(np.eye(2 * w) - q @ q.T)
     return np.stack(projectors)
+
+
+def _unjoined(projector: FloatArray, windows: FloatArray) -> FloatArray:
+    """(k,) squares of what a join leaves of ``windows`` (2w, k, axes): a projector is its own square."""
+    left = (projector @ windows.reshape(len(windows), -1)).reshape(windows.shape)
+    return np.asarray(np.einsum("ikc,ikc->k", left, left))
+
+
+def _trials(projectors: FloatArray, windows: FloatArray) -> FloatArray:
+    """(k, counts) the same for every count of missing samples."""
+    left = projectors.reshape(-1, len(windows)) @ windows.reshape(len(windows), -1)
+    left = left.reshape(len(projectors), *windows.shape)
+    return np.asarray(np.einsum("nikc,nikc->kn", left, left))
 
 
 def find_losses(context: Context) -> list[Loss]:
@@ -155,8 +169,8 @@ def _losses(obs: Observations) -> list[Loss]:
         k = k[~clipped[a + k]]
         if len(k) == 0:
             continue
-        windows = [np.stack([x[a + k + o] for o in range(1 - w, w + 1)], axis=1) for x in sensors]
-        zero = np.stack([np.einsum("kic,ij,kjc->k", v, stack[0], v) for v in windows], axis=1)
+        windows = [np.stack([x[a + k + o] for o in range(1 - w, w + 1)]) for x in sensors]
+        zero = np.stack([_unjoined(stack[0], v) for v in windows], axis=1)
         dof = 3 * (2 * w - 4)
         # What a join costs anyway where the motion is as quick as here: jitter and curvature are no losses.
         ordinary = np.stack(
@@ -166,16 +180,12 @@ def _losses(obs: Observations) -> list[Loss]:
         suspect = np.flatnonzero((zero > 3.0 * np.maximum(ordinary, dof)).any(axis=1))
         if len(suspect) == 0:
             continue
-        trial = np.stack(
-            [np.einsum("kic,nij,kjc->kn", v[suspect], stack, v[suspect], optimize=True) for v in windows], axis=2
-        )
+        trial = np.stack([_trials(stack, v[:, suspect]) for v in windows], axis=2)
         # Quick motion over a wide gap is no cubic: a quintic where the cubic leaves too much.
         quick = (trial.min(axis=1) > 3.0 * np.maximum(ordinary[suspect], dof)).any(axis=1)
         if quick.any():
             rows = suspect[quick]
-            trial[quick] = np.stack(
-                [np.einsum("kic,nij,kjc->kn", v[rows], stiffer, v[rows], optimize=True) for v in windows], axis=2
-            )
+            trial[quick] = np.stack([_trials(stiffer, v[:, rows]) for v in windows], axis=2)
         total = trial.sum(axis=2)
         # Where the minimum is flat the smallest count that joins as well: gravity after the move tells more exactly.
         best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)

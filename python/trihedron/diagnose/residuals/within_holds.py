@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.ndimage import median_filter
 from scipy.special import chdtrc, gammaincc
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.session.observations import Observations
@@ -21,6 +22,8 @@ CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 MIN_LINE_SHARE = 0.03
 """Long holds resolve lines far below the noise: below this share of its variance a line changes nothing that the model
 says, and a line that is no disagreement needs no name."""
+GRID = 41
+"""Frequencies tried at a time, from one resolution below to one above: half a lobe has ten."""
 LOUD = 3.0
 """Variance of a pose over that of the others from which it disagrees, and is named: real noise is not exactly Gaussian
 or white, and a pose on another support has half as much again."""
@@ -155,8 +158,11 @@ def _refine(
         chosen = np.abs(t - t[len(t) // 2]) <= stretch
         if chosen.sum() < 2 * SHORTEST:
             chosen = everything
-        grid = best_f + np.linspace(-width, width, 41)
-        best_f = float(max(grid, key=lambda f: project(f, chosen)[1]))
+        grid = best_f + np.linspace(-width, width, GRID)
+        power = _core.sinusoid_power(
+            t[chosen], x[chosen], start_hz=float(grid[0]), step_hz=2.0 * width / (GRID - 1), count=GRID
+        )
+        best_f = float(grid[power.argmax()])
         width /= 6.0
         if stretch >= span:
             break
@@ -196,13 +202,16 @@ class HoldScatter:
     p_value: FloatArray
 
 
+@lru_cache(maxsize=4)
 def hold_scatter(obs: Observations) -> HoldScatter:
     """Variance of first differences per hold over the median of all: blind to slow drift, sharp on shaking."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     ratio, dof = [], []
     for hold in obs.segments.holds:
         part = x[hold.start : hold.stop]
-        ratio.append(np.nanvar(np.diff(part, axis=0), axis=0))
+        steps = np.diff(part, axis=0)
+        own = np.var(steps, axis=0)
+        ratio.append(np.nanvar(steps, axis=0) if np.isnan(own).any() else own)
         # Neighbouring differences share a sample: two thirds as many independent ones.
         dof.append((len(part) - 1) * 2.0 / 3.0)
     ratio_array, dof_array = np.array(ratio), np.array(dof)

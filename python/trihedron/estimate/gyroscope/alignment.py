@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.special import chdtrc, chdtri
 
 from trihedron import _core
 from trihedron._core import AlignmentFit
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.probability import chdtrc, chdtri
 from trihedron.records.calibration import SensorCalibration
 
 RateDegree = Literal[0, 1, 3]

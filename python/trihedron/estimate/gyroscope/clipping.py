@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 
 LONGEST_BRIDGE_S = 0.15
@@ -105,7 +106,7 @@ def _is_cut(column: FloatArray, at: BoolArray, quantum: float, is_known: bool) -
 
 def _quantum(column: FloatArray) -> float:
     """Step of the converter as neighbouring values show it, 0 where the readings never change."""
-    gaps = np.diff(np.unique(column[np.isfinite(column)]))
+    gaps = np.diff(_core.levels_of(column)[0])
     return float(np.median(gaps[gaps <= 1.5 * np.quantile(gaps, 0.25)])) if len(gaps) else 0.0
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
 
+from trihedron import _core
 from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
@@ -19,6 +19,7 @@ from trihedron.estimate.gyroscope.rounding import (
     undithered_axes,
 )
 from trihedron.estimate.gyroscope.zeros import excess_variance, pool_zeros, shrink
+from trihedron.probability import chdtrc
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
@@ -88,13 +89,12 @@ def resolution_of(readings: FloatArray) -> FloatArray:
     """Smallest step between different values of each column, (3,); zero for a column that is not quantised."""
     steps = np.zeros(readings.shape[1])
     for axis, column in enumerate(readings.T):
-        finite = column[np.isfinite(column)]
-        values = np.unique(finite)
+        values, n_finite = _core.levels_of(column)
         if len(values) < 2:
             continue
         gaps = np.diff(values)
         # A grid shows when values repeat: far fewer distinct ones than samples.
-        if len(values) < 0.5 * len(finite):
+        if len(values) < 0.5 * n_finite:
             steps[axis] = float(np.median(gaps[gaps < 1.5 * np.quantile(gaps, 0.25)]))
     return steps
 

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.turn_angles import (
@@ -32,6 +31,7 @@ from trihedron.estimate.gyroscope.turn_system import (
     solve,
     solve_zero_first,
 )
+from trihedron.probability import chdtrc
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording

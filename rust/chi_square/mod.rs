@@ -1,4 +1,9 @@
-//! Chi-square and normal probabilities for any real number of degrees of freedom.
+//! Chi-square and normal probabilities for any real number of degrees of freedom; with [`beta`] those of F, of Student
+//! and of counts.
+
+pub mod beta;
+
+use beta::falling_root;
 
 /// `ln Γ(x)` for `x > 0` (Lanczos, g = 7, nine terms: relative error below 1e-14).
 #[must_use]
@@ -86,4 +91,20 @@ pub fn normal_above(z: f64) -> f64 {
             chi_square_tails(z * z, 1.0).1
         };
     if z >= 0.0 { half } else { 1.0 - half }
+}
+
+/// Value that a chi-square variate of `dof` degrees of freedom exceeds with probability `above`, however small.
+#[must_use]
+pub fn chi_square_upper(above: f64, dof: f64) -> f64 {
+    falling_root(above, |x| chi_square_tails(x, dof).1)
+}
+
+/// Value that a standard normal variate exceeds with probability `above`.
+#[must_use]
+pub fn normal_upper(above: f64) -> f64 {
+    if above > 0.5 {
+        return -normal_upper(1.0 - above);
+    }
+    // Its square is chi-square with one degree of freedom.
+    chi_square_upper(2.0 * above, 1.0).sqrt()
 }
