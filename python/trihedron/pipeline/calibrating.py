@@ -131,10 +131,7 @@ def calibrate(
         )
     calibration = in_frame(calibration, wanted)
     about_gyro = _about_gyro(calibration, recording, segments)
-    # Losses that were seen leave none to be guessed.
-    is_seen = any(finding.code is FindingCode.SAMPLES_LOST for finding in about_gyro)
-    of_fit = (f for f in calibration.findings if not (is_seen and f.code is FindingCode.SAMPLES_LOST))
-    findings = (*said, *recording.findings, *_as_they_weigh(segments), *of_fit, *about_gyro)
+    findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, about_gyro), *about_gyro)
     return CalibrationResult(replace(calibration, findings=findings), segments, recording)
 
 
@@ -146,6 +143,12 @@ def _about_gyro(calibration: Calibration, recording: Recording, segments: Segmen
     relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
     missing = missing_samples(recording, segments, float(np.median(relative)))
     return (*scale_findings(gyro.S, recording.gyroscope_unit), *missing)
+
+
+def _of_fit(calibration: Calibration, about_gyro: Found) -> Found:
+    """Findings of the fit; losses that were seen leave none to be guessed."""
+    is_seen = any(finding.code is FindingCode.SAMPLES_LOST for finding in about_gyro)
+    return tuple(f for f in calibration.findings if not (is_seen and f.code is FindingCode.SAMPLES_LOST))
 
 
 def _as_they_weigh(segments: Segments) -> Found:
