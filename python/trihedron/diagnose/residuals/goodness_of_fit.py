@@ -21,6 +21,8 @@ ROW_DOMAINS: dict[int, Domain] = {
 }
 N_DOMAINS_TESTED = 6.0
 """Four of poses and moves, two of samples: the rate of false alarms is shared by them."""
+ROWS_OF_MOVE = 5
+"""In order: gravity after it (2), velocity over it (3)."""
 LEAST_DOF = 0.5
 """Degrees of freedom below which the fit has used a domain up."""
 HEAVY, CARRIES = 9.0, 0.2
@@ -91,9 +93,15 @@ def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
     """p (0 or 1), ratio of variances: a walk as strong as the model allows stands in for something else."""
     k = 0 if label == STATIC_ACCEL else 1
     stray = hidden_zeros(fitted)[k]
-    if stray is None or not stray.is_at_edge or stray.rms < AT_EDGE * stray.noise:
+    if stray is None or not stray.is_strayed:
         return 1.0, 1.0, Where()
     return 0.0, (stray.rms / stray.noise) ** 2, Where(_CHANNELS[label])
+
+
+def strayed(fitted: Fit) -> tuple[bool, bool]:
+    """Accelerometer, gyro: whether the walk of its zero stands in for something else (eq. 8.7b)."""
+    accel, gyro = hidden_zeros(fitted)
+    return accel.is_strayed, gyro is not None and gyro.is_strayed
 
 
 @dataclass(frozen=True)
@@ -104,6 +112,11 @@ class HiddenZero:
     rms: float
     noise: float
     is_at_edge: bool
+
+    @property
+    def is_strayed(self) -> bool:
+        """Whether the walk is at the end of its range and farther than noise explains."""
+        return self.is_at_edge and self.rms >= AT_EDGE * self.noise
 
 
 def hidden_zeros(fitted: Fit) -> tuple[HiddenZero, HiddenZero | None]:
@@ -166,8 +179,7 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
         out[STATIC_GYRO] = float(np.sqrt(np.mean(error**2)))
     angle, speed = [], []
     of_moves = np.flatnonzero(np.isin(system.domain, (MOVES, DYNAMICS)) & direct)
-    # Five rows a move, in order: gravity after it (2), velocity over it (3).
-    for white, own in zip(line.move_white, r[of_moves].reshape(-1, 5), strict=True):
+    for white, own in zip(line.move_white, r[of_moves].reshape(-1, ROWS_OF_MOVE), strict=True):
         error = np.linalg.solve(white, own)
         angle.append(float((error[:2] ** 2).sum()) / line.twin.gravity**2)
         speed.append(float((error[2:] ** 2).mean()))
@@ -178,10 +190,10 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
 
 
 def weighted_rms(fitted: Fit, rows_residual: FloatArray, base: Fit) -> dict[int, float]:
-    """Rms at rest in physical units, every reading weighted by the precision that ``base`` gives it.
+    """Rms in physical units, every reading weighted by its precision in ``base``; of moves relative to their noise.
 
-    One pose that was not still, or an axis whose zero scatters, has no more to say here than it knows. The weights are
-    the same for both models that are compared: only errors that fall make it fall.
+    One pose that was not still, an axis whose zero scatters, one long move has no more to say here than it knows. The
+    weights are the same for both models that are compared: only errors that fall make it fall.
     """
     line, system, obs = fitted.line, fitted.system, base.line.obs
     twin, h = base.line.twin, base.line.obs.n_holds
@@ -197,4 +209,10 @@ def weighted_rms(fitted: Fit, rows_residual: FloatArray, base: Fit) -> dict[int,
         error = np.linalg.solve(line.gyro_white, rows_residual[rows].reshape(h, 3, 1))[:, :, 0]
         weight = 1.0 / (spread**2 @ (twin.gyro_S**2).T)
         out[STATIC_GYRO] = float(np.sqrt((weight * error**2).sum() / weight.sum()))
+    of_moves = np.flatnonzero(np.isin(system.domain, (MOVES, DYNAMICS)) & direct)
+    if len(of_moves):
+        own = rows_residual[of_moves].reshape(-1, ROWS_OF_MOVE, 1)
+        error = (base.line.move_white @ np.linalg.solve(line.move_white, own))[:, :, 0]
+        out[MOVES] = float(np.sqrt(np.mean(error[:, :2] ** 2)))
+        out[DYNAMICS] = float(np.sqrt(np.mean(error[:, 2:] ** 2)))
     return out
