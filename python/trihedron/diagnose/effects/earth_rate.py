@@ -17,8 +17,8 @@ STEPS = 91, 180
 """Latitudes and azimuths over which the likelihood is taken: two degrees each."""
 N_STEPS, FINE = 10, np.pi / 90.0
 """Gauss-Newton steps from the best of them, at most two degrees each; angles better known than four are normal."""
-MISSES = 14.2
-"""χ² of three numbers that one chance in 370 exceeds (three sigma): beyond it the vector is not the Earth's."""
+MISSES = 6.63
+"""χ² of one number, the length, that one Earth in a hundred exceeds: beyond it the vector is another's."""
 NOMINAL = (9.8, 9.80665, 9.807, 9.81)
 """Gravity that is written down without being known: it tells no latitude."""
 HEIGHTS_M, GRAVITY_SLACK = (-430.0, 5000.0), 0.005
@@ -91,7 +91,7 @@ def _turning(latitude: FloatArray, azimuth: FloatArray) -> FloatArray:
 def latitudes_of(gravity: float) -> tuple[float, float]:
     """Least and greatest absolute latitude, rad, where gravity has this size at a height where people live."""
     low, high = HEIGHTS_M
-    if min(abs(gravity - nominal) for nominal in NOMINAL) > 1e-9:
+    if not np.isclose(gravity, NOMINAL, rtol=0.0, atol=1e-9).any():
         possible = [
             degree for degree in range(91)
             if normal_gravity(degree, high) - GRAVITY_SLACK <= gravity <= normal_gravity(degree, low) + GRAVITY_SLACK

@@ -190,10 +190,10 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
 
 
 def weighted_rms(fitted: Fit, rows_residual: FloatArray, base: Fit) -> dict[int, float]:
-    """Rms in physical units, every reading weighted by its precision in ``base``; of moves relative to their noise.
+    """Rms at rest in physical units, every reading weighted by the precision that ``base`` gives it.
 
-    One pose that was not still, an axis whose zero scatters, one long move has no more to say here than it knows. The
-    weights are the same for both models that are compared: only errors that fall make it fall.
+    One pose that was not still, or an axis whose zero scatters, has no more to say here than it knows. The weights are
+    the same for both models that are compared: only errors that fall make it fall.
     """
     line, system, obs = fitted.line, fitted.system, base.line.obs
     twin, h = base.line.twin, base.line.obs.n_holds
@@ -209,10 +209,4 @@ def weighted_rms(fitted: Fit, rows_residual: FloatArray, base: Fit) -> dict[int,
         error = np.linalg.solve(line.gyro_white, rows_residual[rows].reshape(h, 3, 1))[:, :, 0]
         weight = 1.0 / (spread**2 @ (twin.gyro_S**2).T)
         out[STATIC_GYRO] = float(np.sqrt((weight * error**2).sum() / weight.sum()))
-    of_moves = np.flatnonzero(np.isin(system.domain, (MOVES, DYNAMICS)) & direct)
-    if len(of_moves):
-        own = rows_residual[of_moves].reshape(-1, ROWS_OF_MOVE, 1)
-        error = (base.line.move_white @ np.linalg.solve(line.move_white, own))[:, :, 0]
-        out[MOVES] = float(np.sqrt(np.mean(error[:, :2] ** 2)))
-        out[DYNAMICS] = float(np.sqrt(np.mean(error[:, 2:] ** 2)))
     return out

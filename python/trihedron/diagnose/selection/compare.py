@@ -152,7 +152,7 @@ class Comparison:
     def falls(self) -> bool:
         """Whether held-out rms in physical units falls visibly in a domain of the effect's own sensor.
 
-        Plain, or with every reading weighted by what the base knows of its noise and scatter.
+        At rest plain, or with every reading weighted by what the base knows of its noise and scatter.
         """
         before, _ = physical_rms(self.base, self.base_prediction.innovation)
         after, _ = physical_rms(self.fitted, self.prediction.innovation)

@@ -129,12 +129,20 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
 def set_apart(model: StepwiseModel, before: list[Scored], after: list[Scored]) -> StepwiseModel:
     """The model whose last effect keeps those rivals only that have little left to explain beside it.
 
-    What gains as much beside it as it did without it explains something else.
+    What gains as much beside it as it did without it explains something else, and does not stand in its place either.
     """
     one = model.accepted[-1]
     was, still = ({s.effect.id: max(s.merits, default=s.merit) for s in scored} for scored in (before, after))
-    kept = tuple(i for i in one.rivals if still.get(i, -np.inf) < LEFT_OVER * was.get(i, np.inf))
-    return replace(model, accepted=(*model.accepted[:-1], replace(one, rivals=kept)))
+
+    def is_rival(effect_id: str) -> bool:
+        return still.get(effect_id, -np.inf) < LEFT_OVER * was.get(effect_id, np.inf)
+
+    kept = replace(
+        one,
+        rivals=tuple(i for i in one.rivals if is_rival(i)),
+        alternatives=tuple(a for a in one.alternatives if is_rival(a.effect.id)),
+    )
+    return replace(model, accepted=(*model.accepted[:-1], kept))
 
 
 def _logged_first(best: Refit, sound: list[Refit], rest: FloatArray) -> Refit:
