@@ -46,10 +46,11 @@ def scores(model: StepwiseModel, exclude: Collection[str] = ()) -> tuple[list[Sc
         # A walk at the end of its range takes up whatever is there, and no score test sees through it. Which of the two
         # it is their joint fits decide, with the walk as strong as it likes on either side.
         seen, _ = score_all(plain, taken)
-        best = {one.effect.id: one for one in scored}
+        best = {(one.effect.id, one.variant.label, tuple(one.variant.shape.values())): one for one in scored}
         for one in seen:
-            if one.effect.id not in best or one.merit > best[one.effect.id].merit:
-                best[one.effect.id] = one
+            key = one.effect.id, one.variant.label, tuple(one.variant.shape.values())
+            if key not in best or one.merit > best[key].merit:
+                best[key] = one
         scored = sorted(best.values(), key=lambda one: -one.merit)
     return scored, missing
 
@@ -83,7 +84,8 @@ def candidates_of(
 def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> StepwiseModel | None:
     """The model with the effect that explains most of what is left; ``None`` where none is demanded."""
     n_effects = len(catalogue())
-    leaders = [s for s in scored[:N_REFITS] if s.p_value * n_effects < alpha / 2.0]
+    first = list(dict.fromkeys(s.effect.id for s in scored))[:N_REFITS]
+    leaders = [s for s in scored if s.effect.id in first and s.p_value * n_effects < alpha / 2.0]
     context = model.context
     refits: list[Refit] = []
     sound: list[Refit] = []
@@ -101,7 +103,8 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     best = _logged_first(best, sound, rest)
     # What another mechanism explains as well: by its joint fit, or, for all of its shapes, by the score test.
     enough = best.against.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
-    close = [r.scored.effect.id for r in refits if r is not best and r.against.bic_gain_at(rest) > enough]
+    others = [r for r in refits if r.scored.effect is not best.scored.effect]
+    close = [r.scored.effect.id for r in others if r.against.bic_gain_at(rest) > enough]
     close += [
         s.effect.id
         for s in scored
@@ -109,8 +112,8 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     ]
     alternatives = tuple(
         Alternative(r.scored.effect, r.against.variant, r.scored.rank)
-        for r in sorted(refits, key=lambda r: -r.against.bic_gain_at(rest))
-        if r is not best and r.against.bic_gain > MIN_DELTA_BIC
+        for r in sorted(others, key=lambda r: -r.against.bic_gain_at(rest))
+        if r.against.bic_gain > MIN_DELTA_BIC
     )
     best = refined(model, best)
     one = Accepted(
