@@ -81,7 +81,7 @@ def main():
         term = axis.terms[symbol]
         print(f"  {symbol} {term.value:.4g} ± {term.sigma:.2g}, true {truth:g}")
     if n <= 100_000_000:
-        whole = allan_deviation(np.concatenate(list(chunks(n))), RATE, found.curve.clusters)
+        whole = allan_deviation(np.concatenate(list(chunks(n)))[:, np.newaxis], RATE, found.curve.clusters)
         difference = np.abs(found.curve.deviation / whole.deviation - 1).max()
         print(f"  largest relative difference to the whole array: {difference:.1e}")
 

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron import calibrate, diagnose
+from trihedron.estimate.gyroscope.clipping import bridge_clipping
 from trihedron.pipeline.demonstrating import truth_of_the_day
 from trihedron.segment import segment_recording
 from trihedron.simulate import hand_session, scenario_by_name, simulate
@@ -23,6 +24,8 @@ NAMES = (
     *(f"S_w{i}{j}" for i in range(1, 4) for j in range(1, 4)), *(f"b_w{i}" for i in range(1, 4)),
 )  # fmt: skip
 LOWER = np.tril_indices(3)
+WANTED = 0.1
+"""Standard errors by which two answers about a healthy session may differ."""
 
 
 def zeros_along(segments, n, sigma, jump, rng):
@@ -71,6 +74,10 @@ def scores(seed, arguments):
         [accelerometer.sigma_S[LOWER], accelerometer.sigma_b, gyroscope.sigma_S.ravel(), gyroscope.sigma_b]
     )
     out = [(value, sigma)]
+    n_clipped = (
+        0 if (clipped := bridge_clipping(recording.time_s, recording.gyroscope)) is None else clipped.is_clipped.sum()
+    )
+    named = []
     if arguments.diagnose:
         diagnosis = diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
         for model in (diagnosis.baseline, diagnosis.extended):
@@ -78,7 +85,8 @@ def scores(seed, arguments):
             value = np.concatenate([np.array(a["S"])[LOWER], a["b"], np.ravel(g["S"]), g["b"]])
             sigma = np.concatenate([np.array(a["sigma_S"])[LOWER], a["sigma_b"], np.ravel(g["sigma_S"]), g["sigma_b"]])
             out.append((value, sigma))
-    return true, out
+        named = [one.id for one in diagnosis.effects]
+    return true, out, f"{n_clipped} readings at the gyro's limit, named: {', '.join(named) or 'nothing'}"
 
 
 def main() -> None:
@@ -98,18 +106,22 @@ def main() -> None:
     )
     names = ("calibrate", "diagnose, no effects", "diagnose, all effects")
     for k in range(len(runs[0][1])):
-        z = np.array([(out[k][0] - true) / out[k][1] for true, out in runs])
+        z = np.array([(out[k][0] - true) / out[k][1] for true, out, _ in runs])
         shares = [100 * np.mean(np.abs(z) < limit) for limit in (1.0, 2.0)]
         print(f"{names[k]:<22} within 1 σ {shares[0]:5.1f} %, 2 σ {shares[1]:5.1f} %, mean z² {np.mean(z**2):.2f}")
         rms = np.sqrt(np.mean(z**2, axis=0))
         print("   rms z: " + " ".join(f"{name} {value:.2f}" for name, value in zip(NAMES, rms, strict=True)))
-    if len(runs[0][1]) > 1:
-        apart = np.array([np.abs(out[0][0] - out[1][0]) / out[0][1] for _, out in runs])
-        for seed, row in enumerate(apart, arguments.first):
-            if row.max() > 0.1:
-                print(f"   session {seed}: {NAMES[row.argmax()]} {row.max():.2f} σ apart")
-        print(f"calibrate and diagnose apart: median {np.median(apart):.3f} σ, largest {apart.max():.3f} σ")
-        ratio = np.array([out[1][1] / out[0][1] for _, out in runs])
+    if arguments.diagnose:
+        # What `diagnose` answers is its model with the effects that it names: without them a session that saturated
+        # is not described.
+        apart = np.array([np.abs(out[0][0] - out[2][0]) / out[0][1] for _, out, _ in runs])
+        for seed, (row, run) in enumerate(zip(apart, runs, strict=True), arguments.first):
+            if row.max() > WANTED:
+                print(f"   session {seed}: {NAMES[row.argmax()]} {row.max():.2f} σ apart; {run[2]}")
+        print(
+            f"calibrate and the answer of diagnose apart: median {np.median(apart):.3f} σ, largest {apart.max():.3f} σ"
+        )
+        ratio = np.array([out[2][1] / out[0][1] for _, out, _ in runs])
         print(f"their error bars: ratio {ratio.min():.3f} to {ratio.max():.3f}, median {np.median(ratio):.3f}")
 
 

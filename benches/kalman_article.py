@@ -40,7 +40,7 @@ def tracks(mix, z, start, hold):
     noise, extra = noise_of(mix), np.zeros(len(z))
     model = shaping_model(noise, ShapingOptions(), session_s=SESSION_S, hold_s=5.0)
     article = shaping_model(noise, ShapingOptions.of_the_article(SESSION_S, 5.0), session_s=SESSION_S, hold_s=5.0)
-    run = (ZERO4, DIFFUSE, ZERO4, z, REFERENCES, start, hold, extra)
+    run = (_core.KalmanStart(ZERO4, DIFFUSE, ZERO4), _core.KalmanPoses(z, REFERENCES, start, hold, extra))
     out = {"kalman": _core.kalman_track(model, *run)[:2], "kalman, article": _core.kalman_track(article, *run)[:2]}
     white = model.fast_variance(5.0)
     out["rls"] = _core.kalman_least_squares(z, REFERENCES, white, ZERO4, DIFFUSE)
@@ -48,7 +48,7 @@ def tracks(mix, z, start, hold):
     k, s = _core.kalman_least_squares(z, REFERENCES / GRAVITY, 1.0, ZERO4, np.ones(4))
     g = np.array([GRAVITY] * 3 + [1.0])
     out["rls, P0 = R = 1"] = (k / g, s / g * np.sqrt(white))
-    gls = _core.kalman_generalised_least_squares(model, ZERO4, DIFFUSE, z, REFERENCES, start, hold, extra)
+    gls = _core.kalman_generalised_least_squares(model, *run)
     out["gls"] = gls[4:6]
     batch = {"batch ls": gls[0], "batch gls": gls[2]}
     return out, batch

@@ -25,7 +25,9 @@ def nees(model, z, references, start, hold, at):
     z4, wide = np.zeros(4), np.full(4, 1e8 * SIGMA)
     n = at
     constants, sigma, covariance, y, s, *_ = _core.kalman_track(
-        model, z4, wide, z4, z[:n], references[:n], start[:n], hold[:n], np.zeros(n)
+        model,
+        _core.KalmanStart(z4, wide, z4),
+        _core.KalmanPoses(z[:n], references[:n], start[:n], hold[:n], np.zeros(n)),
     )
     e = (constants[-1] - CONSTANTS) / sigma[-1]
     correlation = covariance / np.outer(sigma[-1], sigma[-1])

@@ -23,7 +23,9 @@ def run(mix, seed, is_mixed):
     f = np.ascontiguousarray(REFERENCES[order])
     z, start, hold = readings(mix, seed, f)
     model = shaping_model(noise_of(mix), ShapingOptions(), session_s=SESSION_S, hold_s=5.0)
-    kalman = _core.kalman_track(model, ZERO4, WIDE, ZERO4, z, f, start, hold, np.zeros(N))[0]
+    kalman = _core.kalman_track(
+        model, _core.KalmanStart(ZERO4, WIDE, ZERO4), _core.KalmanPoses(z, f, start, hold, np.zeros(N))
+    )[0]
     rls = _core.kalman_least_squares(z, f, model.fast_variance(5.0), ZERO4, WIDE)[0]
     out = []
     for constants in (kalman, rls):

@@ -42,7 +42,9 @@ SCALE = np.array([CONSTANTS[0]] * 3 + [CONSTANTS[0] * GRAVITY])
 def final(z, start, hold, terms):
     model = shaping_model(AxisNoise(**terms), ShapingOptions(), session_s=SESSION_S, hold_s=5.0)
     z4, wide = np.zeros(4), np.full(4, 1e8 * SIGMA)
-    constants, sigma, *_ = _core.kalman_track(model, z4, wide, z4, z, REFERENCES, start, hold, np.zeros(len(z)))
+    constants, sigma, *_ = _core.kalman_track(
+        model, _core.KalmanStart(z4, wide, z4), _core.KalmanPoses(z, REFERENCES, start, hold, np.zeros(len(z)))
+    )
     return (constants[-1] - CONSTANTS) / SCALE, sigma[-1] / SCALE
 
 

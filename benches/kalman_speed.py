@@ -34,7 +34,8 @@ def main():
         ("14 states, exact means", ShapingOptions()),
     ):
         model = shaping_model(NOISE, options, session_s=SESSION_S, hold_s=HOLD_S)
-        took = least(lambda model=model: _core.kalman_track(model, z4, wide, z4, z, f, start, hold, extra))
+        begin, poses = _core.KalmanStart(z4, wide, z4), _core.KalmanPoses(z, f, start, hold, extra)
+        took = least(lambda model=model, begin=begin, poses=poses: _core.kalman_track(model, begin, poses))
         print(f"{name:26} {n / took / 1e6:6.2f} million poses per second, estimates and error bars kept")
     triad = REFERENCES + 0.01 * np.random.default_rng(2).standard_normal((N, 3))
     white = AxisNoise(white=0.02, walk=1e-4)

@@ -145,7 +145,7 @@ def missing(runs=40):
             x[rng.random(len(x)) < share] = np.nan
             began = time.perf_counter()
             noise = identify_noise(x, 100.0, clusters=[1, 2, 4, 16, 64, 256, 1024, 4096, 16384])
-            tally.add(noise.axes[0], allan_deviation(x, 100.0), time.perf_counter() - began)
+            tally.add(noise.axes[0], allan_deviation(x[:, np.newaxis], 100.0), time.perf_counter() - began)
             curves.append(noise.curve.deviation[:, 0])
         tau = noise.curve.tau_s
         expected = np.sqrt(truth["N"] ** 2 / tau + truth["K"] ** 2 * tau / 3)
@@ -202,9 +202,9 @@ def total(runs=300):
         m = clusters.astype(float)
         exact = {"Q": 3 / m**2, "N": 1 / m, "K": (2 * m**2 + 1) / (6 * m)}
         (kind,) = terms
-        truth = exact.get(kind, np.mean([c.variance[:, 0] for c in plain], axis=0))
-        ratio = np.mean([c.variance[:, 0] for c in curves], axis=0) / truth
-        hit = np.mean([(c.lower[:, 0] ** 2 <= truth) & (truth <= c.upper[:, 0] ** 2) for c in curves], axis=0)
+        truth = exact.get(kind, np.mean([c.variance for c in plain], axis=0))
+        ratio = np.mean([c.variance for c in curves], axis=0) / truth
+        hit = np.mean([(c.lower**2 <= truth) & (truth <= c.upper**2) for c in curves], axis=0)
         print(
             f"  {kind}: "
             + ", ".join(f"m={c} {r:.2f} {100 * x:.0f} %" for c, r, x in zip(clusters, ratio, hit, strict=True)),

@@ -156,8 +156,8 @@ def intervals(runs=2000):
     }
     for kind, draw in make.items():
         curves = [allan_deviation(draw(), 1.0, clusters) for _ in range(runs)]
-        truth = exact.get(kind, np.mean([c.variance[:, 0] for c in curves], axis=0))
-        hit = np.mean([(c.lower[:, 0] ** 2 <= truth) & (truth <= c.upper[:, 0] ** 2) for c in curves], axis=0)
+        truth = exact.get(kind, np.mean([c.variance for c in curves], axis=0))
+        hit = np.mean([(c.lower**2 <= truth) & (truth <= c.upper**2) for c in curves], axis=0)
         print(
             f"  {kind}: " + ", ".join(f"m={c} {100 * h:.1f} %" for c, h in zip(clusters, hit, strict=True)), flush=True
         )

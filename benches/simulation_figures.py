@@ -51,8 +51,8 @@ def allan_curves():
     x = make_noise(terms, n, 1.0 / rate, 3, "sum")[:, 0]
     curve = allan_deviation(x, rate)
     tau = curve.tau_s
-    axes[0].loglog(tau, curve.deviation[:, 0], color=COLOURS[0], label="simulated sum")
-    axes[0].fill_between(tau, curve.lower[:, 0], curve.upper[:, 0], color=COLOURS[0], alpha=0.2, label="95 %")
+    axes[0].loglog(tau, curve.deviation, color=COLOURS[0], label="simulated sum")
+    axes[0].fill_between(tau, curve.lower, curve.upper, color=COLOURS[0], alpha=0.2, label="95 %")
     q, w, b, k = terms.Q[0], terms.N[0], terms.B[0], terms.K[0]
     parts = [3 * q**2 / tau**2, w**2 / tau, np.full_like(tau, 2 * np.log(2) / np.pi * b**2), k**2 * tau / 3]
     axes[0].loglog(tau, np.sqrt(sum(parts)), "k--", lw=1, label="from Q, N, B, K")

@@ -7,8 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from trihedron.diagnose.against import FittedModel, compare_numbers
+from trihedron.diagnose.against import FittedModel, compare_numbers, left_open_by
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
+from trihedron.records.diagnosis import AcceptedEffect, EffectParameter
 from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.profiles import profile_by_name
@@ -227,3 +228,43 @@ def test_a_coarser_converter_and_another_rate_are_said_and_nothing_else(unit):
     said = {(n.sensor, n.term) for n in found.noise_compared if n.significant}
     assert said == {("accelerometer", "resolution"), ("both", "rate")}
     assert not any(p.significant for p in found.parameters)
+
+
+def thermal(coefficient, unit, ident="accel-thermal-scale", std=0.0):
+    parameters = tuple(EffectParameter(f"p_{axis}", coefficient, std, unit) for axis in "xyz")
+    return AcceptedEffect(ident, "", parameters, 0.0, 0.0, ())
+
+
+def test_a_level_that_both_logs_count_from_their_own_temperature_is_open_by_what_the_effect_moves_it():
+    both = [thermal(3e-4, "1/K"), thermal(-2e-4, "1/K")]
+    # Once for the effect, at its larger size, over all temperatures of both logs; a zero by gravity's share.
+    assert left_open_by(both, 4.0)["accel-scale"] == pytest.approx(1.2e-3)
+    assert left_open_by(both, 4.0)["accel-zero"] == pytest.approx(1.2e-3 * 9.80665)
+    assert left_open_by([thermal(3e-4, "1/K", std=1e-4)], 4.0)["accel-scale"] == pytest.approx(2e-3)
+    # What one log's temperatures are is not known: open without limit.
+    assert left_open_by(both)["accel-scale"] == np.inf
+    bias = [thermal(2e-3, "m/s^2/K", "accel-thermal-bias"), thermal(1e-3, "1/K")]
+    assert left_open_by(bias, 2.0)["accel-zero"] == pytest.approx(4e-3 + 2e-3 * 9.80665)
+    assert left_open_by([thermal(0.004, "m/s^2", "accel-hidden-drift")])["accel-zero"] == pytest.approx(0.004)
+    assert left_open_by([thermal(0.004, "rad/s", "gyro-hidden-drift")])["gyro-zero"] == pytest.approx(0.004)
+
+
+def test_an_effect_of_temperature_that_both_logs_have_makes_no_scale_at_other_temperatures(unit):
+    profile, accel, gyro = unit
+    logs = []
+    for layout, seed, start in ((31, 61, 25.0), (32, 62, 34.0)):
+        scenario = with_effect(
+            Scenario(hand_session(24, layout=layout), "unit", accel, gyro, profile.clock),
+            "accel-thermal-scale", per_k=(6e-4, -5e-4, 7e-4),
+        )  # fmt: skip
+        temperature = replace(
+            scenario.environment.temperature, start_degc=start, warm_up_k=8.0, warm_up_tau_s=60.0, logged=True
+        )
+        logs.append(
+            simulate(replace(scenario, environment=replace(scenario.environment, temperature=temperature)), seed)[0]
+        )
+    found = trihedron.diagnose(logs[1], against=logs[0], gravity_m_s2=9.80665)
+    scale = max(abs(p.difference) for p in found.parameters if p.id == "accel-scale")
+    # Nine kelvins of 6e-4 are there, and belong to the effect that both have.
+    assert scale > 3e-3
+    assert not any(p.significant for p in found.parameters), [p.id for p in found.parameters if p.significant]

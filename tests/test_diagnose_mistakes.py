@@ -11,10 +11,12 @@ import trihedron
 from trihedron.diagnose.against import FittedModel, compare_numbers
 from trihedron.estimate.gyroscope.world_rates import carried_gravity
 from trihedron.estimate.noise.of_zeros import PoseZeros, compare_slow
+from trihedron.pipeline.comparing import _without_walk as without_walk
 from trihedron.pipeline.comparing_frames import sign_of_gravity
+from trihedron.pipeline.comparing_slow import _has_curve as has_curve
 from trihedron.pipeline.comparing_slow import gyro_zeros
 from trihedron.records import Hold, Segments
-from trihedron.records.diagnosis import Stage, StageDomain
+from trihedron.records.diagnosis import NoiseDifference, Stage, StageDomain
 from trihedron.records.sampling import Sampling, StampKind
 from trihedron.segment import resegment
 from trihedron.simulate import hand_session, scenario_by_name, simulate
@@ -240,3 +242,18 @@ def test_pieces_of_a_bumped_pose_have_lengths_of_their_own_and_zeros_a_covarianc
     assert (starts[1:] >= stops[:-1] - 1e-7).all()
     ideal = [replace(z, values=0.0 * z.values, sigma=1e-10 * z.sigma) for z in seen]
     assert np.isfinite(compare_slow(ideal, seen).p_value)
+
+
+def test_a_walk_that_a_curve_was_drawn_through_is_compared_as_a_walk():
+    held_out = (SimpleNamespace(domain="static-gyro"),)
+    curve = SimpleNamespace(id="gyro-hidden-drift", model={"variant": "curve"}, held_out=held_out)
+    warm_up = SimpleNamespace(id="gyro-hidden-drift", model={"variant": "warm-up"}, held_out=held_out)
+    g = SimpleNamespace(id="gyro-g-sensitivity", model={}, held_out=held_out)
+    scatter = SimpleNamespace(id="gyro-zero-scatter", model={}, held_out=held_out)
+    for effects, expected in (([curve], True), ([curve, scatter], True), ([warm_up], False), ([curve, g], False)):
+        assert has_curve(SimpleNamespace(effects=effects)) is expected
+    larger = NoiseDifference("gyroscope", "x", "K", 10.0, 1.0, 10.0, None, "", 1e-6, True, "")
+    smaller = replace(larger, ratio=0.1)
+    assert without_walk((curve, warm_up), (larger,)) == (warm_up,)
+    assert without_walk((curve, warm_up), (smaller,)) == (curve, warm_up)
+    assert without_walk((curve,), ()) == (curve,)

@@ -19,7 +19,8 @@ readings += 1e-3 * rng.standard_normal((37, 3))
 out = [trihedron.integrate_rate(t, w)[-1], *_core.block_statistics(w, 7)[:2]]
 edges, anchors = np.array([[3, 700], [701, 1490]]), np.array([[-1.0, 8.0], [6.0, 20.0]])
 zero = np.full((2, 3), 0.01)
-out += _core.integrate_moves(t, w, edges, anchors, np.eye(3) * 1.01, zero, zero, 3, np.full(3, 1e-4), 1e-4, 0.01)
+noise = _core.RateNoise(np.full(3, 1e-4), 1e-4, 0.01)
+out += _core.integrate_moves(t, w, edges, anchors, np.eye(3) * 1.01, zero, zero, 3, noise)
 for symmetric in (False, True):
     for squared in (False, True):
         for loss in (0, 1):

@@ -99,7 +99,9 @@ def test_the_filter_is_generalised_least_squares_on_every_prefix(mix):
     readings = f @ [0.1, -0.02, 0.01] + 2.0 + 0.05 * rng.standard_normal(30)
     model, diffuse = compiled(**mix), np.full(4, 1e7)
     constants, sigma, *_ = _core.kalman_track(
-        model, np.zeros(4), diffuse, np.zeros(4), readings, f, start, hold, np.zeros(30)
+        model,
+        _core.KalmanStart(np.zeros(4), diffuse, np.zeros(4)),
+        _core.KalmanPoses(readings, f, start, hold, np.zeros(30)),
     )
     covariance = covariance_by_hand(mix, start, hold)
     for n in (5, 12, 30):
@@ -115,7 +117,9 @@ def test_the_smoother_is_the_conditional_expectation_given_all_readings():
     readings = f @ [0.1, -0.02, 0.01] + 2.0 + 0.05 * rng.standard_normal(40)
     model = compiled(white=0.02, walk=0.004, flicker=0.02, rates=(0.003, 0.03), averages=False)
     start_of = (np.zeros(4), np.full(4, 1e7), np.zeros(4))
-    _, _, drift, drift_sigma = _core.kalman_smooth(model, *start_of, readings, f, start, hold, np.zeros(40))
+    _, _, drift, drift_sigma = _core.kalman_smooth(
+        model, _core.KalmanStart(*start_of), _core.KalmanPoses(readings, f, start, hold, np.zeros(40))
+    )
     total = _core.kalman_noise_covariance(model, start, hold, np.zeros(40))
     slow = total - np.diag([model.white_variance(h) for h in hold])
     constants, cov = generalised_least_squares(f, readings, total)

@@ -22,9 +22,7 @@ CLUSTERS = np.array([8, 16, 64, 512, 1024])
 def test_the_covariance_of_the_points_is_that_of_simulated_curves(terms):
     rng = np.random.default_rng(51)
     runs = 500
-    curves = [
-        allan_deviation(series(rng, N_READINGS, RATE, **terms), RATE, CLUSTERS).variance[:, 0] for _ in range(runs)
-    ]
+    curves = [allan_deviation(series(rng, N_READINGS, RATE, **terms), RATE, CLUSTERS).variance for _ in range(runs)]
     found = np.cov(np.transpose(curves))
     squares = np.array([terms.get(s, 0.0) ** 2 for s in "QNBKR"])
     expected = CurveCovariance.of(CLUSTERS, N_READINGS, RATE).at(squares)

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from scipy.fft import dct
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
 from noise_series import fractional, series
-from trihedron import _core
 from trihedron.estimate.noise import identify_noise
 from trihedron.estimate.noise.spectrum import cosine_transform, line_coefficients, ordinates
 from trihedron.estimate.noise.terms import gauss_markov_density
@@ -271,15 +270,6 @@ def test_the_best_averaging_time_is_that_of_the_terms(published_setting):
         assert deviation == pytest.approx(np.sqrt(curve.min()), rel=1e-3)
         # The published N and K foretell it to what a tenth of K, and B within its interval, leave.
         assert deviation == pytest.approx(np.sqrt(2 * 2.502e-3 * 6.972e-5 / np.sqrt(3)), rel=0.15)
-
-
-@pytest.mark.parametrize("dof", [0.7, 1.0, 3.3, 40.0, 3000.0, 5e5])
-def test_chi_square_quantiles_are_those_of_scipy(dof):
-    for p in (1e-9, 0.025, 0.5, 0.975, 1 - 1e-9):
-        got = float(_core.chi_square_quantile(p, np.array([dof]))[0])
-        # Close to 1 the probability itself is rounded at 1e-16 of 1e-9.
-        assert got == pytest.approx(chi2.ppf(p, dof), rel=2e-7)
-    assert _core.chi_square_above(9.0, 1.0) == pytest.approx(2 * norm.sf(3.0), rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Outputs: whole or not at all, never over an input, never in the place of a device, and cleared up after a kill."""
 
+import contextlib
 import json
 import os
 import shutil
@@ -228,6 +229,23 @@ def test_a_reader_that_leaves_early_is_no_failure(session):
         err = process.stderr.read()
         assert process.wait(60) == 0
         assert err == b""
+
+
+# Two writers at the same moment
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_file_that_appears_while_another_is_written_is_replaced_only_with_leave(tmp_path, overwrite):
+    from trihedron.files.temporary import Temporary
+
+    target = tmp_path / "one.json"
+    with Temporary(target) as slow:
+        slow.write(b"slow")
+        target.write_text("quick")
+        with contextlib.nullcontext() if overwrite else pytest.raises(FileExistsError):
+            slow.put_in_place(None, overwrite=overwrite)
+    assert target.read_text() == ("slow" if overwrite else "quick")
+    assert leftovers(tmp_path) == []
 
 
 # Killed runs

@@ -60,7 +60,7 @@ def test_the_intervals_of_the_allan_estimator_hold_the_defining_variance(term):
     for x in realisations(term)[::2]:
         curve = allan_deviation(x, 1.0 / DT, clusters)
         expected = np.sqrt([EXPECTED[term](m) for m in clusters])
-        inside += int(np.sum((curve.lower[:, 0] <= expected) & (expected <= curve.upper[:, 0])))
+        inside += int(np.sum((curve.lower <= expected) & (expected <= curve.upper)))
         total += len(clusters)
     # 95 % intervals, 120 of them in 30 sets of four that are nearly independent: four binomial deviations, and one per
     # cent for intervals that take the noise type from the curve's own slope.

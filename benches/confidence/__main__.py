@@ -35,6 +35,13 @@ SETTINGS = {
     **{f"lost {100 * p:g} %, stamps true": (hand, {"lost": p}) for p in (0.001, 0.03)},
     **{f"lost {100 * p:g} %, stamps remade": (hand, {"lost": p, "is_remade": True}) for p in (0.001, 0.03)},
     **{
+        f"{hz:g} Hz, moves of {s:g} s, lost {100 * p:g} %, remade": (
+            hand,
+            {"rate_hz": hz, "move_s": s, "lost": p, "is_remade": True},
+        )
+        for hz, s, p in ((1000.0, 2.0, 0.001), (100.0, 10.0, 0.001), (100.0, 0.25, 0.001), (10.0, 2.0, 0.001))
+    },
+    **{
         f"table turns, {r:g} deg/s": (table, {"rate_deg_s": r, "turns": (180.0, -180.0)})
         for r in (0.5, 1.0, 3.0, 10.0, 50.0, 500.0)
     },

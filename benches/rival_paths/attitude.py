@@ -135,7 +135,9 @@ def sensitivities():
         edges = np.arange(m)[:, None] * MOVE + [0, min(MOVE, len(t) - 1) + 1]
         anchors = np.column_stack([t[edges[:, 0]] - 1.0, t[edges[:, 1] - 1] + 1.0])
         zero = np.tile(-MATRIX @ ZERO, (m, 1))
-        return _core.integrate_moves(t, w, edges, anchors, MATRIX, zero, zero, 0, np.full(3, 1e-4), 0.0, STEP_S)
+        return _core.integrate_moves(
+            t, w, edges, anchors, MATRIX, zero, zero, 0, _core.RateNoise(np.full(3, 1e-4), 0.0, STEP_S)
+        )
 
     return call
 

@@ -22,7 +22,9 @@ def main() -> int:
 
         return run()
     except (Interrupted, KeyboardInterrupt) as error:
-        print(f"trihedron: {SENTENCE}", file=sys.stderr)
+        if sys.stderr is not None:
+            # Without one, `print` would say it on standard output.
+            print(f"trihedron: {SENTENCE}", file=sys.stderr)
         return status_of(error)
 
 

@@ -85,8 +85,14 @@ class AllanStream:
     def means(self, channel: int, readings: int) -> tuple[FloatArray, int]: ...
 
 # chi-square
-def chi_square_quantile(probability: float, dof: FloatArray) -> FloatArray: ...
 def chi_square_above(value: float, dof: float) -> float: ...
+def chi_square_upper(above: float, dof: float) -> float: ...
+def normal_above(value: float) -> float: ...
+def normal_upper(above: float) -> float: ...
+def f_above(value: float, top: float, bottom: float) -> float: ...
+def f_upper(above: float, top: float, bottom: float) -> float: ...
+def student_upper(above: float, dof: float) -> float: ...
+def binomial_above(count: float, trials: float, chance: float) -> float: ...
 
 # screening
 def find_jumps(x: FloatArray, scales: Sequence[tuple[int, int, float]]) -> list[tuple[float, int, int, float]]: ...
@@ -157,6 +163,10 @@ def rotation_from_vector(vectors: FloatArray) -> FloatArray: ...
 def vector_from_rotation(rotations: FloatArray) -> FloatArray: ...
 
 # poisson
+@final
+class RateNoise:
+    def __new__(cls, density: FloatArray, sigma_time_s: float, nominal_step_s: float) -> RateNoise: ...
+
 def integrate_moves(
     time_s: FloatArray,
     gyroscope: FloatArray,
@@ -166,9 +176,7 @@ def integrate_moves(
     bias_before: FloatArray,
     bias_after: FloatArray,
     rate_degree: int,
-    noise_density: FloatArray,
-    sigma_time_s: float,
-    nominal_step_s: float,
+    noise: RateNoise,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 def integrate_raw_rate(
     time_s: FloatArray,
@@ -192,7 +200,40 @@ def readings_near(
     readings: FloatArray, axis: int, value: float, depth: float
 ) -> tuple[int, float, npt.NDArray[np.int64]]: ...
 
+# first look
+def levels_of(readings: FloatArray) -> tuple[FloatArray, int]: ...
+def window_statistics(
+    readings: FloatArray, starts: npt.NDArray[np.int64], length: int
+) -> tuple[FloatArray, FloatArray, FloatArray] | None: ...
+def quickest_turns(readings: FloatArray, side: int, turn: float) -> tuple[int | None, int | None]: ...
+def running_median(values: FloatArray, size: int) -> FloatArray: ...
+
+# motion in the means of blocks
+def first_clean(off: FloatArray, most: int, sizes: list[int], variances: FloatArray, limit: float) -> int | None: ...
+def band_power(readings: FloatArray, taps: list[float], ranges: npt.NDArray[np.int64]) -> FloatArray: ...
+def share_equations(
+    change: FloatArray, mean: FloatArray, rate: FloatArray, scale: list[float], solution: FloatArray | None
+) -> tuple[FloatArray, FloatArray]: ...
+
+# joints of a motion, and the law of its noise
+def motion_joints(
+    readings: FloatArray,
+    contrasts: FloatArray,
+    *,
+    nearby: int,
+    sharp: float,
+    part: tuple[float, float],
+    whole: tuple[float, float],
+    left: float,
+    mirrored: float,
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]: ...
+def mean_noise_law(
+    design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int]
+) -> tuple[float, list[float]]: ...
+
 # stamps
+def phase_power(windows: Sequence[FloatArray], cell: float, least: int) -> tuple[FloatArray, int]: ...
+def direct_power(stamps: FloatArray, first: float, step: float, count: int) -> FloatArray: ...
 def stamp_steps(time: FloatArray) -> tuple[int, int, int, int]: ...
 def usual_step(time: FloatArray) -> float: ...
 def steps_above(time: FloatArray, limit: float) -> npt.NDArray[np.int64]: ...
@@ -249,10 +290,23 @@ class AxisKalmanModel:
     def fast_variance(self, hold_s: float) -> float: ...
 
 @final
-class AxisKalman:
+class KalmanStart:
+    def __new__(cls, mean: FloatArray, sigma: FloatArray, walk: FloatArray) -> KalmanStart: ...
+
+@final
+class KalmanPoses:
     def __new__(
-        cls, model: AxisKalmanModel, prior_mean: FloatArray, prior_sigma: FloatArray, walk: FloatArray
-    ) -> AxisKalman: ...
+        cls,
+        readings: FloatArray,
+        references: FloatArray,
+        start_s: FloatArray,
+        hold_s: FloatArray,
+        extra_variance: FloatArray,
+    ) -> KalmanPoses: ...
+
+@final
+class AxisKalman:
+    def __new__(cls, model: AxisKalmanModel, start: KalmanStart) -> AxisKalman: ...
     def add(
         self,
         reading: float,
@@ -315,26 +369,10 @@ class NormKalman:
     def end_s(self) -> float | None: ...
 
 def kalman_track(
-    model: AxisKalmanModel,
-    prior_mean: FloatArray,
-    prior_sigma: FloatArray,
-    walk: FloatArray,
-    readings: FloatArray,
-    references: FloatArray,
-    start_s: FloatArray,
-    hold_s: FloatArray,
-    extra_variance: FloatArray,
+    model: AxisKalmanModel, start: KalmanStart, poses: KalmanPoses
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 def kalman_smooth(
-    model: AxisKalmanModel,
-    prior_mean: FloatArray,
-    prior_sigma: FloatArray,
-    walk: FloatArray,
-    readings: FloatArray,
-    references: FloatArray,
-    start_s: FloatArray,
-    hold_s: FloatArray,
-    extra_variance: FloatArray,
+    model: AxisKalmanModel, start: KalmanStart, poses: KalmanPoses
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]: ...
 def kalman_noise_covariance(
     model: AxisKalmanModel, start_s: FloatArray, hold_s: FloatArray, extra_variance: FloatArray
@@ -347,17 +385,29 @@ def kalman_least_squares(
     prior_sigma: FloatArray,
 ) -> tuple[FloatArray, FloatArray]: ...
 def kalman_generalised_least_squares(
-    model: AxisKalmanModel,
-    prior_mean: FloatArray,
-    prior_sigma: FloatArray,
-    readings: FloatArray,
-    references: FloatArray,
-    start_s: FloatArray,
-    hold_s: FloatArray,
-    extra_variance: FloatArray,
+    model: AxisKalmanModel, start: KalmanStart, poses: KalmanPoses
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...
 
 # gyro alignment
+@final
+class AlignmentPoses:
+    def __new__(
+        cls,
+        *,
+        reading: FloatArray,
+        var_reading: FloatArray,
+        zero: FloatArray,
+        var_zero: FloatArray,
+        zero_weights: FloatArray,
+        var_zero_walk: FloatArray,
+    ) -> AlignmentPoses: ...
+
+@final
+class AlignmentAccelerometer:
+    def __new__(
+        cls, scale: FloatArray, bias: FloatArray, basis: FloatArray, is_given: bool
+    ) -> AlignmentAccelerometer: ...
+
 @final
 class Moves:
     def __new__(
@@ -375,22 +425,12 @@ class Moves:
     def align(
         self,
         *,
-        reading: FloatArray,
-        var_reading: FloatArray,
-        zero: FloatArray,
-        var_zero: FloatArray,
-        zero_weights: FloatArray,
+        poses: AlignmentPoses,
+        noise: RateNoise,
+        accelerometer: AlignmentAccelerometer,
+        gravity_m_s2: float,
         used: npt.NDArray[np.bool_],
         starts: FloatArray,
-        accelerometer_scale: FloatArray,
-        accelerometer_bias: FloatArray,
-        accelerometer_basis: FloatArray,
-        gravity_m_s2: float,
-        noise_density: FloatArray,
-        sigma_time_s: float,
-        nominal_step_s: float,
-        var_zero_walk: FloatArray,
-        is_accelerometer_given: bool,
         is_offset_free: bool,
         loss_scale: float | None,
         is_near: bool = False,
@@ -622,6 +662,11 @@ def zero_process_grams(
     direction: FloatArray,
     strengths: FloatArray,
 ) -> tuple[FloatArray, FloatArray]: ...
+
+# sinusoid
+def sinusoid_power(
+    time_s: FloatArray, readings: FloatArray, *, start_hz: float, step_hz: float, count: int
+) -> FloatArray: ...
 
 # signals of effects
 def play(path: FloatArray, half_width: float) -> FloatArray: ...

@@ -8,6 +8,7 @@ pub mod axis;
 pub mod discretisation;
 pub mod least_squares;
 pub mod norm;
+pub mod rounding;
 pub mod shaping;
 pub mod smoother;
 pub mod timeline;

@@ -1,15 +1,11 @@
 //! Accelerometer fits across the seam.
 
 use nalgebra::{Matrix3, Vector3};
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
-    PyUntypedArrayMethods, ToPyArray,
-};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::lent::{as_vectors, flat3};
-use super::rotation::rows3;
+use super::arrays::{as_vectors, flat3, matrices3, rows, rows3};
 use crate::ellipsoid;
 use crate::gauss_newton::Loss;
 use crate::norm_invariant::{self, Fit, Frame, Model, Objective, Readings, Settings};
@@ -156,22 +152,6 @@ impl NormFit {
     fn n_iterations(&self) -> usize {
         self.0.iterations
     }
-}
-
-fn rows<'py>(py: Python<'py>, flat: &[f64], n: usize) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    flat.to_pyarray(py).reshape([flat.len() / n, n])
-}
-
-/// Owned `(3, 3)` matrices of an `(n, 3, 3)` array of any strides.
-fn matrices3(name: &str, array: &PyReadonlyArray3<'_, f64>) -> PyResult<Vec<Matrix3<f64>>> {
-    let shape = array.shape();
-    if shape[1] != 3 || shape[2] != 3 {
-        return Err(PyValueError::new_err(format!(
-            "{name} must have shape (n, 3, 3), got {shape:?}"
-        )));
-    }
-    let flat: Vec<f64> = array.as_array().iter().copied().collect();
-    Ok(flat.chunks_exact(9).map(Matrix3::from_row_slice).collect())
 }
 
 /// `S` and `b` to start from.

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyAr
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::lent::{as_rows, flat1, flat3};
+use super::arrays::{as_rows, flat1, flat3};
 use crate::attitude::{Form, IDENTITY, Samples};
 use crate::poisson::RateModel;
 

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::lent::{as_rows, flat3};
+use super::arrays::{as_rows, flat3};
 use crate::audit;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

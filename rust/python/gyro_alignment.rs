@@ -8,13 +8,15 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::poisson::{matrix3, ranges, samples, vector3};
-use super::rotation::rows3;
+use super::arrays::{dmatrix, matrix, matrix3, of3, rows3, samples, vector3, vectors};
+use super::poisson::{RateNoise, ranges};
 use crate::gauss_newton::Loss;
 use crate::gyro_alignment::{Alignment, Fit, Link, Model, Settings, StillPose, fit};
-use crate::poisson::{PreparedMove, RateModel, RateNoise, prepare_all};
+use crate::poisson::{PreparedMove, RateModel, prepare_all};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<AlignmentPoses>()?;
+    module.add_class::<AlignmentAccelerometer>()?;
     module.add_class::<Moves>()?;
     module.add_class::<AlignmentFit>()?;
     Ok(())
@@ -25,6 +27,83 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 struct Moves {
     links: Vec<Link>,
     moves: Vec<PreparedMove>,
+}
+
+/// What was read at rest: means of both sensors with variances, and how zeros walk between poses.
+#[pyclass(frozen, module = "trihedron._core")]
+struct AlignmentPoses {
+    holds: Vec<StillPose>,
+    zero_weights: Vec<Vector3<f64>>,
+    var_zero_walk: Vector3<f64>,
+}
+
+#[pymethods]
+impl AlignmentPoses {
+    #[new]
+    #[pyo3(signature = (*, reading, var_reading, zero, var_zero, zero_weights, var_zero_walk))]
+    fn new(
+        reading: PyReadonlyArray2<'_, f64>,
+        var_reading: PyReadonlyArray2<'_, f64>,
+        zero: PyReadonlyArray2<'_, f64>,
+        var_zero: PyReadonlyArray2<'_, f64>,
+        zero_weights: PyReadonlyArray2<'_, f64>,
+        var_zero_walk: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Self> {
+        let reading = rows3("reading", &reading)?;
+        let var_reading = rows3("var_reading", &var_reading)?;
+        let zero = rows3("zero", &zero)?;
+        let var_zero = rows3("var_zero", &var_zero)?;
+        let zero_weights = rows3("zero_weights", &zero_weights)?;
+        let n = reading.len();
+        same_length(
+            n,
+            &[
+                ("var_reading", var_reading.len()),
+                ("zero", zero.len()),
+                ("var_zero", var_zero.len()),
+                ("zero_weights", zero_weights.len()),
+            ],
+        )?;
+        Ok(Self {
+            holds: (0..n)
+                .map(|h| StillPose {
+                    reading: reading[h],
+                    var_reading: var_reading[h],
+                    zero: zero[h],
+                    var_zero: var_zero[h],
+                })
+                .collect(),
+            zero_weights,
+            var_zero_walk: vector3("var_zero_walk", &var_zero_walk)?,
+        })
+    }
+}
+
+/// S and b of the accelerometer, the directions in which they may follow, and whether they are given.
+#[pyclass(frozen, module = "trihedron._core")]
+struct AlignmentAccelerometer {
+    scale: Matrix3<f64>,
+    bias: Vector3<f64>,
+    basis: DMatrix<f64>,
+    is_given: bool,
+}
+
+#[pymethods]
+impl AlignmentAccelerometer {
+    #[new]
+    fn new(
+        scale: PyReadonlyArray2<'_, f64>,
+        bias: PyReadonlyArray1<'_, f64>,
+        basis: PyReadonlyArray2<'_, f64>,
+        is_given: bool,
+    ) -> PyResult<Self> {
+        Ok(Self {
+            scale: matrix3("scale", &scale)?,
+            bias: vector3("bias", &bias)?,
+            basis: dmatrix(&basis),
+            is_given,
+        })
+    }
 }
 
 /// Where the alignment ended.
@@ -135,87 +214,46 @@ impl Moves {
         durations.to_pyarray(py)
     }
 
-    #[pyo3(signature = (*, reading, var_reading, zero, var_zero, zero_weights, used, starts, accelerometer_scale,
-        accelerometer_bias, accelerometer_basis, gravity_m_s2, noise_density, sigma_time_s, nominal_step_s,
-        var_zero_walk, is_accelerometer_given, is_offset_free, loss_scale,
+    #[pyo3(signature = (*, poses, noise, accelerometer, gravity_m_s2, used, starts, is_offset_free, loss_scale,
         is_near=false))]
     #[allow(clippy::too_many_arguments)]
     fn align(
         &self,
         py: Python<'_>,
-        reading: PyReadonlyArray2<'_, f64>,
-        var_reading: PyReadonlyArray2<'_, f64>,
-        zero: PyReadonlyArray2<'_, f64>,
-        var_zero: PyReadonlyArray2<'_, f64>,
-        zero_weights: PyReadonlyArray2<'_, f64>,
+        poses: &AlignmentPoses,
+        noise: &RateNoise,
+        accelerometer: &AlignmentAccelerometer,
+        gravity_m_s2: f64,
         used: PyReadonlyArray1<'_, bool>,
         starts: PyReadonlyArray3<'_, f64>,
-        accelerometer_scale: PyReadonlyArray2<'_, f64>,
-        accelerometer_bias: PyReadonlyArray1<'_, f64>,
-        accelerometer_basis: PyReadonlyArray2<'_, f64>,
-        gravity_m_s2: f64,
-        noise_density: PyReadonlyArray1<'_, f64>,
-        sigma_time_s: f64,
-        nominal_step_s: f64,
-        var_zero_walk: PyReadonlyArray1<'_, f64>,
-        is_accelerometer_given: bool,
         is_offset_free: bool,
         loss_scale: Option<f64>,
         is_near: bool,
     ) -> PyResult<AlignmentFit> {
-        let reading = rows3("reading", &reading)?;
-        let var_reading = rows3("var_reading", &var_reading)?;
-        let zero = rows3("zero", &zero)?;
-        let var_zero = rows3("var_zero", &var_zero)?;
-        let zero_weights = rows3("zero_weights", &zero_weights)?;
-        let n = reading.len();
-        same_length(
-            n,
-            &[
-                ("var_reading", var_reading.len()),
-                ("zero", zero.len()),
-                ("var_zero", var_zero.len()),
-                ("zero_weights", zero_weights.len()),
-            ],
-        )?;
         if starts.shape()[1..] != [3, 3] {
             return Err(PyValueError::new_err(format!(
                 "starts must have shape (k, 3, 3), got {:?}",
                 starts.shape()
             )));
         }
-        let basis = accelerometer_basis.as_array();
         let problem = Alignment {
-            holds: (0..n)
-                .map(|h| StillPose {
-                    reading: reading[h],
-                    var_reading: var_reading[h],
-                    zero: zero[h],
-                    var_zero: var_zero[h],
-                })
-                .collect(),
+            holds: poses.holds.clone(),
             links: self.links.clone(),
             moves: self.moves.clone(),
             used: samples(&used),
             gravity: gravity_m_s2,
-            noise: RateNoise {
-                density: vector3("noise_density", &noise_density)?,
-                sigma_time_s,
-                nominal_step_s,
-            },
-            var_zero_walk: vector3("var_zero_walk", &var_zero_walk)?,
-            accelerometer_basis: DMatrix::from_fn(basis.nrows(), basis.ncols(), |i, j| {
-                basis[[i, j]]
-            }),
-            is_accelerometer_given,
+            noise: noise.0,
+            var_zero_walk: poses.var_zero_walk,
+            accelerometer_basis: accelerometer.basis.clone(),
+            is_accelerometer_given: accelerometer.is_given,
             is_offset_free,
         };
         let base = Model {
-            accelerometer_scale: matrix3("accelerometer_scale", &accelerometer_scale)?,
-            accelerometer_bias: vector3("accelerometer_bias", &accelerometer_bias)?,
+            accelerometer_scale: accelerometer.scale,
+            accelerometer_bias: accelerometer.bias,
             gyroscope_scale: Matrix3::identity(),
             rate_offset: Vector3::zeros(),
-            followed: nalgebra::DVector::zeros(basis.ncols()),
+            followed: nalgebra::DVector::zeros(accelerometer.basis.ncols()),
         };
         let starts: Vec<Model> = starts
             .as_array()
@@ -230,31 +268,11 @@ impl Moves {
             is_near,
             ..Settings::default()
         };
-        let found = super::run_long(py, || fit(&problem, &starts, &zero_weights, &settings))?;
+        let found = super::run_long(py, || {
+            fit(&problem, &starts, &poses.zero_weights, &settings)
+        })?;
         export(py, &found)
     }
-}
-
-fn matrix(py: Python<'_>, matrix: &DMatrix<f64>) -> PyResult<Py<PyArray2<f64>>> {
-    let flat: Vec<f64> = matrix.transpose().as_slice().to_vec();
-    Ok(flat
-        .to_pyarray(py)
-        .reshape([matrix.nrows(), matrix.ncols()])?
-        .unbind())
-}
-
-fn square(py: Python<'_>, matrix: &Matrix3<f64>) -> PyResult<Py<PyArray2<f64>>> {
-    Ok(matrix
-        .transpose()
-        .as_slice()
-        .to_pyarray(py)
-        .reshape([3, 3])?
-        .unbind())
-}
-
-fn vectors(py: Python<'_>, rows: &[Vector3<f64>]) -> PyResult<Py<PyArray2<f64>>> {
-    let flat: Vec<f64> = rows.iter().flat_map(|v| v.as_slice().to_vec()).collect();
-    Ok(flat.to_pyarray(py).reshape([rows.len(), 3])?.unbind())
 }
 
 fn export(py: Python<'_>, found: &Fit) -> PyResult<AlignmentFit> {
@@ -271,18 +289,18 @@ fn export(py: Python<'_>, found: &Fit) -> PyResult<AlignmentFit> {
         .flat_map(|matrix| matrix.transpose().as_slice().to_vec())
         .collect();
     Ok(AlignmentFit {
-        accelerometer_scale: square(py, &found.model.accelerometer_scale)?,
+        accelerometer_scale: of3(py, &found.model.accelerometer_scale)?.unbind(),
         accelerometer_bias: found
             .model
             .accelerometer_bias
             .as_slice()
             .to_pyarray(py)
             .unbind(),
-        gyroscope_scale: square(py, &found.model.gyroscope_scale)?,
+        gyroscope_scale: of3(py, &found.model.gyroscope_scale)?.unbind(),
         rate_offset: found.model.rate_offset.as_slice().to_pyarray(py).unbind(),
-        covariance: matrix(py, &found.covariance)?,
-        wrt_accelerometer: matrix(py, &found.wrt_accelerometer)?,
-        cov_with_zero: matrix(py, &found.cov_with_zero)?,
+        covariance: matrix(py, &found.covariance)?.unbind(),
+        wrt_accelerometer: matrix(py, &found.wrt_accelerometer)?.unbind(),
+        cov_with_zero: matrix(py, &found.cov_with_zero)?.unbind(),
         chi2: found.chi2,
         dof: found.dof,
         rank: found.certainty.rank,
@@ -292,13 +310,13 @@ fn export(py: Python<'_>, found: &Fit) -> PyResult<AlignmentFit> {
             .as_slice()
             .to_pyarray(py)
             .unbind(),
-        directions: matrix(py, &found.certainty.directions)?,
+        directions: matrix(py, &found.certainty.directions)?.unbind(),
         weights: found.weights.to_pyarray(py).unbind(),
         mahalanobis: found.mahalanobis.to_pyarray(py).unbind(),
-        residuals: vectors(py, &found.residuals)?,
+        residuals: vectors(py, &found.residuals)?.unbind(),
         cov_residuals: cov.to_pyarray(py).reshape([m, 3, 3])?.unbind(),
         jacobians: jacobians.to_pyarray(py).reshape([m, 3, p])?.unbind(),
-        predicted: vectors(py, &found.predicted)?,
+        predicted: vectors(py, &found.predicted)?.unbind(),
         iterations: found.iterations,
         is_converged: found.is_converged,
         stopped_because: found.stopped_because,

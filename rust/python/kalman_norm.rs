@@ -7,8 +7,8 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::kalman::{AxisKalmanModel, matrix};
-use super::rotation::rows3;
+use super::arrays::{matrix, rows3};
+use super::kalman::AxisKalmanModel;
 use crate::kalman::norm::{Frame, N_PARAMETERS, NormFilter, NormPose, NormPrior};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,6 +1,6 @@
 //! THE SEAM: the only place that may name `pyo3` or `numpy`. One file per room of the mathematics.
 //!
-//! Every entry lends or copies its arrays (`lent`), then calls [`run`] (or [`run_long`]), which releases the interpreter
+//! Every entry lends or copies its arrays (`arrays`), then calls [`run`] (or [`run_long`]), which releases the interpreter
 //! and turns a kernel's refusal into a `ValueError` with the kernel's own sentence.
 
 // pyo3 hands arguments over by value; that is its calling convention, not a choice of ours.
@@ -13,12 +13,14 @@ mod allan;
 mod arrays;
 mod attitude;
 mod audit;
+mod block_motion;
 mod chi_square;
 mod doorway;
+mod first_look;
 mod gyro_alignment;
+mod joints;
 mod kalman;
 mod kalman_norm;
-mod lent;
 mod move_signals;
 mod number_text;
 mod poisson;
@@ -26,6 +28,7 @@ mod rotation;
 mod screening;
 mod session_model;
 mod simulate;
+mod sinusoid;
 mod spectral_likelihood;
 mod stamps;
 mod stillness;
@@ -39,8 +42,11 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     allan::register(module)?;
     attitude::register(module)?;
     audit::register(module)?;
+    block_motion::register(module)?;
     chi_square::register(module)?;
+    first_look::register(module)?;
     gyro_alignment::register(module)?;
+    joints::register(module)?;
     move_signals::register(module)?;
     number_text::register(module)?;
     poisson::register(module)?;
@@ -51,6 +57,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     screening::register(module)?;
     session_model::register(module)?;
     simulate::register(module)?;
+    sinusoid::register(module)?;
     spectral_likelihood::register(module)?;
     stamps::register(module)?;
     stillness::register(module)?;

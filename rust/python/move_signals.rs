@@ -6,7 +6,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::lent::{as_rows, flat1, flat3};
+use super::arrays::{as_rows, flat1, flat3};
 use crate::move_signals;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -1,6 +1,5 @@
 //! Poisson integration across the seam.
 
-use nalgebra::{Matrix3, Vector3};
 use numpy::{
     PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
     ToPyArray,
@@ -9,49 +8,39 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use super::lent::{as_vectors, flat1, flat3};
-use super::rotation::rows3;
+use super::arrays::{as_vectors, flat1, flat3, matrix3, rows3, stack3, vector3};
 use crate::error::Result as KernelResult;
-use crate::poisson::{self, MoveRange, RateModel, RateNoise};
+use crate::poisson::{self, MoveRange, RateModel};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<RateNoise>()?;
     module.add_function(wrap_pyfunction!(integrate_moves, module)?)?;
     module.add_function(wrap_pyfunction!(integrate_raw_rate, module)?)?;
     Ok(())
 }
 
-/// Owned 3-vector of a `(3,)` array.
-pub(crate) fn vector3(name: &str, array: &PyReadonlyArray1<'_, f64>) -> PyResult<Vector3<f64>> {
-    let view = array.as_array();
-    if view.len() != 3 {
-        return Err(PyValueError::new_err(format!(
-            "{name} must have shape (3,), got ({},)",
-            view.len()
-        )));
-    }
-    Ok(Vector3::new(view[0], view[1], view[2]))
-}
+/// Noise of the rate during moves, raw units, and of the instants at which it was read.
+#[pyclass(frozen, module = "trihedron._core")]
+pub(super) struct RateNoise(pub(super) poisson::RateNoise);
 
-/// Owned matrix of a `(3, 3)` array.
-pub(crate) fn matrix3(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Matrix3<f64>> {
-    if array.shape() != [3, 3] {
-        return Err(PyValueError::new_err(format!(
-            "{name} must have shape (3, 3), got ({}, {})",
-            array.shape()[0],
-            array.shape()[1]
-        )));
+#[pymethods]
+impl RateNoise {
+    #[new]
+    fn new(
+        density: PyReadonlyArray1<'_, f64>,
+        sigma_time_s: f64,
+        nominal_step_s: f64,
+    ) -> PyResult<Self> {
+        Ok(Self(poisson::RateNoise {
+            density: vector3("density", &density)?,
+            sigma_time_s,
+            nominal_step_s,
+        }))
     }
-    let view = array.as_array();
-    Ok(Matrix3::from_fn(|i, j| view[[i, j]]))
-}
-
-/// Owned samples of an `(n,)` array of any stride.
-pub(crate) fn samples<T: numpy::Element + Copy>(array: &PyReadonlyArray1<'_, T>) -> Vec<T> {
-    array.as_array().iter().copied().collect()
 }
 
 /// Ranges from an `(m, 2)` array `start, stop` and the instants `(m, 2)` between which the bias runs.
-pub(crate) fn ranges(
+pub(super) fn ranges(
     edges: &PyReadonlyArray2<'_, i64>,
     anchors_s: &PyReadonlyArray2<'_, f64>,
 ) -> PyResult<Vec<MoveRange>> {
@@ -107,9 +96,7 @@ fn integrate_moves<'py>(
     bias_before: PyReadonlyArray2<'py, f64>,
     bias_after: PyReadonlyArray2<'py, f64>,
     rate_degree: u8,
-    noise_density: PyReadonlyArray1<'py, f64>,
-    sigma_time_s: f64,
-    nominal_step_s: f64,
+    noise: &RateNoise,
 ) -> PyResult<Integrated<'py>> {
     let time_s = flat1(&time_s);
     let raw = flat3("gyroscope", &gyroscope)?;
@@ -118,11 +105,7 @@ fn integrate_moves<'py>(
     let before = rows3("bias_before", &bias_before)?;
     let after = rows3("bias_after", &bias_after)?;
     let m = ranges.len();
-    let noise = RateNoise {
-        density: vector3("noise_density", &noise_density)?,
-        sigma_time_s,
-        nominal_step_s,
-    };
+    let noise = &noise.0;
     let turns = super::run_long(py, || {
         let model = RateModel::of_degree(rate_degree)?;
         poisson::integrate_once(
@@ -133,26 +116,19 @@ fn integrate_moves<'py>(
             &scale,
             &before,
             &after,
-            &noise,
+            noise,
         )
     })?;
-    let stack = |matrices: Vec<Matrix3<f64>>| {
-        let flat: Vec<f64> = matrices
-            .iter()
-            .flat_map(|matrix| matrix.transpose().as_slice().to_vec())
-            .collect();
-        flat.to_pyarray(py).reshape([m, 3, 3])
-    };
     let wrt_scale: Vec<f64> = turns
         .iter()
         .flat_map(|turn| turn.wrt_scale.transpose().as_slice().to_vec())
         .collect();
     Ok((
-        stack(turns.iter().map(|turn| turn.rotation).collect())?,
+        stack3(py, turns.iter().map(|turn| turn.rotation))?,
         wrt_scale.to_pyarray(py).reshape([m, 3, 9])?,
-        stack(turns.iter().map(|turn| turn.wrt_bias_before).collect())?,
-        stack(turns.iter().map(|turn| turn.wrt_bias_after).collect())?,
-        stack(turns.iter().map(|turn| turn.cov_noise).collect())?,
+        stack3(py, turns.iter().map(|turn| turn.wrt_bias_before))?,
+        stack3(py, turns.iter().map(|turn| turn.wrt_bias_after))?,
+        stack3(py, turns.iter().map(|turn| turn.cov_noise))?,
     ))
 }
 

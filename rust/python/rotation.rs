@@ -1,6 +1,6 @@
 //! Rotations across the seam.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use numpy::{
     PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
     ToPyArray,
@@ -8,29 +8,13 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::arrays::rows3;
 use crate::rotation;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(rotation_from_vector, module)?)?;
     module.add_function(wrap_pyfunction!(vector_from_rotation, module)?)?;
     Ok(())
-}
-
-/// Owned rows of an `(n, 3)` array of any strides.
-pub(crate) fn rows3(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vector3<f64>>> {
-    if array.shape()[1] != 3 {
-        return Err(PyValueError::new_err(format!(
-            "{name} must have shape (n, 3), got ({}, {})",
-            array.shape()[0],
-            array.shape()[1]
-        )));
-    }
-    let view = array.as_array();
-    Ok(view
-        .rows()
-        .into_iter()
-        .map(|row| Vector3::new(row[0], row[1], row[2]))
-        .collect())
 }
 
 #[pyfunction]

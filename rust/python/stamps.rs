@@ -6,8 +6,8 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::lent::flat1;
-use crate::stamps::{self, Course};
+use super::arrays::flat1;
+use crate::stamps::{self, Course, phase_sum};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stamp_steps, module)?)?;
@@ -19,6 +19,8 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(block_medians, module)?)?;
     module.add_function(wrap_pyfunction!(block_mean_ticks, module)?)?;
     module.add_function(wrap_pyfunction!(robust_line, module)?)?;
+    module.add_function(wrap_pyfunction!(phase_power, module)?)?;
+    module.add_function(wrap_pyfunction!(direct_power, module)?)?;
     module.add_function(wrap_pyfunction!(lay_even_clock, module)?)
 }
 
@@ -228,4 +230,36 @@ fn lay_even_clock(
             })
         }
     }
+}
+
+/// Power `(length / 2 + 1,)` of the phase sums of windows of stamps on a grid of `length` cells, and that length: the
+/// first from `least` on at which a transform is fast.
+#[pyfunction]
+fn phase_power<'py>(
+    py: Python<'py>,
+    windows: Vec<PyReadonlyArray1<'py, f64>>,
+    cell: f64,
+    least: usize,
+) -> PyResult<(Bound<'py, PyArray1<f64>>, usize)> {
+    let length = phase_sum::next_fast_length(least);
+    let windows: Vec<_> = windows.iter().map(flat1).collect();
+    let lent: Vec<&[f64]> = windows.iter().map(AsRef::as_ref).collect();
+    let power = super::run(py, || phase_sum::phase_power(&lent, cell, length))?;
+    Ok((PyArray1::from_vec(py, power), length))
+}
+
+/// Power `(count,)` of the phase sum of stamps at frequencies `step` apart.
+#[pyfunction]
+fn direct_power<'py>(
+    py: Python<'py>,
+    stamps: PyReadonlyArray1<'py, f64>,
+    first: f64,
+    step: f64,
+    count: usize,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let stamps = flat1(&stamps);
+    let power = super::run(py, || {
+        Ok(phase_sum::direct_power(&stamps, first, step, count))
+    })?;
+    Ok(PyArray1::from_vec(py, power))
 }

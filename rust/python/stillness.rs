@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use super::lent::flat3;
+use super::arrays::flat3;
 use crate::stillness;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -31,16 +31,43 @@ pub(super) fn add_product(out: &mut DMatrix<f64>, factor: f64, a: &DMatrix<f64>,
     }
 }
 
-/// `(L Lᵀ)⁻¹ rhs`.
-pub(super) fn solve(half: &Cholesky<f64, Dyn>, rhs: &DMatrix<f64>) -> DMatrix<f64> {
-    let (n, m) = rhs.shape();
-    if n == 0 || m == 0 {
-        return rhs.clone();
+/// Adds `factor · Σ rᵀr` over rows of `width` numbers to the lower triangle of `out`; what is zero costs nothing.
+pub(super) fn add_gram(out: &mut DMatrix<f64>, factor: f64, rows: &[f64], width: usize) {
+    if width == 0 {
+        return;
+    }
+    for row in rows.chunks_exact(width) {
+        for (j, value) in row.iter().enumerate() {
+            if *value != 0.0 {
+                let column = &mut out.as_mut_slice()[j * width + j..(j + 1) * width];
+                add_scaled(column, factor * value, &row[j..]);
+            }
+        }
+    }
+}
+
+/// Copies the lower triangle of `out` above its diagonal.
+pub(super) fn mirror(out: &mut DMatrix<f64>) {
+    for j in 0..out.ncols() {
+        for i in j + 1..out.nrows() {
+            out[(j, i)] = out[(i, j)];
+        }
+    }
+}
+
+/// `L⁻¹ rhs` row by row.
+pub(super) fn forward(half: &Cholesky<f64, Dyn>, rhs: &DMatrix<f64>) -> Vec<f64> {
+    let mut rows = rhs.transpose();
+    forward_rows(half, rows.as_mut_slice(), rhs.ncols());
+    rows.as_slice().to_vec()
+}
+
+fn forward_rows(half: &Cholesky<f64, Dyn>, data: &mut [f64], m: usize) {
+    if m == 0 {
+        return;
     }
     let lower = half.l_dirty();
-    let mut rows = rhs.transpose();
-    let data = rows.as_mut_slice();
-    for i in 0..n {
+    for i in 0..lower.nrows() {
         let (before, from) = data.split_at_mut(i * m);
         let own = &mut from[..m];
         for (j, other) in before.chunks_exact(m).enumerate() {
@@ -51,6 +78,18 @@ pub(super) fn solve(half: &Cholesky<f64, Dyn>, rhs: &DMatrix<f64>) -> DMatrix<f6
             *value *= inverse;
         }
     }
+}
+
+/// `(L Lᵀ)⁻¹ rhs`.
+pub(super) fn solve(half: &Cholesky<f64, Dyn>, rhs: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, m) = rhs.shape();
+    if n == 0 || m == 0 {
+        return rhs.clone();
+    }
+    let lower = half.l_dirty();
+    let mut rows = rhs.transpose();
+    let data = rows.as_mut_slice();
+    forward_rows(half, data, m);
     for i in (0..n).rev() {
         let (upto, after) = data.split_at_mut((i + 1) * m);
         let own = &mut upto[i * m..];

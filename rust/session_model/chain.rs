@@ -6,7 +6,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::blocks::{add_product, solve};
+use super::blocks::{add_gram, add_product, forward, mirror, solve};
 use super::factor::Factor;
 use crate::error::{Error, Result};
 
@@ -143,10 +143,10 @@ impl Rows {
 pub struct Chain {
     /// Sizes.
     pub layout: Layout,
-    corner: DMatrix<f64>,
-    border: Vec<DMatrix<f64>>,
-    diagonal: Vec<DMatrix<f64>>,
-    next: Vec<DMatrix<f64>>,
+    pub(super) corner: DMatrix<f64>,
+    pub(super) border: Vec<DMatrix<f64>>,
+    pub(super) diagonal: Vec<DMatrix<f64>>,
+    pub(super) next: Vec<DMatrix<f64>>,
 }
 
 impl Chain {
@@ -170,9 +170,7 @@ impl Chain {
     /// Of all these rows.
     pub fn of<'a>(layout: Layout, rows: impl IntoIterator<Item = &'a Rows>) -> Self {
         let mut chain = Self::zeros(layout);
-        for part in rows {
-            chain.add(part);
-        }
+        chain.add_all(rows);
         chain
     }
 
@@ -181,24 +179,34 @@ impl Chain {
         let mut chain = Self::zeros(layout);
         chain.corner = DMatrix::zeros(0, 0);
         chain.border.clear();
-        for part in rows {
-            chain.add(part);
-        }
+        chain.add_all(rows);
         chain
     }
 
+    fn add_all<'a>(&mut self, rows: impl IntoIterator<Item = &'a Rows>) {
+        for part in rows {
+            self.add(part);
+        }
+        mirror(&mut self.corner);
+        self.diagonal.iter_mut().for_each(mirror);
+    }
+
+    /// Adds rows; of what is symmetric the lower triangle.
     fn add(&mut self, rows: &Rows) {
         let has_border = rows.border.ncols() > 0;
+        let add_own = |out: &mut DMatrix<f64>, block: &DMatrix<f64>| {
+            add_gram(out, 1.0, block.transpose().as_slice(), block.ncols());
+        };
         if has_border {
-            add_product(&mut self.corner, 1.0, &rows.border, &rows.border);
+            add_own(&mut self.corner, &rows.border);
         }
         let Some(pose) = rows.pose else { return };
-        add_product(&mut self.diagonal[pose], 1.0, &rows.here, &rows.here);
+        add_own(&mut self.diagonal[pose], &rows.here);
         if has_border {
             add_product(&mut self.border[pose], 1.0, &rows.here, &rows.border);
         }
         if rows.next.ncols() > 0 {
-            add_product(&mut self.diagonal[pose + 1], 1.0, &rows.next, &rows.next);
+            add_own(&mut self.diagonal[pose + 1], &rows.next);
             add_product(&mut self.next[pose], 1.0, &rows.here, &rows.next);
             if has_border {
                 add_product(&mut self.border[pose + 1], 1.0, &rows.next, &rows.border);
@@ -242,16 +250,7 @@ impl Chain {
     /// When the matrix is not positive definite.
     pub fn factor(&self, ridge: f64, scale: Option<&DVector<f64>>) -> Result<Factor> {
         let layout = self.layout;
-        let scale = scale.cloned().unwrap_or_else(|| {
-            self.diagonal().map(|value| {
-                let length = value.max(0.0).sqrt();
-                if length > 0.0 && length.is_finite() {
-                    length
-                } else {
-                    1.0
-                }
-            })
-        });
+        let scale = scale.cloned().unwrap_or_else(|| lengths(&self.diagonal()));
         let d_border = scale.rows(0, layout.border).map(f64::recip);
         let mut schur = scaled(&self.corner, &d_border, &d_border);
         add_ridge(&mut schur, ridge);
@@ -272,13 +271,8 @@ impl Chain {
                 add_product(&mut edge, -1.0, &along, &border[i - 1]);
                 gain.push(along);
             }
-            let half = block.cholesky().ok_or_else(|| {
-                Error::not_determined(
-                    "the normal equations of the session are not positive definite: a noise figure is missing or zero",
-                )
-            })?;
-            let inner = solve(&half, &edge);
-            add_product(&mut schur, -1.0, &edge, &inner);
+            let half = block.cholesky().ok_or_else(indefinite)?;
+            add_gram(&mut schur, -1.0, &forward(&half, &edge), layout.border);
             diagonal.push(half);
             border.push(edge);
         }
@@ -302,6 +296,24 @@ impl Chain {
     }
 }
 
+pub(super) fn indefinite() -> Error {
+    Error::not_determined(
+        "the normal equations of the session are not positive definite: a noise figure is missing or zero",
+    )
+}
+
+/// Lengths of columns from the diagonal of `JᵀJ`; a column of nothing has length one.
+pub(super) fn lengths(diagonal: &DVector<f64>) -> DVector<f64> {
+    diagonal.map(|value| {
+        let length = value.max(0.0).sqrt();
+        if length > 0.0 && length.is_finite() {
+            length
+        } else {
+            1.0
+        }
+    })
+}
+
 pub(super) fn scaled(
     matrix: &DMatrix<f64>,
     left: &DVector<f64>,
@@ -312,7 +324,7 @@ pub(super) fn scaled(
     })
 }
 
-fn add_ridge(matrix: &mut DMatrix<f64>, ridge: f64) {
+pub(super) fn add_ridge(matrix: &mut DMatrix<f64>, ridge: f64) {
     for i in 0..matrix.nrows() {
         matrix[(i, i)] += ridge;
     }

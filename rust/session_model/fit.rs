@@ -91,13 +91,16 @@ impl Fit {
     }
 }
 
-pub(super) fn chi2_of(groups: &[Group]) -> f64 {
-    groups.iter().map(|g| g.rows.residual.norm_squared()).sum()
+pub(super) fn chi2_of<'a>(groups: impl IntoIterator<Item = &'a Group>) -> f64 {
+    groups
+        .into_iter()
+        .map(|g| g.rows.residual.norm_squared())
+        .sum()
 }
 
 /// `Jᵀr` `(n, 1)`.
 #[must_use]
-pub fn gradient(layout: Layout, groups: &[Group]) -> DMatrix<f64> {
+pub fn gradient<'a>(layout: Layout, groups: impl IntoIterator<Item = &'a Group>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(layout.n(), 1);
     for group in groups {
         let r = DMatrix::from_column_slice(group.rows.len(), 1, group.rows.residual.as_slice());

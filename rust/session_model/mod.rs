@@ -7,6 +7,7 @@
 
 mod blocks;
 pub mod chain;
+mod evidence;
 pub mod factor;
 pub mod fit;
 pub mod held_out;

@@ -1,11 +1,13 @@
 //! Error bars over the ways in which zeros may scatter, not over the likeliest alone (docs/model-session.md, 11.12b).
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::Session;
+use super::evidence::Evidence;
 use super::factor::Factor;
 use super::fit::{Fit, RIDGE};
-use super::strengths::{Evidence, NO_SCATTER, reweighed};
+use super::strengths::{NO_SCATTER, reweighed};
 use crate::error::Result;
 
 /// Scatters of the accelerometer's zero that its error bars allow for, in units of the reference, together as likely
@@ -40,29 +42,33 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
             let mut at = fit.strengths;
             at.scatter = [scatter, fit.likely_scatter[1]];
             at.corner_s[0] = corner;
-            tried.push((evidence.at(&at) + prior, at));
+            tried.push((prior, at));
         }
     }
+    let tried: Vec<_> = tried
+        .into_par_iter()
+        .map(|(prior, at)| (evidence.at(&at) + prior, at))
+        .collect();
     let best = tried
         .iter()
         .map(|(v, _)| *v)
         .fold(f64::NEG_INFINITY, f64::max);
-    let mut out = Vec::new();
-    for (value, at) in tried {
-        let weight = (value - best).exp();
-        if weight < LEAST_WEIGHT {
-            continue;
-        }
-        let (moves, _) = reweighed(fit, &at)?;
-        let (chain, side, _, _) = evidence.combined(&at, &moves, 1.0);
-        let factor = chain.factor(RIDGE, None)?;
-        let step = -factor.solve(&side).column(0).into_owned();
-        out.push(Possible {
-            weight,
-            step,
-            factor,
-        });
-    }
+    let mut out = tried
+        .into_par_iter()
+        .map(|(value, at)| ((value - best).exp(), at))
+        .filter(|(weight, _)| *weight >= LEAST_WEIGHT)
+        .map(|(weight, at)| {
+            let (moves, _) = reweighed(fit, &at)?;
+            let (chain, side) = evidence.combined(&at, &moves);
+            let factor = chain.factor(RIDGE, None)?;
+            let step = -factor.solve(&side).column(0).into_owned();
+            Ok(Possible {
+                weight,
+                step,
+                factor,
+            })
+        })
+        .collect::<Result<Vec<_>>>()?;
     let total: f64 = out.iter().map(|one| one.weight).sum();
     for one in &mut out {
         one.weight /= total;

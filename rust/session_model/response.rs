@@ -1,7 +1,7 @@
 //! How the residuals of a move answer to every sample: one backward pass, and products with it (docs/model-session.md,
 //! equations 11.5-11.7).
 
-use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
 
 use super::moves::{Carried, Move, MoveCovariance, MoveNoise, N_MOVE, Sees};
 use crate::rotation::{exp_and_left_jacobian, skew};
@@ -208,22 +208,31 @@ pub fn effect_columns(
     rate: Option<&[f64]>,
     k: usize,
 ) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(N_MOVE, k);
-    for c in 0..k {
-        let mut change = SVector::<f64, N_MOVE>::zeros();
-        let along = |row: &[f64]| Vector3::new(row[c], row[k + c], row[2 * k + c]);
-        if let Some(rate) = rate {
-            for (r, row) in response.by_rate.iter().zip(rate.chunks_exact(3 * k)) {
-                change -= r * along(row);
+    // Row by row, so that the loop runs along the parameters.
+    let mut out = vec![0.0; N_MOVE * k];
+    if let Some(rate) = rate.filter(|_| k > 0) {
+        for (r, row) in response.by_rate.iter().zip(rate.chunks_exact(3 * k)) {
+            for (i, own) in out.chunks_exact_mut(k).enumerate() {
+                subtract_along(own, [r[(i, 0)], r[(i, 1)], r[(i, 2)]], row);
             }
         }
-        if let Some(force) = force {
-            let mut velocity = change.fixed_rows_mut::<3>(2);
-            for (f, row) in response.by_force.iter().zip(force.chunks_exact(3 * k)) {
-                velocity -= f * along(row);
-            }
-        }
-        out.column_mut(c).copy_from(&change);
     }
-    out
+    if let Some(force) = force.filter(|_| k > 0) {
+        for (f, row) in response.by_force.iter().zip(force.chunks_exact(3 * k)) {
+            for (i, own) in out[2 * k..].chunks_exact_mut(k).enumerate() {
+                subtract_along(own, [f[(i, 0)], f[(i, 1)], f[(i, 2)]], row);
+            }
+        }
+    }
+    DMatrix::from_row_slice(N_MOVE, k, &out)
+}
+
+/// Takes `Σ response_i row_i` off, where `row` holds three vectors one after the other.
+fn subtract_along(out: &mut [f64], response: [f64; 3], row: &[f64]) {
+    let k = out.len();
+    let (x, rest) = row.split_at(k);
+    let (y, z) = rest.split_at(k);
+    for (((o, x), y), z) in out.iter_mut().zip(x).zip(y).zip(z) {
+        *o -= response[0] * x + response[1] * y + response[2] * z;
+    }
 }

@@ -1,12 +1,14 @@
 //! Strengths of the processes behind the zeros, by marginal likelihood (docs/model-session.md, 11.12).
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::chain::Chain;
-use super::fit::{Fit, RIDGE, chi2_of, fit, gradient};
+use super::evidence::{Evidence, Part};
+use super::fit::{Fit, chi2_of, fit, gradient};
 use super::move_rows::{Weights, Whitening};
 use super::moves::N_MOVE;
-use super::rows::{Domain, Group, N_PROCESSES};
+use super::rows::Domain;
 use super::{Distortion, Session, State, Strengths};
 use crate::error::Result;
 
@@ -31,7 +33,7 @@ const SCATTER_GATE: f64 = 5.41;
 /// is √(1/12) of a leap of √2 (0.4), a leap at either end of the move √2/2 (0.7), a third zero √(3/2) (1.2).
 const BETWEEN: [f64; 8] = [0.15, 0.3, 0.42, 0.6, 0.85, 1.2, 1.7, 2.4];
 /// Rows of moves count this much less while strengths of walk and scatter are chosen.
-const DEAF: f64 = 1e-3;
+pub(super) const DEAF: f64 = 1e-3;
 
 /// Fits a session with the strengths of its processes chosen by marginal likelihood (11.12).
 ///
@@ -75,95 +77,7 @@ pub fn tune(
     })
 }
 
-/// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.
-pub(super) struct Part {
-    chain: Chain,
-    side: DMatrix<f64>,
-    sum: f64,
-    n: usize,
-}
-
-/// Normal equations by process, ready to be weighed anew.
-pub(super) struct Evidence {
-    at: Strengths,
-    /// Readings of the poses, and priors.
-    rest: Part,
-    /// Readings of the moves.
-    moves: Part,
-    process: Vec<Part>,
-}
-
 impl Evidence {
-    pub(super) fn of(fit: &Fit) -> Self {
-        let layout = fit.layout();
-        let part = |is_in: &dyn Fn(&Group) -> bool, is_bordered: bool| {
-            let groups: Vec<Group> = fit.groups.iter().filter(|g| is_in(g)).cloned().collect();
-            let rows = groups.iter().map(|group| &group.rows);
-            Part {
-                chain: if is_bordered {
-                    Chain::of(layout, rows)
-                } else {
-                    Chain::of_poses(layout, rows)
-                },
-                side: gradient(layout, &groups),
-                sum: chi2_of(&groups),
-                n: groups.iter().map(|group| group.rows.len()).sum(),
-            }
-        };
-        let is_move = |group: &Group| group.domain == Domain::Moves && group.rows.len() == N_MOVE;
-        let is_fixed = |group: &Group| group.kind.process().is_none();
-        Self {
-            at: fit.strengths,
-            rest: part(&|g| is_fixed(g) && !is_move(g), true),
-            moves: part(&|g| is_fixed(g) && is_move(g), true),
-            process: (0..N_PROCESSES)
-                .map(|p| part(&|g: &Group| g.kind.process() == Some(p), false))
-                .collect(),
-        }
-    }
-
-    /// Normal equations, `Jᵀr`, `Σ r²` and normalisation at other strengths, with the rows of the moves as given.
-    pub(super) fn combined(
-        &self,
-        strengths: &Strengths,
-        moves: &Part,
-        hearing: f64,
-    ) -> (Chain, DMatrix<f64>, f64, f64) {
-        let factors = [
-            strengths.corner_s[0] / self.at.corner_s[0],
-            strengths.corner_s[1] / self.at.corner_s[1],
-            self.at.scatter[0] / strengths.scatter[0],
-            self.at.scatter[1] / strengths.scatter[1],
-        ];
-        let mut chain = self.rest.chain.clone();
-        let mut side = self.rest.side.clone();
-        let mut sum = self.rest.sum;
-        let mut weight = 0.0;
-        let processes = self.process.iter().zip(factors);
-        for (part, factor) in processes.chain(std::iter::once((moves, hearing))) {
-            let squared = factor * factor;
-            chain.add_scaled(&part.chain, squared);
-            side += &part.side * squared;
-            sum += part.sum * squared;
-            weight += part.n as f64 * factor.ln();
-        }
-        (chain, side, sum, weight)
-    }
-
-    /// Log-evidence at other strengths, from the linear problem here.
-    fn with(&self, strengths: &Strengths, moves: &Part, hearing: f64) -> f64 {
-        let (chain, side, sum, weight) = self.combined(strengths, moves, hearing);
-        let Ok(factor) = chain.factor(RIDGE, None) else {
-            return f64::NEG_INFINITY;
-        };
-        let chi2 = sum - side.dot(&factor.solve(&side));
-        -0.5 * chi2 - 0.5 * factor.log_det() + weight
-    }
-
-    pub(super) fn at(&self, strengths: &Strengths) -> f64 {
-        self.with(strengths, &self.moves, DEAF)
-    }
-
     /// One process after the other until none moves.
     fn search(&self, session: &Session) -> Strengths {
         let has_rate = session.rate.is_some();
@@ -218,12 +132,12 @@ impl Evidence {
             if sensor == 1 && !has_rate {
                 continue;
             }
-            let values = CORNER_GRID_S.map(|corner| {
+            let values = best_of(&CORNER_GRID_S, |corner| {
                 let mut tried = *best;
                 tried.corner_s[sensor] = corner;
-                (self.at(&tried), corner)
+                self.at(&tried)
             });
-            if let Some((_, corner)) = values.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+            if let Some(corner) = values {
                 best.corner_s[sensor] = corner;
             }
         }
@@ -234,17 +148,15 @@ impl Evidence {
         let value = |k: i32| {
             let mut tried = *best;
             tried.scatter[sensor] = SCATTER_FROM * SCATTER_RATIO.powi(k);
-            (self.at(&tried), k)
+            self.at(&tried)
         };
-        let best_of = |ks: &mut dyn Iterator<Item = i32>| {
-            ks.map(value)
-                .max_by(|a, b| a.0.total_cmp(&b.0))
-                .map_or(0, |(_, k)| k)
-        };
-        let coarse = best_of(&mut (0..=N_SCATTER / COARSE).map(|k| k * COARSE));
+        let all: Vec<i32> = (0..=N_SCATTER / COARSE).map(|k| k * COARSE).collect();
+        let coarse = best_of(&all, value).unwrap_or(0);
         let reach = COARSE - 1;
-        let fine = best_of(&mut ((coarse - reach).max(0)..(coarse + reach + 1).min(N_SCATTER)));
-        let shift = peak([fine - 1, fine, fine + 1].map(|k| value(k).0));
+        let near: Vec<i32> =
+            ((coarse - reach).max(0)..(coarse + reach + 1).min(N_SCATTER)).collect();
+        let fine = best_of(&near, value).unwrap_or(0);
+        let shift = peak([fine - 1, fine, fine + 1].map(value));
         best.scatter[sensor] = SCATTER_FROM * SCATTER_RATIO.powf(f64::from(fine) + shift);
     }
 
@@ -255,21 +167,26 @@ impl Evidence {
             if best.scatter[sensor] <= NO_SCATTER {
                 continue;
             }
-            let values = BETWEEN.map(|between| {
+            let values = best_of(&BETWEEN, |between| {
                 let mut tried = best;
                 tried.between[sensor] = between;
-                let evidence = reweighed(fit, &tried)
-                    .map_or(f64::NEG_INFINITY, |(moves, weight)| {
-                        self.with(&tried, &moves, 1.0) + weight
-                    });
-                (evidence, between)
+                reweighed(fit, &tried).map_or(f64::NEG_INFINITY, |(moves, weight)| {
+                    self.with(&tried, &moves) + weight
+                })
             });
-            if let Some((_, between)) = values.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+            if let Some(between) = values {
                 best.between[sensor] = between;
             }
         }
         best.between
     }
+}
+
+/// The candidate of the greatest value, the last of equal ones: candidates are tried side by side.
+fn best_of<T: Copy + Send + Sync>(candidates: &[T], value: impl Fn(T) -> f64 + Sync) -> Option<T> {
+    let values: Vec<f64> = candidates.par_iter().map(|&one| value(one)).collect();
+    let best = candidates.iter().zip(values);
+    best.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(one, _)| *one)
 }
 
 /// Where a parabola through three values at -1, 0, 1 is highest, within half a step.

@@ -6,6 +6,7 @@
 mod blocks;
 mod line;
 mod median;
+pub mod phase_sum;
 mod steps;
 
 pub use blocks::{block_means, block_medians, earliest};

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use trihedron::kalman::discretisation::discretise;
-use trihedron::kalman::shaping::undithered_variance;
+use trihedron::kalman::rounding::undithered_variance;
 use trihedron::kalman::ud::{Factors, Transition, UdFilter};
 use trihedron::kalman::{AxisFilter, NoiseTerms, Pose, Prior, ShapingModel};
 

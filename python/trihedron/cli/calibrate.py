@@ -9,7 +9,7 @@ import typer
 
 from trihedron.cli.calibrate_sessions import By, Labels, calibrate_many
 from trihedron.cli.options import Force, GravitySource, Json, LogsSource, Report, progress, with_options
-from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+from trihedron.cli.output import Ending, check_outputs
 from trihedron.cli.streamed import Stream, calibrate_stream
 
 FIRST_SCREEN = 2
@@ -89,6 +89,7 @@ def calibrate(
     With several logs of one unit: one model, and how far every parameter repeats.
     """
     check_outputs(output, json, force=force, report=report, inputs=sources.files)
+    ending = Ending(output, json, report, full, force)
     choices = _choices(method, frame, faces, turns, axis_signs, loss)
     if sources.are_many(by):
         if extended or gyro_nominal is not None or {k for k, v in choices.items() if v} - {"method", "loss", "frame"}:
@@ -97,20 +98,18 @@ def calibrate(
             )
         if method != "joint" or loss != "linear":
             raise typer.BadParameter("several logs are calibrated with --method joint and --loss linear")
-        calibrate_many(sources, place, by, labels, choices["frame"], output, json, report, full=full, force=force)
+        calibrate_many(sources, place, by, labels, choices["frame"], ending)
         return
     if stream:
         if extended:
             raise typer.BadParameter("--extended needs the whole log; leave out --stream")
         options = {**choices, "gyroscope_nominal": gyro_nominal}
-        sections = None if full else FIRST_SCREEN
-        calibrate_stream(sources.one(), place, options, output, json, report, sections, force=force)
+        calibrate_stream(sources.one(), place, options, ending, FIRST_SCREEN)
         return
     if labels is not None:
         raise typer.BadParameter("--labels belong to several logs")
     recording = sources.one().read()
     from trihedron import pipeline
-    from trihedron.files.calibration import write_calibration
     from trihedron.report import calibration_report
     from trihedron.report.machine import calibration_record
 
@@ -130,15 +129,8 @@ def calibrate(
             result = pipeline.extend(result, progress=tell)
     document = calibration_report(result.calibration, result.segments, recording)
     machine = calibration_record(result.calibration, result.segments, recording)
-    show(document, json, sections=None if full else FIRST_SCREEN)
-    if output is not None:
-        write_calibration(result.calibration, output, overwrite=force)
-        say(f"calibration: {output}")
-    write_json(machine, json, force=force)
-    write_report(document, machine, report, force=force)
-    if not full and report is None:
-        say("Every pose and move: --full, or --report FILE.html with figures.")
-    leave(result.findings)
+    more = "Every pose and move: --full, or --report FILE.html with figures."
+    ending.tell(document, machine, result.calibration, FIRST_SCREEN, more)
 
 
 def _choices(

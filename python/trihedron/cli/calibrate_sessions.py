@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
 from trihedron.cli.options import GravitySource, LogSource, LogsSource, progress
-from trihedron.cli.output import leave, say, show, write_json, write_report
+from trihedron.cli.output import Ending
 
 if TYPE_CHECKING:
     from trihedron.records import Recording
@@ -36,19 +35,13 @@ def calibrate_many(
     by: str | None,
     labels: str | None,
     frame: Any,
-    output: Path | None,
-    json: Path | None,
-    report: Path | None,
-    *,
-    full: bool,
-    force: bool,
+    ending: Ending,
 ) -> None:
     """Calibrate every log and print what is common and what repeats how far."""
     how = by or "session"
     if how not in ("session", "date", "device", "temperature"):
         raise typer.BadParameter(f"--by is one of session, date, device, temperature, not {how!r}")
     from trihedron import pipeline
-    from trihedron.files.calibration import write_calibration
     from trihedron.report import sessions_report
     from trihedron.report.sessions import sessions_record
 
@@ -74,15 +67,8 @@ def calibrate_many(
         )
     document = sessions_report(result.model)
     machine = sessions_record(result.model)
-    show(document, json, sections=None if full else FIRST_SCREEN)
-    if output is not None:
-        write_calibration(result.calibration, output, overwrite=force)
-        say(f"calibration: {output}")
-    write_json(machine, json, force=force)
-    write_report(document, machine, report, force=force)
-    if not full and report is None:
-        say("What changed and every recording: --full, or --report FILE.html with figures.")
-    leave(result.model.findings)
+    more = "What changed and every recording: --full, or --report FILE.html with figures."
+    ending.tell(document, machine, result.calibration, FIRST_SCREEN, more)
 
 
 def _recordings(sources: list[LogSource], by: str) -> Iterator[Recording]:

@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from trihedron.files.output import OutputError, check_free, write_whole
 from trihedron.printable import printable
 
 if TYPE_CHECKING:
-    from trihedron.records import Finding
+    from trihedron.records import Calibration, Finding
     from trihedron.report import Document
     from trihedron.report.text import Style
 
@@ -74,6 +75,33 @@ def write_json(machine: dict[str, Any], target: Path | None, *, force: bool) -> 
         return
     write_whole(target, json_text(machine), overwrite=force)
     say(f"JSON: {target}")
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Where a calibration goes, and how much of its report is printed."""
+
+    output: Path | None
+    json: Path | None
+    report: Path | None
+    full: bool
+    force: bool
+
+    def tell(
+        self, document: Document, machine: dict[str, Any], calibration: Calibration, sections: int, more: str = ""
+    ) -> None:
+        """The report, the files that were asked for, what ``more`` there is; status 2 where it is not to be trusted."""
+        from trihedron.files.calibration import write_calibration
+
+        show(document, self.json, sections=None if self.full else sections)
+        if self.output is not None:
+            write_calibration(calibration, self.output, overwrite=self.force)
+            say(f"calibration: {self.output}")
+        write_json(machine, self.json, force=self.force)
+        write_report(document, machine, self.report, force=self.force)
+        if more and not self.full and self.report is None:
+            say(more)
+        leave(calibration.findings)
 
 
 def show(document: Document, json_target: Path | None, *, sections: int | None) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from trihedron.cli.options import GravitySource, LogSource, progress
-from trihedron.cli.output import leave, say, show, write_json, write_report
+from trihedron.cli.output import Ending, leave, say, show, write_json, write_report
 
 if TYPE_CHECKING:
     from trihedron.pipeline.streaming import LogOnDisk
@@ -66,16 +66,11 @@ def calibrate_stream(
     source: LogSource,
     place: GravitySource,
     options: dict[str, Any],
-    output: Path | None,
-    json: Path | None,
-    report: Path | None,
-    sections: int | None,
-    *,
-    force: bool,
+    ending: Ending,
+    sections: int,
 ) -> None:
     """A calibration from a log on disk."""
     log = opened(source)
-    from trihedron.files.calibration import write_calibration
     from trihedron.pipeline.streaming import calibrate_file
     from trihedron.report import calibration_report
     from trihedron.report.machine import calibration_record
@@ -85,13 +80,7 @@ def calibrate_stream(
         result = calibrate_file(log, progress=tell, **where, **options)
     document = calibration_report(result.calibration, result.segments, result.recording)
     machine = calibration_record(result.calibration, result.segments, result.recording)
-    show(document, json, sections=sections)
-    if output is not None:
-        write_calibration(result.calibration, output, overwrite=force)
-        say(f"calibration: {output}")
-    write_json(machine, json, force=force)
-    write_report(document, machine, report, force=force)
-    leave(result.findings)
+    ending.tell(document, machine, result.calibration, sections)
 
 
 def apply_stream(calibration: Path, source: LogSource, output: Path, *, force: bool) -> None:

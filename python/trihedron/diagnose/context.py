@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import convolve1d, gaussian_filter1d, uniform_filter1d
-from scipy.signal import savgol_coeffs
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
@@ -19,6 +18,10 @@ TEMPERATURE_WINDOW_S = 10.0
 """Over which a logged temperature is smoothed before its rate of change is taken: its steps are a tenth of a kelvin."""
 VIBRATION_WINDOW_S = 0.25
 """Stretch over which a parabola follows the motion while vibration is measured in a move."""
+LEAST_SWING_K = 0.2
+"""A logged temperature that changes by less explains nothing: thermometers of chips step by 0.002 to 0.1 °C."""
+LEAST_SWING_V = 1e-4
+"""A logged supply that changes by less is digits: a tenth of a millivolt is far below any regulator's noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,13 +127,11 @@ class Context:
 
     def on_accelerometers(self, values: FloatArray) -> FloatArray:
         """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of accelerometer j."""
-        out: FloatArray = self.accel_axes[None] * values[:, None, :]
-        return out
+        return _on_axes(self.accel_axes, values)
 
     def on_gyros(self, values: FloatArray) -> FloatArray:
         """(points, 3, 3) columns: parameter j times ``values[:, j]`` added to the reading of gyro j."""
-        out: FloatArray = self.gyro_axes[None] * values[:, None, :]
-        return out
+        return _on_axes(self.gyro_axes, values)
 
     # -- whole-recording signals ----------------------------------------------------------------------------------
     def at_points(self, samples: FloatArray) -> FloatArray:
@@ -199,7 +200,9 @@ class Context:
         for i, hold in enumerate(obs.segments.holds):
             values = raw[hold.samples()] @ S.T
             # Differences of neighbours forget slow drift; half their mean square is the fast part's variance.
-            out[i] = np.nanvar(values, axis=0)
+            out[i] = np.var(values, axis=0)
+            if np.isnan(out[i]).any():
+                out[i] = np.nanvar(values, axis=0)
         return out
 
     def si_per_raw(self, sensor: str) -> FloatArray:
@@ -223,7 +226,8 @@ class Context:
         out[: obs.n_holds] = np.maximum(holds - floor, 0.0)
         width = max(round(VIBRATION_WINDOW_S * obs.recording.rate_hz), 7) | 1
 
-        parabola = savgol_coeffs(width, 2)
+        # What a parabola by least squares has in the middle (the filter of Savitzky and Golay).
+        parabola = np.linalg.pinv(np.vander(np.arange(width) - width // 2, 3))[2]
 
         def rough(force: FloatArray) -> FloatArray:
             if len(force) < width:
@@ -283,3 +287,11 @@ class Context:
         if obs.rate_density is not None:
             out[1] = np.sqrt((twin.gyro_S**2) @ obs.rate_density**2) * root_rate
         return out
+
+
+def _on_axes(axes: FloatArray, values: FloatArray) -> FloatArray:
+    """(n, 3, 3) ``axes[i, j] · values[:, j]``, as one product of matrices: rows of three are slow one by one."""
+    spread = np.zeros((3, 3, 3))
+    spread[range(3), :, range(3)] = axes.T
+    out: FloatArray = (values @ spread.reshape(3, 9)).reshape(-1, 3, 3)
+    return out

@@ -34,6 +34,9 @@ from trihedron.records.diagnosis import Candidate, Diagnosis
 from trihedron.records.domains import DomainTest
 from trihedron.records.progress import Progress
 
+LARGEST_ALPHA = 0.5
+"""A false-alarm rate of a half or more is a coin, not a test."""
+
 
 def diagnose_recording(
     recording: Recording,
@@ -64,7 +67,7 @@ def diagnose_recording(
         When there is nothing to hold a model against: no accelerometer, fewer than two poses.
     """
     tell = progress or (lambda _fraction, _text: None)
-    if not 0.0 < alpha < 0.5:
+    if not 0.0 < alpha < LARGEST_ALPHA:
         raise ValueError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments)
     start = start_twin(obs, calibration)

@@ -19,6 +19,7 @@ from trihedron.estimate.session.carried import carried
 from trihedron.estimate.session.figures import held_out as held_out_of_session
 from trihedron.estimate.session.figures import move_quality, norm_quality
 from trihedron.estimate.session.fit import SessionSolution, solve_session
+from trihedron.estimate.session.lost_turns import lost_share
 from trihedron.estimate.session.observed import arranged
 from trihedron.records.calibration import Calibration, FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
@@ -93,6 +94,10 @@ def _by_session(
     if measured.attitude is not None:
         more = solution.S_w @ np.diag(measured.attitude.var_zero) @ solution.S_w.T
         covariance[21:, 21:] += np.diag(np.maximum(np.diag(more) - np.diag(covariance[21:, 21:]), 0.0))
+    # Turns that are all short by one share look like a scale: S and b = -S z grow with it.
+    lost = lost_share(measured, solution, seen, aligned.used)
+    along = lost * np.concatenate([solution.S_w.ravel(), solution.b_w])
+    covariance[12:, 12:] += np.outer(along, along)
     used = np.where(aligned.used, 1.0, 0.0)
     held = None if left_out is None else left_out.norm
     alone = accelerometer.quality

@@ -4,8 +4,8 @@ moves."""
 from __future__ import annotations
 
 import numpy as np
-from scipy import special
 
+from trihedron import probability
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried
@@ -116,7 +116,7 @@ def _carried(
 
 def _norm_findings(error: FloatArray, sigma: FloatArray) -> list[Finding]:
     z2 = (error / sigma) ** 2
-    if special.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
+    if probability.chdtrc(len(z2), float(z2.sum())) > FALSE_ALARM:
         return []
     rms = float(np.sqrt(np.mean(error**2)))
     times = float(np.sqrt(np.mean(z2)))
@@ -137,7 +137,7 @@ def _angle_findings(angle_deg: FloatArray, sigma_deg: FloatArray) -> list[Findin
         return []
     # Two components per move share the variance sigma², so the squared ratio has mean one and two degrees of freedom.
     z2 = 2.0 * (angle_deg / sigma_deg) ** 2
-    if special.chdtrc(2 * len(z2), float(z2.sum())) > FALSE_ALARM:
+    if probability.chdtrc(2 * len(z2), float(z2.sum())) > FALSE_ALARM:
         return []
     rms = float(np.sqrt(np.mean(angle_deg**2)))
     worst = int(np.argmax(angle_deg))

@@ -24,12 +24,11 @@ from trihedron.records import (
     PARAMETER_NAMES,
     Calibration,
     Finding,
-    FindingCode,
     FitQuality,
     Observability,
     SensorCalibration,
-    Severity,
 )
+from trihedron.records.plain import as_plain, from_plain
 
 FORMAT = "trihedron calibration"
 FORMAT_VERSION = 1
@@ -46,17 +45,6 @@ FRAME_MEANING = {
     "symmetric": "the trihedron nearest to the accelerometer's axes; S of the accelerometer is symmetric",
     "case": "axes normal to three faces of the case; S is full",
 }
-
-_ARRAYS = (
-    "singular_values",
-    "residual",
-    "sigma",
-    "held_out",
-    "held_out_sigma",
-    "angle_deg",
-    "held_out_angle_deg",
-    "weights",
-)
 
 
 class CalibrationFileError(ValueError):
@@ -223,8 +211,8 @@ def _sensor_document(sensor: SensorCalibration) -> dict[str, Any]:
         "raw_unit": sensor.raw_unit,
         "si_unit": sensor.si_unit,
         "method": sensor.method,
-        "residuals": None if sensor.quality is None else plain(vars(sensor.quality)),
-        "observability": None if sensor.observability is None else plain(vars(sensor.observability)),
+        "residuals": None if sensor.quality is None else plain(as_plain(sensor.quality)),
+        "observability": None if sensor.observability is None else plain(as_plain(sensor.observability)),
     }
 
 
@@ -233,22 +221,10 @@ def _array(value: Any) -> npt.NDArray[np.float64]:
     return np.array(value, dtype=np.float64)
 
 
-def _fields(document: dict[str, Any]) -> dict[str, Any]:
-    return {key: _array(value) if key in _ARRAYS and value is not None else value for key, value in document.items()}
-
-
 def _sensor(document: dict[str, Any], covariance: npt.NDArray[np.float64]) -> SensorCalibration:
     quality, observability = document["residuals"], document["observability"]
-    if quality is not None:
-        numbers: dict[str, Any] = _fields(quality)
-        numbers |= {key: math.nan for key in _MAY_BE_NAN if numbers[key] is None}
-        quality = FitQuality(**numbers)
-    if observability is not None:
-        seen = _fields(observability)
-        seen["condition"] = math.inf if seen["condition"] is None else seen["condition"]
-        seen["advice"] = tuple(seen["advice"])
-        seen["correlated"] = tuple((a, b, float(c)) for a, b, c in seen["correlated"])
-        observability = Observability(**seen)
+    if observability is not None and observability["condition"] is None:
+        observability = {**observability, "condition": math.inf}
     return SensorCalibration(
         S=_array(document["S"]),
         b=_array(document["b"]),
@@ -256,13 +232,9 @@ def _sensor(document: dict[str, Any], covariance: npt.NDArray[np.float64]) -> Se
         raw_unit=document["raw_unit"],
         si_unit=document["si_unit"],
         method=document["method"],
-        quality=quality,
-        observability=observability,
+        quality=None if quality is None else from_plain(quality, FitQuality),
+        observability=None if observability is None else from_plain(observability, Observability),
     )
-
-
-# Numbers of a fit without degrees of freedom.
-_MAY_BE_NAN = ("chi2", "rms", "rms_dof", "floor")
 
 
 def _from_checked(document: dict[str, Any]) -> Calibration:
@@ -281,19 +253,8 @@ def _from_checked(document: dict[str, Any]) -> Calibration:
         gravity_source=document["gravity_source"],
         recording_source=document["recording"]["source"],
         recording_sha256=document["recording"]["sha256"],
-        findings=tuple(_finding(finding) for finding in document["findings"]),
+        findings=tuple(from_plain(finding, Finding) for finding in document["findings"]),
         extensions=MappingProxyType(document["extensions"]),
-    )
-
-
-def _finding(document: dict[str, Any]) -> Finding:
-    return Finding(
-        code=FindingCode(document["code"]),
-        severity=Severity(document["severity"]),
-        seen=document["seen"],
-        cause=document["cause"],
-        action=document["action"],
-        numbers=MappingProxyType({k: math.nan if v is None else v for k, v in document["numbers"].items()}),
     )
 
 

@@ -115,7 +115,7 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes, *, overwrite
         clear_leftovers(place.parent)
         with Temporary(place) as temporary:
             temporary.write(data)
-            temporary.put_in_place(None if found is None else stat.S_IMODE(found.st_mode))
+            temporary.put_in_place(None if found is None else stat.S_IMODE(found.st_mode), overwrite=overwrite)
     except FileExistsError:
         raise OutputError(f"{target}: the file appeared meanwhile and was left alone; choose another name.") from None
     except OSError as error:

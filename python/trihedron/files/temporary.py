@@ -47,20 +47,20 @@ class Temporary:
             left = left[os.write(self.descriptor, left) :]
         os.fsync(self.descriptor)
 
-    def put_in_place(self, mode: int | None) -> None:
+    def put_in_place(self, mode: int | None, *, overwrite: bool = False) -> None:
         """Become the target: in the place of an old file of ``mode``, or, where it is None, of nothing.
 
         Raises
         ------
         FileExistsError
-            When there was nothing and now there is something.
+            When there was nothing and now there is something that ``overwrite`` does not cover.
         """
         # Made private above; a result is as readable as the one it replaces, or as any file the user makes.
         if mode is None:
             mask = os.umask(0)
             os.umask(mask)
         os.chmod(self.path, mode if mode is not None else 0o666 & ~mask)
-        if mode is not None:
+        if mode is not None or overwrite:
             os.replace(self.path, self.target)
             return
         try:

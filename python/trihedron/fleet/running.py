@@ -168,7 +168,17 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             "do one log after the other in this process."
         ) from None
     # One log is one task of one thread: linear algebra that starts threads of its own would fight over processors.
-    settings = {"distributed.scheduler.allowed-failures": DEATHS - 1, "distributed.admin.tick.limit": "60s"}
+    settings = {
+        "distributed.scheduler.allowed-failures": DEATHS - 1,
+        "distributed.admin.tick.limit": "60s",
+        # Dask watches itself a hundred times a second in every process: time that two workers of two processors miss.
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.system-monitor.interval": "5s",
+        "distributed.admin.system-monitor.gil.enabled": False,
+        "distributed.admin.tick.interval": "500ms",
+        "distributed.scheduler.active-memory-manager.start": False,
+        "distributed.worker.memory.monitor-interval": "500ms",
+    }
     with dask.config.set(settings):
         if scheduler is not None:
             try:

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
-from scipy.stats import t as student
 
 from trihedron.estimate.sessions import changes_among, repeated_parameters
+from trihedron.probability import betaincinv, fdtrc
 from trihedron.records.fleet import FleetLog, FleetSummary, Outlier, SharedEffect
 from trihedron.records.sessions import PARAMETERS, Session
 
@@ -153,7 +152,7 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
             others = np.delete(column, worst)
             spread = float(others.std(ddof=1)) * np.sqrt(1.0 + 1.0 / len(others))
             sigmas = float(column[worst] - others.mean()) / max(spread, 1e-300)
-            p = min(1.0, 2.0 * float(student.sf(abs(sigmas), len(others) - 1)) * n_tests)
+            p = min(1.0, fdtrc(1, len(others) - 1, sigmas**2) * n_tests)
             if p >= ALPHA:
                 break
             serial = names[kept[worst]]
@@ -175,7 +174,7 @@ def _shared(diagnosed: Sequence[dict[str, Any]]) -> tuple[SharedEffect, ...]:
     out = []
     for name, count in logs.most_common():
         k = len(devices[name])
-        low = float(beta.ppf(0.025, k, n - k + 1)) if k else 0.0
-        high = float(beta.ppf(0.975, k + 1, n - k)) if k < n else 1.0
+        low = betaincinv(k, n - k + 1, 0.025) if k else 0.0
+        high = betaincinv(k + 1, n - k, 0.975) if k < n else 1.0
         out.append(SharedEffect(name, count, k, low, high))
     return tuple(out)

@@ -6,13 +6,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from trihedron.estimate.noise.allan import allan_deviation
     from trihedron.pipeline.applying import apply, write_calibration
     from trihedron.pipeline.calibrating import METHODS, calibrate
     from trihedron.pipeline.capturing import capture, ports
     from trihedron.pipeline.checking import check
     from trihedron.pipeline.choices import settle_gravity
     from trihedron.pipeline.converting import convert
-    from trihedron.pipeline.curves import allan_deviation
     from trihedron.pipeline.demonstrating import demo
     from trihedron.pipeline.diagnosing import diagnose
     from trihedron.pipeline.exporting import export
@@ -79,7 +79,7 @@ _HOME = {
     "plot": "trihedron.pipeline.presenting",
     "plan": "trihedron.pipeline.planning",
     "demo": "trihedron.pipeline.demonstrating",
-    "allan_deviation": "trihedron.pipeline.curves",
+    "allan_deviation": "trihedron.estimate.noise.allan",
     "ports": "trihedron.pipeline.capturing",
     "capture": "trihedron.pipeline.capturing",
     "METHODS": "trihedron.pipeline.calibrating",

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-from scipy import special
 
+from trihedron import probability
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm
 from trihedron.estimate.accelerometer.face_poses import identify
 from trihedron.estimate.gyroscope import (
@@ -227,9 +227,9 @@ def _still_said(found: Found, joint: SensorCalibration) -> Found:
 def _pull_allowed(alone: SensorCalibration) -> float:
     """Limit of that rise; where the norms alone exceed their noise, χ² counts in units of that excess (F test)."""
     quality = alone.quality
-    if quality is None or quality.dof < 1 or special.chdtrc(quality.dof, quality.chi2) >= 0.01:
-        return float(special.chdtri(9, FALSE_ALARM))
-    return float(9.0 * quality.chi2 / quality.dof * special.fdtri(9, quality.dof, 1.0 - FALSE_ALARM))
+    if quality is None or quality.dof < 1 or probability.chdtrc(quality.dof, quality.chi2) >= 0.01:
+        return float(probability.chdtri(9, FALSE_ALARM))
+    return float(9.0 * quality.chi2 / quality.dof * probability.fdtri(9, quality.dof, 1.0 - FALSE_ALARM))
 
 
 def _pull_on_accelerometer(alone: SensorCalibration, joint: SensorCalibration) -> float:

@@ -17,14 +17,22 @@ from trihedron.diagnose.against import (
 from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor
 from trihedron.estimate.verification import verify_calibration
 from trihedron.records import Calibration, Recording, Segments
-from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage, StageDomain, Verdict
+from trihedron.records.diagnosis import (
+    AcceptedEffect,
+    Diagnosis,
+    NoiseDifference,
+    ParameterDifference,
+    Stage,
+    StageDomain,
+    Verdict,
+)
 from trihedron.records.domains import DomainTest, Where
 
 
 def compared(
     found: Diagnosis,
     given: Calibration,
-    simulated: Diagnosis | None,
+    simulated: tuple[Diagnosis, Recording] | None,
     noise: tuple[NoiseDifference, ...],
     recording: Recording,
     segments: Segments,
@@ -32,11 +40,11 @@ def compared(
 ) -> Diagnosis:
     """The free diagnosis of a recording as the answer to: where does the given model differ?
 
-    ``simulated`` is the free diagnosis of the user's simulated log, where that is the model; else ``given`` is.
+    ``simulated`` is the user's simulated log with its free diagnosis, where that is the model; else ``given`` is.
     ``noise`` is what was compared of noise and sampling beside it.
     """
-    model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated)
-    given_effects = () if simulated is None else simulated.effects
+    model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated[0])
+    given_effects = () if simulated is None else _without_walk(simulated[0].effects, noise)
     unexplained = {test.domain for test in found.remaining if test.disagrees}
     effects = compare_effects(given_effects, found.effects, found.candidates, alpha=alpha, unexplained=unexplained)
     numbers = compare_numbers(
@@ -45,7 +53,7 @@ def compared(
         alpha=alpha,
         # A linear calibration was fitted beside effects that it does not know: it is also held against such a fit.
         linear=model_of_diagnosis(found, with_effects=False) if simulated is None and found.effects else None,
-        left_open=left_open_by((*effects.missing, *effects.surplus)),
+        left_open=left_open_by((*found.effects, *given_effects), _span_k(recording, simulated)),
     )
     parameters = (*numbers.parameters, *effects.parameters)
     noise = (*noise, *(_factor(one) for one in numbers.factors))
@@ -67,6 +75,26 @@ def compared(
         noise_compared=noise,
         stages=(_as_given(given, recording, segments), *found.stages),
     )
+
+
+def _without_walk(
+    effects: tuple[AcceptedEffect, ...], noise: tuple[NoiseDifference, ...]
+) -> tuple[AcceptedEffect, ...]:
+    """Effects of a simulation less a free curve through its zeros where its slow noise is the larger: that draws it."""
+    slow = [n.ratio for n in noise if n.significant and n.sensor == "gyroscope" and n.term in ("B", "K") and n.ratio]
+    if not slow or min(slow) < 1.0:
+        return effects
+    return tuple(e for e in effects if (e.id, e.model.get("variant")) != ("gyro-hidden-drift", "curve"))
+
+
+def _span_k(recording: Recording, simulated: tuple[Diagnosis, Recording] | None) -> float | None:
+    """From the lowest to the highest temperature of both logs [K]; ``None`` where one has none."""
+    logs = (recording,) if simulated is None else (recording, simulated[1])
+    seen = [log.temperature_degc[np.isfinite(log.temperature_degc)] for log in logs if log.temperature_degc is not None]
+    if simulated is None or len(seen) < len(logs) or not all(len(one) for one in seen):
+        return None
+    every = np.concatenate(seen)
+    return float(every.max() - every.min())
 
 
 def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.stats import chi2
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.against import FittedModel
@@ -34,9 +35,12 @@ LEAST_OCTAVE_RATIO = 1.5
 """Octaves below the white floor hold a few periods a hold each: smaller differences belong to the day."""
 LEAST_JITTER = 0.05
 """Scatter of the stamps, in steps, from which on it matters to a session (0.05 of 10 ms is 0.5 ms)."""
-SAME_ON_ALL_AXES = 1.03
-"""Three axes of a real part agree within 3 % by chance once in some hundred parts."""
-UNLIKE_AXES = 1.25
+SAME_ON_ALL_AXES = 1.05
+"""Three axes of a real part agree within 5 % by chance in a few of a hundred parts."""
+UNLIKE_AXES = 1.1
+"""Beyond this, and beyond chance, axes are unlike each other."""
+UNLIKE_BY_CHANCE = 0.01
+"""Equal densities that were each measured to a per cent or two spread beyond 3 % often, beyond this seldom."""
 RESEMBLES = 1.06
 """A ratio this near to √rate, or to its inverse, is taken for it."""
 SHOWS = 0.5
@@ -107,7 +111,8 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
         pairs = list(zip(_AXES, model.noise[sensor], recording.noise[sensor], strict=True))
         n_octaves = 2 * sum(len(r.octaves) for _, _, r in pairs)
         white = [_white(sensor, axis, m, r, alpha * SHARE / 6.0) for axis, m, r in pairs]
-        out += _resembling(sensor, [w for w in white if w is not None], recording.rate_hz)
+        even = _are_even([m.white for _, m, _ in pairs]) and not _are_even([r.white for _, _, r in pairs])
+        out += _resembling(sensor, [w for w in white if w is not None], recording.rate_hz, even)
         for axis, m, r in pairs:
             out += _step(sensor, axis, m, r)
             out += _corner(sensor, axis, m, r, alpha * SHARE / 6.0)
@@ -159,6 +164,7 @@ def _resembling(
     sensor: Sensor,
     white: Sequence[NoiseDifference],
     rate_hz: float,
+    only_model_is_even: bool,
 ) -> list[NoiseDifference]:
     """White densities with what their ratio resembles: mistakes that simulators have made."""
     name = "accelerometer" if sensor == "accelerometer" else "gyro"
@@ -178,9 +184,7 @@ def _resembling(
             said = f"White noise of the {name} is {common:.3g} = {times} times the recording's: {words}."
             return [replace(w, remark=said) if w in known else w for w in out]
     values = np.array([[w.model or 0.0, w.recording or 0.0] for w in known])
-    if values[:, 0].max() < SAME_ON_ALL_AXES * values[:, 0].min() and (
-        values[:, 1].max() > UNLIKE_AXES * values[:, 1].min()
-    ):
+    if only_model_is_even and values[:, 1].max() > UNLIKE_AXES * values[:, 1].min():
         spread = float(values[:, 1].max() / values[:, 1].min())
         said = f"White noise of the {name} is the same on all axes of the model; "
         said += f"the recording's axes differ {spread:.2g} times."
@@ -191,6 +195,20 @@ def _resembling(
         said = f"White noise of the {name} is {common:.3g} ({low:.3g} to {high:.3g}) times the recording's."
         return [replace(w, remark=said) if w.significant else w for w in out]
     return out
+
+
+def _are_even(white: Sequence[Measured | None]) -> bool:
+    """Whether densities of three axes are one, but for how well each is known and 5 %."""
+    known = [w for w in white if w is not None and w.value > 0.0]
+    if len(known) < len(_AXES):
+        return False
+    logs = np.log([w.value for w in known])
+    if float(np.ptp(logs)) < math.log(SAME_ON_ALL_AXES):
+        return True
+    weight = 1.0 / np.maximum([w.sigma_log for w in known], 1e-9) ** 2
+    away = logs - float(weight @ logs / weight.sum())
+    chance = float(chi2.sf(float(weight @ away**2), len(known) - 1))
+    return chance > UNLIKE_BY_CHANCE and float(np.ptp(logs)) < math.log(UNLIKE_AXES)
 
 
 def _step(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise) -> Iterator[NoiseDifference]:

@@ -155,7 +155,7 @@ def _of_poses(
         if simulated is not None:
             frames = _frames((simulated.segments, simulated.calibration), (segments, used))
             noise = (*simulated.frames, *frames, *_noise(simulated, found, recording_used, segments_used, alpha))
-        free_simulation = None if simulated is None else simulated.diagnosis
+        free_simulation = None if simulated is None else (simulated.diagnosis, simulated.recording)
         fit = model_of_diagnosis(found)
         found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
         if simulated is not None:

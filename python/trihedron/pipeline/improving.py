@@ -2,19 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomllib
+from scipy.stats import f as f_distribution
 
+from trihedron.diagnose.against import model_of_diagnosis
+from trihedron.files.log import write_recording
 from trihedron.files.scenario import improved_scenario
+from trihedron.pipeline.calibrating import calibrate
+from trihedron.pipeline.carried_misses import carried_misses
+from trihedron.pipeline.comparing_noise import sampled
+from trihedron.pipeline.reading import read
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect
-from trihedron.simulate import Scenario, converter_step, diagnosed_sizes, read_scenario, simulate, twin_scenario
+from trihedron.records.hold_noise import HoldNoise
+from trihedron.segment import resegment
+from trihedron.simulate import (
+    NoiseTerms,
+    Scenario,
+    Smoother,
+    converter_step,
+    diagnosed_sizes,
+    noise_of_octaves,
+    read_scenario,
+    scenario_from_table,
+    simulate,
+    twin_scenario,
+)
 
+FEWEST_OCTAVES = 4
+FEWEST_MOVES = 6
+BY_CHANCE = 0.01
+"""Two sessions of one unit miss so unlike in one of a hundred."""
 SEED = 20
 """Of the simulation that is held against the recording: any, but always the same one."""
 
@@ -31,9 +58,20 @@ def driven(
     ValueError
         When the recording lacks a sensor or was never still.
     """
-    motion = twin_scenario(recording, segments, own).motion
+    # A pose that was pushed is pushed again: what happened to the recording is no property of an instrument.
+    motion = twin_scenario(recording, resegment(recording, segments), own).motion
     simulated, _ = simulate(replace(scenario, motion=motion), seed)
+    if scenario.clock.stamp_jitter_s > 0.0 or scenario.clock.jitter_s > 0.0:
+        simulated = _as_read(simulated)
     return replace(simulated, source=f"{scenario.name}, moved as {recording.source}")
+
+
+def _as_read(simulated: Recording) -> Recording:
+    """A simulated log through a file: what its stamps are worth is settled as that of the recording was."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "simulated.csv"
+        write_recording(simulated, path)
+        return read(path)
 
 
 @dataclass(frozen=True)
@@ -63,7 +101,75 @@ def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
     shared = {p.id for p in found.parameters if p.significant}
     sizes, left_out = diagnosed_sizes([e.to_dict() for e in (*physics, *_shared(found, shared))])
     surplus = [effect.id for effect in found.effects if effect.side == "model"]
-    return Improvement(improved_scenario(scenario, tables, sizes, surplus), left_out)
+    text = improved_scenario(scenario, tables, sizes, surplus)
+    own = found.updated
+    if own is not None and own.gyroscope is not None:
+        strays = zero_in_moves(scenario_from_table(tomllib.loads(text)), found.recording, found.segments, own)
+        if strays is not None:
+            tables["gyroscope"]["electronics"] = {"zero_in_moves": strays}
+            text = improved_scenario(scenario, tables, sizes, surplus)
+    return Improvement(text, left_out)
+
+
+def zero_in_moves(
+    better: Scenario, recording: Recording, segments: Segments, own: Calibration
+) -> tuple[float, float, float] | None:
+    """By how much the gyro's zero must stray in moves [rad/s] for an improved scenario to miss as the recording does.
+
+    Gravity carried through the moves of the recording and of the scenario moved alike: what the recording misses more
+    is put on the zero, the same on all axes. ``None`` where both miss alike within chance.
+    """
+    simulated = driven(better, recording, segments, own)
+    try:
+        of_it = calibrate(simulated, gravity_m_s2=better.environment.gravity)
+    except ValueError:
+        return None
+    ours = carried_misses(own, recording, resegment(recording, segments))
+    theirs = carried_misses(of_it.calibration, simulated, resegment(simulated, of_it.segments))
+    if len(ours.angle_rad) < FEWEST_MOVES or len(theirs.angle_rad) < FEWEST_MOVES:
+        return None
+    seen, made = (float(np.mean(one.angle_rad**2)) for one in (ours, theirs))
+    ratio = max(seen / made, made / seen) if made > 0.0 else np.inf
+    # An angle has two components across the vertical.
+    if f_distribution.sf(ratio, 2 * len(ours.angle_rad), 2 * len(theirs.angle_rad)) > BY_CHANCE:
+        return None
+    before = np.array(better.gyroscope.electronics.zero_in_moves)
+    # Straying σ at both ends and straight between turns by σT/√2 an axis, two axes of three of it across the vertical.
+    wanted = float(np.mean(before**2)) + (seen - made) / float(np.mean(ours.duration_s**2))
+    if wanted <= 0.0:
+        return (0.0, 0.0, 0.0) if np.any(before) else None
+    return (float(np.sqrt(wanted)),) * 3
+
+
+def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
+    """Noise inside the recording's still poses as terms and a low-pass, sensor by sensor: what its octaves show."""
+    recording = found.recording
+    seen = sampled(recording, found.segments.holds, model_of_diagnosis(found)).noise
+    out = {}
+    for name, axes in seen.items():
+        # The same octaves on all axes; at most those below half the rate.
+        bands = [o for o in axes[0].octaves if o.high_hz <= 0.5 * recording.rate_hz]
+        by_axis = [{o.low_hz: o.density for o in axis.octaves} for axis in axes]
+        bands = [o for o in bands if all(o.low_hz in one for one in by_axis)]
+        if len(bands) < FEWEST_OCTAVES:
+            continue
+        rounding = np.array([axis.step**2 / (12.0 * recording.rate_hz) for axis in axes])
+        density = np.array([[one[o.low_hz].value for one in by_axis] for o in bands])
+        relative = np.array([[one[o.low_hz].sigma_log for one in by_axis] for o in bands])
+        out[str(name)] = noise_of_octaves(
+            np.array([(o.low_hz, o.high_hz) for o in bands]),
+            np.maximum(density - rounding, 1e-3 * density),
+            relative,
+            1.0 / recording.rate_hz,
+            _corner(axes),
+        )
+    return out
+
+
+def _corner(axes: Sequence[HoldNoise]) -> float | None:
+    """Corner [Hz] of the low-pass that most axes show, ``None`` where they show none."""
+    seen = [math.log(axis.corner_hz.value) for axis in axes if axis.corner_hz is not None]
+    return math.exp(sum(seen) / len(seen)) if 2 * len(seen) > len(axes) else None
 
 
 def _shared(found: DiagnosisResult, ids: set[str]) -> list[AcceptedEffect]:
@@ -94,17 +200,26 @@ def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
 
 
 def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:
+    holds = _of_holds(found)
     for name in ("accelerometer", "gyroscope"):
         differing = [n for n in found.noise_compared if n.significant and n.sensor == name]
         terms: dict[str, list[float]] = {}
+        had = getattr(given, name).noise
         for n in differing:
             if n.term in ("N", "B", "K", "Q") and n.recording is not None:
-                base = [float(v) for v in getattr(getattr(given, name).noise, n.term)]
-                values = terms.setdefault(n.term, base)
+                values = terms.setdefault(n.term, [float(v) for v in getattr(had, n.term)])
                 for axis in range(3) if not n.axis else ["xyz".index(n.axis)]:
                     values[axis] = n.recording
             elif n.term == "resolution" and n.recording is not None:
                 tables[name].setdefault("adc", {})["lsb"] = n.recording
+        has_shape = any(n.term in ("octave", "bandwidth") for n in differing) or not any(had.N)
+        if name in holds and has_shape and differing:
+            noise, low_pass = holds[name]
+            terms["N"] = list(noise.N)
+            if low_pass.corner_hz > 0.0:
+                tables[name]["noise_filter"] = {"corner_hz": low_pass.corner_hz, "order": low_pass.order}
+            if "B" not in terms and any(noise.B):
+                terms["B"] = list(noise.B)
         if terms:
             tables[name]["noise"] = terms
     for n in found.noise_compared:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz, settle_clock
+from trihedron.read.clock.order import in_order
 from trihedron.read.clock.steps import steps_of
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
 from trihedron.read.devices import Choice, one_device
@@ -56,7 +57,7 @@ class Sensors:
     gyroscope: FloatArray | None
     table: Table
     columns: Columns
-    rows: npt.NDArray[np.int64] | None
+    rows: npt.NDArray[np.signedinteger] | None
     offset: int
     has_clock: bool
     gyroscope_unit: str = ""
@@ -77,12 +78,19 @@ class Sensors:
         return f"sample {sample}, {self.table.place(self.row(sample))}, {self.time_s[sample]:.3f} s"
 
 
-def _triad(table: Table, triad: tuple[int, int, int] | None, rows: npt.NDArray[np.int64] | None) -> FloatArray | None:
+def _triad(
+    table: Table, triad: tuple[int, int, int] | None, rows: npt.NDArray[np.signedinteger] | None
+) -> FloatArray | None:
     if triad is None:
         return None
     together = side_by_side([table.columns[column] for column in triad])
     if together is not None and rows is None:
         return together
+    if together is not None and rows is not None and table.is_private:
+        # A long log has no room for all columns twice: one after the other, where they lie.
+        for k in range(3):
+            in_order(together[:, k].copy(), rows, together[: len(rows), k])
+        return together[: len(rows)]
     out = np.empty((table.n_rows if rows is None else len(rows), 3))
     for k, column in enumerate(triad):
         values = table.columns[column]

@@ -54,6 +54,8 @@ class Table:
     sensor: Literal["accelerometer", "gyroscope"] | None = None
     clock: StatedClock = field(default_factory=StatedClock)
     rows_in_file: int = 0
+    is_private: bool = False
+    """Its arrays were made by the reader and belong to nobody else: rows may be put in order where they lie."""
     is_chosen: bool = False
     """The user's choice of topic and instance was spent on reading this table."""
 

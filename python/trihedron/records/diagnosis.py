@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 from trihedron.arrays import FloatArray
 from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of, said
 from trihedron.records.domains import Domain, DomainResiduals, DomainTest, HeldOut
-from trihedron.records.frozen import Frozen, freeze, thawed
+from trihedron.records.frozen import Frozen, freeze
+from trihedron.records.plain import Layout, Plain, as_plain
 
 Verdict = Literal["consistent", "parameters-differ", "missing-physics", "unexplained", "not-testable"]
 SCHEMA_VERSION = 2
 
 
 @dataclass(frozen=True)
-class EffectParameter:
+class EffectParameter(Plain):
     """One physical parameter of an effect with its standard error."""
 
     name: str
@@ -24,13 +25,9 @@ class EffectParameter:
     std: float
     unit: str
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types."""
-        return {"name": self.name, "value": self.value, "std": self.std, "unit": self.unit}
-
 
 @dataclass(frozen=True)
-class AcceptedEffect(Frozen):
+class AcceptedEffect(Frozen, Plain):
     """An effect the recording demands, or, with ``side`` ``model``, one that only the given model has.
 
     ``share`` is the part of the misfit of the recording that it removes, 0 to 1; ``None`` where that was not computed.
@@ -47,27 +44,19 @@ class AcceptedEffect(Frozen):
     model: MappingProxyType[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     share: float | None = None
     side: Literal["recording", "model"] = "recording"
-
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types; ``heldout`` is the most improved domain, ``heldout_all`` every domain touched."""
-        return {
-            "id": self.id,
-            "in": self.side,
-            "share": self.share,
-            "statement": self.statement,
-            "parameters": [p.to_dict() for p in self.parameters],
-            "p_adjusted": self.p_adjusted,
-            "delta_bic": self.delta_bic,
-            "heldout": self.held_out[0].to_dict() if self.held_out else None,
-            "heldout_all": [h.to_dict() for h in self.held_out],
-            "confounded_with": list(self.confounded_with),
-            "separating_experiment": self.separating_experiment,
-            "model": thawed(self.model),
-        }
+    LAYOUT: ClassVar[Layout] = Layout(
+        {"side": "in", "held_out": "heldout_all"},
+        (
+            "id", "in", "share", "statement", "parameters", "p_adjusted", "delta_bic", "heldout", "heldout_all",
+            "confounded_with", "separating_experiment", "model",
+        ),
+        # The most improved domain, beside every domain touched.
+        lambda effect, made: {"heldout": made["heldout_all"][0] if effect.held_out else None},
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class ParameterDifference:
+class ParameterDifference(Plain):
     """One number of a given model against the value that the recording has.
 
     ``id`` is the group (``gyro-zero``, ``accel-scale``, ...), ``name`` the component. ``difference`` is recording minus
@@ -85,21 +74,6 @@ class ParameterDifference:
     p_value: float
     significant: bool
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types (the ``parameters`` entries of the schema)."""
-        return {
-            "id": self.id,
-            "sensor": self.sensor,
-            "name": self.name,
-            "model": self.model,
-            "recording": self.recording,
-            "difference": self.difference,
-            "std": self.std,
-            "unit": self.unit,
-            "p_value": self.p_value,
-            "significant": self.significant,
-        }
-
 
 NoiseTerm = Literal[
     "N", "B", "K", "Q", "bandwidth", "line", "resolution", "range", "rate", "jitter", "octave", "distribution",
@@ -108,7 +82,7 @@ NoiseTerm = Literal[
 
 
 @dataclass(frozen=True)
-class NoiseDifference:
+class NoiseDifference(Plain):
     """One figure of noise or sampling of a given model against the recording's.
 
     ``ratio`` is model over recording with its 95 % ``interval``; ``axis`` is empty for what all axes share; ``remark``
@@ -128,25 +102,9 @@ class NoiseDifference:
     significant: bool
     remark: str = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types (the ``noise`` entries of the schema)."""
-        return {
-            "sensor": self.sensor,
-            "axis": self.axis,
-            "term": self.term,
-            "model": self.model,
-            "recording": self.recording,
-            "ratio": self.ratio,
-            "interval": None if self.interval is None else list(self.interval),
-            "unit": self.unit,
-            "p_value": self.p_value,
-            "significant": self.significant,
-            "remark": self.remark,
-        }
-
 
 @dataclass(frozen=True)
-class Law:
+class Law(Plain):
     """What a misfit without a known mechanism depends on, by which law, and how much of it that law predicts."""
 
     sensor: Literal["accelerometer", "gyroscope"]
@@ -158,24 +116,16 @@ class Law:
     resembles: tuple[str, ...] = ()
     experiment: str = ""
     statement: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types (the ``laws`` entries of the schema)."""
-        return {
-            "sensor": self.sensor,
-            "depends_on": list(self.depends_on),
-            "form": self.form,
-            "coefficients": [c.to_dict() for c in self.coefficients],
-            "share": self.share,
-            "heldout": None if self.held_out is None else self.held_out.to_dict(),
-            "resembles": list(self.resembles),
-            "experiment": self.experiment,
-            "statement": self.statement,
-        }
+    LAYOUT: ClassVar[Layout] = Layout(
+        {"held_out": "heldout"},
+        (
+            "sensor", "depends_on", "form", "coefficients", "share", "heldout", "resembles", "experiment", "statement",
+        ),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class StageDomain:
+class StageDomain(Plain):
     """One domain at one stage, on poses and moves that the stage's fit did not see."""
 
     domain: Domain
@@ -183,25 +133,17 @@ class StageDomain:
     chi2_per_dof: float | None
     unit: str
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types."""
-        return {"domain": self.domain, "rms": self.rms, "chi2_per_dof": self.chi2_per_dof, "unit": self.unit}
-
 
 @dataclass(frozen=True)
-class Stage:
+class Stage(Plain):
     """How well the recording is predicted: as given, with numbers, noise, effects re-estimated one after the other."""
 
     stage: Literal["as-given", "numbers", "noise", "effects"]
     domains: tuple[StageDomain, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types (the ``stages`` entries of the schema)."""
-        return {"stage": self.stage, "domains": [d.to_dict() for d in self.domains]}
-
 
 @dataclass(frozen=True)
-class Candidate:
+class Candidate(Plain):
     """One catalogue effect tried on the baseline: its score test, or why it does not apply."""
 
     id: str
@@ -209,13 +151,9 @@ class Candidate:
     applicable: bool
     reason: str = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types."""
-        return {"id": self.id, "p_value": self.p_value, "applicable": self.applicable, "reason": self.reason}
-
 
 @dataclass(frozen=True)
-class LinearModel(Frozen):
+class LinearModel(Frozen, Plain):
     """S and b of both sensors with their standard errors (direct form, raw → SI), as plain nested tuples.
 
     ``covariance`` (24, 24), or (12, 12) without a gyro, in the order of a calibration file; ``None`` if not kept.
@@ -225,17 +163,9 @@ class LinearModel(Frozen):
     gyroscope: MappingProxyType[str, Any] | None
     covariance: FloatArray | None = None
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types."""
-        return {
-            "accelerometer": thawed(self.accelerometer),
-            "gyroscope": None if self.gyroscope is None else thawed(self.gyroscope),
-            "covariance": None if self.covariance is None else self.covariance.tolist(),
-        }
-
 
 @dataclass(frozen=True)
-class Diagnosis(Frozen):
+class Diagnosis(Frozen, Plain):
     """What came out when the digital twin was held against the recording (schema version 2)."""
 
     verdict: Verdict
@@ -256,6 +186,18 @@ class Diagnosis(Frozen):
     noise_compared: tuple[NoiseDifference, ...] = ()
     laws: tuple[Law, ...] = ()
     stages: tuple[Stage, ...] = ()
+    LAYOUT: ClassVar[Layout] = Layout(
+        {"noise": "noise_model", "noise_compared": "noise"},
+        (
+            "schema_version", "verdict", "domains", "effects", "remaining", "candidates", "calibration", "parameters",
+            "noise", "noise_model", "laws", "stages", "gravity_m_s2", "alpha", "recording", "references", "residuals",
+        ),
+        lambda _, made: {
+            "schema_version": SCHEMA_VERSION,
+            "calibration": {name: made[name] for name in ("baseline", "extended")},
+            "recording": {name: made[f"recording_{name}"] for name in ("source", "sha256")},
+        },
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         if not isinstance(self.verdict, str) or self.verdict not in get_args(Verdict):
@@ -281,22 +223,4 @@ class Diagnosis(Frozen):
 
     def to_dict(self) -> dict[str, Any]:
         """As plain JSON types, valid against the published schema."""
-        return {
-            "schema_version": SCHEMA_VERSION,
-            "verdict": self.verdict,
-            "domains": [d.to_dict() for d in self.domains],
-            "effects": [e.to_dict() for e in self.effects],
-            "remaining": [d.to_dict() for d in self.remaining],
-            "candidates": [c.to_dict() for c in self.candidates],
-            "calibration": {"baseline": self.baseline.to_dict(), "extended": self.extended.to_dict()},
-            "parameters": [p.to_dict() for p in self.parameters],
-            "noise": [n.to_dict() for n in self.noise_compared],
-            "noise_model": thawed(self.noise),
-            "laws": [law.to_dict() for law in self.laws],
-            "stages": [stage.to_dict() for stage in self.stages],
-            "gravity_m_s2": self.gravity_m_s2,
-            "alpha": self.alpha,
-            "recording": {"source": self.recording_source, "sha256": self.recording_sha256},
-            "references": dict(self.references),
-            "residuals": [r.to_dict() for r in self.residuals],
-        }
+        return as_plain(self, Diagnosis)

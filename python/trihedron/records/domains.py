@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from trihedron.arrays import FloatArray
 from trihedron.records.frozen import Frozen
+from trihedron.records.plain import Plain
 
 Domain = Literal["static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing", "numbers", "noise"]
 DOMAINS: tuple[Domain, ...] = ("static-accel", "static-gyro", "moves", "dynamics", "within-static", "timing")
 
 
 @dataclass(frozen=True)
-class Where:
+class Where(Plain):
     """What carries a disagreement: channels, segments (``hold 3``, ``move 7``), stretches of time, frequencies."""
 
     channels: tuple[str, ...] = ()
@@ -21,18 +22,9 @@ class Where:
     times_s: tuple[tuple[float, float], ...] = ()
     frequencies_hz: tuple[float, ...] = ()
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types."""
-        return {
-            "channels": list(self.channels),
-            "segments": list(self.segments),
-            "times_s": [list(pair) for pair in self.times_s],
-            "frequencies_hz": list(self.frequencies_hz),
-        }
-
 
 @dataclass(frozen=True)
-class DomainTest:
+class DomainTest(Plain):
     """Residuals of one domain, whitened by the predicted noise, against what a healthy recording gives."""
 
     domain: Domain
@@ -44,22 +36,9 @@ class DomainTest:
     rms: float = 0.0
     unit: str = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types (the ``domains`` and ``remaining`` entries of the schema)."""
-        return {
-            "domain": self.domain,
-            "chi2_per_dof": self.chi2_per_dof,
-            "dof": self.dof,
-            "p_value": self.p_value,
-            "disagrees": self.disagrees,
-            "where": self.where.to_dict(),
-            "rms": self.rms,
-            "unit": self.unit,
-        }
-
 
 @dataclass(frozen=True, eq=False)
-class DomainResiduals(Frozen):
+class DomainResiduals(Frozen, Plain):
     """What one domain looks like before and after the accepted effects, pose by pose or move by move, SI or degrees.
 
     ``before`` (n, k) and ``after`` (m, k) at ``time_before_s`` (n,), ``time_after_s`` (m,) (middle of pose or move),
@@ -79,21 +58,9 @@ class DomainResiduals(Frozen):
     after: FloatArray
     sigma_after: FloatArray
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types."""
-        arrays = ("time_before_s", "before", "sigma_before", "time_after_s", "after", "sigma_after")
-        return {
-            "domain": self.domain,
-            "quantity": self.quantity,
-            "unit": self.unit,
-            "kind": self.kind,
-            "channels": list(self.channels),
-            **{name: getattr(self, name).tolist() for name in arrays},
-        }
-
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOut(Plain):
     """Prediction of poses and moves the fit did not see, without and with the effect, in the domain it helps most."""
 
     domain: Domain
@@ -102,14 +69,3 @@ class HeldOut:
     rms_before: float
     rms_after: float
     unit: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types."""
-        return {
-            "domain": self.domain,
-            "chi2_per_dof_before": self.chi2_per_dof_before,
-            "chi2_per_dof_after": self.chi2_per_dof_after,
-            "rms_before": self.rms_before,
-            "rms_after": self.rms_after,
-            "unit": self.unit,
-        }

@@ -12,6 +12,7 @@ from typing import Any
 
 from trihedron.records.checked import kind_of, word_of
 from trihedron.records.frozen import Frozen, freeze
+from trihedron.records.plain import Plain
 
 
 class Severity(str, Enum):
@@ -138,7 +139,7 @@ class FindingCode(str, Enum):
 
 
 @dataclass(frozen=True)
-class Finding(Frozen):
+class Finding(Frozen, Plain):
     """One thing noticed.
 
     ``seen`` is one sentence with the number and the place; ``cause`` the likely reason; ``action`` what to do next.
@@ -186,17 +187,6 @@ class Finding(Frozen):
         severity, seen, cause, action = catalogue.words_of(code, case, severity, values)
         told = {name: float(v) for name, v in values.items() if isinstance(v, Real) and not isinstance(v, bool)}
         return cls(code, severity, seen, cause, action, MappingProxyType(told | dict(numbers or {})))
-
-    def to_dict(self) -> dict[str, object]:
-        """As plain JSON types."""
-        return {
-            "code": self.code.value,
-            "severity": self.severity.value,
-            "seen": self.seen,
-            "cause": self.cause,
-            "action": self.action,
-            "numbers": dict(self.numbers),
-        }
 
     def __str__(self) -> str:
         return f"{self.severity.value}: {self.seen}" + (f" {self.action}" if self.action else "")

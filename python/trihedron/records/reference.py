@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.finding import Finding
+from trihedron.records.plain import Layout, Plain
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,7 @@ class ReferenceMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class Estimate(Plain):
     """Named numbers (n,) with their covariance (n, n) in one SI unit.
 
     ``p_value`` that all of them are zero; ``held_out`` rms [SI] of rows left out in turn, without and with them.
@@ -71,26 +72,20 @@ class Estimate:
     unit: str
     p_value: float | None = None
     held_out: tuple[float, float] | None = None
+    LAYOUT: ClassVar[Layout] = Layout(
+        {"held_out": "rms_held_out"},
+        ("names", "value", "std", "unit", "p_value", "rms_held_out"),
+        lambda estimate, _: {"std": estimate.std.tolist()},
+    )
 
     @property
     def std(self) -> FloatArray:
         """(n,) standard errors."""
         return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)), dtype=np.float64)
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types."""
-        return {
-            "names": list(self.names),
-            "value": self.value.tolist(),
-            "std": self.std.tolist(),
-            "unit": self.unit,
-            "p_value": self.p_value,
-            "rms_held_out": None if self.held_out is None else list(self.held_out),
-        }
-
 
 @dataclass(frozen=True, eq=False)
-class FitToReference:
+class FitToReference(Plain):
     """One sensor held against a reference: ``truth in the reference's body = S raw + b``.
 
     ``covariance`` (12, 12) as a calibration's; ``rms`` [SI] of what is left sample by sample in the band that is
@@ -107,22 +102,16 @@ class FitToReference:
     n_rows: int
     n_left_out: int
     widened: float
+    LAYOUT: ClassVar[Layout] = Layout(
+        {"n_rows": "rows", "n_left_out": "left_out"},
+        ("S", "b", "sigma_S", "sigma_b", "rms", "rms_held_out", "band_hz", "rows", "left_out", "widened"),
+        lambda fit, _: fit.sigmas(),
+    )
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types."""
+    def sigmas(self) -> dict[str, Any]:
+        """Standard errors of S (3, 3) and b (3,), as plain lists."""
         sigma = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return {
-            "S": self.S.tolist(),
-            "b": self.b.tolist(),
-            "sigma_S": sigma[:9].reshape(3, 3).tolist(),
-            "sigma_b": sigma[9:].tolist(),
-            "rms": self.rms,
-            "rms_held_out": self.rms_held_out,
-            "band_hz": self.band_hz,
-            "rows": self.n_rows,
-            "left_out": self.n_left_out,
-            "widened": self.widened,
-        }
+        return {"sigma_S": sigma[:9].reshape(3, 3).tolist(), "sigma_b": sigma[9:].tolist()}
 
 
 @dataclass(frozen=True)
@@ -136,7 +125,7 @@ class ReplayStage:
 
 
 @dataclass(frozen=True, eq=False)
-class AgainstReference:
+class AgainstReference(Plain):
     """Everything that a reference says of a log: clocks, mounting, lever arm, both sensors, effects, replay.
 
     ``clock_offset_s``: by how much the reference's clock is ahead at ``clock_middle_s`` of the log, and its σ.
@@ -159,29 +148,20 @@ class AgainstReference:
     findings: tuple[Finding, ...] = ()
     residual_time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     residual_rate: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    LAYOUT: ClassVar[Layout] = Layout(
+        {},
+        (
+            "source", "kind", "overlap_s", "correlation", "clock", "mounting", "lever_arm", "vertical", "gyroscope",
+            "accelerometer", "effects", "replay",
+        ),
+        lambda found, _: {"clock": found.clock()},
+    )  # fmt: skip
 
-    def to_dict(self) -> dict[str, Any]:
-        """As plain JSON types (the ``reference`` entry of the diagnosis schema)."""
-        rate = self.clock_rate_ppm
+    def clock(self) -> dict[str, Any]:
+        """How the two clocks compare."""
+        rate, rate_std = self.clock_rate_ppm or (None, None)
+        offset, offset_std = self.clock_offset_s
         return {
-            "source": self.source,
-            "kind": self.kind,
-            "overlap_s": self.overlap_s,
-            "correlation": self.correlation,
-            "clock": {
-                "offset_s": self.clock_offset_s[0],
-                "offset_std_s": self.clock_offset_s[1],
-                "at_s": self.clock_middle_s,
-                "rate_ppm": None if rate is None else rate[0],
-                "rate_std_ppm": None if rate is None else rate[1],
-            },
-            "mounting": self.mounting.to_dict(),
-            "lever_arm": None if self.lever_arm is None else self.lever_arm.to_dict(),
-            "vertical": None if self.vertical is None else self.vertical.to_dict(),
-            "gyroscope": self.gyroscope.to_dict(),
-            "accelerometer": None if self.accelerometer is None else self.accelerometer.to_dict(),
-            "effects": {name: one.to_dict() for name, one in self.effects.items()},
-            "replay": [
-                {"stage": r.stage, "horizon_s": r.horizon_s, "error_rad": r.error_rad, "n": r.n} for r in self.replay
-            ],
-        }
+            "offset_s": offset, "offset_std_s": offset_std, "at_s": self.clock_middle_s,
+            "rate_ppm": rate, "rate_std_ppm": rate_std,
+        }  # fmt: skip

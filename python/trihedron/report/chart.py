@@ -17,7 +17,10 @@ AXIS_COLOURS: tuple[Colour, Colour, Colour] = ("c1", "c2", "c3")
 
 @dataclass(frozen=True)
 class Scale:
-    """An axis of a panel: ``limits`` in data units (found from the marks where None), ``unit`` for values shown."""
+    """An axis of a panel: ``limits`` in data units (found from the marks where None), ``unit`` for values shown.
+
+    ``names`` are of the places 1, 2, ...; a drawing that has room for them writes them there.
+    """
 
     label: str
     unit: str = ""
@@ -25,6 +28,7 @@ class Scale:
     limits: tuple[float, float] | None = None
     includes: tuple[float, ...] = ()
     whole: bool = False
+    names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from trihedron.records import Finding
 from trihedron.records.diagnosis import AcceptedEffect, Diagnosis
 from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration import figures_in_words
+from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
 from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
 from trihedron.report.diagnosis_laws import laws_blocks
 from trihedron.report.diagnosis_models import models_blocks
@@ -79,10 +80,12 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         Section("Calibration and noise", models_blocks(diagnosis)),
     ]
     if diagnosis.parameters:
-        sections.append(Section("Stage by stage", stages_blocks(diagnosis, MEANING)))
+        stages = (*stages_blocks(diagnosis, MEANING), *stages_pictures(diagnosis))
+        sections.append(Section("Stage by stage", stages))
         sections.append(Section("All numbers of the model", numbers_blocks(diagnosis)))
     if diagnosis.noise_compared:
-        sections.append(Section("Noise and sampling of the model", noise_blocks(diagnosis)))
+        noise = (*noise_blocks(diagnosis), *noise_pictures(diagnosis))
+        sections.append(Section("Noise and sampling of the model", noise))
     findings: Iterable[Finding] = getattr(diagnosis, "findings", ())
     if findings:
         sections.append(Section("Findings", (findings_block(findings),)))

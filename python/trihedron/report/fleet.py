@@ -44,7 +44,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         picture = Picture(
             "numbers",
             "Every number by device, one point a log with its own error; the line is the median of devices.",
-            later("fleet_figures", "draw_numbers", summary),
+            later("chart_figures", "draw_chart", partial(fleet_chart, summary)),
             partial(fleet_chart, summary),
         )
         sections.append(Section("Distributions", (picture,)))

@@ -7,7 +7,7 @@ import numpy as np
 from trihedron.records.fleet import FleetSummary
 from trihedron.records.reference import AgainstReference
 from trihedron.records.sessions import PARAMETERS, SessionsModel
-from trihedron.report.chart import AXIS_COLOURS, Chart, Level, Line, Panel, Points, Scale
+from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Panel, Points, Scale
 from trihedron.report.drawn import envelope, said
 from trihedron.report.sessions import shown
 from trihedron.units import degrees_from_radians
@@ -20,11 +20,12 @@ def sessions_chart(model: SessionsModel) -> Chart:
     if thermal is not None:
         place = np.array([session.temperature_degc for session in model.sessions])
     step = 0.12 * max(float(np.ptp(place)) / max(len(place) - 1, 1), 1e-9)
+    names = tuple(session.name for session in model.sessions)
     panels = []
     for name in dict.fromkeys(one.parameter.id for one in model.repeated):
         picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == name]
         factor, unit = shown(PARAMETERS[picked[0]].unit)
-        marks: list[Level | Line | Points] = [Level(y=0.0)]
+        marks: list[Band | Level | Line | Points] = [Level(y=0.0)]
         for colour, k in zip(AXIS_COLOURS, picked, strict=True):
             centre = model.repeated[k].value
             if thermal is not None:
@@ -40,9 +41,13 @@ def sessions_chart(model: SessionsModel) -> Chart:
                 said(f"{session.name}, {PARAMETERS[k].name}", "", v, f"± {e:.2g} {unit}")
                 for session, v, e in zip(model.sessions, values, error, strict=True)
             ]
+            spread = model.repeated[k].within
+            if thermal is None and spread is not None:
+                reach = np.full(2, spread.sd * factor)
+                marks.insert(0, Band(np.array([0.5, len(place) + 0.5]), -reach, reach))
             axis = f"axis {'xyz'[k - picked[0]]}"
             marks.append(Points(place + (k - picked[0] - 1) * step, values, told, error, axis, colour))
-        x = Scale("temperature [°C]", "°C") if thermal is not None else Scale("recording", whole=True)
+        x = Scale("temperature [°C]", "°C") if thermal is not None else Scale("recording", whole=True, names=names)
         panels.append(Panel(x, Scale(f"{name}  [{unit}]", unit), tuple(marks), height_px=170))
     return Chart(tuple(panels), is_linked=True)
 
@@ -59,6 +64,7 @@ def fleet_chart(summary: FleetSummary) -> Chart:
     across = 1.0 + serial_of + 0.5 * ((order + 0.5) / count - 0.5)
     numbers = np.array([log.numbers[:n] for log in logs if log.numbers is not None])
     errors = np.array([log.std[:n] for log in logs if log.std is not None])
+    x = Scale("device, in the order of the table", whole=True, names=tuple(serials))
     panels = []
     for k in range(n):
         parameter = PARAMETERS[k]
@@ -72,7 +78,7 @@ def fleet_chart(summary: FleetSummary) -> Chart:
                 told = [said(logs[i].serial, "", values[i], f"± {error[i]:.2g} {unit}") for i in np.flatnonzero(part)]
                 marks.append(Points(across[part], values[part], told, error[part], name, colour))
         y = Scale(f"{parameter.id} {parameter.name}  [{unit}]", unit)
-        panels.append(Panel(Scale("device, in the order of the table", whole=True), y, tuple(marks), height_px=150))
+        panels.append(Panel(x, y, tuple(marks), height_px=150))
     return Chart(tuple(panels), columns=3)
 
 

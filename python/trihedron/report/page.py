@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed
@@ -12,6 +13,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
+from trihedron.printable import one_line
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawing import NoFiguresError
 
@@ -32,12 +34,12 @@ WORDY = 28
 def to_html(document: Document) -> str:
     """The whole report, figures drawn and embedded."""
     sections = [
-        {"heading": section.heading, "blocks": [_shown(block) for block in section.blocks]}
+        {"heading": one_line(section.heading), "blocks": [_shown(block) for block in section.blocks]}
         for section in document.sections
     ]
     lead = None if document.lead is None else _shown(document.lead)
     return template("page.html.j2").render(
-        document=document,
+        document=replace(document, title=one_line(document.title), subtitle=one_line(document.subtitle)),
         sections=sections,
         lead=lead,
         version=_version(),

@@ -47,7 +47,7 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
         Picture(
             "reference",
             "What is left of the rate, window by window.",
-            later("reference_figures", "draw_residual", found),
+            later("chart_figures", "draw_chart", partial(residual_chart, found)),
             partial(residual_chart, found),
         )
     )

@@ -213,7 +213,7 @@ def _picture(model: SessionsModel) -> Picture:
     return Picture(
         "sessions",
         "Every number in every recording with its own error (bars), about the common value.",
-        later("sessions_figures", "draw_sessions", model),
+        later("chart_figures", "draw_chart", partial(_chart, model)),
         partial(_chart, model),
     )
 

@@ -7,7 +7,7 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from trihedron.printable import printable
+from trihedron.printable import one_line, printable
 from trihedron.records import Finding
 from trihedron.report.ascii import ascii_of
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
@@ -45,15 +45,15 @@ def to_text(document: Document, *, sections: int | None = None, width: int = WID
     """
     style = Style(width) if style is None else style
     style = replace(style, width=min(max(style.width, NARROWEST), WIDEST))
-    title = [style.paint(line, _BOLD) for line in _wrap(style.plain(document.title), style.width)]
+    title = [style.paint(line, _BOLD) for line in _wrap(style.plain(one_line(document.title)), style.width)]
     verdict = _wrap(style.plain(document.verdict), style.width)
-    lines = [*title, *_wrap(style.plain(document.subtitle), style.width), ""]
+    lines = [*title, *_wrap(style.plain(one_line(document.subtitle)), style.width), ""]
     lines += [style.paint(line, _COLOURS[document.level]) for line in verdict]
     for section in document.sections[:sections]:
         shown = [_block(block, style) for block in section.blocks if not isinstance(block, Picture)]
         if not shown:
             continue
-        heading = style.plain(section.heading)
+        heading = style.plain(one_line(section.heading))
         lines += ["", style.paint(heading, _BOLD), style.plain("─") * _width(heading)]
         for k, block in enumerate(shown):
             lines += ([""] if k else []) + block

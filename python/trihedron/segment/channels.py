@@ -119,7 +119,7 @@ def _quantum(readings: FloatArray) -> FloatArray:
 def _step(probe: FloatArray) -> FloatArray:
     out = np.zeros(3)
     for axis in range(3):
-        values = np.unique(probe[np.isfinite(probe[:, axis]), axis])
+        values, _ = _core.levels_of(probe[:, axis])
         if len(values) > 1:
             steps = np.diff(values)
             # Rounding of the arithmetic that made the numbers is no step of a converter.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
+from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 
@@ -101,9 +101,9 @@ def measure_activity(channels: Channels) -> Activity:
 
 def _limit(activity: FloatArray, freedom: int) -> float:
     median = float(np.median(activity))
-    lower = median - float(np.quantile(activity, special.ndtr(-1.0)))
-    return median + -float(special.ndtri(FALSE_ALARM)) * max(lower, float(np.sqrt(2.0 / freedom)))
+    lower = median - float(np.quantile(activity, probability.ndtr(-1.0)))
+    return median + -float(probability.ndtri(FALSE_ALARM)) * max(lower, float(np.sqrt(2.0 / freedom)))
 
 
 def _chi2_median_ratio(freedom: int) -> float:
-    return float(special.chdtri(freedom, 0.5) / freedom)
+    return float(probability.chdtri(freedom, 0.5) / freedom)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import special
 
+from trihedron import probability
 from trihedron.arrays import BoolArray
 from trihedron.records import Finding, FindingCode, Hold, Recording
 from trihedron.segment.channels import Channels
@@ -84,7 +84,7 @@ def _creep_size(channels: Channels, run: Run, noise: MeanNoise, chance: float) -
     live = variance > 0.0
     statistic = float(np.sum(difference[live] ** 2 / variance[live]))
     freedom = int(live.sum())
-    return float(np.sqrt(statistic)) if freedom and statistic > float(special.chdtri(freedom, chance)) else 0.0
+    return float(np.sqrt(statistic)) if freedom and statistic > float(probability.chdtri(freedom, chance)) else 0.0
 
 
 def judge_log(

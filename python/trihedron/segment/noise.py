@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
+from trihedron import _core, probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.segment.channels import Channels
 
@@ -94,7 +94,7 @@ def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = F
     members = [octave == k for k in np.unique(octave)]
     n = np.array([float(m.sum()) for m in members])
     if is_robust:
-        variances = np.array([np.median(halves.square[m], axis=0) for m in members]) / special.chdtri(1, 0.5)
+        variances = np.array([np.median(halves.square[m], axis=0) for m in members]) / probability.chdtri(1, 0.5)
     else:
         variances = np.array([halves.square[m].mean(axis=0) for m in members])
     tau = halves.size * channels.step_s
@@ -125,6 +125,15 @@ def _fit(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int])
 
     A variance with n degrees of freedom has the deviance n (s/v - 1 - ln(s/v)).
     """
+    if len(seen) < len(chosen):
+        # Too few lengths leave the terms open; which are then zero is a matter of the method.
+        return _fit_open(design, seen, n, chosen)
+    deviance, terms = _core.mean_noise_law(design, seen, n, chosen)
+    return deviance, np.array(terms)
+
+
+def _fit_open(design: FloatArray, seen: FloatArray, n: FloatArray, chosen: list[int]) -> tuple[float, FloatArray]:
+    """As :func:`_fit`, by the active sets of Lawson and Hanson."""
     from scipy import optimize
 
     terms = np.zeros(3)

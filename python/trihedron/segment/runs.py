@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import special
 
+from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels
 from trihedron.segment.floor import Activity
@@ -133,7 +133,7 @@ def _is_same_pose(channels: Channels, before: Run, after: Run, noise: MeanNoise,
     variance += 2.0 * channels.quantisation_variance
     live = variance > 0.0
     statistic = float(np.sum(difference[live] ** 2 / variance[live]))
-    if statistic > float(special.chdtri(int(live.sum()), SAME_POSE)):
+    if statistic > float(probability.chdtri(int(live.sum()), SAME_POSE)):
         return False
     return _comes_back(channels, before, after, noise, creeping)
 
@@ -151,7 +151,7 @@ def _comes_back(channels: Channels, before: Run, after: Run, noise: MeanNoise, c
     variance = noise.variance(len(rate) * channels.step_s)[gyro]
     live = variance > 0.0
     statistic = float(np.sum(net[live] ** 2 / variance[live]))
-    is_nothing = statistic < float(special.chdtri(max(int(live.sum()), 1), SAME_POSE))
+    is_nothing = statistic < float(probability.chdtri(max(int(live.sum()), 1), SAME_POSE))
     travelled = float(np.linalg.norm(rate, axis=1).mean())
     return is_nothing or float(np.linalg.norm(net)) < max(RETURN * travelled, creeping)
 
@@ -252,17 +252,13 @@ def trim_edges(channels: Channels, run: Run, noise: MeanNoise) -> Run:
 
 
 def _clean_from(off: FloatArray, core_variance: FloatArray, channels: Channels, noise: MeanNoise, most: int) -> int:
-    total = np.vstack([np.zeros(off.shape[1]), np.cumsum(off, axis=0)])
     sizes = [2**k for k in range(16) if 2**k <= most]
     live = np.flatnonzero(noise.variance(1.0) > 0.0)
-    limit = float(special.chdtri(len(live), CLEAN_EDGE))
-    dirty = np.zeros(most + 1, dtype=bool)
-    for size in sizes:
-        variance = noise.variance(size * channels.step_s) + core_variance + channels.quantisation_variance
-        mean = (total[size : size + most + 1] - total[: most + 1][: len(total) - size]) / size
-        statistic = (mean[:, live] ** 2 / variance[live]).sum(axis=1)
-        dirty[: len(statistic)] |= statistic > limit
-    clean = np.flatnonzero(~dirty)
+    limit = float(probability.chdtri(len(live), CLEAN_EDGE))
+    duration_s = np.array(sizes, dtype=np.float64)[:, None] * channels.step_s
+    variance = np.zeros((len(sizes), off.shape[1]))
+    variance[:, live] = (noise.variance(duration_s) + core_variance + channels.quantisation_variance)[:, live]
+    clean = _core.first_clean(off, most, sizes, variance, limit)
     # A soft beginning goes on below what can be seen: as much again is given away; and one block, which may be the
     # one the motion begins in.
-    return min(2 * int(clean[0]) + 1, most) if len(clean) else most
+    return most if clean is None else min(2 * clean + 1, most)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import special
 
+from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.runs import CREEP_PART, MIN_HOLD_S, SAME_POSE, SWAY_RAD, ranges_of, speed_of_moves
@@ -80,7 +80,7 @@ def _tilts_a_little(channels: Channels, first: int, last: int, gravity: float) -
     statistic = float((drift[live] ** 2 / variance[live]).sum())
     # The halves' means are half of the whole drift apart.
     is_small = 2.0 * float(np.linalg.norm(drift)) / gravity < SWAY_RAD
-    return is_small and statistic > float(special.chdtri(max(int(live.sum()), 1), SAME_POSE))
+    return is_small and statistic > float(probability.chdtri(max(int(live.sum()), 1), SAME_POSE))
 
 
 def _densest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -92,5 +92,5 @@ def _densest(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     at = width.argmin(axis=0)
     axes = np.arange(values.shape[1])
     middle: FloatArray = ordered[at + quarter // 2, axes]
-    deviation: FloatArray = width[at, axes] / (2.0 * float(special.ndtri(0.5 + 0.25 / 2.0)))
+    deviation: FloatArray = width[at, axes] / (2.0 * float(probability.ndtri(0.5 + 0.25 / 2.0)))
     return middle, deviation

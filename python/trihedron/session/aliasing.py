@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
 
-_AT_HALF = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 16.0
+_AT_HALF = [1.0 / 16.0, -4.0 / 16.0, 6.0 / 16.0, -4.0 / 16.0, 1.0 / 16.0]
 """Unit gain at half the sampling frequency, fourth-order zero at rest: smooth motion does not pass."""
-_AT_QUARTER = np.array([-1.0, 0.0, 2.0, 0.0, -1.0]) / 4.0
+_AT_QUARTER = [-0.25, 0.0, 0.5, 0.0, -0.25]
 MARGIN = 3.0
 """Standard deviations of the noise's own power that are not yet motion."""
 
@@ -36,34 +37,23 @@ def unresolved_variance(
     -------
     (moves, 3) array, (raw unit · s)²
     """
-    half, quarter = (_power(readings, taps) for taps in (_AT_HALF, _AT_QUARTER))
+    moves = np.array(move_ranges, dtype=np.int64).reshape(-1, 2)
+    holds = np.array([(a, b) for a, b in hold_ranges if b - a > 8], dtype=np.int64).reshape(-1, 2)
+    n_moves, n_holds = ((ranges[:, 1] - ranges[:, 0] - 4)[:, None] for ranges in (moves, holds))
+    n_moves = np.maximum(n_moves, 0)
 
-    def excess(power: FloatArray) -> FloatArray:
-        noise = np.array([power[a + 2 : b - 2].mean(axis=0) for a, b in hold_ranges if b - a > 8])
-        level = np.median(noise, axis=0) if len(noise) else np.zeros(3)
-        out = np.zeros((len(move_ranges), 3))
-        for m, (a, b) in enumerate(move_ranges):
-            inner = power[a + 2 : b - 2]
-            if len(inner):
-                # Neighbouring outputs of five taps share samples: about a third as many independent squares.
-                usual = level * (1.0 + MARGIN * np.sqrt(6.0 / len(inner)))
-                out[m] = np.maximum(inner.sum(axis=0) - usual * len(inner), 0.0)
+    def excess(taps: list[float]) -> FloatArray:
+        power = _core.band_power(readings, taps, np.concatenate([holds, moves]))
+        level = np.median(power[: len(holds)] / n_holds, axis=0) if len(holds) else np.zeros(3)
+        # Neighbouring outputs of five taps share samples: about a third as many independent squares.
+        usual = level * (1.0 + MARGIN * np.sqrt(6.0 / np.maximum(n_moves, 1)))
+        out: FloatArray = np.maximum(power[len(holds) :] - usual * n_moves, 0.0)
         return out
 
-    at_half, at_quarter = excess(half), excess(quarter)
+    at_half, at_quarter = excess(_AT_HALF), excess(_AT_QUARTER)
     # The fall from band to band is the sensor's filter and the hand's manner: that of the usual move, not the wildest.
     total = at_quarter.sum(axis=1)
     falls = at_half.sum(axis=1)[total > 0] / total[total > 0]
     fall = min(float(np.median(falls)), 1.0) if len(falls) else 1.0
     variance: FloatArray = at_half * fall * step_s**2
     return variance
-
-
-def _power(readings: FloatArray, taps: FloatArray) -> FloatArray:
-    """(n, 3) squared output of a five-tap filter, scaled so that white noise gives its variance."""
-    n = len(readings)
-    out = np.zeros_like(readings)
-    if n >= 5:
-        filtered = sum(tap * readings[k : n - 4 + k] for k, tap in enumerate(taps))
-        out[2 : n - 2] = np.asarray(filtered) ** 2 / (taps**2).sum()
-    return np.nan_to_num(out)

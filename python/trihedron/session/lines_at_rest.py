@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +26,8 @@ ABOVE_SLOWER = 10.0
 """Power of a line over that of the bins three to five below: a walk of a bias has up to nine times less, not more."""
 FEWEST_SAMPLES = 64
 """A spectrum of fewer has too few frequencies to tell a line from the noise around it."""
+LONGEST_REMEMBERED = 4096
+"""Samples of a pose whose lines are remembered: with 512 poses of two sensors 50 MB at most."""
 FEWEST_BINS, MOST_BINS = 27, 101
 """Frequencies whose median is the level of the noise at one: few follow its colour, many know it well."""
 MOST_LINES = 3
@@ -57,7 +61,7 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
             part = readings[hold.start : hold.stop]
             if hold.disturbed or len(part) < FEWEST_SAMPLES or not np.isfinite(part).all():
                 continue
-            lines, has_line = find_pose_lines(part)
+            lines, has_line = _known_lines(part)
             if not lines:
                 continue
             fitted, own = _constant_beside(part, lines, sigma)
@@ -67,6 +71,21 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
         if (new_mean != mean).any():
             changed |= {f"{sensor}_mean": new_mean, f"{sensor}_sigma_mean": new_error}
     return (replace(segments, **changed) if changed else segments), swing  # type: ignore[arg-type]
+
+
+def _known_lines(part: FloatArray) -> tuple[tuple[float, ...], npt.NDArray[np.bool_]]:
+    """As :func:`find_pose_lines`; poses of usual length are remembered: every change of a session asks for all anew."""
+    if len(part) > LONGEST_REMEMBERED:
+        lines, has_line = find_pose_lines(part)
+        return tuple(lines), has_line
+    return _lines_of(part.tobytes(), part.shape[1])
+
+
+@lru_cache(maxsize=512)
+def _lines_of(readings: bytes, n_axes: int) -> tuple[tuple[float, ...], npt.NDArray[np.bool_]]:
+    lines, has_line = find_pose_lines(np.frombuffer(readings).reshape(-1, n_axes))
+    has_line.flags.writeable = False
+    return tuple(lines), has_line
 
 
 def find_pose_lines(part: FloatArray) -> tuple[list[float], npt.NDArray[np.bool_]]:
@@ -110,18 +129,18 @@ def _strongest(rest: FloatArray) -> tuple[int, npt.NDArray[np.bool_]] | None:
     return (k, axes) if axes.any() else None
 
 
-def _basis(n: int, lines: list[float]) -> FloatArray:
+def _basis(n: int, lines: Sequence[float]) -> FloatArray:
     phase = 2.0 * np.pi * np.outer(np.arange(n) - 0.5 * (n - 1), lines)
     return np.hstack([np.ones((n, 1)), np.cos(phase), np.sin(phase)])
 
 
-def _model(part: FloatArray, lines: list[float]) -> tuple[FloatArray, FloatArray]:
+def _model(part: FloatArray, lines: Sequence[float]) -> tuple[FloatArray, FloatArray]:
     basis = _basis(len(part), lines)
     coefficient = np.asarray(np.linalg.lstsq(basis, part, rcond=None)[0], dtype=np.float64)
     return basis @ coefficient, coefficient
 
 
-def _swing(part: FloatArray, lines: list[float]) -> FloatArray:
+def _swing(part: FloatArray, lines: Sequence[float]) -> FloatArray:
     """(3,) variance of the lines' integral over a phase that may be any, (reading · samples)²."""
     _, coefficient = _model(part, lines)
     m = len(lines)
@@ -130,7 +149,7 @@ def _swing(part: FloatArray, lines: list[float]) -> FloatArray:
     return out
 
 
-def _refined(part: FloatArray, lines: list[float], near: float) -> float:
+def _refined(part: FloatArray, lines: Sequence[float], near: float) -> float:
     """Frequency of least squares within a bin and a half of ``near``, the lines known already fitted along."""
     scale = np.maximum(np.std(part, axis=0), 1e-300)
     reduced = part / scale
@@ -146,7 +165,7 @@ def _refined(part: FloatArray, lines: list[float], near: float) -> float:
     )
 
 
-def _constant_beside(part: FloatArray, lines: list[float], sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _constant_beside(part: FloatArray, lines: Sequence[float], sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Constant (3,) beside the lines and its standard error (3,); amplitudes, phases and frequencies are unknowns."""
     n, m = len(part), len(lines)
     model, coefficient = _model(part, lines)

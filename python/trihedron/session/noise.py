@@ -79,8 +79,10 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
 
 
 def _second_half_minus_first(values: FloatArray) -> FloatArray:
-    first, second = np.array_split(values, 2)
-    out: FloatArray = np.nanmean(second, axis=0) - np.nanmean(first, axis=0)
+    middle = (len(values) + 1) // 2
+    out: FloatArray = values[middle:].mean(axis=0) - values[:middle].mean(axis=0)
+    if np.isnan(out).any():
+        out = np.nanmean(values[middle:], axis=0) - np.nanmean(values[:middle], axis=0)
     return out
 
 

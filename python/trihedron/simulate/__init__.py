@@ -11,7 +11,7 @@ from trihedron.simulate.profiles import PROFILES, Profile, profile_by_name
 from trihedron.simulate.readout import Adc, Drift, Electronics, Filter, Interference, Smoother, Thermal
 from trihedron.simulate.run import simulate
 from trihedron.simulate.scenario import Clock, Environment, Loss, Scenario, Supply, Temperature
-from trihedron.simulate.scenario_file import read_scenario
+from trihedron.simulate.scenario_file import read_scenario, scenario_from_table
 from trihedron.simulate.sessions import (
     dividing_head,
     hand_session,
@@ -22,6 +22,7 @@ from trihedron.simulate.sessions import (
     table_turns,
 )
 from trihedron.simulate.twin import converter_step, twin_scenario
+from trihedron.simulate.twin_noise import noise_of_octaves
 
 __all__ = [
     "EFFECT_IDS",
@@ -62,11 +63,13 @@ __all__ = [
     "list_scenarios",
     "long_rest",
     "make_noise",
+    "noise_of_octaves",
     "poses_in_order",
     "profile_by_name",
     "rate_table",
     "read_scenario",
     "scenario_by_name",
+    "scenario_from_table",
     "simulate",
     "six_faces",
     "table_turns",

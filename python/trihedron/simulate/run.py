@@ -19,7 +19,7 @@ from trihedron.simulate.motion import Plan, plan_motion
 from trihedron.simulate.noise import NoiseTerms, make_noise, stream
 from trihedron.simulate.readout import Triple, sense_axes
 from trihedron.simulate.scenario import Clock, Environment, Scenario
-from trihedron.simulate.zero_scatter import zero_of_poses
+from trihedron.simulate.zero_scatter import zero_in_moves, zero_of_poses
 
 Sensor = Accelerometer | Gyroscope
 
@@ -128,6 +128,9 @@ def _read(
     if any(sensor.electronics.zero_scatter):
         rng = stream(seed, f"{name}/zero scatter")
         signal = signal + zero_of_poses(plan.labels, time_s, sensor.electronics.zero_scatter, rng)
+    if any(sensor.electronics.zero_in_moves):
+        rng = stream(seed, f"{name}/zero in moves")
+        signal = signal + zero_in_moves(plan.labels, time_s, sensor.electronics.zero_in_moves, rng)
     _, gain = sense_axes(sensor.S, name)
     offset = -np.linalg.solve(np.asarray(sensor.S), np.asarray(sensor.b))
     raw = signal  # in place: ten million samples are 240 MB

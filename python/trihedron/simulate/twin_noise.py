@@ -19,6 +19,15 @@ _FREQUENCIES = np.pi * (np.arange(1 << 13) + 0.5) / (1 << 13)
 _CORNERS = (0.03, 0.045, 0.06, 0.08, 0.1, 0.12, 0.15, 0.19, 0.24, 0.3, 0.37, 0.45)
 _ORDERS = (1, 2, 3, 4, 6)
 
+FILTER_EARNS = 16.0
+"""Twice the log-likelihood that a low-pass must win over none, as where its corner is measured."""
+FLICKER_EARNS = 6.63
+"""The same for flicker: χ² of one degree of freedom passes it in 1 %."""
+NEAR = 0.3
+"""In the logarithm: neighbours of the corners that are tried differ by about as much."""
+SHAPES = 0.1
+"""Relative error of a density that two terms and a low-pass do not follow: lines, sharper filters."""
+
 
 def noise_of_holds(
     signal: FloatArray, holds: Sequence[tuple[int, int]], dt: float, step: FloatArray | float = 0.0
@@ -42,6 +51,55 @@ def noise_of_holds(
         return (columns[0][j], columns[1][j], columns[2][j])
 
     return NoiseTerms(N=triple(0), B=triple(1)), filters[best]
+
+
+def noise_of_octaves(
+    bands_hz: FloatArray, density: FloatArray, relative: FloatArray, dt: float, corner_hz: float | None = None
+) -> tuple[NoiseTerms, Smoother]:
+    """Terms per axis and the low-pass that all axes share, from mean densities in frequency bands.
+
+    ``bands_hz`` (m, 2), ``density`` (m, 3) two-sided, unit²/Hz (that of white noise is N²), ``relative`` (m, 3) their
+    relative standard errors. A low-pass must earn ``FILTER_EARNS``, else all colour would become one; where its
+    ``corner_hz`` was seen otherwise it is one near there.
+    """
+    filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
+    frequency_hz = _FREQUENCIES / (2.0 * np.pi * dt)
+    inside = [(low <= frequency_hz) & (frequency_hz < high) for low, high in bands_hz]
+    flicker = np.array([float(np.mean(1.0 / (2.0 * np.pi * frequency_hz[one]))) for one in inside])
+    fits = []
+    for low_pass in filters:
+        power = _power(low_pass, dt)
+        design = np.column_stack([[float(power[one].mean()) for one in inside], flicker])
+        axes = [_earned(design, density[:, k], relative[:, k]) for k in range(density.shape[1])]
+        fits.append((axes, sum(misfit for _, misfit in axes)))
+    near = [k for k in range(1, len(fits)) if corner_hz is None or abs(np.log(filters[k].corner_hz / corner_hz)) < NEAR]
+    best = min(near or range(1, len(fits)), key=lambda k: fits[k][1])
+    best = best if corner_hz is not None or fits[0][1] - fits[best][1] > FILTER_EARNS else 0
+    terms = np.sqrt([variances for variances, _ in fits[best][0]])
+    N, B = ((float(x), float(y), float(z)) for x, y, z in terms.T)
+    return NoiseTerms(N=N, B=B), filters[best]
+
+
+def _earned(design: FloatArray, density: FloatArray, relative: FloatArray) -> tuple[FloatArray, float]:
+    """White noise (first column), and flicker (second) where it earns ``FLICKER_EARNS``."""
+    white, alone = _non_negative(design[:, :1], density, relative)
+    both, misfit = _non_negative(design, density, relative)
+    return (both, misfit) if alone - misfit > FLICKER_EARNS else (np.append(white, 0.0), alone)
+
+
+def _non_negative(design: FloatArray, density: FloatArray, relative: FloatArray) -> tuple[FloatArray, float]:
+    """Non-negative weights of the columns, errors relative to the model, and -2 log-likelihood."""
+    spread = np.hypot(relative, SHAPES)
+    model = np.maximum(density, 1e-3 * float(density.max()))
+    solution = np.zeros(design.shape[1])
+    misfit = 0.0
+    for _ in range(5):
+        scaled = design / (model * spread)[:, None]
+        norms = np.linalg.norm(scaled, axis=0)
+        found, misfit = nnls(scaled / norms, density / (model * spread))
+        solution = found / norms
+        model = np.maximum(design @ solution, 1e-6 * float(density.max()))
+    return solution, float(misfit) ** 2 + 2.0 * float(np.sum(np.log(model)))
 
 
 def _pooled(x: FloatArray, holds: Sequence[tuple[int, int]], step: float) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -12,8 +12,7 @@ use pyo3::prelude::*;
 
 use super::read_out::{Blocks, Rows, labels, moves, path};
 use super::{Corners, distortion};
-use crate::python::arrays::{dmatrix, matrix, of3, vectors};
-use crate::python::poisson::vector3;
+use crate::python::arrays::{dmatrix, matrix, of3, vector3, vectors};
 use crate::python::{run, run_long};
 use crate::session_model::Session;
 use crate::session_model::fit::Fit;

@@ -14,7 +14,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::rotation::rows3;
+use super::arrays::rows3;
 use crate::session_model::fit::fit;
 use crate::session_model::move_rows::Weights;
 use crate::session_model::moves::MoveNoise;

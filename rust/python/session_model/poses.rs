@@ -7,8 +7,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::python::poisson::{matrix3, samples, vector3};
-use crate::python::rotation::rows3;
+use crate::python::arrays::{matrix3, rows3, samples, vector3};
 use crate::session_model::moves::Move;
 use crate::session_model::{AtRest, State};
 

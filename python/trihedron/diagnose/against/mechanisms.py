@@ -3,35 +3,63 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 from scipy.stats import norm
 
 from trihedron.diagnose.effects import catalogue
-from trihedron.records.diagnosis import AcceptedEffect, Candidate, ParameterDifference
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.records.domains import Domain
+from trihedron.units import STANDARD_GRAVITY_M_S2
 
 FRAME_TOLERANCE = 0.03
 """Parameters of one effect are stated along the axes of each side's own fit: 3 % (the angle between the two frames and
 the first order of the mechanisms) is no difference."""
 
+LARGEST_READ: Mapping[str, float] = MappingProxyType({"accel-zero": STANDARD_GRAVITY_M_S2, "gyro-zero": 1.0})
+"""What a scale that follows temperature is a share of where it is taken for a zero: gravity; a turn by hand [rad/s]."""
 
-def left_open_by(effects: Iterable[AcceptedEffect]) -> dict[str, float]:
+
+def left_open_by(effects: Iterable[AcceptedEffect], span_k: float | None = None) -> dict[str, float]:
     """Ids of numbers that these effects leave open, and by how much (SI): where they are counted from is a convention.
 
-    The size is that of the effect's own parameters where they are of the number's unit, else not known: infinite.
+    ``effects`` of either side, those that both have included: two sessions at other temperatures, or begun at another
+    state of warmth, count the level of one and the same effect from other places. The size is that of the effect's
+    parameters, those per kelvin times ``span_k`` (all temperatures of both logs), each up to two standard errors more;
+    infinite where that is not known. An effect that both sides have counts once, with its larger size.
     """
     named = {effect.id: effect.leaves_open for effect in catalogue()}
-    out: dict[str, float] = {}
+    by_effect: dict[tuple[str, str], float] = {}
     for effect in effects:
         for number in named.get(effect.id, ()):
-            unit = {"accel-zero": "m/s^2", "gyro-zero": "rad/s"}.get(number, "")
-            size = max((abs(p.value) for p in effect.parameters if p.unit == unit), default=math.inf)
-            out[number] = out.get(number, 0.0) + size
+            unit = {"accel-zero": "m/s^2", "gyro-zero": "rad/s"}.get(number, "1")
+            sizes = (_moved(p, number, unit, span_k) for p in effect.parameters)
+            size = max((s for s in sizes if s is not None), default=math.inf)
+            by_effect[number, effect.id] = max(by_effect.get((number, effect.id), 0.0), size)
+    out: dict[str, float] = {}
+    for (number, _), size in by_effect.items():
+        out[number] = out.get(number, 0.0) + size
     return out
+
+
+def _moved(parameter: EffectParameter, number: str, unit: str, span_k: float | None) -> float | None:
+    """How far one parameter moves the level of a number in ``unit``; ``None`` where it says nothing of it."""
+    size = abs(parameter.value) + 2.0 * abs(parameter.std)
+    if parameter.unit == unit:
+        return size
+    if span_k is None:
+        return None
+    if parameter.unit == f"{unit}/K":
+        return size * span_k
+    if parameter.unit == f"{unit}/K^2":
+        return size * span_k * span_k
+    if parameter.unit == "1/K" and number in LARGEST_READ:
+        return size * span_k * LARGEST_READ[number]
+    return None
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,9 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
 
+SIGN_SIGMA = 5.0
+"""A scale this many standard errors from zero has its sign: a wrong one once in 3.5 million axes."""
+
 
 class AxisHandedness(DirectEffect):
     """The gyro's axes, as documented, turn against the accelerometers' as documented."""
@@ -29,7 +32,7 @@ class AxisHandedness(DirectEffect):
         cov = context.fitted.covariance()[9:18, 9:18]
         sigma = np.sqrt(np.maximum(np.diag(cov), 0.0)).reshape(3, 3)
         # A sign is only claimed where the scale itself is known.
-        if any(abs(S[main[j], j]) < 5.0 * sigma[main[j], j] for j in range(3)):
+        if any(abs(S[main[j], j]) < SIGN_SIGMA * sigma[main[j], j] for j in range(3)):
             return None
         signs = np.array([np.sign(unit[main[j], j]) for j in range(3)])
         if (signs > 0).all() and (main == np.arange(3)).all():

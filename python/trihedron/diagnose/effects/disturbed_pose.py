@@ -29,6 +29,15 @@ OWN_SIGMA = 4.0
 """How far a pose's own readings must be off before a push of it is considered."""
 BUMP_SIGMA = 7.0
 """A tenth of a second must leave the line through its surroundings by this much: drift inside a hold does not."""
+FEWEST_BLOCKS = 4
+"""Blocks of a tenth of a second a pose must have: two on either side carry the line."""
+SHAKES_P = 1e-6
+"""p-value of a pose's variance, times the number of poses and channels, from which it shakes: 48 healthy sessions do
+not come below 0.02 (benches/diagnosis_thresholds.py), and real noise is not as white."""
+IN_EITHER_HALF = 0.5
+"""Share of ``LOUD`` that shaking reaches in both halves of its pose; a push is in one of them."""
+LEAST_DOF = 0.1
+"""Degrees of freedom at least: a pose whose rows the fit has used up cannot be off by a rounding error."""
 
 
 def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
@@ -45,7 +54,7 @@ def _bump(obs: Observations, span: tuple[float, float]) -> HeldOut | None:
     if obs.raw_rate is not None and obs.rate_density is not None:
         pairs.append((obs.raw_rate, obs.rate_density))
     n = (last - first) // block
-    if n < 4:
+    if n < FEWEST_BLOCKS:
         return None
     k = np.arange(n)
     outer = (k < max(side // block, 2)) | (k >= n - max(side // block, 2))
@@ -102,7 +111,7 @@ def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
     """Poses that shake throughout: the level of one half, not that of the other poses, predicts the other half."""
     scatter = hold_scatter(obs)
     own = np.array([not hold.is_unsteady for hold in obs.segments.holds])
-    loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < 1e-6)
+    loud = own[:, None] & (scatter.ratio > LOUD) & (scatter.p_value * scatter.p_value.size < SHAKES_P)
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     found, before, after = [], [], []
     for i in np.flatnonzero(loud.any(axis=1)):
@@ -110,7 +119,7 @@ def _restless(obs: Observations) -> tuple[list[int], HeldOut | None]:
         steps = np.diff(x[hold.start : hold.stop][:, loud[i]], axis=0)
         early, late = (np.nanvar(half, axis=0) for half in np.array_split(steps, 2))
         usual = np.nanvar(steps, axis=0) / scatter.ratio[i, loud[i]]
-        if (np.minimum(early, late) > 0.5 * LOUD * usual).any():
+        if (np.minimum(early, late) > IN_EITHER_HALF * LOUD * usual).any():
             found.append(int(i))
             before.append(float(np.mean(late / usual)))
             after.append(float(np.mean(late / early)))
@@ -131,7 +140,7 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
     for i, hold in enumerate(obs.segments.holds):
         own = rows & (fitted.system.segment == i)
         chi2, dof = float((fitted.system.residual[own] ** 2).sum()), float((1.0 - used[own]).sum())
-        if chi2 > OWN_SIGMA**2 * max(dof, 0.1):
+        if chi2 > OWN_SIGMA**2 * max(dof, LEAST_DOF):
             out[i] = True
             continue
         for values, sigma in ((obs.raw_force, obs.hold_force_sigma), (obs.raw_rate, obs.hold_rate_sigma)):

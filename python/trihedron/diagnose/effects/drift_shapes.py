@@ -65,6 +65,9 @@ def shortest_time_constant(context: Context) -> float:
 def is_possible_drift(variant: Variant, value: FloatArray) -> bool:
     """Whether the curve stays inside what zeros of parts drift by."""
     for side, most in ((variant.distortion.force, MOST_M_S2), (variant.distortion.rate, MOST_RAD_S)):
-        if side is not None and float(np.ptp(side @ value, axis=0).max(initial=0.0)) > most:
+        if side is None:
+            continue
+        drift = (side.reshape(-1, len(value)) @ value).reshape(len(side), 3)
+        if float(np.ptp(drift, axis=0).max(initial=0.0)) > most:
             return False
     return True

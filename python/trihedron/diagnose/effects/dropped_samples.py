@@ -21,6 +21,10 @@ CLEAR_COUNT = 3.0
 """Standard errors by which a count must differ from none."""
 UNSETTLED = 0.15
 """Relative error of a count that only the joint of the two sides tells."""
+MOST_OF_INTERVALS = 0.02
+"""Losses in more than one of fifty intervals are no losses here and there: the clock or the motion is another."""
+NAMED = 4
+"""Places that the sentence names."""
 _KNOWN: WeakKeyDictionary[Observations, tuple[list[Loss], dict[int, float]]] = WeakKeyDictionary()
 
 
@@ -111,7 +115,7 @@ class DroppedSamples(DirectEffect):
             return None
         obs = context.obs
         n_intervals = sum(b - a for a, b in obs.move_ranges)
-        if len(losses) > 0.02 * n_intervals:
+        if len(losses) > MOST_OF_INTERVALS * n_intervals:
             return None  # everywhere is not a loss here and there
         counts = {loss.sample: loss.count for loss in losses}
         t = obs.time_s
@@ -124,8 +128,8 @@ class DroppedSamples(DirectEffect):
                 for one in losses
             ),
         )
-        places = ", ".join(f"{loss.count} at {t[loss.sample]:.2f} s" for loss in losses[:4])
-        more = f" and {len(losses) - 4} more" if len(losses) > 4 else ""
+        places = ", ".join(f"{loss.count} at {t[loss.sample]:.2f} s" for loss in losses[:NAMED])
+        more = f" and {len(losses) - NAMED} more" if len(losses) > NAMED else ""
 
         def reweigh(old: Observations) -> Observations:
             recording, segments = insert_samples(old.recording, old.segments, counts)

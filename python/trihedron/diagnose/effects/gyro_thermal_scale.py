@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.diagnose.context import Context
+from trihedron.diagnose.context import LEAST_SWING_K, Context
 from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, rate_only
 
 
@@ -20,8 +20,8 @@ class GyroThermalScale(Effect):
     def unavailable(self, context: Context) -> str | None:
         if context.temperature is None:
             return "the log has no temperature"
-        if np.ptp(context.temperature) < 0.2:
-            return "the temperature changes by less than 0.2 °C"
+        if np.ptp(context.temperature) < LEAST_SWING_K:
+            return f"the temperature changes by less than {LEAST_SWING_K:g} °C"
         return None
 
     def variants(self, context: Context) -> list[Variant]:

@@ -17,12 +17,14 @@ TIMES_S = (0.004, 0.008, 0.016, 0.032, 0.064)
 """Times tried, each twice the one before: a parameter between 1/√2 and √2 of its own covers all between."""
 NEAR_ONE = (0.6, 1.6)
 """A time that its own column does not confirm: the next of the grid fits better, or the mechanism does not."""
+LEAST_STEPS = 0.25
+"""A shorter time constant decays by e⁻⁴ within a sample: its column is that of one delay."""
 
 
 def times_for(context: Context) -> tuple[float, ...]:
-    """The times of the grid that the sampling resolves: half a sample at least."""
+    """The times of the grid that the sampling resolves: a quarter of a sample at least."""
     step_s = 1.0 / context.obs.recording.rate_hz
-    return tuple(t for t in TIMES_S if t >= 0.25 * step_s) or (TIMES_S[-1],)
+    return tuple(t for t in TIMES_S if t >= LEAST_STEPS * step_s) or (TIMES_S[-1],)
 
 
 def shifted(context: Context, values: FloatArray, ahead_s: float) -> FloatArray:

@@ -14,6 +14,14 @@ from trihedron.records.domains import HeldOut, Where
 
 MIN_SHARE = 0.5
 """One arm must predict at least this share of the motion of moves it was not fitted to: a hand also just travels."""
+FEWEST_MOVES = 6
+"""Twice the arm's three numbers: the scatter between moves is its error bar."""
+TOO_FLAT = 1e6
+"""Condition above which a component of the arm moves the readings a thousandth as much as another: it is not seen."""
+P_LIMIT = 1e-3
+"""False alarms of Hotelling's test on moves whose own travel does not follow the turn."""
+SMOOTHED = 5
+"""Samples of the mean that both sides pass."""
 
 
 class LeverArm(DirectEffect):
@@ -30,7 +38,7 @@ class LeverArm(DirectEffect):
     )
 
     def unavailable(self, context: Context) -> str | None:
-        return "fewer than six moves with a gyro" if len(context.moves) < 6 else None
+        return "fewer than six moves with a gyro" if len(context.moves) < FEWEST_MOVES else None
 
     def find(self, context: Context) -> Evidence | None:
         smooth = _smoothing(context)
@@ -48,7 +56,7 @@ class LeverArm(DirectEffect):
             samples.append(len(t))
         N, b, e2 = np.array(normal), np.array(side), np.array(energy)
         total = N.sum(axis=0)
-        if np.linalg.cond(total) > 1e6:
+        if np.linalg.cond(total) > TOO_FLAT:
             return None
         arm = np.linalg.solve(total, b.sum(axis=0))
         deviations = b - N @ arm
@@ -63,7 +71,7 @@ class LeverArm(DirectEffect):
             other = np.linalg.solve(total - N[k], b.sum(axis=0) - b[k])
             after += float(e2[k] - 2 * other @ b[k] + other @ N[k] @ other)
         share = 1.0 - after / float(e2.sum())
-        if share < MIN_SHARE or p > 1e-3:
+        if share < MIN_SHARE or p > P_LIMIT:
             return None
         n = 3 * sum(samples)
         before_rms, after_rms = float(np.sqrt(e2.sum() / n)), float(np.sqrt(after / n))
@@ -84,10 +92,10 @@ class LeverArm(DirectEffect):
 
 def _smoothing(context: Context):  # type: ignore[no-untyped-def]
     """Five-sample mean: both sides of the comparison pass the same filter, so that derivatives are not noise."""
-    kernel = np.ones(5) / 5.0
+    kernel = np.ones(SMOOTHED) / SMOOTHED
 
     def smooth(x: FloatArray) -> FloatArray:
-        if len(x) < 5:
+        if len(x) < SMOOTHED:
             return x
         padded = np.pad(x, ((2, 2), (0, 0)), mode="edge")
         return np.stack([np.convolve(padded[:, k], kernel, mode="valid") for k in range(x.shape[1])], axis=1)

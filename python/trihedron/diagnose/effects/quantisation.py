@@ -21,6 +21,22 @@ MISSED = 25.0
 """Readings that a code never read was to have: chance leaves it empty once in 10¹¹."""
 SIGMA_GRID = np.geomspace(0.03, 2.0, 36)
 """Noise before the converter that is tried, in steps."""
+MOST_CODES = 0.2
+"""Codes per reading: on a grid every code is read five times or more, readings without one are all different."""
+ONE_STEP, OFF_GRID, ON_GRID = 1.5, 0.02, 0.98
+"""Gaps nearer to one step than to two tell it; 98 % of all gaps must be within 2 % of whole steps (chance: 4 %)."""
+REACHES = 0.5
+"""Noise, in steps, that leaves a third of the readings off their code: its neighbours are to be expected then."""
+MOSTLY = 0.5
+"""Share of the still readings on one code, from which a zone around it is looked for."""
+ZONE_STEPS, JUST_OUTSIDE = 3.5, 20
+"""A zone is wider than the gap of three steps that two missing codes leave. Were readings spread evenly to twice its
+width, twenty would all lie in the outer half once in 2²⁰."""
+FEWEST_READINGS = 4
+"""Readings of a pose whose codes say anything of its scatter."""
+NOISE_ENOUGH = 0.75
+"""Scatter, in steps, with which averaging resolves: less the twelfth of rounding 0.69 of noise, the staircase of the
+mean is then exp(-2π²·0.69²)/π, 3·10⁻⁵ steps. Around a missing code steps are twice as wide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,22 +62,22 @@ def lattice(holds: list[FloatArray], sigma: float) -> tuple[float, int] | None:
     """Step of the grid on which all values lie and the number of codes skipped amid visited ones, or ``None``."""
     values = np.concatenate(holds)
     codes = np.unique(values)
-    if len(codes) < 3 or len(codes) > 0.2 * len(values):
+    if len(codes) < 3 or len(codes) > MOST_CODES * len(values):
         return None
     gaps = np.diff(codes)
     tiny = 1e-6 * float(np.max(np.abs(codes)) + 1e-300)
     gaps = gaps[gaps > tiny]
     if len(gaps) == 0:
         return None
-    step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
+    step = float(np.median(gaps[gaps < ONE_STEP * gaps.min()]))
     ratio = gaps / step
-    if np.mean(np.abs(ratio - np.round(ratio)) < 0.02) < 0.98:
+    if np.mean(np.abs(ratio - np.round(ratio)) < OFF_GRID) < ON_GRID:
         return None
     # A code is missing where a pose's own readings lie on both sides of it: noise has one summit, so at least the
     # geometric mean of its neighbours' counts was to be expected there.
     expected: dict[int, float] = {}
     visited = set(np.round((codes - codes[0]) / step).astype(int).tolist())
-    for one in holds if sigma > 0.5 * step else []:
+    for one in holds if sigma > REACHES * step else []:
         own, seen = np.unique(np.round((one - codes[0]) / step).astype(int), return_counts=True)
         count = dict(zip(own.tolist(), seen.tolist(), strict=True))
         for k in own.tolist():
@@ -110,7 +126,7 @@ def dead_zone(values: FloatArray, everything: FloatArray) -> float:
     """Half-width of a zone around the commonest still code that no reading of the recording enters, or 0."""
     codes, counts = np.unique(values, return_counts=True)
     zero = float(codes[counts.argmax()])
-    if counts.max() < 0.5 * len(values):
+    if counts.max() < MOSTLY * len(values):
         return 0.0
     away = np.abs(everything[everything != zero] - zero)
     if len(np.unique(away)) < 3:
@@ -119,7 +135,7 @@ def dead_zone(values: FloatArray, everything: FloatArray) -> float:
     # Readings just outside must be common: a gap that the motion merely never stopped in is no zone.
     beyond = int((away < 2.0 * nearest).sum())
     fine = float(np.diff(np.unique(away)).min())
-    return nearest if nearest > 3.5 * fine and beyond >= 20 else 0.0
+    return nearest if nearest > ZONE_STEPS * fine and beyond >= JUST_OUTSIDE else 0.0
 
 
 class Quantisation(DirectEffect):
@@ -163,7 +179,7 @@ class Quantisation(DirectEffect):
         x = np.round(raw[:, c % 3], 9)
         holds = [x[hold.samples()] for hold in obs.segments.holds]
         holds = [values[np.isfinite(values)] for values in holds]
-        if min(len(values) for values in holds) < 4:
+        if min(len(values) for values in holds) < FEWEST_READINGS:
             return None
         still = np.concatenate(holds)
         scatter = float(np.sqrt(np.median([np.var(values) for values in holds])))
@@ -176,11 +192,10 @@ class Quantisation(DirectEffect):
             size = np.full(len(holds), dead / np.sqrt(3.0))  # anywhere inside the zone
             return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(holds)), size, 0, dead)
         step, missing = grid
-        # Scatter holds a twelfth of a step squared besides the noise: this much is noise enough.
-        if scatter > 0.75 * step and not (missing and scatter < 1.5 * step):
+        if scatter > NOISE_ENOUGH * step and not (missing and scatter < 2.0 * NOISE_ENOUGH * step):
             return None
         sigma, shift, spread = before_converter(holds, step)
-        if missing and scatter < 1.5 * step:
+        if missing and scatter < 2.0 * NOISE_ENOUGH * step:
             return Lattice(
                 c, step, sigma * step, sigma * step, 0.0 * shift, np.full(len(holds), 0.25 * step), missing, 0.0
             )

@@ -19,6 +19,13 @@ HALF_WINDOW = 6
 MAX_LOST = 60
 AGREEMENT = 30.0
 """Chi-square that one sensor may lose by the count both share."""
+AGREEMENT_SHARE = 0.01
+"""The same as a share of the joint's own chi-square: a large gap is no exact cubic."""
+LEAST_GAIN = 40.0
+"""Chi-square a count must win: by chance once in 4·10⁹, once in 650 sessions of 10⁵ intervals and 60 counts each."""
+OVER_USUAL, LEFT_SHARE = 5.0, 0.1
+"""It must also win five times what joints nearby cost anyway, and leave little: none was found in 48
+healthy sessions (benches/diagnosis_thresholds.py)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +79,7 @@ def _step_errors(obs: Observations) -> StepErrors:
     index, moves, extra, sigma = [], [], [], []
     for m, (a, b) in enumerate(obs.move_ranges):
         n = b - a
-        if n < 2 * w + 6:
+        if n < 2 * w + HALF_WINDOW:
             continue
         step_s = float(np.median(np.diff(obs.time_s[a:b])))
         k = np.arange(w, n - w - 1)
@@ -124,6 +131,17 @@ def _joints(w: int, order: int) -> FloatArray:
     return np.stack(projectors)
 
 
+def _unjoined(projector: FloatArray, windows: FloatArray) -> FloatArray:
+    """(k,) squares of what a join leaves of ``windows`` (2w, k, axes): a projector is its own square."""
+    left = (projector @ windows.reshape(len(windows), -1)).reshape(windows.shape)
+    return np.asarray(np.einsum("ikc,ikc->k", left, left))
+
+
+def _trials(projectors: FloatArray, windows: FloatArray) -> FloatArray:
+    """(k, counts) the same for every count of missing samples."""
+    return np.stack([_unjoined(one, windows) for one in projectors], axis=1)
+
+
 def find_losses(context: Context) -> list[Loss]:
     """The losses of the recording as it is now observed, found once."""
     return list(_losses(context.obs))
@@ -148,8 +166,8 @@ def _losses(obs: Observations) -> list[Loss]:
         k = k[~clipped[a + k]]
         if len(k) == 0:
             continue
-        windows = [np.stack([x[a + k + o] for o in range(1 - w, w + 1)], axis=1) for x in sensors]
-        zero = np.stack([np.einsum("kic,ij,kjc->k", v, stack[0], v) for v in windows], axis=1)
+        windows = [np.stack([x[a + k + o] for o in range(1 - w, w + 1)]) for x in sensors]
+        zero = np.stack([_unjoined(stack[0], v) for v in windows], axis=1)
         dof = 3 * (2 * w - 4)
         # What a join costs anyway where the motion is as quick as here: jitter and curvature are no losses.
         ordinary = np.stack(
@@ -159,16 +177,12 @@ def _losses(obs: Observations) -> list[Loss]:
         suspect = np.flatnonzero((zero > 3.0 * np.maximum(ordinary, dof)).any(axis=1))
         if len(suspect) == 0:
             continue
-        trial = np.stack(
-            [np.einsum("kic,nij,kjc->kn", v[suspect], stack, v[suspect], optimize=True) for v in windows], axis=2
-        )
+        trial = np.stack([_trials(stack, v[:, suspect]) for v in windows], axis=2)
         # Quick motion over a wide gap is no cubic: a quintic where the cubic leaves too much.
         quick = (trial.min(axis=1) > 3.0 * np.maximum(ordinary[suspect], dof)).any(axis=1)
         if quick.any():
             rows = suspect[quick]
-            trial[quick] = np.stack(
-                [np.einsum("kic,nij,kjc->kn", v[rows], stiffer, v[rows], optimize=True) for v in windows], axis=2
-            )
+            trial[quick] = np.stack([_trials(stiffer, v[:, rows]) for v in windows], axis=2)
         total = trial.sum(axis=2)
         # Where the minimum is flat the smallest count that joins as well: gravity after the move tells more exactly.
         best = (total <= total.min(axis=1, keepdims=True) + AGREEMENT).argmax(axis=1)
@@ -180,13 +194,13 @@ def _losses(obs: Observations) -> list[Loss]:
             gains = zero[s] - left
             usual = np.maximum(ordinary[s], dof)
             # The gain must also exceed what a trial count wins where the signal is merely rough (shaking, jitter).
-            clear = (gains > 40.0) & (gains > 5.0 * usual) & (left < 0.1 * zero[s] + 3.0 * usual)
+            clear = (gains > LEAST_GAIN) & (gains > OVER_USUAL * usual) & (left < LEFT_SHARE * zero[s] + 3.0 * usual)
             # A sensor that sees nothing of it must at least not object; one that sees it must see the same count.
             silent = ~clear & (left < 2.0 * usual)
             good = bool(clear.any() and (clear | silent).all())
             # A count that suits one sensor much better than the common one is no loss of samples.
             agree = all(
-                trial[row, n, c] - trial[row, :, c].min() <= max(AGREEMENT, 0.01 * zero[s, c])
+                trial[row, n, c] - trial[row, :, c].min() <= max(AGREEMENT, AGREEMENT_SHARE * zero[s, c])
                 for c in range(len(windows))
                 if clear[c]
             )

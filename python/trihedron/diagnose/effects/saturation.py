@@ -27,6 +27,10 @@ MEDIAN_CHI2 = 0.455
 """Median of a chi-square of one degree of freedom."""
 CONTRADICTION = 4.0
 """Chi-square per row of the moves concerned above which their readings are false."""
+FEWEST_OTHERS = 10
+"""Rows of other moves whose median says what is usual: it is then known to three quarters, against ``CLEARLY`` of 5."""
+ABOVE_REST = 1.2
+"""A range that ends below 1.2 g is reached by poses and gentle moves alike."""
 
 
 class _Saturation(DirectEffect):
@@ -57,7 +61,7 @@ class _Saturation(DirectEffect):
         squared = (system.residual * widened) ** 2
         misfit = float(np.mean(squared[move_rows & at_limit]))
         others = squared[move_rows & ~at_limit]
-        usual = float(np.median(others) / MEDIAN_CHI2) if len(others) >= 10 else 0.0
+        usual = float(np.median(others) / MEDIAN_CHI2) if len(others) >= FEWEST_OTHERS else 0.0
         # Plateaus on one level time and again need no such comparison: where most moves are clipped, all disagree.
         sides = Counter((run.axis, run.sign) for run in runs)
         repeats = max(sides.values()) >= MIN_PLATEAUS
@@ -112,7 +116,7 @@ class _Saturation(DirectEffect):
         close = {m for m, (a, b) in enumerate(obs.move_ranges)
                  if (np.abs(raw[a:b] * scale + zero).max(axis=0) > NEAR_LIMIT * limit).any()}  # fmt: skip
         # An accelerometer that ends at little more than 1 g comes close in every pose: then only plateaus count.
-        return sorted(close | set(touched)) if is_gyro or limit > 1.2 * twin.gravity else touched
+        return sorted(close | set(touched)) if is_gyro or limit > ABOVE_REST * twin.gravity else touched
 
     def _limits(self, context: Context, runs: list[Plateau], sigma: FloatArray) -> tuple[EffectParameter, ...]:
         """Limits in SI along every channel, with the exact code where readings end on one."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.diagnose.context import Context
+from trihedron.diagnose.context import LEAST_SWING_V, Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
 
 
@@ -19,7 +19,7 @@ class SupplySensitivity(Effect):
     def unavailable(self, context: Context) -> str | None:
         if context.supply is None:
             return "the log has no supply voltage"
-        if np.ptp(context.supply) < 1e-4:
+        if np.ptp(context.supply) < LEAST_SWING_V:
             return "the supply voltage does not change"
         return None
 

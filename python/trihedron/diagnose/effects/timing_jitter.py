@@ -16,6 +16,13 @@ from trihedron.records.diagnosis import EffectParameter
 
 STEP_FACTOR = 5.0
 """A jitter of σ_t moves a step error by (1.5² + 1.5² + 0.5² + 0.5²) σ_t²."""
+SHARP, FEWEST_SHARP = 0.5, 50
+"""Intervals are used whose noise is below half a step of time, fifty at least: four blocks of twelve give the error."""
+SURE = 5.0
+"""Standard errors of the common error of time: 3·10⁻⁷ by chance; the most in 48 healthy sessions
+is 1.9 (benches/diagnosis_thresholds.py)."""
+ORDINARY = 0.01
+"""Jitter, in steps, that the common curvature of a smooth motion is mistaken for: not worth a name alone."""
 
 
 def common_time_error(steps: StepErrors, step_s: float) -> tuple[float, float, int]:
@@ -25,9 +32,9 @@ def common_time_error(steps: StepErrors, step_s: float) -> tuple[float, float, i
     """
     if steps.extra_s.shape[1] < 2:
         return 0.0, np.inf, 0
-    sharp = (steps.sigma_s < 0.5 * step_s).all(axis=1)
+    sharp = (steps.sigma_s < SHARP * step_s).all(axis=1)
     n = int(sharp.sum())
-    if n < 50:
+    if n < FEWEST_SHARP:
         return 0.0, np.inf, n
     # Clipped at five scatters, so that single losses do not decide.
     e = steps.extra_s[sharp]
@@ -59,7 +66,7 @@ class TimingJitter(DirectEffect):
 
     def _wrong_stamps(self, context: Context) -> Evidence | None:
         stamps = stamp_errors(context.obs)
-        if stamps is None or stamps.sigma > CLEAR or abs(stamps.followed) > 0.1 + 3.0 * stamps.sigma:
+        if stamps is None or stamps.sigma > CLEAR or abs(stamps.followed) > CLEAR + 3.0 * stamps.sigma:
             return None
         even = stamps.even_s
 
@@ -88,12 +95,11 @@ class TimingJitter(DirectEffect):
     def _uneven_samples(self, context: Context) -> Evidence | None:
         step_s = 1.0 / context.obs.recording.rate_hz
         value, spread, n = common_time_error(step_errors(context), step_s)
-        if n < 50 or value <= 0.0:
+        if n < FEWEST_SHARP or value <= 0.0:
             return None
         z = value / spread
         jitter = float(np.sqrt(value / STEP_FACTOR))
-        # A smooth motion leaves a little common curvature: less than a hundredth of a step is not worth a name.
-        if z < 5.0 or jitter < 0.01 * step_s:
+        if z < SURE or jitter < ORDINARY * step_s:
             return None
 
         def reweigh(obs: Observations) -> Observations:

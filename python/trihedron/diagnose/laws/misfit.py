@@ -19,6 +19,12 @@ N_BLOCKS = 6
 """Blocks of neighbouring poses or moves that are left out in turn."""
 RIGID = 1e-8
 """Directions of a block that nothing outside it predicts: their precision is this small beside the largest."""
+IMITATED = 1e-7
+"""Smallest eigenvalue of columns of unit length: below it one is the others' sum to three digits."""
+FEWEST_LEFT = 4.0
+"""Degrees of freedom that must be left: with three the 1 % point of F is 34."""
+TINY = float(np.finfo(float).tiny)
+"""Keeps a ratio finite."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +108,7 @@ class Misfit:
             return None
         scaled = normal / np.outer(length, length)
         value, vector = np.linalg.eigh(scaled)
-        if value[0] < 1e-7:
+        if value[0] < IMITATED:
             return None
         inverse = (vector / value) @ vector.T / np.outer(length, length)
         estimate = inverse @ columns.side
@@ -110,7 +116,7 @@ class Misfit:
         k = len(estimate)
         left = max(self.square - taken, 1e-300)
         dof = self.dof - k
-        if dof < 4.0:
+        if dof < FEWEST_LEFT:
             return None
         spread = left / dof
         p = float(fdtrc(k, dof, max(taken, 0.0) / k / spread))
@@ -138,7 +144,7 @@ class Misfit:
             if not len(rows):
                 continue
             value, vector = np.linalg.eigh(self.P[np.ix_(rows, rows)])
-            seen = value > RIGID * max(float(value[-1]), 1e-300)
+            seen = value > RIGID * max(float(value[-1]), TINY)
             root = (vector[:, seen] / np.sqrt(value[seen])).T
             out.append(_Block(rows, root, root @ self.Py[rows], -float(np.log(value[seen]).sum())))
         return tuple(out)

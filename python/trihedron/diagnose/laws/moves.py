@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.context import Context
+from trihedron.diagnose.context import LEAST_SWING_K, Context
 from trihedron.diagnose.laws.misfit import Columns, Misfit
 from trihedron.diagnose.laws.search import Candidate
 from trihedron.diagnose.laws.signals import AXES
@@ -16,6 +16,7 @@ from trihedron.diagnose.session.solve import Reduced, leverage, reduce
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, Distortion
 
 FEWEST_MOVES = 12
+"""Two in each of the six blocks that are left out in turn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ def _signals(context: Context, *, is_gyro: bool) -> list[tuple[str, str, str, Fl
             for b in range(3):
                 name = f"w_{AXES[a]} f_{AXES[b]}"
                 out.append(("rate times force", name, "rad/s g", w[:, a] * context.force[:, b] / g))
-        if context.temperature is not None and np.ptp(context.temperature) > 0.2:
+        if context.temperature is not None and np.ptp(context.temperature) > LEAST_SWING_K:
             T = context.temperature
             out += [("temperature", f"T w_{AXES[a]}", "K rad/s", T * w[:, a]) for a in range(3)]
     else:

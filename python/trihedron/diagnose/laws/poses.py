@@ -13,11 +13,9 @@ from trihedron.diagnose.laws.misfit import Misfit, misfit_of
 from trihedron.diagnose.laws.search import Candidate
 from trihedron.diagnose.laws.signals import AXES, Signal, pose_signals, room_vectors
 from trihedron.diagnose.zeros.curve import covariance_of
-from trihedron.diagnose.zeros.evidence import ALL
+from trihedron.diagnose.zeros.evidence import ALL, FEWEST_POSES
 from trihedron.diagnose.zeros.process import ZeroProcess
 from trihedron.diagnose.zeros.readings import SessionZeros, accel_zeros, gyro_zeros
-
-FEWEST_POSES = 15
 
 
 @dataclass(frozen=True, eq=False)

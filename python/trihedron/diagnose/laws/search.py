@@ -24,6 +24,7 @@ SURE_GAIN = 40.0
 """From this gain on the shift test is not asked of variables that jump from pose to pose."""
 SHIFT_P, SHIFT_SQUARES = 0.05, 0.75
 MAX_TERMS = 4
+"""Terms of one law: each is the best of all that were tried, and a longer one is no law that a person would check."""
 
 
 @dataclass(frozen=True, eq=False)

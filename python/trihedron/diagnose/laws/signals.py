@@ -8,9 +8,12 @@ from itertools import combinations
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.context import Context
+from trihedron.diagnose.context import LEAST_SWING_K, LEAST_SWING_V, Context
 
 AXES = ("x", "y", "z")
+HIGH, VIBRATES = 0.9, 3.0
+"""Vibration is a signal where the 90 % point of the poses' powers is three times their median: in 48 healthy
+sessions 2.1 is the most (benches/diagnosis_thresholds.py)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +85,14 @@ def _logged(context: Context) -> list[Signal]:
     if logged is not None and np.isfinite(logged).any():
         filled = np.where(np.isfinite(logged), logged, np.nanmean(logged))
         T = context.at_points(filled)[:h]
-        if np.ptp(T) > 0.2:
+        if np.ptp(T) > LEAST_SWING_K:
             assert context.temperature_rate is not None
             speed = context.temperature_rate[:h]
             T = T - T.mean()
             out.append(Signal("temperature", ("T",), T[:, None], "K", is_smooth=True))
             out.append(Signal("temperature", ("T", "T^2"), np.column_stack([T, T**2]), "K", is_smooth=True))
             out.append(Signal("temperature", ("dT/dt",), speed[:, None], "K/s", is_smooth=True))
-    if context.supply is not None and np.ptp(context.supply[:h]) > 1e-4:
+    if context.supply is not None and np.ptp(context.supply[:h]) > LEAST_SWING_V:
         out.append(Signal("supply", ("supply",), context.supply[:h, None], "1", is_smooth=True))
     return out
 
@@ -98,6 +101,7 @@ def _vibration(context: Context) -> list[Signal]:
     power = context.vibration_power[: context.obs.n_holds]
     total = power.sum(axis=1)
     # A power that stands out of its own floor in some poses; else it is the noise of a variance.
-    if not total.any() or np.quantile(total, 0.9) < 3.0 * max(float(np.median(total)), 1e-300):
+    usual, high = np.quantile(total, [0.5, HIGH])
+    if not total.any() or high < VIBRATES * usual:
         return []
     return [Signal("vibration", ("vibration power",), total[:, None], "(m/s^2)^2")]

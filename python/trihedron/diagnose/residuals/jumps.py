@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
+from scipy.linalg import toeplitz
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
@@ -28,7 +28,7 @@ TURNS = 4.0
 LAG, LIKE_A_WALK = 4, 3.0
 """Ratio of squared differences four blocks apart to neighbours': white noise 0.7 to 1.4, flicker 1.3 to 2.8, with jumps
 in a third of the poses up to 3; a walk 3.4 to 8 (25 poses)."""
-N_POOL, N_DRAWS, SEED = 40_000, 20_000, 1
+N_POOL, N_DRAWS, SEED, N_NOISES = 40_000, 20_000, 1, 3
 FEWEST_POSES = 12
 JUMPS = 1e-3
 """p-value from which zeros are said to change inside poses."""
@@ -80,9 +80,10 @@ def jumps_in_poses(obs: Observations) -> Jumps:
         counted = np.where((own.left < LOUD) & ~_moved(own, other, k), np.maximum(own.beats - COUNTS, 0.0), 0.0)
         total = counted.sum(axis=0)
         axis = int(total.argmax())
-        nulls = _nulls(len(which))[: 3 if _walks(own.blocks[:, :, axis]) else 2]
-        chance = max(float((1 + (null >= total[axis]).sum()) / (N_DRAWS + 1)) for null in nulls)
-        p[k] = min(1.0, N_LOOKS * chance)
+        if total[axis] > 0.0:
+            nulls = _nulls(len(which), N_NOISES if _walks(own.blocks[:, :, axis]) else N_NOISES - 1)
+            chance = max(float((1 + (null >= total[axis]).sum()) / (N_DRAWS + 1)) for null in nulls)
+            p[k] = min(1.0, N_LOOKS * chance)
         found = np.flatnonzero(counted[:, axis])
         ratio[k] = 1.0 + float(counted[:, axis].max())
         holds[k] = which[found[np.argsort(-counted[found, axis])]][: max(1, len(which) // 10)]
@@ -95,7 +96,12 @@ def _block_means(obs: Observations, raw: FloatArray, which: npt.NDArray[np.intp]
     for i in which:
         values = raw[obs.segments.holds[i].samples()]
         lasts = np.sqrt(len(values) / obs.recording.rate_hz)
-        out.append(np.stack([np.nanmean(part, axis=0) for part in np.array_split(values, N_BLOCKS)]) * lasts)
+        short, n_longer = divmod(len(values), N_BLOCKS)
+        first = short * np.arange(N_BLOCKS) + np.minimum(np.arange(N_BLOCKS), n_longer)
+        known = np.isfinite(values)
+        present = np.add.reduceat(known, first, axis=0, dtype=np.float64)
+        with np.errstate(invalid="ignore"):
+            out.append(np.add.reduceat(np.where(known, values, 0.0), first, axis=0) / present * lasts)
     blocks = np.array(out)
     change = np.diff(blocks, axis=1)
     # Robust: the median over all poses of squared changes (0.455 of a chi-square's mean), half of it one block's.
@@ -141,10 +147,10 @@ def _moved(own: _Steps, other: _Steps | None, sensor: int) -> npt.NDArray[np.boo
 
 
 @lru_cache(maxsize=16)
-def _nulls(n: int) -> tuple[FloatArray, ...]:
-    """Draws of the sum for ``n`` poses of white noise, of flicker, and of a walk."""
+def _nulls(n: int, n_noises: int) -> tuple[FloatArray, ...]:
+    """Draws of the sum for ``n`` poses of white noise, of flicker, and of a walk, or of the first of these."""
     rng = np.random.default_rng(SEED)
-    return tuple(pool[rng.integers(0, len(pool), (N_DRAWS, n))].sum(axis=1) for pool in _pools())
+    return tuple(pool[rng.integers(0, len(pool), (N_DRAWS, n))].sum(axis=1) for pool in _pools()[:n_noises])
 
 
 @lru_cache(maxsize=1)
@@ -156,7 +162,7 @@ def _pools() -> tuple[FloatArray, ...]:
     taps = np.ones(4 * N_BLOCKS)
     for j in range(1, len(taps)):
         taps[j] = taps[j - 1] * (j - 0.5) / j
-    flicker = np.asarray(lfilter(taps, [1.0], white, axis=1))
+    flicker = white @ toeplitz(taps, np.zeros(len(taps))).T
     out = []
     for series in (white, flicker, np.cumsum(white, axis=1)):
         blocks = series.reshape(N_POOL, N_BLOCKS, 4).mean(axis=2)[:, :, None]

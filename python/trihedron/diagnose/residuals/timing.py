@@ -10,7 +10,7 @@ from scipy.special import ndtr
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.sample_steps import step_errors
-from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
+from trihedron.diagnose.effects.timing_jitter import FEWEST_SHARP, TimingJitter, common_time_error
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.records.domains import DomainTest, Where
 
@@ -22,7 +22,7 @@ def judge_timing(context: Context, alpha: float, refused: Collection[str]) -> Do
     """
     step_s = 1.0 / context.obs.recording.rate_hz
     value, spread, n = common_time_error(step_errors(context), step_s)
-    if n < 50:
+    if n < FEWEST_SHARP:
         return DomainTest("timing", 1.0, float(n), 1.0, False, rms=0.0, unit="s")
     z = value / spread
     looks = [effect for effect in (DroppedSamples(), TimingJitter()) if effect.id not in refused]

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.ndimage import median_filter
 from scipy.special import chdtrc, gammaincc
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.diagnose.session.observations import Observations
@@ -21,9 +22,17 @@ CHANNELS = ("ax", "ay", "az", "gx", "gy", "gz")
 MIN_LINE_SHARE = 0.03
 """Long holds resolve lines far below the noise: below this share of its variance a line changes nothing that the model
 says, and a line that is no disagreement needs no name."""
+GRID = 41
+"""Frequencies tried at a time, from one resolution below to one above: half a lobe has ten."""
 LOUD = 3.0
 """Variance of a pose over that of the others from which it disagrees, and is named: real noise is not exactly Gaussian
 or white, and a pose on another support has half as much again."""
+SHORTEST = 32
+"""Readings of a piece of a hold: twice as many have 33 frequencies, two windows of the median."""
+ENOUGH_STRETCHES = 6
+"""Spectra in the average before longer ones are preferred: it is then known to 40 %."""
+COHERENT = 4.0
+"""Standard errors of an amplitude that keeps its phase through the recording: by noise alone once in 3000 lines."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +68,13 @@ def hold_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
         quiet[:] = True
     for i in np.flatnonzero(quiet):
         keep = obs.segments.holds[i].samples()
-        if len(keep) < 32:
+        if len(keep) < SHORTEST:
             continue
         # Contiguous part only: a line keeps its phase across it.
         breaks = np.flatnonzero(np.diff(keep) > 1)
         for part in np.split(keep, breaks + 1):
             piece = x[part]
-            if len(part) >= 32 and np.isfinite(piece).all():
+            if len(part) >= SHORTEST and np.isfinite(piece).all():
                 out.append((int(part[0]), piece - piece.mean(axis=0)))
     return out
 
@@ -92,7 +101,7 @@ def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
         return []
     longest = max(len(p) for _, p in pieces)
     n = 1 << int(np.log2(min(longest, 1024)))
-    while n > 64 and sum(len(p) // n for _, p in pieces) < 6:
+    while n > 2 * SHORTEST and sum(len(p) // n for _, p in pieces) < ENOUGH_STRETCHES:
         n //= 2
     if sum(len(p) // n for _, p in pieces) < 3:
         return []
@@ -147,10 +156,13 @@ def _refine(
     while True:
         stretch = min(stretch, span)
         chosen = np.abs(t - t[len(t) // 2]) <= stretch
-        if chosen.sum() < 64:
+        if chosen.sum() < 2 * SHORTEST:
             chosen = everything
-        grid = best_f + np.linspace(-width, width, 41)
-        best_f = float(max(grid, key=lambda f: project(f, chosen)[1]))
+        grid = best_f + np.linspace(-width, width, GRID)
+        power = _core.sinusoid_power(
+            t[chosen], x[chosen], start_hz=float(grid[0]), step_hz=2.0 * width / (GRID - 1), count=GRID
+        )
+        best_f = float(grid[power.argmax()])
         width /= 6.0
         if stretch >= span:
             break
@@ -159,7 +171,7 @@ def _refine(
     amplitude = float(np.hypot(*coefficient))
     noise = np.sqrt(density)
     sigma = float(noise * np.sqrt(2.0 / len(t)))
-    if amplitude < 4.0 * sigma:
+    if amplitude < COHERENT * sigma:
         # Not coherent through the recording: the line is real, its amplitude is that of single holds.
         powers = [project_piece(obs.time_s[a : a + len(part)], part[:, c], f0) for a, part in pieces]
         amplitude = float(np.sqrt(np.mean(np.square(powers))))
@@ -190,13 +202,16 @@ class HoldScatter:
     p_value: FloatArray
 
 
+@lru_cache(maxsize=4)
 def hold_scatter(obs: Observations) -> HoldScatter:
     """Variance of first differences per hold over the median of all: blind to slow drift, sharp on shaking."""
     x = obs.raw_force if obs.raw_rate is None else np.hstack([obs.raw_force, obs.raw_rate])
     ratio, dof = [], []
     for hold in obs.segments.holds:
         part = x[hold.start : hold.stop]
-        ratio.append(np.nanvar(np.diff(part, axis=0), axis=0))
+        steps = np.diff(part, axis=0)
+        own = np.var(steps, axis=0)
+        ratio.append(np.nanvar(steps, axis=0) if np.isnan(own).any() else own)
         # Neighbouring differences share a sample: two thirds as many independent ones.
         dof.append((len(part) - 1) * 2.0 / 3.0)
     ratio_array, dof_array = np.array(ratio), np.array(dof)

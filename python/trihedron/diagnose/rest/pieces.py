@@ -29,6 +29,7 @@ MOSTLY_STILL = 0.6
 LEAST_SHARE, FEWEST_OF_POSE = 0.04, 4
 """An orientation that fewer pieces hold is handling."""
 TEMPERATURE_WINDOW_S = 10.0
+"""Mean of the logged temperature: takes its digits away, and no chip heats faster than in tens of seconds."""
 
 
 @dataclass(frozen=True, eq=False)

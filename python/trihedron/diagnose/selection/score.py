@@ -6,6 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
@@ -40,6 +41,34 @@ def dispersion(residual: FloatArray, fitted: Fit, used: FloatArray) -> FloatArra
     return out
 
 
+@dataclass(frozen=True, eq=False)
+class _Rest:
+    """What the fit leaves by domain: squares of the residuals, degrees of freedom, prior rows last."""
+
+    residual: FloatArray
+    domain: npt.NDArray[np.int8]
+    squares: FloatArray
+    dof: FloatArray
+
+    @staticmethod
+    def of(fitted: Fit) -> _Rest:
+        residual, domain = fitted.system.residual, fitted.system.domain
+        used = leverage(fitted)
+        return _Rest(residual, domain, _by_domain(domain, residual**2), _by_domain(domain, 1.0 - used)[:N_DOMAINS])
+
+    def gain_and_dispersion(self, after: FloatArray) -> tuple[float, FloatArray]:
+        """Fall of chi-square over the dispersion that is left, and that dispersion (domains,)."""
+        left = _by_domain(self.domain, after**2)
+        fewest = np.where(self.dof >= 1.0, self.dof, np.inf)
+        scale = np.maximum(1.0, left[:N_DOMAINS] / fewest)
+        fall = self.squares - left
+        return float((fall[:N_DOMAINS] / scale).sum() + fall[N_DOMAINS:].sum()), scale
+
+
+def _by_domain(domain: npt.NDArray[np.int8], values: FloatArray) -> FloatArray:
+    return np.asarray(np.bincount(domain, values, minlength=PRIOR + 1), dtype=np.float64)
+
+
 def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored], list[tuple[str, str]]]:
     """Score test of every applicable effect; the gain is judged against what remains after it.
 
@@ -47,8 +76,7 @@ def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored],
     """
     fitted = context.fitted
     reduced = reduce(fitted)
-    used = leverage(fitted)
-    residual = fitted.system.residual
+    rest = _Rest.of(fitted)
     n_rows = int((fitted.system.domain != PRIOR).sum())
     out, missing = [], []
     for effect in catalogue():
@@ -68,14 +96,7 @@ def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored],
             result = score(reduced, columns)
             if result.rank == 0:
                 continue
-            after = residual + result.projected @ result.estimate
-            scale = dispersion(after, fitted, used)
-            gain = 0.0
-            for d in range(N_DOMAINS):
-                rows = fitted.system.domain == d
-                gain += float((residual[rows] ** 2).sum() - (after[rows] ** 2).sum()) / scale[d]
-            prior_rows = fitted.system.domain == PRIOR
-            gain += float((residual[prior_rows] ** 2).sum() - (after[prior_rows] ** 2).sum())
+            gain, scale = rest.gain_and_dispersion(rest.residual + result.projected @ result.estimate)
             gain = max(gain, 0.0)
             n_shape = len(variant.shape)
             merit = gain - np.log(n_rows) * (result.rank + n_shape) - 2.0 * np.log(len(variants))

@@ -34,6 +34,8 @@ from trihedron.session.noise import START_STRENGTHS
 
 N_DOMAINS = 4
 """Domains of residual rows: the first four labels."""
+SEEN = 1e-6
+"""Share of a column's squared length beside the fit, at least: below it rounding decides what is left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,8 +187,8 @@ class Score:
 def score(reduced: Reduced, columns: FloatArray) -> Score:
     """Rao's score test of effect columns against the fitted twin (eq. 8.7).
 
-    Directions whose projection keeps less than 1e-6 of their length are imitated by the calibration itself and are not
-    counted: they cannot be seen in this recording.
+    Directions whose projection keeps less than ``SEEN`` of their squared length are imitated by the calibration itself
+    and are not counted: they cannot be seen in this recording.
     """
     residual = reduced.fitted.system.residual
     projected = reduced.project(columns)
@@ -195,11 +197,11 @@ def score(reduced: Reduced, columns: FloatArray) -> Score:
     normal = (projected / length).T @ (projected / length)
     gradient = (projected / length).T @ residual
     value, vector = eigh(normal)
-    seen = value > 1e-6
+    seen = value > SEEN
     along = vector[:, seen].T @ gradient
     chi2 = float((along**2 / value[seen]).sum())
     inverse = (vector[:, seen] / value[seen]) @ vector[:, seen].T
-    visible = np.diag(normal) > 1e-6
+    visible = np.diag(normal) > SEEN
     estimate, covariance = -(inverse @ gradient) / length, inverse / np.outer(length, length)
     return Score(chi2, int(seen.sum()), estimate, covariance, visible, projected)
 

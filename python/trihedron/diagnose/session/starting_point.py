@@ -25,6 +25,11 @@ TYPICAL_BIAS_M_S2, TYPICAL_SCALE, TYPICAL_ANGLE = 0.5, 0.05, 0.03
 """How far an instrument strays from a plain triad of its nominal scale: zero, scale (relative), axes (rad)."""
 TABLE_TURN_RAD, WHOLE_TURN_RAD = 0.05, 0.07
 """A turn that leaves the vertical within 3° is one about it; turns meant as multiples of 90° miss by 4° on average."""
+LEAST_ANGLE_RAD = 0.5
+"""Angle between two verticals from which a move tells the gyro's scale: known to 1° each, to 5 % at worst."""
+FEWEST_TURNS, BEST_MISS = 4, 0.5
+"""Turns of an axis, and how much better than the median of all trial scales the best must make them right angles: turns
+by any angle miss by 22° whatever the scale."""
 START_CORNER_S = 160.0
 """Where the search for the noise corner begins."""
 
@@ -65,7 +70,8 @@ def is_open(calibration: Calibration) -> bool:
     sensor = calibration.accelerometer
     sigma = np.sqrt(np.diag(np.asarray(sensor.covariance))[:12])
     scale = float(np.abs(np.linalg.det(sensor.S))) ** (1.0 / 3.0)
-    return bool(sigma[9:].max() > OPEN_BIAS_M_S2 or sigma[:9].max() > OPEN_SCALE * scale)
+    of_scales, of_biases = sigma[:9].max(), sigma[9:].max()
+    return bool(of_biases > OPEN_BIAS_M_S2 or of_scales > OPEN_SCALE * scale)
 
 
 def nominal_start(obs: Observations, calibration: Calibration) -> tuple[Twin, Prior]:
@@ -119,7 +125,7 @@ def _rate_scales_of_counts(obs: Observations, up: FloatArray) -> tuple[FloatArra
     for (a, b), (before, after) in zip(obs.move_ranges, obs.move_holds, strict=True):
         angle = float(np.arccos(np.clip(up[before] @ up[after], -1.0, 1.0)))
         read = trapezoid(obs.raw_rate[a:b], obs.time_s[a:b], axis=0)
-        if angle > 0.5 and np.linalg.norm(read) > 0.0:
+        if angle > LEAST_ANGLE_RAD and np.linalg.norm(read) > 0.0:
             ratios.append(angle / float(np.linalg.norm(read)))
         elif angle < TABLE_TURN_RAD:
             turns.append((int(np.abs(up[before]).argmax()), float(read @ up[before])))
@@ -128,12 +134,12 @@ def _rate_scales_of_counts(obs: Observations, up: FloatArray) -> tuple[FloatArra
     right = np.pi / 2.0
     for axis in range(3):
         read_angles = np.array([value for k, value in turns if k == axis and abs(value) * first > right / 2.0])
-        if len(read_angles) < 4:
+        if len(read_angles) < FEWEST_TURNS:
             continue
         trial = first * np.linspace(0.8, 1.25, 901)
         angles = np.abs(trial[:, None] * read_angles)
         miss = np.abs((angles + right / 2.0) % right - right / 2.0).mean(axis=1)
-        if miss.min() < WHOLE_TURN_RAD and miss.min() < 0.5 * float(np.median(miss)):
+        if miss.min() < WHOLE_TURN_RAD and miss.min() < BEST_MISS * float(np.median(miss)):
             out[axis], is_whole[axis] = trial[miss.argmin()], True
     return out, is_whole
 

@@ -19,6 +19,12 @@ CONFOUNDED_VARIANCE = 10.0
 """A coefficient whose variance walk and drift raise by more than this factor is not told apart from them."""
 KIND_LIMIT = 8.75
 """1 % point of 3/8 χ²(1) + 3/8 χ²(2) + 1/8 χ²(3): one strength more where the others may be 0."""
+SLOW = 0.01
+"""p-value from which zeros are said to change slowly: false in 1 % of sessions whose zeros only scatter."""
+AT_EDGE = 0.99
+"""Share of the grid's last level at which a strength lies on its edge."""
+TOO_FEW_NORMS, TOO_FEW_ZEROS = 12, 6
+"""Poses up to which none can be spared: nine numbers of S and b are fitted to lengths, three means to zeros."""
 ALL: tuple[int, ...] = (SCATTER, WALK, DRIFT)
 Kind = Literal["", "walk", "drift", "slow"]
 
@@ -88,17 +94,17 @@ def examine(
     p_slow = min(1.0, 2.0 * _half(max(ratio_walk, ratio_drift)))
     kind: Kind = ""
     drift_over, walk_over = 2.0 * (top - s_walk), 2.0 * (top - s_drift)
-    if p_slow < 0.01:
+    if p_slow < SLOW:
         is_drift, is_walk = drift_over > KIND_LIMIT, walk_over > KIND_LIMIT
         kind = "slow"
         if readings.n_poses >= FEWEST_FOR_KIND and is_drift != is_walk:
             kind = "drift" if is_drift else "walk"
-    p_scatter = _scatter_p(process, every, top, is_slow=p_slow < 0.01)
-    worst, p_spared = _without_worst(process, every, sigma, is_slow=p_slow < 0.01, is_norm=is_norm)
+    p_scatter = _scatter_p(process, every, top, is_slow=p_slow < SLOW)
+    worst, p_spared = _without_worst(process, every, sigma, is_slow=p_slow < SLOW, is_norm=is_norm)
     scatter, scatter_std = _scatter_sizes(process, every, sigma)
     return ZeroEvidence(
         process, readings.n_poses, sigma, scatter, scatter_std, p_slow, p_scatter, max(p_scatter, p_spared), worst,
-        kind, drift_over, walk_over, bool((sigma >= 0.99 * process.levels[-1]).any()), groups,
+        kind, drift_over, walk_over, bool((sigma >= AT_EDGE * process.levels[-1]).any()), groups,
     )  # fmt: skip
 
 
@@ -152,7 +158,7 @@ def _without_worst(
 ) -> tuple[int, float]:
     """The pose whose zero is farthest from the others' prediction, and the scatter's p-value without it."""
     readings = process.readings
-    if readings.n_poses <= (12 if is_norm else 6):
+    if readings.n_poses <= (TOO_FEW_NORMS if is_norm else TOO_FEW_ZEROS):
         return -1, 1.0
     worst = _worst_pose(process, every, sigma)
     rest = ZeroProcess(readings.without(worst), process.axis_factor, process.noise_factor)

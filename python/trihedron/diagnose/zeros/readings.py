@@ -8,14 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.context import Context
+from trihedron.diagnose.context import LEAST_SWING_K, Context
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.zeros.process import ZeroReadings
 
-LEAST_SWING_K = 0.2
-"""A logged temperature that changes by less explains no zero."""
 MOST_COLUMNS = 0.6
 """Columns of the mean over poses: with more, what is left tells no strength."""
+FEWEST_FOR_GRAVITY = 8
+"""Poses from which a zero may follow gravity: twice the four numbers (a mean and three slopes) of every axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def gyro_zeros(context: Context) -> SessionZeros | None:
     columns: list[FloatArray] = [np.ones(len(values))]
     thermal: tuple[int, ...] = ()
     gravity: tuple[int, ...] = ()
-    if obs.n_holds >= 8:
+    if obs.n_holds >= FEWEST_FOR_GRAVITY:
         columns += list(twin.up[halves.pose].T)
         gravity = (1, 2, 3)
     if halves.temperature is not None:

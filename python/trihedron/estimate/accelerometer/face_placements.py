@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
 
+from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.accelerometer import face_poses, verdict
 
@@ -54,7 +54,7 @@ def placements(values: FloatArray, noise: FloatArray, faces: IntArray) -> Placem
     merged, error = np.array(means), np.array(errors)
     freedom = 2.0 * n_within
     expected = float(np.mean(np.einsum("nii->n", noise))) / 3.0
-    limit = expected * float(special.chdtri(freedom, verdict.SIGNIFICANCE)) if freedom else np.inf
+    limit = expected * float(probability.chdtri(freedom, verdict.SIGNIFICANCE)) if freedom else np.inf
     apart = 2.0 * float(np.sum(np.array(n_headings) - 1))
     if within <= limit or apart == 0.0:
         return Placements(merged, error, faces[start], None)
@@ -66,7 +66,7 @@ def placements(values: FloatArray, noise: FloatArray, faces: IntArray) -> Placem
 
 def _headings(values: FloatArray, noise: FloatArray) -> npt.NDArray[np.intp]:
     """(n,) number of the heading of each hold (n, 2): that of the first one before it which it repeats within noise."""
-    limit = float(special.chdtri(2, verdict.SIGNIFICANCE))
+    limit = float(probability.chdtri(2, verdict.SIGNIFICANCE))
     out = np.zeros(len(values), dtype=np.intp)
     first: list[int] = []
     for k in range(len(values)):

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import special
 
+from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.accelerometer import face_poses, inputs, verdict
 from trihedron.estimate.accelerometer.face_placements import placements
@@ -146,7 +146,7 @@ def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float, 
     dof = 3 * len(values) - 12
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
     chi2_noise = _chi2(values, noise, faces, g)
-    if dof <= 0 or chi2_noise <= special.chdtri(dof, verdict.SIGNIFICANCE):
+    if dof <= 0 or chi2_noise <= probability.chdtri(dof, verdict.SIGNIFICANCE):
         return _Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof)
     low, high = 0.0, 0.5
     for _ in range(60):
@@ -159,7 +159,7 @@ def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float, 
     S_a, b_a, covariance = fit(values, widened, faces, g)
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
     # A tilt estimated from few degrees of freedom has Student's tails: 1.96 standard errors shall hold in 95 %.
-    covariance = covariance * float(special.stdtrit(dof, 0.025) / special.ndtri(0.025)) ** 2
+    covariance = covariance * float(probability.stdtrit(dof, 0.025) / probability.ndtri(0.025)) ** 2
     return _with_doubt(_Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof), high**2)
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import special
 
+from trihedron import probability
 from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import NAMES, PoseDesign
 from trihedron.records.finding import Finding, FindingCode
@@ -20,7 +20,7 @@ set hardly constrains some direction."""
 
 def covariance_scale(chi2: float, dof: int) -> float:
     """χ²/dof where it exceeds the 99 % quantile of noise alone, else 1: errors never shrink below the noise."""
-    if dof <= 0 or chi2 <= special.chdtri(dof, SIGNIFICANCE):
+    if dof <= 0 or chi2 <= probability.chdtri(dof, SIGNIFICANCE):
         return 1.0
     return chi2 / dof
 
@@ -105,14 +105,14 @@ def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: Flo
     spread = np.sqrt(np.maximum(np.where(np.isfinite(chi2_per_dof), chi2_per_dof, 1.0), 1.0))
     z = np.zeros(len(held_out))
     z[seen] = held_out[seen] / (sigma[seen] * spread[seen])
-    limit = float(-special.stdtrit(dof - 1, SIGNIFICANCE / (2 * n)))
+    limit = float(-probability.stdtrit(dof - 1, SIGNIFICANCE / (2 * n)))
     found = [
         Finding.of(FindingCode.OUTLIER_POSE, pose=int(i), held_out_m_s2=held_out[i], z=z[i], limit=limit)
         for i in np.flatnonzero(np.abs(z) > limit)
     ]
     mean_square = float(np.mean(z[seen] ** 2))
     # Held-out z share one training set and heavy tails of t: twice the variance of noise alone is beyond both.
-    if not found and n >= 12 and mean_square > 2.0 * special.chdtri(n, SIGNIFICANCE) / n:
+    if not found and n >= 12 and mean_square > 2.0 * probability.chdtri(n, SIGNIFICANCE) / n:
         found.append(Finding.of(FindingCode.HELD_OUT_WORSE, "poses", held_out_z_rms=np.sqrt(mean_square)))
     return found
 

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.special import chdtrc, chdtri
 
+from trihedron import _core
 from trihedron._core import AlignmentFit
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.probability import chdtrc, chdtri
 from trihedron.records.calibration import SensorCalibration
 
 RateDegree = Literal[0, 1, 3]
@@ -172,23 +173,21 @@ def _core_align(
     loss_scale: float | None,
     is_near: bool = False,
 ) -> AlignmentFit:
+    model = accelerometer.model
     return measured.moves.align(
-        reading=measured.reading,
-        var_reading=measured.var_reading,
-        zero=measured.zero,
-        var_zero=measured.var_zero,
-        zero_weights=measured.zero_weights,
+        poses=_core.AlignmentPoses(
+            reading=measured.reading,
+            var_reading=measured.var_reading,
+            zero=measured.zero,
+            var_zero=measured.var_zero,
+            zero_weights=measured.zero_weights,
+            var_zero_walk=measured.var_zero_walk,
+        ),
+        noise=_core.RateNoise(measured.noise_density, measured.sigma_time_s, measured.nominal_step_s),
+        accelerometer=_core.AlignmentAccelerometer(model.S, model.b, accelerometer.basis, accelerometer.is_given),
+        gravity_m_s2=gravity_m_s2,
         used=used,
         starts=starts,
-        accelerometer_scale=accelerometer.model.S,
-        accelerometer_bias=accelerometer.model.b,
-        accelerometer_basis=accelerometer.basis,
-        is_accelerometer_given=accelerometer.is_given,
-        gravity_m_s2=gravity_m_s2,
-        noise_density=measured.noise_density,
-        sigma_time_s=measured.sigma_time_s,
-        nominal_step_s=measured.nominal_step_s,
-        var_zero_walk=measured.var_zero_walk,
         is_offset_free=options.is_offset_free,
         loss_scale=loss_scale,
         is_near=is_near,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import fdtrc
 
 from trihedron.arrays import FloatArray
+from trihedron.probability import fdtrc
 
 FALSE_ALARM = 1e-4
 """Chance that a sensor without it is treated for it: the price of removing nothing is small, but it is a decision."""

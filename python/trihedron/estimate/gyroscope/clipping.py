@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 
 LONGEST_BRIDGE_S = 0.15
@@ -15,6 +17,14 @@ DOUBT = 0.5
 """Standard error of the bridged area above the limit, as a part of that area."""
 
 
+FAR = 0.3
+"""Part of an axis' span that lies between a limit and where the gyro rests."""
+FEWEST_CODES = 100.0
+"""From so many steps on, two axes that end at one code, or one that ends at a power of two, do so hardly by chance."""
+TOP = 3.0
+"""Sharper by this much than that parabola falls a peak upon which a tremor rides."""
+PAIR_BEND = 8.0
+"""Bend, in steps, that two equal samples are allowed: more is no evidence by itself."""
 NOISE_JUMP = 5.0
 """Standard deviations of a reading that noise alone may jump at the two ends of a peak's top, in all peaks of a log."""
 
@@ -38,16 +48,23 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray) -> Clipped | None
     has the area ``T² (s₁ − s₂)/12`` above the chord; half of it is taken for its standard error.
     """
     is_clipped = np.zeros(gyroscope.shape, dtype=bool)
-    for axis in range(3):
-        column = gyroscope[:, axis]
-        finite = np.isfinite(column)
-        if not np.any(finite):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # an axis without a reading ends nowhere
+        extremes = np.concatenate([np.nanmax(gyroscope, axis=0), np.nanmin(gyroscope, axis=0)])
+    lasting = [j for j, end in enumerate(extremes) if _longest(gyroscope[:, j % 3] == end) > 1]
+    for k, limit in enumerate(extremes):
+        column = gyroscope[:, k % 3]
+        if not np.isfinite(limit):
             continue
-        rest, span = float(np.median(column[finite])), float(np.ptp(column[finite]))
-        for limit in (float(np.max(column[finite])), float(np.min(column[finite]))):
-            at = column == limit
-            if abs(limit - rest) > 0.3 * span and _is_cut(column, at):
-                is_clipped[:, axis] |= at
+        far = abs(limit - float(np.nanmedian(column)))
+        quantum = _quantum(column)
+        if far <= FAR * np.ptp(extremes[[k % 3, k % 3 + 3]]) or quantum == 0.0:
+            continue
+        at = column == limit
+        if _is_cut(
+            column, at, quantum, _is_end_of_codes(limit, np.array([extremes[j] for j in lasting if j != k]), quantum)
+        ):
+            is_clipped[:, k % 3] |= at
     if not np.any(is_clipped):
         return None
     readings, variance = gyroscope.copy(), np.zeros(gyroscope.shape)
@@ -57,27 +74,53 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray) -> Clipped | None
     return Clipped(is_clipped, readings, variance)
 
 
-def _is_cut(column: FloatArray, at: BoolArray) -> bool:
-    """Some run at the extreme is no smooth peak that happens to share a code.
+def _is_cut(column: FloatArray, at: BoolArray, quantum: float, is_known: bool) -> bool:
+    """Some run at the extreme is no smooth peak, and no steady turn, that happens to share a code.
 
-    A parabola of which n samples stay within a step q has a curvature of at most 8 q/(n − 1)², and one sample further
-    it has fallen by at most 4 q n/(n − 1)² more; rounding may add a step, and noise its own jumps.
+    A parabola of which n samples stay within a step q has a curvature of at most 8 q/((n − 1)² − 1), n even, or
+    8 q/(n − 1)², n odd. One sample further it has fallen by half of that times n, two further by that times n + 1;
+    a tremor makes it steeper (``TOP``), rounding may add a step, and noise its own jumps. The readings fall by more at
+    *both* ends of a run that was cut: a turn at a steady rate begins and ends steeply and meanwhile wavers about its
+    extreme. Two equal samples may lie on either side of any peak: they are the limit's only where it is ``is_known``
+    otherwise, or two peaks end at it.
     """
     finite = column[np.isfinite(column)]
-    gaps = np.diff(np.unique(finite))
-    if not len(gaps):
-        return False
-    quantum = float(np.median(gaps[gaps <= 1.5 * np.quantile(gaps, 0.25)]))
     noise = 1.4826 * float(np.median(np.abs(np.diff(finite)))) / np.sqrt(2.0)
+    pairs = 0
     for first, last in _runs(at):
         count = last - first + 1
         if count < 2:
             continue
-        smooth = quantum * (1.0 + 4.0 * count / (count - 1) ** 2) + NOISE_JUMP * noise
-        ends = [column[k] for k in (first - 1, last + 1) if 0 <= k < len(column) and np.isfinite(column[k])]
-        if ends and max(abs(value - column[first]) for value in ends) > smooth:
-            return True
-    return False
+        bend = TOP * 8.0 / ((count - 1) ** 2 - (1 - count % 2)) if count > 2 else PAIR_BEND
+        smooth = quantum * (1.0 + bend * np.array([0.5 * count, count + 1.0])) + NOISE_JUMP * noise
+        if all(
+            np.any(np.abs(side - column[first]) > smooth[: len(side)])
+            for side in (column[last + 1 : last + 3], column[max(first - 2, 0) : first][::-1])
+            if np.isfinite(side).any()
+        ):
+            if count > 2 or is_known:
+                return True
+            pairs += 1
+    return pairs > 1
+
+
+def _quantum(column: FloatArray) -> float:
+    """Step of the converter as neighbouring values show it, 0 where the readings never change."""
+    gaps = np.diff(_core.levels_of(column)[0])
+    return float(np.median(gaps[gaps <= 1.5 * np.quantile(gaps, 0.25)])) if len(gaps) else 0.0
+
+
+def _is_end_of_codes(limit: float, others: FloatArray, quantum: float) -> bool:
+    """Whether an extreme looks like a limit by its value: the end of a word of bits, or where another axis ends."""
+    if quantum <= 0.0:
+        return False
+    code = abs(limit) / quantum
+    if code < FEWEST_CODES:
+        return False
+    is_word = quantum == 1.0 and any(end > 0 and end & (end - 1) == 0 for end in (int(code), int(code) + (limit > 0)))
+    # Both ends of a word are a step apart; ends on one side are the same.
+    apart = np.where(others * limit > 0.0, 0.1, 1.1) * quantum
+    return is_word or bool(np.any(np.abs(np.abs(others) - abs(limit)) < apart))
 
 
 def clipped_time(clipped: Clipped | None, edges: IntArray, step_s: float) -> FloatArray:
@@ -91,6 +134,10 @@ def clipped_time(clipped: Clipped | None, edges: IntArray, step_s: float) -> Flo
 def _runs(mask: BoolArray) -> list[tuple[int, int]]:
     change = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return [(int(a), int(b) - 1) for a, b in zip(change[::2], change[1::2], strict=True)]
+
+
+def _longest(mask: BoolArray) -> int:
+    return max((last - first + 1 for first, last in _runs(mask)), default=0)
 
 
 def _bridge(time_s: FloatArray, column: FloatArray, variance: FloatArray, first: int, last: int) -> None:

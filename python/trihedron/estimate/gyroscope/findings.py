@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.alignment import FALSE_ALARM, Aligned
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, audit_moves
 from trihedron.estimate.gyroscope.observability import describe, observability_findings
 from trihedron.estimate.gyroscope.verification import Prediction
+from trihedron.probability import chdtrc
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, rate_to_si
 

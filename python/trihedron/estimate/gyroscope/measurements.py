@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc
 
+from trihedron import _core
 from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
@@ -18,11 +19,14 @@ from trihedron.estimate.gyroscope.rounding import (
     undithered_axes,
 )
 from trihedron.estimate.gyroscope.zeros import excess_variance, pool_zeros, shrink
+from trihedron.probability import chdtrc
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
 
+GAP_STEPS = 5.0
+"""A step of time so much longer than the usual one is a gap: the rate in it is unknown."""
 BLOCK_S = 0.5
 """Length of the blocks whose scatter gives the angle random walk: moves last of this order, and it is long against
 the correlation that an anti-alias filter leaves between samples."""
@@ -85,13 +89,12 @@ def resolution_of(readings: FloatArray) -> FloatArray:
     """Smallest step between different values of each column, (3,); zero for a column that is not quantised."""
     steps = np.zeros(readings.shape[1])
     for axis, column in enumerate(readings.T):
-        finite = column[np.isfinite(column)]
-        values = np.unique(finite)
+        values, n_finite = _core.levels_of(column)
         if len(values) < 2:
             continue
         gaps = np.diff(values)
         # A grid shows when values repeat: far fewer distinct ones than samples.
-        if len(values) < 0.5 * len(finite):
+        if len(values) < 0.5 * n_finite:
             steps[axis] = float(np.median(gaps[gaps < 1.5 * np.quantile(gaps, 0.25)]))
     return steps
 
@@ -148,20 +151,13 @@ def measure_moves(
     """
     gyroscope = _required(recording.gyroscope, "gyroscope")
     raw_force = _required(recording.accelerometer, "accelerometer")
-    if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
-        raise ValueError("method 2 needs the hold means of both sensors: segment a recording that has both")
+    accelerometer_mean, gyroscope_mean = _both_means(segments)
     moves = _moves_of(recording, segments)
-    edges = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
-    links = np.array([[move.hold_before, move.hold_after] for move in moves], dtype=np.int64)
-    anchors = segments.time_mid_s[links]
-    reading = np.ascontiguousarray(segments.accelerometer_mean, dtype=np.float64)
-    zero = np.ascontiguousarray(segments.gyroscope_mean, dtype=np.float64)
+    edges, links = _edges_and_links(moves)
+    reading, zero = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
     var_zero = _mean_variance(segments.gyroscope_sigma_mean, segments.gyroscope_sigma, gyroscope)
     force = reading @ accelerometer.S.T + accelerometer.b
-    sigma = segments.gyroscope_sigma
-    quantum = resolution_of(gyroscope)
-    white = np.full(3, np.inf) if sigma is None else _without_rounding(np.asarray(sigma), quantum)
-    undithered = undithered_axes(quantum, white)
+    quantum, undithered = _undithered(gyroscope, segments.gyroscope_sigma)
     attitude = attitude_dependence(zero, var_zero, force) if is_attitude_removed is not False else None
     if attitude is not None and (attitude.is_present or is_attitude_removed):
         rate = gyroscope - (raw_force @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
@@ -169,21 +165,23 @@ def measure_moves(
     else:
         attitude, rate = None, gyroscope
     clipped = bridge_clipping(recording.time_s, gyroscope)
-    extra = rounding_variance(gyroscope, quantum, np.median(segments.gyroscope_mean, axis=0), undithered)
+    extra = rounding_variance(gyroscope, quantum, np.median(gyroscope_mean, axis=0), undithered)
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope)
-    prepared = Moves(recording.time_s, rate, edges, np.ascontiguousarray(anchors), links, rate_degree, extra)
+    prepared = Moves(
+        recording.time_s, rate, edges, np.ascontiguousarray(segments.time_mid_s[links]), links, rate_degree, extra
+    )
 
     var_reading = _mean_variance(segments.accelerometer_sigma_mean, segments.accelerometer_sigma, raw_force)
-    var_reading_noise, zero_read, var_zero_read = var_reading, zero, var_zero
-    var_reading = var_reading + _unexplained_reading_variance(accelerometer)
+    zero_read, var_zero_read = zero, var_zero
     walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_zero[links[:, 1]] + var_zero[links[:, 0]])
     weights, mean, var_mean, excess, _ = pool_zeros(zero, var_zero)
     zero, var_zero = shrink(zero, var_zero, mean)
     if np.any(undithered):
         zero, var_zero = _with_hidden_zero(zero, var_zero, segments, quantum, undithered)
-    density = rate_noise_density(recording, segments)
-    density = density_without_rounding(density, quantum, 1.0 / recording.rate_hz, undithered)
+    density = density_without_rounding(
+        rate_noise_density(recording, segments), quantum, 1.0 / recording.rate_hz, undithered
+    )
     if attitude is not None:
         var_mean = np.maximum(var_mean, attitude.var_zero)
     steps, nominal, jitter = _steps_of(recording)
@@ -193,7 +191,7 @@ def measure_moves(
         edges=edges,
         durations_s=prepared.durations_s(),
         reading=reading,
-        var_reading=var_reading,
+        var_reading=var_reading + _unexplained_reading_variance(accelerometer),
         zero=zero,
         var_zero=var_zero,
         zero_weights=weights,
@@ -204,14 +202,14 @@ def measure_moves(
         sigma_time_s=jitter,
         nominal_step_s=nominal,
         clipped_s=clipped_time(clipped, edges, nominal),
-        is_gapped=np.array([np.max(steps[a : b - 1], initial=0.0) > 5.0 * nominal for a, b in edges]),
+        is_gapped=_gapped(steps, nominal, edges),
         zero_excess=excess,
         attitude=attitude,
         rate=rate,
         is_undithered=undithered,
         zero_read=zero_read,
         var_zero_read=var_zero_read,
-        var_reading_noise=var_reading_noise,
+        var_reading_noise=var_reading,
         reading_variance=extra,
     )
 
@@ -282,6 +280,30 @@ def audit_moves(measured: MoveMeasurements) -> list[Finding]:
             )
         )
     return findings
+
+
+def _edges_and_links(moves: Sequence[Move]) -> tuple[IntArray, IntArray]:
+    edges = np.array([[move.start, move.stop] for move in moves], dtype=np.int64)
+    links = np.array([[move.hold_before, move.hold_after] for move in moves], dtype=np.int64)
+    return edges, links
+
+
+def _undithered(gyroscope: FloatArray, sigma: FloatArray | None) -> tuple[FloatArray, BoolArray]:
+    """(3,) step of the converter, and axes whose noise does not reach it."""
+    quantum = resolution_of(gyroscope)
+    white = np.full(3, np.inf) if sigma is None else _without_rounding(np.asarray(sigma), quantum)
+    return quantum, undithered_axes(quantum, white)
+
+
+def _both_means(segments: Segments) -> tuple[FloatArray, FloatArray]:
+    if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
+        raise ValueError("method 2 needs the hold means of both sensors: segment a recording that has both")
+    return segments.accelerometer_mean, segments.gyroscope_mean
+
+
+def _gapped(steps: FloatArray, nominal: float, edges: IntArray) -> BoolArray:
+    """Moves over a gap in the samples."""
+    return np.array([np.max(steps[a : b - 1], initial=0.0) > GAP_STEPS * nominal for a, b in edges])
 
 
 def _required(readings: FloatArray | None, name: str) -> FloatArray:

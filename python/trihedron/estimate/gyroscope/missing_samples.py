@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import maximum_filter1d, median_filter
-from scipy.special import bdtrc
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.probability import bdtrc
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
 
 HALF_WINDOW = 4
@@ -24,6 +24,8 @@ WHOLE = (0.6, 1.5)
 """Extra time, in steps, of a step that is one sample off; a step that is one too short is the measure of jolts."""
 STILL_ORDINARY = 3.0
 """What may be left with the sample put between, in ordinary joints."""
+MIRRORED = 0.2
+"""And of a step that falls short, as a part of what there was."""
 NEARBY = 65
 """Steps over which an ordinary joint is the median: losses of 3 % touch a quarter of all windows of eight."""
 FEWEST = 4
@@ -57,7 +59,7 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     # A step that the stamps show to be long is a gap, known and reported; no curve is laid across it.
     is_gap = ~(np.abs(np.diff(recording.time_s) - step_s) < 0.4 * step_s)
     is_gap |= ~np.isfinite(readings[1:]).all(axis=1) | ~np.isfinite(readings[:-1]).all(axis=1)
-    is_cut = maximum_filter1d(is_gap, 2 * HALF_WINDOW + 1)
+    is_cut = np.convolve(is_gap, np.ones(2 * HALF_WINDOW + 1), mode="same") > 0.5
     n, n_short, long_steps = 0, 0, []
     for move in segments.moves:
         first = max(move.start, HALF_WINDOW)
@@ -115,53 +117,17 @@ def _contrasts(missing: int) -> FloatArray:
     return out
 
 
-AS_IS, ONE_MISSING, ONE_TOO_MANY = (_contrasts(missing) for missing in (0, 1, -1))
-JUMP = AS_IS[:, HALF_WINDOW:].sum(axis=1)
-"""What a jump of one between the two sides leaves."""
-
-
-def _misfit(contrasts: FloatArray, readings: FloatArray) -> FloatArray:
-    """(k, 2, channels) left over at every inner step of readings in noises."""
-    k = len(readings) - 2 * HALF_WINDOW - 1
-    out = np.zeros((k, len(contrasts), readings.shape[1]))
-    for i, row in enumerate(contrasts):
-        for offset, weight in enumerate(row):
-            out[:, i] += weight * readings[1 + offset : 1 + offset + k]
-    return out
+CONTRASTS = np.array([_contrasts(missing) for missing in (0, 1, -1)])
+"""As the readings stand, with one sample put between, and with one taken out."""
 
 
 def _steps(readings: FloatArray) -> _Steps:
-    """The steps behind samples ``HALF_WINDOW`` to the last but ``HALF_WINDOW + 1``."""
-    left = _misfit(AS_IS, readings)
-    zero = np.sum(left**2, axis=(1, 2))
-    gains = [zero - np.sum(_misfit(c, readings) ** 2, axis=(1, 2)) for c in (ONE_MISSING, ONE_TOO_MANY)]
-    dof = left[0].size
-    ordinary = np.maximum(median_filter(zero, size=NEARBY, mode="nearest") / dof, 1.0)
-    w, k = HALF_WINDOW, len(zero)
-    across = (readings[w + 2 : w + 2 + k] - readings[w - 1 : w - 1 + k]) / 3.0
-    expected = np.sum(JUMP**2) * np.sum(across**2, axis=1)
-    is_sharp = expected > SHARP * ordinary
-    best = np.maximum(*gains)
-    is_best = best >= maximum_filter1d(best, 2 * w + 1)
-    low, high = PART
-    is_long, is_short = (
-        is_sharp & is_best & (gain == best) & (gain > low * expected) & (gain < high * expected)
-        & (zero - gain < STILL_ORDINARY * dof * ordinary)
-        for gain in gains
-    )  # fmt: skip
-    # A short step is also one whose jump falls short of the slope beside it, the mirror image of a long one: a bend
-    # is as often the one as the other.
-    beside = (
-        readings[w : w + k] - readings[w - 2 : w - 2 + k] + readings[w + 3 : w + 3 + k] - readings[w + 1 : w + 1 + k]
-    ) / 4.0
-    shape = JUMP[:, None] * beside[:, None, :]
-    power = np.maximum(np.sum(shape**2, axis=(1, 2)), 1e-300)
-    extra = np.sum(left * shape, axis=(1, 2)) / power
-    explained = extra**2 * power
-    low, high = WHOLE
-    is_mirrored = (
-        (power > SHARP * ordinary) & (explained >= maximum_filter1d(explained, 2 * w + 1))
-        & (-extra > low) & (-extra < high)
-        & (np.sum((left + shape) ** 2, axis=(1, 2)) < 0.2 * zero + STILL_ORDINARY * dof * ordinary)
-    )  # fmt: skip
-    return _Steps(is_sharp, is_long, is_short | is_mirrored)
+    """The steps behind samples ``HALF_WINDOW`` to the last but ``HALF_WINDOW + 1``.
+
+    A short step is also one whose jump falls short of the slope beside it, the mirror image of a long one: a bend is as
+    often the one as the other.
+    """
+    flags = _core.motion_joints(
+        readings, CONTRASTS, nearby=NEARBY, sharp=SHARP, part=PART, whole=WHOLE, left=STILL_ORDINARY, mirrored=MIRRORED
+    )
+    return _Steps(*flags)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from trihedron.arrays import BoolArray, FloatArray
 
@@ -12,6 +13,8 @@ UNDITHERED = 0.5
 """Noise below this part of a step does not dither it: the mean of a rounded reading is off by up to half a step,
 however long it is taken."""
 SOFT_START = 1.0 / (math.sqrt(2.0) - 1.0)
+CHATTER = 9
+"""Readings whose median is free of toggling between neighbouring codes."""
 LEAST_WHITE = 1e-2
 """Part of the rounding's variance that an undithered axis is given as white noise: it shows none of its own."""
 
@@ -48,21 +51,37 @@ def _of_runs(codes: FloatArray, quantum: float, rest: float) -> FloatArray:
     level = codes[begins]
     with np.errstate(invalid="ignore"):
         step = np.sign(np.diff(level))
-        # Between the two nearest codes a zero may toggle.
-        is_rest = np.abs(level - rest) < 0.75 * quantum
     is_passed = np.zeros(len(level), dtype=bool)
     is_passed[1:-1] = step[1:] * step[:-1] > 0.0
     out = np.repeat(np.where(is_passed, 1.0 / count, count).astype(np.float64), count)
-    for k in np.flatnonzero(is_rest & ~is_passed):
-        # A rate that grows as t² crosses the first step in at most 1/(√2 − 1) of the time it takes for the next.
-        left = int(min(count[k], SOFT_START * count[k - 1])) if k > 0 else 0
-        right = int(min(count[k], SOFT_START * count[k + 1])) if k + 1 < len(count) else 0
-        if left + right < count[k]:
-            first, last = int(begins[k]), int(begins[k] + count[k])
-            out[first:last] = 0.0
-            out[first : first + left] = left
-            out[last - right : last] = right
+    # A little noise makes readings toggle where they pass from code to code: the runs there say nothing of the time.
+    steady = np.asarray(median_filter(codes, CHATTER, mode="nearest"))
+    away = np.abs(steady - rest)
+    # Between the two nearest codes a zero may toggle.
+    is_rest, is_next = away < 0.75 * quantum, away < 1.75 * quantum
+    at_rest = _stretches(is_rest)
+    for first, last in _stretches(is_next):
+        inside = [(b - a, a, b) for a, b in at_rest if first <= a and b <= last]
+        if not inside:
+            continue
+        n, begin, end = max(inside)
+        # A rate that grows as t² crosses the first step in at most 1/(√2 − 1) of the time it takes for the next, and
+        # whether the move before and the one after go the same way says nothing.
+        left = math.ceil(SOFT_START * (begin - first)) if first > 0 else 0
+        right = math.ceil(SOFT_START * (last - end)) if last < len(codes) else 0
+        if n <= min(left, right):
+            continue  # passed on the way, or turned back in
+        part = np.zeros(n)
+        part[:left] = min(left, n)
+        if right:
+            part[-right:] = np.maximum(part[-right:], min(right, n))
+        out[begin:end] = part
     return out * quantum**2 / 12.0
+
+
+def _stretches(mask: BoolArray) -> list[tuple[int, int]]:
+    change = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in zip(change[::2], change[1::2], strict=True)]
 
 
 def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: float, axes: BoolArray) -> FloatArray:

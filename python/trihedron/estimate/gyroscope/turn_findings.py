@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.turn_angles import KnownTurn
 from trihedron.estimate.gyroscope.turn_system import FALSE_ALARM, Screened
+from trihedron.probability import chdtrc
 from trihedron.records.finding import Finding, FindingCode
 
 LOOSE_TURN_RAD = math.radians(1.0)

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc, chdtri
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
+from trihedron.probability import chdtrc, chdtri
 
 FALSE_ALARM = 1e-3
 """Chance that sound turns raise a statistical finding of one kind."""

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.turn_angles import (
@@ -32,6 +31,7 @@ from trihedron.estimate.gyroscope.turn_system import (
     solve,
     solve_zero_first,
 )
+from trihedron.probability import chdtrc
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
@@ -126,17 +126,12 @@ def calibrate_turns(
     system, used = screened.system, screened.used
     fit = solve_zero_first(system, used) if route == "zero-turn-first" else solve(system, used)
     S, b = other_form(fit.S_w, fit.b_w)
-    jacobian = other_form_jacobian(fit.S_w, fit.b_w)
     inflation = _inflation(fit)
-    inverse_covariance = inflation * fit.covariance
-    if shared_errors is not None:
-        pull = system.pull(fit, used, shared_errors)
-        inverse_covariance = inverse_covariance + pull @ pull.T
-    covariance = jacobian @ inverse_covariance @ jacobian.T
+    pull = None if shared_errors is None else system.pull(fit, used, shared_errors)
     calibration = SensorCalibration(
         S=S,
         b=b,
-        covariance=0.5 * (covariance + covariance.T),
+        covariance=_covariance(fit, inflation, pull),
         raw_unit=recording.gyroscope_unit.value,
         si_unit="rad/s",
         method="turns" if route == "least-squares" else "turns, zero turn first",
@@ -147,6 +142,16 @@ def calibrate_turns(
     return calibration, turn_findings(
         known, screened, deviation, S, inflation, fit.dof, quantum_rad, is_sigma_given=sigma_turn_rad is not None
     )
+
+
+def _covariance(fit: Solution, inflation: float, pull: FloatArray | None) -> FloatArray:
+    """(12, 12) of the direct form, errors that all turns share added."""
+    jacobian = other_form_jacobian(fit.S_w, fit.b_w)
+    inverse = inflation * fit.covariance
+    if pull is not None:
+        inverse = inverse + pull @ pull.T
+    covariance: FloatArray = jacobian @ inverse @ jacobian.T
+    return 0.5 * (covariance + covariance.T)
 
 
 def _inflation(fit: Solution) -> float:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import chdtri
 
 from trihedron.arrays import FloatArray
+from trihedron.probability import chdtri
 
 
 def pool_zeros(
@@ -41,13 +41,19 @@ def excess_variance(values: FloatArray, noise: FloatArray) -> FloatArray:
     out = np.zeros(values.shape[1])
     for axis, (x2, v) in enumerate(zip((values**2).T, noise.T, strict=True)):
         low, high = 0.0, float(np.max(x2)) / target
-        if np.median(x2 / np.maximum(v, 1e-300)) <= target:
+        if _median(x2 / np.maximum(v, 1e-300)) <= target:
             continue
         for _ in range(60):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if np.median(x2 / (v + middle)) > target else (low, middle)
+            low, high = (middle, high) if _median(x2 / (v + middle)) > target else (low, middle)
         out[axis] = high
     return out
+
+
+def _median(values: FloatArray) -> float:
+    """As ``np.median`` of numbers; for some tens of them it takes six times as long as the sorting."""
+    ordered, n = np.sort(values), len(values)
+    return float(0.5 * (ordered[(n - 1) // 2] + ordered[n // 2]))
 
 
 def shrink(zero: FloatArray, var_zero: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -56,7 +56,7 @@ class LiveCalibration:
         models = [shaping_model(n, options, session_s=session_s, hold_s=hold_s) for n in noise_per_axis(noise)]
         prior = prior or Prior.diffuse([model.fast_variance(hold_s) ** 0.5 for model in models])
         self._filters = [
-            _core.AxisKalman(model, prior.mean[i].copy(), prior.sigma[i].copy(), prior.walk[i].copy())
+            _core.AxisKalman(model, _core.KalmanStart(prior.mean[i], prior.sigma[i], prior.walk[i]))
             for i, model in enumerate(models)
         ]
 

@@ -172,11 +172,11 @@ def _one_axis(
     with_baselines: bool,
     must_determine: bool,
 ) -> AxisKalmanResult:
-    mean, sigma, walk = prior.mean[axis].copy(), prior.sigma[axis].copy(), prior.walk[axis].copy()
-    constants, stated, covariance, innovation, variance, drift, drift_sigma = _core.kalman_track(
-        model, mean, sigma, walk, z, f, start, hold, extra
-    )
-    _, _, smoothed, smoothed_sigma = _core.kalman_smooth(model, mean, sigma, walk, z, f, start, hold, extra)
+    mean, sigma = prior.mean[axis].copy(), prior.sigma[axis].copy()
+    begin = _core.KalmanStart(mean, sigma, prior.walk[axis])
+    poses = _core.KalmanPoses(z, f, start, hold, extra)
+    constants, stated, covariance, innovation, variance, drift, drift_sigma = _core.kalman_track(model, begin, poses)
+    _, _, smoothed, smoothed_sigma = _core.kalman_smooth(model, begin, poses)
     tracks = [ConstantsTrack("kalman", constants, stated)]
     batch: dict[str, tuple[FloatArray, FloatArray]] = {}
     if with_baselines:
@@ -185,9 +185,7 @@ def _one_axis(
         recursive = _core.kalman_least_squares(z, f, white, mean, sigma)
         tracks.append(ConstantsTrack("recursive least squares", *recursive))
         try:
-            ols, ols_cov, gls, gls_cov, *track = _core.kalman_generalised_least_squares(
-                model, mean, sigma, z, f, start, hold, extra
-            )
+            ols, ols_cov, gls, gls_cov, *track = _core.kalman_generalised_least_squares(model, begin, poses)
         except ValueError:
             if must_determine:
                 raise

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
@@ -37,7 +38,9 @@ def allan_deviation(
     names: Sequence[str] = (),
     units: Sequence[str] = (),
 ) -> AllanCurve:
-    """Allan deviation of rate (not phase) readings, every channel, with chi-square intervals (docs/noise.md, eq. 1-6).
+    """Allan deviation of rate (not phase) readings with chi-square intervals (docs/noise.md, eq. 1-6).
+
+    A series (n,) gives arrays (k,), channels side by side (n, channels) give arrays (k, channels).
 
     Parameters
     ----------
@@ -59,11 +62,13 @@ def allan_deviation(
 
     Examples
     --------
-    >>> import numpy as np
-    >>> curve = allan_deviation(np.random.default_rng(1).normal(size=10000), rate_hz=100.0, clusters=[1, 100])
-    >>> [round(float(d), 2) for d in curve.deviation[:, 0]]
-    [1.0, 0.1]
+    >>> import numpy as np, trihedron
+    >>> curve = trihedron.allan_deviation(np.random.default_rng(1).normal(size=10000), 100.0, clusters=[1, 100])
+    >>> curve.deviation.shape, [round(float(d), 2) for d in curve.deviation]
+    ((2,), [1.0, 0.1])
     """
+    if isinstance(names, str) or isinstance(units, str):
+        raise ValueError("names and units are lists, one text for each channel.")
     readings = as_readings(x)
     n = len(readings)
     check_question(rate_hz, kind, confidence)
@@ -73,9 +78,10 @@ def allan_deviation(
     variance, terms, weight = _core.allan_variance(readings, sizes, KINDS[kind])
     for c in range(len(variance)):
         variance[c] *= true_share(readings[:, c], np.array(sizes), variance[c], 3 if kind == "hadamard" else 2)
-    return curve_with_intervals(
+    curve = curve_with_intervals(
         kind, rate_hz, n, np.array(sizes), variance.T, terms.T, weight.T, confidence, tuple(names), tuple(units)
     )
+    return curve.of_one_series() if np.ndim(x) == 1 else curve
 
 
 def curve_of_columns(
@@ -217,7 +223,7 @@ def curve_with_intervals(
     edf = np.column_stack([edf_along(n, clusters, variance[:, c], weight[:, c], kind) for c in range(channels)])
     bias = np.column_stack([bias_along(n, clusters, variance[:, c], kind) for c in range(channels)])
     tail = (1.0 - confidence) / 2.0
-    high, low = (_core.chi_square_quantile(share, edf.ravel()).reshape(edf.shape) for share in (1.0 - tail, tail))
+    high, low = (chdtri(edf, above) for above in (tail, 1.0 - tail))
     return AllanCurve(
         kind=kind,
         rate_hz=float(rate_hz),

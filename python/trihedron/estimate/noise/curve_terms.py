@@ -15,7 +15,6 @@ from itertools import combinations
 
 import numpy as np
 
-from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.curve_covariance import CurveCovariance
 from trihedron.estimate.noise.terms import allan_variance_of_terms
@@ -203,8 +202,3 @@ def _crossing(excess: Callable[[float], float], first: float) -> float:
         if abs(outside - inside) < 0.01 * abs(outside) or abs(value) < 0.02:
             return middle
     return outside
-
-
-def chi_square_above(value: float, dof: float) -> float:
-    """Probability that a chi-square exceeds ``value``."""
-    return float(_core.chi_square_above(value, dof))

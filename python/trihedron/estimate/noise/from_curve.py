@@ -9,13 +9,14 @@ from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.allan import check_question, curve_with_intervals
 from trihedron.estimate.noise.axis import LEAST_EDF
 from trihedron.estimate.noise.curve_terms import LEAST_EDF as LEAST_EDF_OF_A_POINT
-from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints, chi_square_above
+from trihedron.estimate.noise.curve_terms import TERMS, CurveFit, CurvePoints
 from trihedron.records.finding import Finding
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis, NoiseTerm, TermName
 
@@ -176,7 +177,7 @@ def _screened(points: CurvePoints) -> _Found:
     chi2, z = used.misfit(fit.squares)
     dof = len(used.clusters) - len(fit.active)
     scale = 1.0
-    if chi_square_above(chi2, dof) < CHANCE:
+    if chdtrc(dof, chi2) < CHANCE:
         scale = chi2 / dof
         worst = int(np.argmax(np.abs(z)))
         share = math.sqrt(used.variance[worst] / float(used.design[worst] @ fit.squares)) - 1.0
@@ -187,4 +188,4 @@ def _screened(points: CurvePoints) -> _Found:
 def _is_unlikely(points: CurvePoints) -> bool:
     everything = points.fit(range(len(TERMS)), points.alone())
     chi2, _ = points.misfit(everything.squares)
-    return chi_square_above(chi2, max(1, len(points.clusters) - len(TERMS))) < CHANCE
+    return bool(chdtrc(max(1, len(points.clusters) - len(TERMS)), chi2) < CHANCE)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import chdtri
 
-from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.corner import filter_corner
 from trihedron.estimate.noise.hold_statistics import as_measured, pooled_logarithm, robust_holds
@@ -204,7 +204,7 @@ def _lines(frequency: FloatArray, power: FloatArray, count: int, rate_hz: float)
     level = np.array([np.median(power[max(0, i - 16) : i + 17]) for i in range(n)])
     centre = (1.0 - 2.0 / (9.0 * count)) ** 3 if count > 1 else 0.4549
     ratio = power * centre / np.maximum(level, 1e-300)
-    limit = float(_core.chi_square_quantile(1.0 - LINE_CHANCE / n, np.array([float(count)]))[0]) / count
+    limit = float(chdtri(count, LINE_CHANCE / n)) / count
     # The neighbourhood's median is itself known to 1.25/√33 of a deviation.
     limit *= 1.0 + 3.0 * 1.25 * math.sqrt(2.0 / count / 33.0)
     out: list[HoldLine] = []

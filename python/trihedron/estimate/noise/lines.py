@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import chdtri
 
-from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.selection import BinnedSpectrum, Selection, binned
 from trihedron.estimate.noise.spectrum import Ordinates
@@ -44,7 +44,7 @@ def find_lines(
         power = band.power - 2 * selection.fit.slope * band.cross + (selection.fit.slope * band.line) ** 2
         level = smooth_level(band, power / expected) * expected
         ratio = power / level
-        limit = float(_core.chi_square_quantile(1.0 - FALSE_ALARM / total, band.count[:1])[0] / band.count[0])
+        limit = float(chdtri(band.count[0], FALSE_ALARM / total) / band.count[0])
         mask = np.zeros(len(ratio), dtype=bool)
         for i in np.argsort(-ratio):
             if ratio[i] < limit or len(lines) >= MOST_LINES:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
@@ -106,7 +107,7 @@ def _mean(values: FloatArray) -> float:
 
 
 def _limit(n_looks: int, n_independent: float) -> float:
-    gaussian = math.sqrt(float(_core.chi_square_quantile(1.0 - FALSE_ALARM / n_looks, np.ones(1))[0]))
+    gaussian = math.sqrt(float(chdtri(1.0, FALSE_ALARM / n_looks)))
     # The spread itself is known to 1.17/√(2k) from k independent values: three of its errors.
     return gaussian * (1.0 + 3.0 * 1.17 / math.sqrt(2.0 * n_independent))
 

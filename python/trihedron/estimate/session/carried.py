@@ -45,7 +45,7 @@ def carried(
     rotation, wrt_scale, wrt_before, wrt_after, cov_rate = _core.integrate_moves(
         time_s, measured.rate, measured.edges, np.ascontiguousarray(anchors_s), np.ascontiguousarray(S_w),
         np.ascontiguousarray(zero[before]), np.ascontiguousarray(zero[after]), 3,
-        measured.noise_density, measured.sigma_time_s, measured.nominal_step_s,
+        _core.RateNoise(measured.noise_density, measured.sigma_time_s, measured.nominal_step_s),
     )  # fmt: skip
     force = measured.reading @ S_a.T + b_a
     start, end = force[before], force[after]

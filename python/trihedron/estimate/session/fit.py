@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import fdtrc
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.session.observed import Observed
+from trihedron.probability import fdtrc
 from trihedron.session.noise import START_STRENGTHS
 
 FALSE_ALARM = 1e-3

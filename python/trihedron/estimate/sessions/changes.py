@@ -12,9 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import f as f_distribution
 
 from trihedron.arrays import FloatArray
+from trihedron.probability import fdtrc
 from trihedron.records.sessions import PARAMETERS, Change, ChangeKind, Session
 
 SPREAD_DOF, WANDER_DOF = 25.0, 5.0
@@ -119,7 +119,7 @@ def _solved(values: FloatArray, weights: FloatArray, column: FloatArray | None) 
 
 
 def _p(statistic: float, dof: int, name: str, n_sessions: int) -> float:
-    return max(float(f_distribution.sf(statistic / dof, dof, _dof(name, n_sessions))), 1e-300)
+    return max(fdtrc(dof, _dof(name, n_sessions), statistic / dof), 1e-300)
 
 
 def _candidates(n: int) -> Iterator[_Candidate]:
@@ -152,7 +152,7 @@ def _stands_out(values: FloatArray, weights: FloatArray, best: _Candidate) -> bo
         return False
     before, after = _left(values, weights, None), _left(values, weights, best.column)
     ratio = ((before - after) / k) / max(after / dof, 1e-300)
-    return float(f_distribution.sf(ratio, k, dof)) * len(list(_candidates(n))) < MIN_REST_P
+    return fdtrc(k, dof, ratio) * len(list(_candidates(n))) < MIN_REST_P
 
 
 def _as_gravity(

@@ -12,15 +12,14 @@ group's mean depends on σ_u, which is not known: (1) is averaged over what (1) 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
-from scipy.optimize import minimize_scalar
-from scipy.stats import chi2
-from scipy.stats import t as student
 
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.probability import chdtri, stdtrit
 from trihedron.records.sessions import Spread
 
 LEVEL = 0.95
@@ -66,8 +65,8 @@ def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[o
     dof = len(members) - 1
     one_group = [np.arange(len(members))]
     points = (np.arange(QUANTILES) + 0.5) / QUANTILES
-    inner = _solved(values, variances, members, np.asarray(chi2.isf(points, dof_within)))
-    targets = np.asarray(chi2.isf(points, dof))
+    inner = _solved(values, variances, members, _chi_square(points, dof_within))
+    targets = _chi_square(points, dof)
     at_each = [_group_means(values, variances, members, s2) for s2 in inner]
     draws = _solved_for_all(np.array([m for m, _ in at_each]), np.array([v for _, v in at_each]), targets)
     ends = np.sqrt(np.quantile(draws, [0.5 - LEVEL / 2.0, 0.5 + LEVEL / 2.0]))
@@ -88,7 +87,7 @@ def common_mean(
     if within is None:
         value = float(np.average(values, weights=1.0 / variances))
         std = float(np.sqrt(1.0 / np.sum(1.0 / variances)))
-        return Mean(value, std, float(student.isf(0.5 - LEVEL / 2.0, max(len(values), 2))) * std)
+        return Mean(value, std, -stdtrit(max(len(values), 2), 0.5 - LEVEL / 2.0) * std)
     members = _members(groups)
     if between is None:
         level, variance = values, variances + within.sd**2
@@ -100,7 +99,18 @@ def common_mean(
     dof = len(level) - 1
     scatter = float(np.sum(weights * (level - value) ** 2)) / dof
     std = float(np.sqrt(max(scatter, 1.0) / np.sum(weights)))
-    return Mean(value, std, float(student.isf(0.5 - LEVEL / 2.0, dof)) * std)
+    return Mean(value, std, -stdtrit(dof, 0.5 - LEVEL / 2.0) * std)
+
+
+def _chi_square(above: Iterable[float], dof: int) -> FloatArray:
+    """(k,) values that a chi-square variate exceeds with these probabilities."""
+    return np.array([_exceeded(float(p), dof) for p in above])
+
+
+@cache
+def _exceeded(above: float, dof: int) -> float:
+    # The same some hundred values for each of the 21 parameters.
+    return chdtri(dof, above)
 
 
 def _members(groups: Sequence[object]) -> list[IntArray]:
@@ -110,7 +120,7 @@ def _members(groups: Sequence[object]) -> list[IntArray]:
 
 def _spread(values: FloatArray, variances: FloatArray, members: list[IntArray], dof: int) -> Spread:
     tail = 0.5 - LEVEL / 2.0
-    targets = np.asarray(chi2.isf([tail, 1.0 - tail], dof))
+    targets = _chi_square([tail, 1.0 - tail], dof)
     low, high = np.sqrt(_solved(values, variances, members, targets))
     if high == 0.0:
         # Sessions agree better than their error bars allow: those are too wide, and "no spread at all" is not shown.
@@ -177,6 +187,8 @@ def _restricted(values: FloatArray, variances: FloatArray, members: list[IntArra
             total += float(np.sum(weights * (values[group] - mean) ** 2) - np.sum(np.log(weights)))
             total += float(np.log(np.sum(weights)))
         return total
+
+    from scipy.optimize import minimize_scalar
 
     best = minimize_scalar(negative, bounds=(0.0, 3.0 * largest), method="bounded", options={"xatol": 1e-5 * largest})
     return 0.0 if negative(0.0) <= best.fun else float(best.x)

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import f as f_distribution
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.sessions.spread import spread_within
+from trihedron.probability import fdtrc
 from trihedron.records.sessions import PARAMETERS, Session, Spread, ThermalModel, ThermalTerm
 
 MAX_ORDER = 3
@@ -145,7 +145,7 @@ def _branches(values: FloatArray, variances: FloatArray, X: FloatArray, branch: 
         size.append(float(c[-1]))
     # The scatter is never taken as less than the sessions' own error bars say.
     ratio = (gain / k) / max(left / (k * dof), 1.0)
-    return np.array(size), float(f_distribution.sf(ratio, k, k * dof))
+    return np.array(size), fdtrc(k, k * dof, ratio)
 
 
 def _remaining(y: FloatArray, v: FloatArray, X: FloatArray) -> Spread:

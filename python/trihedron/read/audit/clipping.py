@@ -82,11 +82,10 @@ def _is_full_scale(value: float) -> bool:
 def quantum(values: FloatArray) -> float:
     """Step between neighbouring possible readings; zero where the values do not repeat, as those of a fine sensor."""
     probe = values[:: max(1, len(values) // 200_000)]
-    finite = probe[np.isfinite(probe)]
     # Where a quarter of them holds that many levels, all do.
-    if len(np.unique(finite[::4])) > MOST_LEVELS * len(probe):
+    if len(_core.levels_of(probe[::4])[0]) > MOST_LEVELS * len(probe):
         return 0.0
-    levels = np.unique(finite)
+    levels, _ = _core.levels_of(probe)
     if len(levels) < 2 or len(levels) > MOST_LEVELS * len(probe):
         return 0.0
     # Decimals as written may differ in the last digit for one and the same code: the tenth percentile passes over that.

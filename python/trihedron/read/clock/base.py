@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.read.clock.order import order_of_rows, unwrap
+from trihedron.read.clock.order import in_order, order_of_rows, unwrap
 from trihedron.read.clock.steps import steps_of
 from trihedron.read.clock.unit import SECONDS, Witness, time_unit
 from trihedron.read.errors import ReadError
@@ -28,7 +28,7 @@ class Clock:
 
     time_s: FloatArray
     start_s: float
-    rows: npt.NDArray[np.int64] | None
+    rows: npt.NDArray[np.signedinteger] | None
     findings: tuple[Finding, ...]
 
 
@@ -57,7 +57,7 @@ def build_clock(
         raw = (raw - base) + 1e-9 * table.columns[nanoseconds]
         named = "s"
     findings: list[Finding] = []
-    rows: npt.NDArray[np.int64] | None = None
+    rows: npt.NDArray[np.signedinteger] | None = None
     steps = steps_of(raw)
     if steps.missing:
         finite = np.isfinite(raw)
@@ -78,7 +78,7 @@ def build_clock(
     raw, wraps = unwrap(raw, table, rows, findings) if steps.back else (raw, False)
     order = order_of_rows(raw, table, column, rows, findings) if steps.back else None
     if order is not None:
-        raw = raw[order]
+        raw = in_order(raw, order, np.empty(len(order)))
         rows = order if rows is None else rows[order]
     unit = time_unit(raw, named, given, wraps, witness, findings)
     scale = SECONDS[unit]
@@ -93,7 +93,9 @@ def build_clock(
             f"{table.path}: column {table.label(column)} read as time in {unit} spans "
             f"{(raw[-1] - raw[0]) * scale:.3g} s, which no log does; give --time-unit, or name another time column."
         )
-    time_s = raw - raw[0]
+    first = float(raw[0])
+    # In its own place where it is a copy: a long log has no room for another.
+    time_s = raw - first if order is None else np.subtract(raw, first, out=raw)
     if scale != 1.0:
         time_s *= scale
-    return Clock(time_s, float(base + raw[0]) * scale, rows, tuple(findings))
+    return Clock(time_s, float(base + first) * scale, rows, tuple(findings))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
@@ -168,13 +167,13 @@ def _lay(
         left = y - np.polyval(line, u)
         noise = 1.4826 * float(np.median(np.abs(np.diff(each)))) / np.sqrt(2.0) + 1e-3 * period
         size = min(max(len(y) // 12, 5), 401) | 1
-        smooth = median_filter(left, size, mode="nearest")
+        smooth = _core.running_median(left, size)
         # Wander: the smoothed rest is far more than the blocks' own scatter leaves in it.
         curved = float(np.std(smooth)) > max(8.0 * noise / np.sqrt(size), UNSEEN * period)
         course = None
         if curved and len(y) >= 24:
             wanders = True
-            course = median_filter(left, min(max(len(y) // pieces, 5), 101) | 1, mode="nearest")
+            course = _core.running_median(left, min(max(len(y) // pieces, 5), 101) | 1)
         _core.lay_even_clock(tick[a:b], line, x0, scale, period, even[a:b])
         if course is not None:
             for p in _parts(a, b):

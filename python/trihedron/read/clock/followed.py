@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from trihedron.arrays import FloatArray, IntArray
 
@@ -54,6 +53,8 @@ def _active(triads: list[FloatArray], n: int) -> list[slice]:
 
 def _sums(late: FloatArray, step_s: float, tick: IntArray, triads: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Blocks' sums of misfit times prediction and of squared prediction."""
+    from scipy.ndimage import uniform_filter1d  # here: most logs have stamps that need no such question
+
     n = len(late)
     margin = REACH + 2
     if n < 4 * BLOCK:

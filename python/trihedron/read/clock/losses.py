@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import cast
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
@@ -158,7 +157,7 @@ def _settle(first: FloatArray, count: IntArray) -> None:
         level = first - np.concatenate([[0], np.cumsum(count)])
         if len(level) < 2 * m + 1:
             return
-        middle = median_filter(level, m, mode="nearest")
+        middle = _core.running_median(level, m)
         change = np.zeros(len(count))
         change[m // 2 : len(count) - m // 2] = middle[m:] - middle[:-m]
         far = np.abs(change) > LOST

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,15 +14,17 @@ from trihedron.records import Finding, FindingCode
 
 MAX_DISPLACEMENT = 64
 """Rows a packet may arrive late. Anything further is another recording, not another order."""
+PART = 1 << 20
+"""Rows of a long log that are looked at together."""
 _MODULI = (2.0**16, 2.0**24, 2.0**32)
 
 
-def _place(table: Table, rows: npt.NDArray[np.int64] | None, sample: int) -> str:
+def _place(table: Table, rows: npt.NDArray[np.signedinteger] | None, sample: int) -> str:
     return table.place(int(rows[sample]) if rows is not None else sample)
 
 
 def unwrap(
-    raw: FloatArray, table: Table, rows: npt.NDArray[np.int64] | None, findings: list[Finding]
+    raw: FloatArray, table: Table, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
 ) -> tuple[FloatArray, bool]:
     """A tick counter of 16, 24 or 32 bits that started again from zero, continued."""
     if len(raw) < 3:
@@ -48,9 +52,22 @@ def unwrap(
     return raw, False
 
 
+def in_order(values: FloatArray, rows: npt.NDArray[np.signedinteger], out: FloatArray) -> FloatArray:
+    """``values[rows]`` into ``out``; short numbers of rows are made long a part at a time."""
+    for start in range(0, len(rows), PART):
+        out[start : start + PART] = values[rows[start : start + PART]]
+    return out
+
+
+def _overlapping(raw: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+    """Parts of the stamps, each with the first of the next one, and where they begin."""
+    for start in range(0, max(len(raw) - 1, 1), PART):
+        yield start, raw[start : start + PART + 1]
+
+
 def order_of_rows(
-    raw: FloatArray, table: Table, column: int, rows: npt.NDArray[np.int64] | None, findings: list[Finding]
-) -> npt.NDArray[np.int64] | None:
+    raw: FloatArray, table: Table, column: int, rows: npt.NDArray[np.signedinteger] | None, findings: list[Finding]
+) -> npt.NDArray[np.signedinteger] | None:
     """Rows in order of their stamps; ``None`` where they are.
 
     Raises
@@ -58,24 +75,30 @@ def order_of_rows(
     ReadError
         When time runs backward as a whole or jumps back further than a packet may be late.
     """
-    step = np.diff(raw)
-    back = np.flatnonzero(step < 0)
+    back = np.concatenate([start + np.flatnonzero(np.diff(part) < 0) for start, part in _overlapping(raw)])
     if not len(back):
         return None
     first = int(back[0]) + 1
     place = _place(table, rows, first)
-    if len(back) > 0.5 * len(step):
+    if len(back) > 0.5 * (len(raw) - 1):
         raise ReadError(
-            f"{table.path}: time runs backward ({len(back)} of {len(step)} steps, first at {place}); "
+            f"{table.path}: time runs backward ({len(back)} of {len(raw) - 1} steps, first at {place}); "
             "the rows stand in reverse order or column "
             f"{table.label(column)} is not a time: turn the rows round or name another time column."
         )
-    order = np.argsort(raw, kind="stable").astype(np.int64)
-    displaced = int(np.max(np.abs(order - np.arange(len(order)))))
+    order = np.argsort(raw, kind="stable")
+    if len(raw) < np.iinfo(np.int32).max:
+        # Half the room, which long logs lack.
+        order = order.astype(np.int32)
+    displaced = max(
+        int(np.max(np.abs(order[a : a + PART] - np.arange(a, min(a + PART, len(order))))))
+        for a in range(0, len(order), PART)
+    )
     if displaced > MAX_DISPLACEMENT:
+        step = raw[back + 1] - raw[back]
         raise ReadError(
-            f"{table.path}: the clock jumps back by {-float(step[back].min()):.6g} (in its own unit) at "
-            f"{_place(table, rows, int(back[np.argmin(step[back])]) + 1)}: two recordings in one file, or a clock that "
+            f"{table.path}: the clock jumps back by {-float(step.min()):.6g} (in its own unit) at "
+            f"{_place(table, rows, int(back[np.argmin(step)]) + 1)}: two recordings in one file, or a clock that "
             "was set; cut the file there."
         )
     findings.append(

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import fft, special
 
+from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.probability import chdtri
 
 WINDOW = 2048
 """Rows of one phase sum: a rate that wanders by 10⁻⁴ within it turns the phase by a fifth of a period."""
@@ -63,13 +64,9 @@ def find_period(time_s: FloatArray) -> Period:
     windows, mean_step = _windows(time_s)
     cell = mean_step / (2.0 * GRID_HIGHEST)
     size = max(float(w[-1]) for w in windows) / cell
-    length = int(fft.next_fast_len(int(4 * size) + 16, real=True))
-    # Sharing stamps linearly between neighbouring cells lowers a frequency by sinc², undone here.
-    damped = np.sinc(np.arange(length // 2 + 1) / length) ** 2
-    power = np.average([_phase_sum(w / cell, length) for w in windows], axis=0, weights=[len(w) for w in windows])
-    power /= damped**2
-    threshold = float(special.gammainccinv(len(windows), CHANCE) / special.gammaincinv(len(windows), 0.5))
-    spectrum = _Spectrum(np.asarray(power), mean_step / (length * cell), int(2 * length / size) + 1, threshold)
+    power, length = _core.phase_power(windows, cell, int(4 * size) + 16)
+    threshold = chdtri(2 * len(windows), CHANCE) / chdtri(2 * len(windows), 0.5)
+    spectrum = _Spectrum(power, mean_step / (length * cell), int(2 * length / size) + 1, threshold)
     line = _first_line(windows, mean_step, spectrum)
     grid = mean_step / line if line else 0.0
     best = _choose(spectrum, line, _shortest_step(windows) / mean_step)
@@ -133,15 +130,8 @@ def _first_line(windows: list[FloatArray], mean_step: float, spectrum: _Spectrum
 
 def _direct(time_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
     """Power of the phase sum of the first stamps at every frequency (k,), evenly spaced."""
-    part = time_s[:512]
-    # A frequency on, every stamp turns by so much: the first and its turns take the place of k exponentials.
-    phase = np.exp(2j * np.pi * frequency_hz[0] * part)
-    turn = np.exp(2j * np.pi * (frequency_hz[1] - frequency_hz[0]) * part)
-    out = np.empty(len(frequency_hz))
-    for k in range(len(frequency_hz)):
-        out[k] = np.abs(phase.mean()) ** 2
-        phase *= turn
-    return out
+    first, step = float(frequency_hz[0]), float(frequency_hz[1] - frequency_hz[0])
+    return _core.direct_power(time_s[:512], first, step, len(frequency_hz))
 
 
 def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:
@@ -163,16 +153,6 @@ def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:
     steps = [float(w[-1]) / (len(w) - 1) for w in kept]
     # Losses lengthen it, a stall at an end shortens it: the lower quartile is near the window with the fewest.
     return kept, float(np.percentile(steps, 25.0))
-
-
-def _phase_sum(position: FloatArray, length: int) -> FloatArray:
-    """|mean exp(2πi f t)|² on the grid of a transform, tapered so that lines have no skirts (Hann)."""
-    cell = np.floor(position).astype(np.int64)
-    share = position - cell
-    taper = np.sin(np.pi * (np.arange(len(position)) + 0.5) / len(position)) ** 2
-    weight = np.bincount(cell, (1.0 - share) * taper, length) + np.bincount(cell + 1, share * taper, length)
-    spectrum = fft.rfft(weight[:length])
-    return np.asarray((np.abs(spectrum) / taper.sum()) ** 2)
 
 
 def _poll(spectrum: _Spectrum) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.read.clock.rate import usual_step
 from trihedron.read.clock.steps import steps_of
@@ -119,31 +120,9 @@ def _quickest_turns(accelerometer: FloatArray | None) -> tuple[int | None, int |
 
     A stretch is five rows; at rest it turns ten times slower than between the two, so that no rate need be known.
     """
-    if accelerometer is None or len(accelerometer) < 4 * _SIDE:
+    if accelerometer is None:
         return None, None
-    readings = accelerometer[:_MOST_ROWS]
-    readings = readings[np.isfinite(readings).all(axis=1)]
-    norm = np.linalg.norm(readings, axis=1)
-    if len(readings) < 4 * _SIDE or not np.all(norm > 0):
-        return None, None
-    total = np.vstack([np.zeros(3), np.cumsum(readings / norm[:, None], axis=0)])
-    mean = (total[_SIDE:] - total[:-_SIDE]) / _SIDE
-    length = np.linalg.norm(mean, axis=1)
-    # Unit vectors spread evenly over an angle a have a mean shorter by a²/24.
-    spread = np.sqrt(24.0 * np.maximum(1.0 - length, 0.0))
-    mean /= np.maximum(length, 1e-12)[:, None]
-    turn = math.radians(_TURN_DEG)
-    rows, any_turn = 1, None
-    while rows + _SIDE < len(mean):
-        lag = rows + _SIDE - 1
-        has_turned = np.einsum("ij,ij->i", mean[:-lag], mean[lag:]) < math.cos(turn)
-        if np.any(has_turned):
-            any_turn = any_turn or rows + 1
-            quiet = spread <= 0.1 * turn * _SIDE / (rows + 1)
-            if np.any(quiet[:-lag] & quiet[lag:] & has_turned):
-                return rows + 1, any_turn
-        rows = max(rows + 1, int(1.5 * rows))
-    return None, any_turn
+    return _core.quickest_turns(accelerometer[:_MOST_ROWS], _SIDE, math.radians(_TURN_DEG))
 
 
 def _quickest_warming(temperature: FloatArray | None) -> float | None:

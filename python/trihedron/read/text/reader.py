@@ -332,4 +332,5 @@ class TextReader:
             words=words,
             labels=labels,
             rows_in_file=self.n_rows + self.n_left_out,
+            is_private=True,
         )

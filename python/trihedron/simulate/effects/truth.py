@@ -90,8 +90,9 @@ def _note_electronics(
         note(f"{prefix}-scale-asymmetry", asymmetry=electronics.asymmetry)
     if any(electronics.drift.amplitude):
         note(f"{prefix}-hidden-drift", amplitude=electronics.drift.amplitude, tau_s=electronics.drift.tau_s)
-    if any(electronics.zero_scatter):
-        note(f"{prefix}-zero-scatter", sigma=electronics.zero_scatter)
+    if any(electronics.zero_scatter) or any(electronics.zero_in_moves):
+        in_moves = {"in_moves": electronics.zero_in_moves} if any(electronics.zero_in_moves) else {}
+        note(f"{prefix}-zero-scatter", sigma=electronics.zero_scatter, **in_moves)
     if any(math.isfinite(v) for v in electronics.saturation):
         note(f"{prefix}-saturation", limit=electronics.saturation)
     if any(electronics.lag_s) or electronics.filter.cutoff_hz:

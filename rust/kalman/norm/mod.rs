@@ -4,8 +4,14 @@
 //! three axes. The measurement is not linear, so each update is iterated, and after a session the whole run is repeated
 //! with every pose linearised at the latest constants until nothing moves: that limit is the weighted batch fit.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+mod frame;
+mod pose;
+mod relinearise;
 
+use nalgebra::{DMatrix, Vector3};
+
+pub use self::frame::Frame;
+pub use self::pose::{NormPose, NormPrior};
 use super::shaping::{Shaping, ShapingModel};
 use super::timeline::{Steps, Timeline};
 use super::ud::{Factors, Innovation, Transition, UdFilter};
@@ -14,82 +20,13 @@ use crate::error::{Error, Result};
 /// Constants of the triad: six of `S`, three of `b`.
 pub const N_PARAMETERS: usize = 9;
 
-/// Which rotation of the body frame is chosen, since the length of a vector cannot tell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frame {
-    /// `S` lower triangular: parameters `s11 s21 s22 s31 s32 s33`.
-    Lower,
-    /// `S` symmetric: the same entries, mirrored.
-    Symmetric,
-}
-
-/// Row and column of each of the six parameters of `S`.
-const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-
-impl Frame {
-    /// `S` and `b` of nine parameters.
-    #[must_use]
-    pub fn unpack(self, theta: &[f64]) -> (Matrix3<f64>, Vector3<f64>) {
-        let mut s = Matrix3::zeros();
-        for (value, (i, j)) in theta.iter().zip(ENTRIES) {
-            s[(i, j)] = *value;
-            if self == Self::Symmetric {
-                s[(j, i)] = *value;
-            }
-        }
-        (s, Vector3::new(theta[6], theta[7], theta[8]))
-    }
-
-    /// Derivative of `u·(S a + b)` with respect to the nine parameters.
-    fn row(self, u: &Vector3<f64>, a: &Vector3<f64>, row: &mut [f64]) {
-        for (value, (i, j)) in row.iter_mut().zip(ENTRIES) {
-            *value = u[i] * a[j];
-            if self == Self::Symmetric && i != j {
-                *value += u[j] * a[i];
-            }
-        }
-        row[6..9].copy_from_slice(u.as_slice());
-    }
-}
-
-/// Mean reading of all three axes over one hold.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NormPose {
-    /// Mean raw readings.
-    pub reading: [f64; 3],
-    /// Start of the hold, s.
-    pub start: f64,
-    /// Length of the hold, s.
-    pub hold: f64,
-    /// Variance on top of the noise model per axis, raw².
-    pub extra_variance: [f64; 3],
-}
-
-/// What is believed of the nine parameters before the first pose.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NormPrior {
-    /// Mean, in the order of [`Frame::unpack`].
-    pub mean: [f64; N_PARAMETERS],
-    /// Standard deviations.
-    pub sigma: [f64; N_PARAMETERS],
-}
-
 /// Updates are repeated at most this often; four or five suffice unless the start is far off.
 const MAX_ITERATIONS: usize = 20;
 /// An iteration that moves every parameter by less than this part of its standard error is the last.
 const SETTLED: f64 = 1e-3;
-/// A run over all poses that moves every parameter by less than this part of its standard error is the last.
-const CONVERGED: f64 = 1e-6;
-
 /// The point of linearisation moves by at most this part of gravity or of a sensitivity at a time: a few poses in one
 /// plane leave directions to which the length of gravity is stationary, and a full step there leads nowhere.
 const LONGEST_STEP: f64 = 0.2;
-
-/// A step longer than this many standard errors must lower the cost; shorter ones end at the fixed point of the runs,
-/// which is not exactly where the cost, whose weights move as well, is least.
-const LOOKED_AT: f64 = 0.1;
-/// A step that does not lower the cost is halved at most this often.
-const MOST_HALVINGS: usize = 12;
 
 /// Recursive estimate of a triad from the length of gravity alone.
 #[derive(Debug, Clone)]
@@ -208,51 +145,6 @@ impl NormFilter {
         self.filter.predict(step);
         self.timeline.pass(start, hold);
         Ok(())
-    }
-
-    /// Filter over all poses with every pose linearised at `theta`.
-    fn run(&mut self, theta: &[f64], prior: &NormPrior) -> Result<(UdFilter, Vec<Innovation>)> {
-        let mut filter = Self::start(&self.shapings, self.n_noise, prior);
-        let mut timeline = Timeline::default();
-        let mut innovations = Vec::with_capacity(self.poses.len());
-        for i in 0..self.poses.len() {
-            let pose = self.poses[i];
-            let gap = timeline.gap(pose.start, pose.hold)?;
-            filter.predict(transition(
-                &mut self.steps,
-                &self.shapings,
-                self.n_noise,
-                gap,
-                pose.hold,
-            ));
-            timeline.pass(pose.start, pose.hold);
-            innovations.push(self.update_at(&mut filter, &pose, theta));
-        }
-        Ok((filter, innovations))
-    }
-
-    /// Squared innovations with the constants held at `theta`, and its squared distance from the prior.
-    ///
-    /// The weights belong to `theta`: towards `S = 0` the noise in m/s² vanishes together with the signal, so that the
-    /// worthless solution `S = 0`, `|b| = |g|` costs as much as no fit at all.
-    fn cost(&mut self, theta: &[f64]) -> Result<f64> {
-        let mut fixed = self.prior.clone();
-        fixed.mean.copy_from_slice(theta);
-        fixed.sigma = [0.0; N_PARAMETERS];
-        let (_, innovations) = self.run(theta, &fixed)?;
-        let data: f64 = innovations
-            .iter()
-            .map(|y| y.value * y.value / y.variance)
-            .sum();
-        let away: f64 = (0..N_PARAMETERS)
-            .map(|i| ((theta[i] - self.prior.mean[i]) / self.prior.sigma[i]).powi(2))
-            .sum();
-        let cost = data + away;
-        Ok(if cost.is_finite() {
-            cost
-        } else {
-            f64::INFINITY
-        })
     }
 
     /// Row, predicted length and white variance of a pose, linearised at `theta` and the given noise states.
@@ -405,60 +297,6 @@ impl NormFilter {
             self.poses.push(*pose);
         }
         Ok(())
-    }
-
-    /// Run over all poses again, linearised at the latest constants, until they stay. Returns the number of runs, or
-    /// `None` when `most` were not enough.
-    ///
-    /// Starts from the best of the latest constants, those of the last call and the prior's mean; a long step is
-    /// shortened until it lowers the cost.
-    ///
-    /// # Errors
-    /// Never for poses that were taken once.
-    pub fn relinearise(&mut self, most: usize) -> Result<Option<usize>> {
-        let mut theta = self.prior.mean.to_vec();
-        let mut cost = self.cost(&theta)?;
-        for candidate in [self.settled.clone(), self.filter.x[self.n_noise..].to_vec()] {
-            let its = self.cost(&candidate)?;
-            if its < cost {
-                (theta, cost) = (candidate, its);
-            }
-        }
-        let mut runs = None;
-        for run in 1..=most {
-            let (filter, innovations) = self.run(&theta, &self.prior.clone())?;
-            self.filter = filter;
-            self.innovations = innovations;
-            let moved = self.moved(&self.filter, &theta);
-            if moved < CONVERGED {
-                runs = Some(run);
-                break;
-            }
-            let from = theta.clone();
-            self.approach(&mut theta, &self.filter.x[self.n_noise..]);
-            if moved > LOOKED_AT {
-                let mut its = self.cost(&theta)?;
-                for _ in 0..MOST_HALVINGS {
-                    if its < cost {
-                        break;
-                    }
-                    for (value, start) in theta.iter_mut().zip(&from) {
-                        *value = 0.5 * (*value + start);
-                    }
-                    its = self.cost(&theta)?;
-                }
-                cost = its;
-            }
-        }
-        if runs.is_none() {
-            // The last run's estimate is a full step from `theta` that nobody has looked at.
-            let estimate = self.filter.x[self.n_noise..].to_vec();
-            if self.cost(&estimate)? > cost {
-                self.filter.x[self.n_noise..].copy_from_slice(&theta);
-            }
-        }
-        self.settled = theta;
-        Ok(runs)
     }
 
     /// What a future reading would do to the covariance.

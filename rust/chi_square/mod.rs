@@ -1,4 +1,9 @@
-//! Chi-square and normal probabilities for any real number of degrees of freedom.
+//! Chi-square and normal probabilities for any real number of degrees of freedom; with [`beta`] those of F, of Student
+//! and of counts.
+
+pub mod beta;
+
+use beta::falling_root;
 
 /// `ln Γ(x)` for `x > 0` (Lanczos, g = 7, nine terms: relative error below 1e-14).
 #[must_use]
@@ -76,42 +81,6 @@ pub fn chi_square_tails(value: f64, dof: f64) -> (f64, f64) {
     (1.0 - above, above)
 }
 
-/// Value that a chi-square variate of `dof` degrees of freedom stays below with `probability`.
-#[must_use]
-pub fn chi_square_quantile(probability: f64, dof: f64) -> f64 {
-    if !(dof > 0.0 && (0.0..=1.0).contains(&probability)) {
-        return f64::NAN;
-    }
-    let excess = |x: f64| {
-        let (below, above) = chi_square_tails(x, dof);
-        if probability < 0.5 {
-            below - probability
-        } else {
-            (1.0 - probability) - above
-        }
-    };
-    let (mut low, mut high) = (0.0, dof + 1.0);
-    while excess(high) < 0.0 {
-        low = high;
-        high *= 2.0;
-        if high > 1e300 {
-            return f64::INFINITY;
-        }
-    }
-    for _ in 0..200 {
-        let middle = 0.5 * (low + high);
-        if high - low <= 1e-13 * high {
-            break;
-        }
-        if excess(middle) < 0.0 {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
-}
-
 /// Probability that a standard normal variate exceeds `z`.
 #[must_use]
 pub fn normal_above(z: f64) -> f64 {
@@ -122,4 +91,20 @@ pub fn normal_above(z: f64) -> f64 {
             chi_square_tails(z * z, 1.0).1
         };
     if z >= 0.0 { half } else { 1.0 - half }
+}
+
+/// Value that a chi-square variate of `dof` degrees of freedom exceeds with probability `above`, however small.
+#[must_use]
+pub fn chi_square_upper(above: f64, dof: f64) -> f64 {
+    falling_root(above, |x| chi_square_tails(x, dof).1)
+}
+
+/// Value that a standard normal variate exceeds with probability `above`.
+#[must_use]
+pub fn normal_upper(above: f64) -> f64 {
+    if above > 0.5 {
+        return -normal_upper(1.0 - above);
+    }
+    // Its square is chi-square with one degree of freedom.
+    chi_square_upper(2.0 * above, 1.0).sqrt()
 }

@@ -1,0 +1,111 @@
+"""Records as plain JSON types and back: cattrs reads the fields off the dataclasses, here stands what it cannot know.
+
+That is: arrays are nested lists, read-only mappings are dictionaries, and a few documents name or arrange their entries
+otherwise than the record (``in`` for ``side``). The documents are described by the schemas in ``files/schema/``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, TypeVar, get_origin
+
+import numpy as np
+
+from trihedron.records.frozen import thawed
+
+if TYPE_CHECKING:
+    from cattrs import Converter
+
+Record = TypeVar("Record")
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a document's entry differs from its record: ``names`` of fields, ``added`` entries, and which in what order.
+
+    ``added`` is given the record and its fields as plain types.
+    """
+
+    names: Mapping[str, str]
+    order: tuple[str, ...]
+    added: Callable[[Any, dict[str, Any]], dict[str, Any]] | None = None
+
+
+class Plain:
+    """Base of a dataclass that documents hold."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain JSON types."""
+        return as_plain(self)
+
+
+def as_plain(record: object, kind: type | None = None) -> dict[str, Any]:
+    """The fields of a dataclass as plain JSON types; of a subclass only those of ``kind`` when that is given."""
+    made: dict[str, Any] = _converter().unstructure(record, unstructure_as=kind)
+    return made
+
+
+def from_plain(document: dict[str, Any], kind: type[Record]) -> Record:
+    """A record of a document's entry. ``null`` where a number belongs was not a finite one: it is read as NaN.
+
+    Raises
+    ------
+    ValueError, TypeError, KeyError
+        When the entry lacks a field or holds what the field cannot.
+    """
+    from cattrs.errors import ForbiddenExtraKeysError
+
+    try:
+        return _converter().structure(document, kind)
+    except ForbiddenExtraKeysError as error:
+        raise ValueError(f"{kind.__name__} has no {', '.join(sorted(error.extra_fields))}") from None
+
+
+@cache
+def _converter() -> Converter:
+    # Imported here: a command that writes no document does without it.
+    from cattrs import Converter
+    from cattrs.gen import make_dict_unstructure_fn, override
+
+    plain = Converter(unstruct_collection_overrides={tuple: list}, detailed_validation=False, forbid_extra_keys=True)
+    plain.register_unstructure_hook_func(_is_array, lambda array: array.tolist())
+    plain.register_structure_hook_func(_is_array, lambda numbers, _: np.array(numbers, dtype=np.float64))
+    plain.register_structure_hook(float, lambda number, _: math.nan if number is None else float(number))
+    plain.register_structure_hook_func(_is_mapping, _mapping)
+
+    def of_mapping(entries: MappingProxyType[str, Any]) -> dict[str, Any]:
+        return {name: as_plain(one) if isinstance(one, Plain) else thawed(one) for name, one in entries.items()}
+
+    plain.register_unstructure_hook_func(_is_mapping, of_mapping)
+
+    def laid_out(kind: Any) -> Callable[[Any], dict[str, Any]]:
+        layout: Layout = kind.LAYOUT
+        names: dict[str, Any] = {field: override(rename=name) for field, name in layout.names.items()}
+        of_fields: Callable[[Any], dict[str, Any]] = make_dict_unstructure_fn(kind, plain, **names)
+
+        def written(record: Any) -> dict[str, Any]:
+            made = of_fields(record)
+            if layout.added is not None:
+                made |= layout.added(record, made)
+            return {name: made[name] for name in layout.order}
+
+        return written
+
+    plain.register_unstructure_hook_factory(lambda kind: hasattr(kind, "LAYOUT"), laid_out)
+    return plain
+
+
+def _is_array(kind: Any) -> bool:
+    return kind is np.ndarray or get_origin(kind) is np.ndarray
+
+
+def _is_mapping(kind: Any) -> bool:
+    return kind is MappingProxyType or get_origin(kind) is MappingProxyType
+
+
+def _mapping(entries: Any, _: Any) -> MappingProxyType[str, Any]:
+    return MappingProxyType({name: math.nan if one is None else one for name, one in entries.items()})

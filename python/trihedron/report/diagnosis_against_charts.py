@@ -1,0 +1,160 @@
+"""A given simulation beside the recording in pictures: stage by stage, spectra of the holds, their Allan curves."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.records.diagnosis import Diagnosis, NoiseDifference
+from trihedron.report.chart import AXIS_COLOURS, Chart, Line, Mark, Panel, Points, Scale
+from trihedron.report.document import Block, Picture
+from trihedron.report.numbers import plain_number
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+
+STAGES = {"as-given": "as given", "numbers": "numbers", "noise": "noise", "effects": "effects"}
+PRINTED = {
+    "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
+    "rad/s": (degrees_from_radians(1.0), "°/s"),
+    "deg": (1.0, "°"),
+    "dB": (1.0, "dB"),
+}
+WORDS = {
+    "static-accel": "gravity at rest",
+    "static-gyro": "rate at rest",
+    "moves": "gravity after moves",
+    "noise": "noise, octave by octave",
+}
+FEWEST_OCTAVES = 2
+PER_OCTAVE = 24
+"""Frequencies at which an octave is integrated: sin⁴ has two periods in the highest at the shortest averaging time."""
+BAND = re.compile(r"([\d.]+) to ([\d.]+) Hz")
+SENSORS = ("accelerometer", "gyroscope")
+Spectrum = tuple[FloatArray, FloatArray, FloatArray]
+"""Edges (m, 2) [Hz], density of the model and of the recording (m,), printed unit/√Hz."""
+
+
+def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Misfit of the held-out part after every stage."""
+    if len(diagnosis.stages) < len(STAGES) - 1:
+        return ()
+    caption = "What is left of the held-out part, stage by stage: as given, with its own numbers, noise, effects."
+    return (Picture("stages", caption, None, partial(stages_chart, diagnosis)),)
+
+
+def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
+    """Spectra of both logs one above the other, and Allan curves of both."""
+    seen = _spectra(diagnosis.noise_compared)
+    if not seen:
+        return ()
+    first = "Noise inside still poses, model (dashed) and recording, octave by octave."
+    second = "Allan deviation of that noise, model (dashed) and recording: what the octaves above make of it."
+    return (
+        Picture("spectra-both", first, None, partial(spectra_chart, diagnosis)),
+        Picture("allan-both", second, None, partial(allan_chart, diagnosis)),
+    )
+
+
+def stages_chart(diagnosis: Diagnosis) -> Chart:
+    """A panel per domain: rms after every stage."""
+    panels = []
+    names = tuple(STAGES[stage.stage] for stage in diagnosis.stages)
+    for domain, words in WORDS.items():
+        found = [(k, d) for k, stage in enumerate(diagnosis.stages, 1) for d in stage.domains if d.domain == domain]
+        found = [(k, d) for k, d in found if d.unit in PRINTED and d.rms > 0.0]
+        if len(found) < FEWEST_OCTAVES:
+            continue
+        factor, unit = PRINTED[found[0][1].unit]
+        x = np.array([k for k, _ in found], dtype=np.float64)
+        y = factor * np.array([d.rms for _, d in found])
+        told = [f"{names[k - 1]}: {plain_number(float(v))} {unit}" for (k, _), v in zip(found, y, strict=True)]
+        marks: tuple[Mark, ...] = (Line(x, y, "", "soft", is_thin=True), Points(x, y, told, None, "", "accent"))
+        low, high = float(y.min()), float(y.max())
+        panels.append(
+            Panel(
+                Scale("stage", "", limits=(0.6, len(names) + 0.4), whole=True, names=names),
+                Scale(f"rms [{unit}]", unit, is_log=True, limits=(low / 1.6, high * 1.6)),
+                marks,
+                title=words,
+            )
+        )
+    return Chart(tuple(panels), columns=2)
+
+
+def spectra_chart(diagnosis: Diagnosis) -> Chart:
+    """A panel per sensor and axis: density of the noise in every octave, steps over its band."""
+    panels = []
+    for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
+        unit = _unit(sensor) + "/√Hz"
+        x = np.concatenate([edges, np.full((len(edges), 1), np.nan)], axis=1).ravel()
+        marks = _both(x, np.repeat(model, 3), np.repeat(own, 3), "xyz".index(axis))
+        panels.append(_panel("frequency [Hz]", "Hz", f"density [{unit}]", unit, marks, f"{_said(sensor)} {axis}"))
+    return Chart(tuple(panels), columns=3)
+
+
+def allan_chart(diagnosis: Diagnosis) -> Chart:
+    """A panel per sensor and axis: Allan deviation of a spectrum that is even within its octaves.
+
+    ``σ²(τ) = 4 ∫ S sin⁴(πτf)/(πτf)² df``, S two-sided, from half a period of the highest frequency to a quarter of
+    the lowest's: what lies below the octaves would be missed beyond.
+    """
+    panels = []
+    for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
+        unit = _unit(sensor)
+        tau = np.geomspace(0.5 / edges[-1, 1], 0.25 / edges[0, 0], 60)
+        marks = _both(tau, allan_of(edges, model, tau), allan_of(edges, own, tau), "xyz".index(axis))
+        panels.append(
+            _panel("averaging time τ [s]", "s", f"Allan deviation [{unit}]", unit, marks, f"{_said(sensor)} {axis}")
+        )
+    return Chart(tuple(panels), columns=3)
+
+
+def allan_of(edges_hz: FloatArray, density: FloatArray, tau_s: FloatArray) -> FloatArray:
+    """(k,) Allan deviation at ``tau_s`` (k,) of root densities (m,) in bands ``edges_hz`` (m, 2), their unit·√Hz."""
+    out = np.zeros(len(tau_s))
+    for (low, high), root in zip(edges_hz, density, strict=True):
+        f = low + (high - low) * (np.arange(PER_OCTAVE) + 0.5) / PER_OCTAVE
+        x = np.pi * np.multiply.outer(tau_s, f)
+        out += 4.0 * root**2 * (np.sin(x) ** 4 / x**2).mean(axis=1) * (high - low)
+    return np.sqrt(out)
+
+
+def _both(x: FloatArray, model: FloatArray, own: FloatArray, k: int) -> tuple[Mark, ...]:
+    return (
+        Line(x, own, "recording", AXIS_COLOURS[k]),
+        Line(x, model, "model", "ink", is_dashed=True),
+    )
+
+
+def _panel(x: str, unit_x: str, y: str, unit_y: str, marks: Sequence[Mark], title: str) -> Panel:
+    seen = np.concatenate([m.y[np.isfinite(m.x)] for m in marks if isinstance(m, Line)])
+    limits = (float(seen.min()) / 1.6, float(seen.max()) * 1.6)
+    return Panel(Scale(x, unit_x, is_log=True), Scale(y, unit_y, is_log=True, limits=limits), tuple(marks), title=title)
+
+
+def _spectra(compared: Sequence[NoiseDifference]) -> dict[tuple[str, str], Spectrum]:
+    """Octaves of both sides by sensor and axis, lowest first."""
+    rows: dict[tuple[str, str], list[tuple[float, float, float, float]]] = {}
+    for n in compared:
+        band = BAND.search(n.unit) if n.term == "octave" else None
+        if band is not None and n.model and n.recording and n.sensor in SENSORS:
+            factor = PRINTED["m/s^2" if n.sensor == "accelerometer" else "rad/s"][0]
+            low, high = (float(edge) for edge in band.groups())
+            rows.setdefault((n.sensor, n.axis), []).append((low, high, factor * n.model, factor * n.recording))
+    out = {}
+    for key, found in rows.items():
+        if len(found) >= FEWEST_OCTAVES:
+            table = np.array(sorted(found))
+            out[key] = table[:, :2], table[:, 2], table[:, 3]
+    return out
+
+
+def _unit(sensor: str) -> str:
+    return PRINTED["m/s^2" if sensor == "accelerometer" else "rad/s"][1]
+
+
+def _said(sensor: str) -> str:
+    return "gyro" if sensor == "gyroscope" else sensor

@@ -1,0 +1,148 @@
+//! Motion in the means of blocks of a log: where a hold begins, and which part of a change the gyro foretells.
+
+/// First row from which on no stretch of the sizes departs from zero; `None` where every one of the first `most` does.
+///
+/// `off` are rows of `channels` differences from the level; a stretch of `sizes[k]` rows departs where the squares of its
+/// means over `variances[k]` (channels of zero variance left out) add up to more than `limit`.
+#[must_use]
+pub fn first_clean(
+    off: &[f64],
+    channels: usize,
+    most: usize,
+    sizes: &[usize],
+    variances: &[f64],
+    limit: f64,
+) -> Option<usize> {
+    let n = off.len() / channels.max(1);
+    let mut total = vec![0.0; (n + 1) * channels];
+    for at in channels..total.len() {
+        total[at] = total[at - channels] + off[at - channels];
+    }
+    (0..=most).find(|&start| {
+        !sizes
+            .iter()
+            .zip(variances.chunks_exact(channels))
+            .filter(|(size, _)| start + **size <= n)
+            .any(|(&size, variance)| {
+                let (from, to) = (start * channels, (start + size) * channels);
+                let statistic: f64 = (0..channels)
+                    .filter(|&c| variance[c] > 0.0)
+                    .map(|c| {
+                        ((total[to + c] - total[from + c]) / size as f64).powi(2) / variance[c]
+                    })
+                    .sum();
+                statistic > limit
+            })
+    })
+}
+
+/// Sums of the squared output of a filter of five taps over ranges of rows, two less at either end; missing readings
+/// count as zero.
+#[must_use]
+pub fn band_power(rows: &[[f64; 3]], taps: [f64; 5], ranges: &[[usize; 2]]) -> Vec<[f64; 3]> {
+    let scale = taps.iter().map(|t| t * t).sum::<f64>();
+    ranges
+        .iter()
+        .map(|&[start, stop]| {
+            let mut sum = [0.0; 3];
+            for seen in rows[start..stop].windows(5) {
+                for k in 0..3 {
+                    let passed = (0..5).fold(0.0, |sum, j| sum + taps[j] * seen[j][k]);
+                    let power = passed * passed / scale;
+                    sum[k] += if power.is_nan() {
+                        0.0
+                    } else {
+                        power.min(f64::MAX)
+                    };
+                }
+            }
+            sum
+        })
+        .collect()
+}
+
+/// Unknowns of what the gyro foretells: nine of scale, three of zero.
+pub const UNKNOWNS: usize = 12;
+
+/// Windows over which a reading changed: by noise, and by `mean × (W rate + z)` where the body turned.
+#[derive(Debug, Clone, Copy)]
+pub struct Windows<'a> {
+    /// Change from half to half.
+    pub change: &'a [[f64; 3]],
+    /// Mean reading.
+    pub mean: &'a [[f64; 3]],
+    /// Rate as the change weighs it.
+    pub rate: &'a [[f64; 3]],
+}
+
+impl Windows<'_> {
+    /// What `W` (row by row) and `z` do not foretell of every change, in units of `scale`: its length.
+    fn left(&self, solution: &[f64; UNKNOWNS], scale: [f64; 3]) -> Vec<f64> {
+        let windows = self.change.iter().zip(self.mean).zip(self.rate);
+        windows
+            .map(|((change, mean), rate)| {
+                let turn: [f64; 3] = std::array::from_fn(|i| {
+                    (0..3).map(|k| solution[3 * i + k] * rate[k]).sum::<f64>() + solution[9 + i]
+                });
+                let told: [f64; 3] = std::array::from_fn(|i| {
+                    let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+                    mean[j] * turn[k] - mean[k] * turn[j]
+                });
+                let squares = (0..3).map(|i| ((change[i] - told[i]) / scale[i]).powi(2));
+                squares.sum::<f64>().sqrt()
+            })
+            .collect()
+    }
+
+    /// Normal equations `(12, 12)` and `(12,)`, changes in units of `scale`, weighed to least absolute deviations from
+    /// `solution` (all alike without one).
+    #[must_use]
+    pub fn equations(
+        &self,
+        scale: [f64; 3],
+        solution: Option<&[f64; UNKNOWNS]>,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let weights = solution.map(|s| {
+            let left = self.left(s, scale);
+            let least = crate::stamps::median(&mut left.clone()).max(1e-12);
+            left.iter()
+                .map(|l| 1.0 / l.max(least))
+                .collect::<Vec<f64>>()
+        });
+        let (mut gram, mut side) = (vec![0.0; UNKNOWNS * UNKNOWNS], vec![0.0; UNKNOWNS]);
+        // Where (row j of `W`, column k; k = 3 is `z`) stands among the unknowns.
+        let place = |j: usize, k: usize| if k < 3 { 3 * j + k } else { 9 + j };
+        for (w, ((change, mean), rate)) in
+            self.change.iter().zip(self.mean).zip(self.rate).enumerate()
+        {
+            let weight = weights.as_ref().map_or(1.0, |v| v[w]);
+            let seen = [rate[0], rate[1], rate[2], 1.0];
+            let cross = [
+                [0.0, -mean[2], mean[1]],
+                [mean[2], 0.0, -mean[0]],
+                [-mean[1], mean[0], 0.0],
+            ];
+            for j in 0..3 {
+                let mut told = 0.0;
+                let mut with = [0.0; 3];
+                for i in 0..3 {
+                    let share = weight * cross[i][j] / (scale[i] * scale[i]);
+                    told += share * change[i];
+                    for (w, c) in with.iter_mut().zip(cross[i]) {
+                        *w += share * c;
+                    }
+                }
+                for k in 0..4 {
+                    let row = place(j, k);
+                    side[row] += told * seen[k];
+                    for (j2, w) in with.iter().enumerate() {
+                        for k2 in 0..4 {
+                            gram[row * UNKNOWNS + place(j2, k2)] += w * seen[k] * seen[k2];
+                        }
+                    }
+                }
+            }
+        }
+        (gram, side)
+    }
+}

@@ -1,0 +1,104 @@
+//! A first look at readings: how quiet short windows are, and in how few rows gravity turned.
+
+/// Mean, noise and spread of every window of a triad.
+#[derive(Debug, Clone, Default)]
+pub struct Windows {
+    /// Mean reading.
+    pub mean: Vec<[f64; 3]>,
+    /// Standard deviation of the first difference over √2.
+    pub noise: Vec<[f64; 3]>,
+    /// Length of the three standard deviations.
+    pub spread: Vec<f64>,
+}
+
+/// Statistics of windows `[start, start + length)`; `None` where a reading in one of them is no number, a window does
+/// not lie in the readings, or is shorter than two rows.
+#[must_use]
+pub fn windows(rows: &[[f64; 3]], starts: &[usize], length: usize) -> Option<Windows> {
+    if length < 2 {
+        return None;
+    }
+    let mut out = Windows::default();
+    for &start in starts {
+        let block = rows.get(start..start.checked_add(length)?)?;
+        let steps: Vec<[f64; 3]> = block
+            .windows(2)
+            .map(|pair| std::array::from_fn(|k| pair[1][k] - pair[0][k]))
+            .collect();
+        let (mean, variance) = moments(block);
+        let (_, of_steps) = moments(&steps);
+        if !mean.iter().chain(&variance).all(|v| v.is_finite()) {
+            return None;
+        }
+        out.mean.push(mean);
+        out.noise.push(of_steps.map(|v| v.sqrt() / 2.0_f64.sqrt()));
+        out.spread.push(variance.iter().sum::<f64>().sqrt());
+    }
+    Some(out)
+}
+
+fn moments(rows: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
+    let n = rows.len() as f64;
+    let mut sum = [0.0; 3];
+    for row in rows {
+        for k in 0..3 {
+            sum[k] += row[k];
+        }
+    }
+    let mean = sum.map(|s| s / n);
+    let mut squares = [0.0; 3];
+    for row in rows {
+        for k in 0..3 {
+            squares[k] += (row[k] - mean[k]).powi(2);
+        }
+    }
+    (mean, squares.map(|s| s / n))
+}
+
+/// Rows in which a direction at its quickest turned by `turn` [rad]: between two stretches at rest, and at all.
+///
+/// A stretch is `side` rows; at rest it turns ten times slower than between the two. Readings that are no numbers are
+/// left out; none where a reading is zero or there are fewer than four stretches.
+#[must_use]
+pub fn quickest_turns(rows: &[[f64; 3]], side: usize, turn: f64) -> (Option<usize>, Option<usize>) {
+    let mut total = vec![[0.0; 3]];
+    for row in rows.iter().filter(|r| r.iter().all(|v| v.is_finite())) {
+        let norm = (row[0] * row[0] + row[1] * row[1] + row[2] * row[2]).sqrt();
+        if norm <= 0.0 {
+            return (None, None);
+        }
+        let last = total[total.len() - 1];
+        total.push(std::array::from_fn(|k| last[k] + row[k] / norm));
+    }
+    if total.len() < 4 * side + 1 || side == 0 {
+        return (None, None);
+    }
+    let mut spread = Vec::with_capacity(total.len());
+    let mut mean = Vec::with_capacity(total.len());
+    for pair in total.windows(side + 1) {
+        let sum: [f64; 3] = std::array::from_fn(|k| (pair[side][k] - pair[0][k]) / side as f64);
+        let length = (sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]).sqrt();
+        // Unit vectors spread evenly over an angle a have a mean shorter by a²/24.
+        spread.push((24.0 * (1.0 - length).max(0.0)).sqrt());
+        mean.push(sum.map(|v| v / length.max(1e-12)));
+    }
+    let (mut rows, mut any_turn) = (1, None);
+    while rows + side < mean.len() {
+        let lag = rows + side - 1;
+        let (quiet, least) = (0.1 * turn * side as f64 / (rows + 1) as f64, turn.cos());
+        let turned = |i: usize| {
+            let (a, b) = (&mean[i], &mean[i + lag]);
+            a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < least
+        };
+        let mut pairs = (0..mean.len() - lag).filter(|&i| turned(i));
+        if let Some(first) = pairs.next() {
+            any_turn = any_turn.or(Some(rows + 1));
+            let at_rest = |i: usize| spread[i] <= quiet && spread[i + lag] <= quiet;
+            if at_rest(first) || pairs.any(at_rest) {
+                return (Some(rows + 1), any_turn);
+            }
+        }
+        rows = (rows + 1).max(rows + rows / 2);
+    }
+    (None, any_turn)
+}

@@ -1,0 +1,163 @@
+//! Steps of a motion that are longer than the motion around them by one sample: joints of the curves on either side.
+
+use crate::error::{Error, Result};
+use crate::running::{running_maximum, running_median};
+
+/// Samples on either side through which one curve is laid.
+pub const HALF: usize = 4;
+/// What one curve through both sides leaves: numbers a channel.
+pub const FREE: usize = 2;
+/// Weights by which samples on both sides of a step contradict one curve.
+pub type Contrasts = [[f64; 2 * HALF]; FREE];
+
+/// What tells a step that is one sample off from the motion around it.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Steps over which an ordinary joint is the median.
+    pub nearby: usize,
+    /// What one lost sample would add, in ordinary joints, from where a step counts.
+    pub sharp: f64,
+    /// Of that, the least and most that is gained by a sample put between.
+    pub part: (f64, f64),
+    /// Least and greatest shortfall of a step that is too short, in steps.
+    pub whole: (f64, f64),
+    /// What may be left, in ordinary joints.
+    pub left: f64,
+    /// What may be left of a step that falls short, as a part of what there was.
+    pub mirrored: f64,
+}
+
+/// Of the inner steps of one move: which would show a lost sample, which are one sample too long, which too short.
+#[derive(Debug, Clone, Default)]
+pub struct Joints {
+    /// A lost sample would show.
+    pub is_sharp: Vec<bool>,
+    /// One sample too long.
+    pub is_long: Vec<bool>,
+    /// One sample too short.
+    pub is_short: Vec<bool>,
+}
+
+/// Joints of readings `(n, channels)`, in noises, row by row; `contrasts` as they stand, with one sample put between and
+/// one taken out. `n - 2 HALF - 1` steps.
+///
+/// # Errors
+/// `BadInput` when the numbers do not make rows.
+pub fn joints(
+    readings: &[f64],
+    channels: usize,
+    contrasts: &[Contrasts; 3],
+    limits: &Limits,
+) -> Result<Joints> {
+    if channels == 0 || !readings.len().is_multiple_of(channels) || limits.nearby == 0 {
+        return Err(Error::bad_input(
+            "readings of a move are rows of equal length",
+        ));
+    }
+    let n = readings.len() / channels;
+    let k = n.saturating_sub(2 * HALF + 1);
+    if k == 0 {
+        return Ok(Joints::default());
+    }
+    let jump: [f64; FREE] = std::array::from_fn(|i| contrasts[0][i][HALF..].iter().sum());
+    let jump2: f64 = jump.iter().map(|j| j * j).sum();
+    let seen: Vec<Seen> = (0..k)
+        .map(|at| {
+            Seen::at(
+                &readings[at * channels..(at + 2 * HALF + 2) * channels],
+                channels,
+                contrasts,
+                jump,
+            )
+        })
+        .collect();
+    let dof = (FREE * channels) as f64;
+    let column = |value: fn(&Seen) -> f64| seen.iter().map(value).collect::<Vec<f64>>();
+    let ordinary: Vec<f64> = running_median(&column(|s| s.zero), limits.nearby)
+        .iter()
+        .map(|m| (m / dof).max(1.0))
+        .collect();
+    let best = running_maximum(&column(|s| s.gain[0].max(s.gain[1])), HALF);
+    let explained = running_maximum(&column(Seen::explained), HALF);
+    let mut out = Joints::default();
+    for (at, s) in seen.iter().enumerate() {
+        let expected = jump2 * s.across2;
+        let is_sharp = expected > limits.sharp * ordinary[at];
+        let most = s.gain[0].max(s.gain[1]);
+        let is_off = |gain: f64| {
+            is_sharp
+                && most >= best[at]
+                && gain >= most
+                && gain > limits.part.0 * expected
+                && gain < limits.part.1 * expected
+                && s.zero - gain < limits.left * dof * ordinary[at]
+        };
+        // A short step is also one whose jump falls short of the slope beside it, the mirror image of a long one: a bend
+        // is as often the one as the other.
+        let short_by = -s.extra();
+        let is_mirrored = s.power() > limits.sharp * ordinary[at]
+            && s.explained() >= explained[at]
+            && short_by > limits.whole.0
+            && short_by < limits.whole.1
+            && s.with_jump < limits.mirrored * s.zero + limits.left * dof * ordinary[at];
+        out.is_sharp.push(is_sharp);
+        out.is_long.push(is_off(s.gain[0]));
+        out.is_short.push(is_off(s.gain[1]) || is_mirrored);
+    }
+    Ok(out)
+}
+
+/// Sums over the channels at one step.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    /// Squares left over as the readings stand.
+    zero: f64,
+    /// What a sample put between, and one taken out, takes off them.
+    gain: [f64; 2],
+    /// Squared slope across the step.
+    across2: f64,
+    /// Squares of a jump by the slope beside the step, its product with what is left, and what is left with it.
+    shape2: f64,
+    product: f64,
+    with_jump: f64,
+}
+
+impl Seen {
+    fn at(rows: &[f64], channels: usize, contrasts: &[Contrasts; 3], jump: [f64; FREE]) -> Self {
+        let mut out = Self::default();
+        for c in 0..channels {
+            let value = |row: usize| rows[row * channels + c];
+            let misfit = |of: &Contrasts, i: usize| -> f64 {
+                (0..2 * HALF).fold(0.0, |sum, j| sum + of[i][j] * value(1 + j))
+            };
+            let across = (value(HALF + 2) - value(HALF - 1)) / 3.0;
+            let beside = (value(HALF) - value(HALF - 2) + value(HALF + 3) - value(HALF + 1)) / 4.0;
+            out.across2 += across * across;
+            for i in 0..FREE {
+                let left = misfit(&contrasts[0], i);
+                let shape = jump[i] * beside;
+                out.zero += left * left;
+                for (gain, of) in out.gain.iter_mut().zip(&contrasts[1..]) {
+                    *gain -= misfit(of, i).powi(2);
+                }
+                out.shape2 += shape * shape;
+                out.product += left * shape;
+                out.with_jump += (left + shape).powi(2);
+            }
+        }
+        out.gain = out.gain.map(|g| out.zero + g);
+        out
+    }
+
+    fn power(&self) -> f64 {
+        self.shape2.max(1e-300)
+    }
+
+    fn extra(&self) -> f64 {
+        self.product / self.power()
+    }
+
+    fn explained(&self) -> f64 {
+        self.extra().powi(2) * self.power()
+    }
+}

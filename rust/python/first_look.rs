@@ -1,0 +1,95 @@
+//! Levels, windows and running order statistics across the seam.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::arrays::{as_rows, flat1, flat3};
+use crate::{first_look, levels, running};
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(levels_of, module)?)?;
+    module.add_function(wrap_pyfunction!(window_statistics, module)?)?;
+    module.add_function(wrap_pyfunction!(quickest_turns, module)?)?;
+    module.add_function(wrap_pyfunction!(running_median, module)?)
+}
+
+/// Different values `(k,)` that are numbers, ascending, and how many readings are numbers.
+#[pyfunction]
+fn levels_of<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray1<'py, f64>,
+) -> PyResult<(Bound<'py, PyArray1<f64>>, usize)> {
+    let flat = flat1(&readings);
+    let (found, finite) = super::run(py, || Ok(levels::levels(&flat)))?;
+    Ok((PyArray1::from_vec(py, found), finite))
+}
+
+type WindowArrays<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
+/// Mean and noise `(m, 3)` and spread `(m,)` of windows; nothing where a reading in them is no number.
+#[pyfunction]
+fn window_statistics<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    starts: PyReadonlyArray1<'py, i64>,
+    length: usize,
+) -> PyResult<Option<WindowArrays<'py>>> {
+    let flat = flat3("readings", &readings)?;
+    let starts: Result<Vec<usize>, _> = starts
+        .as_array()
+        .iter()
+        .map(|&s| usize::try_from(s))
+        .collect();
+    let starts = starts.map_err(|_| PyValueError::new_err("starts must not be negative"))?;
+    let found = super::run(py, || {
+        Ok(first_look::windows(as_rows(&flat), &starts, length))
+    })?;
+    let shape = [starts.len(), 3];
+    let stack = |rows: Vec<[f64; 3]>| {
+        PyArray1::from_vec(py, bytemuck::cast_vec::<[f64; 3], f64>(rows)).reshape(shape)
+    };
+    let Some(found) = found else {
+        return Ok(None);
+    };
+    Ok(Some((
+        stack(found.mean)?,
+        stack(found.noise)?,
+        found.spread.to_pyarray(py),
+    )))
+}
+
+/// Rows in which a direction at its quickest turned by `turn` [rad]: between two stretches at rest, and at all.
+#[pyfunction]
+fn quickest_turns(
+    py: Python<'_>,
+    readings: PyReadonlyArray2<'_, f64>,
+    side: usize,
+    turn: f64,
+) -> PyResult<(Option<usize>, Option<usize>)> {
+    let flat = flat3("readings", &readings)?;
+    super::run(py, || {
+        Ok(first_look::quickest_turns(as_rows(&flat), side, turn))
+    })
+}
+
+/// Median of the `size` (odd) numbers about each; beyond the ends the last number stands.
+#[pyfunction]
+fn running_median<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray1<'py, f64>,
+    size: usize,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    if size.is_multiple_of(2) {
+        return Err(PyValueError::new_err(format!(
+            "a running median needs an odd size, got {size}"
+        )));
+    }
+    let flat = flat1(&values);
+    let found = super::run(py, || Ok(running::running_median(&flat, size)))?;
+    Ok(PyArray1::from_vec(py, found))
+}

@@ -1,0 +1,85 @@
+//! Joints of a motion, and the law of its noise, across the seam.
+
+use numpy::{
+    PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::arrays::flat1;
+use crate::joints::{self, Contrasts, FREE, HALF, Limits};
+use crate::noise_law;
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(motion_joints, module)?)?;
+    module.add_function(wrap_pyfunction!(mean_noise_law, module)?)
+}
+
+type Flags<'py> = Bound<'py, PyArray1<bool>>;
+
+/// Which inner steps of a motion would show a lost sample, are one sample too long, one too short, `(n - 9,)` each.
+#[pyfunction]
+#[pyo3(signature = (readings, contrasts, *, nearby, sharp, part, whole, left, mirrored))]
+#[expect(clippy::too_many_arguments, reason = "limits by name")]
+fn motion_joints<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    contrasts: PyReadonlyArray3<'py, f64>,
+    nearby: usize,
+    sharp: f64,
+    part: (f64, f64),
+    whole: (f64, f64),
+    left: f64,
+    mirrored: f64,
+) -> PyResult<(Flags<'py>, Flags<'py>, Flags<'py>)> {
+    if contrasts.shape() != [3, FREE, 2 * HALF] {
+        return Err(PyValueError::new_err(format!(
+            "contrasts must have shape (3, {FREE}, {}), got {:?}",
+            2 * HALF,
+            contrasts.shape()
+        )));
+    }
+    if nearby.is_multiple_of(2) {
+        return Err(PyValueError::new_err(format!(
+            "nearby must be odd, got {nearby}"
+        )));
+    }
+    let weights = contrasts.as_array();
+    let of = |c: usize| -> Contrasts {
+        std::array::from_fn(|i| std::array::from_fn(|j| weights[[c, i, j]]))
+    };
+    let contrasts = [of(0), of(1), of(2)];
+    let channels = readings.shape()[1];
+    let flat: Vec<f64> = readings.as_array().iter().copied().collect();
+    let limits = Limits {
+        nearby,
+        sharp,
+        part,
+        whole,
+        left,
+        mirrored,
+    };
+    let found = super::run(py, || joints::joints(&flat, channels, &contrasts, &limits))?;
+    Ok((
+        PyArray1::from_vec(py, found.is_sharp),
+        PyArray1::from_vec(py, found.is_long),
+        PyArray1::from_vec(py, found.is_short),
+    ))
+}
+
+/// Deviance and non-negative terms of a choice of columns of the law of a mean's variance.
+#[pyfunction]
+fn mean_noise_law(
+    py: Python<'_>,
+    design: PyReadonlyArray2<'_, f64>,
+    seen: PyReadonlyArray1<'_, f64>,
+    n: PyReadonlyArray1<'_, f64>,
+    chosen: Vec<usize>,
+) -> PyResult<(f64, [f64; 3])> {
+    let design = super::arrays::flat3("design", &design)?;
+    let (seen, n) = (flat1(&seen), flat1(&n));
+    let found = super::run(py, || {
+        noise_law::law(super::arrays::as_rows(&design), &seen, &n, &chosen)
+    })?;
+    Ok((found.deviance, found.terms))
+}

@@ -1,0 +1,40 @@
+//! Order statistics of a window that runs over numbers.
+
+/// Median of the `size` (odd) numbers about each; beyond the ends the last number stands.
+#[must_use]
+pub fn running_median(values: &[f64], size: usize) -> Vec<f64> {
+    let (n, half) = (values.len(), size / 2);
+    if n == 0 {
+        return Vec::new();
+    }
+    let at = |i: usize| values[i.saturating_sub(half).min(n - 1)];
+    // `i` counts from half a window before the first number.
+    let mut window: Vec<f64> = (0..2 * half + 1).map(at).collect();
+    window.sort_unstable_by(f64::total_cmp);
+    let mut out = vec![window[half]];
+    for i in 1..n {
+        let (old, new) = (at(i - 1), at(i + 2 * half));
+        let from = window.partition_point(|v| v.total_cmp(&old).is_lt());
+        let to = window.partition_point(|v| v.total_cmp(&new).is_lt());
+        if from < to {
+            window.copy_within(from + 1..to, from);
+            window[to - 1] = new;
+        } else {
+            window.copy_within(to..from, to + 1);
+            window[to] = new;
+        }
+        out.push(window[half]);
+    }
+    out
+}
+
+/// Greatest of the numbers up to `half` away from each.
+#[must_use]
+pub fn running_maximum(values: &[f64], half: usize) -> Vec<f64> {
+    (0..values.len())
+        .map(|i| {
+            let window = &values[i.saturating_sub(half)..(i + half + 1).min(values.len())];
+            window.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+        })
+        .collect()
+}

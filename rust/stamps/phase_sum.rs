@@ -1,0 +1,110 @@
+//! The power of phase sums of stamps, from which the sampling period is read.
+
+use std::f64::consts::PI;
+
+use rayon::prelude::*;
+use realfft::RealFftPlanner;
+
+use crate::error::{Error, Result};
+
+/// Smallest number of the form 2^a 3^b 5^c that is at least `n`: lengths at which a real transform is fast.
+#[must_use]
+pub fn next_fast_length(n: usize) -> usize {
+    let mut best = n.next_power_of_two();
+    let mut fives = 1;
+    while fives < best {
+        let mut odd = fives;
+        while odd < best {
+            let twos = n.div_ceil(odd).next_power_of_two();
+            best = best.min(odd * twos);
+            odd *= 3;
+        }
+        fives *= 5;
+    }
+    best
+}
+
+/// `|mean exp(2πi f t)|²` on the grid of a transform of `length` cells, the mean of all windows by their stamps.
+///
+/// Windows are tapered (Hann) so that lines have no skirts; a stamp is shared linearly between neighbouring cells, which
+/// lowers a frequency by sinc², undone here. `length / 2 + 1` powers.
+///
+/// # Errors
+/// `BadInput` when a stamp is not within the cells.
+pub fn phase_power(windows: &[&[f64]], cell: f64, length: usize) -> Result<Vec<f64>> {
+    if length < 2 {
+        return Err(Error::bad_input("a transform needs two cells and more"));
+    }
+    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+    let each: Vec<Option<Vec<f64>>> = windows
+        .par_iter()
+        .map(|window| {
+            let n = window.len() as f64;
+            let mut shared = vec![0.0; length + 1];
+            let mut taken = 0.0;
+            for (i, stamp) in window.iter().enumerate() {
+                let position = stamp / cell;
+                // A stamp beyond the cells, or none at all, has no place in them.
+                if !(position >= 0.0 && position < length as f64) {
+                    return None;
+                }
+                let taper = (PI * (i as f64 + 0.5) / n).sin().powi(2);
+                let share = position.fract();
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "checked above"
+                )]
+                let at = position as usize;
+                shared[at] += (1.0 - share) * taper;
+                shared[at + 1] += share * taper;
+                taken += taper;
+            }
+            shared.truncate(length);
+            let mut spectrum = transform.make_output_vec();
+            transform.process(&mut shared, &mut spectrum).ok()?;
+            let scale = n / (taken * taken);
+            Some(spectrum.iter().map(|z| scale * z.norm_sqr()).collect())
+        })
+        .collect();
+    let mut power = vec![0.0; length / 2 + 1];
+    for window in each {
+        let window = window.ok_or_else(|| Error::bad_input("a stamp lies outside the cells"))?;
+        for (sum, value) in power.iter_mut().zip(&window) {
+            *sum += value;
+        }
+    }
+    let stamps: usize = windows.iter().map(|w| w.len()).sum();
+    for (k, value) in power.iter_mut().enumerate() {
+        let angle = PI * k as f64 / length as f64;
+        let damped = if k == 0 { 1.0 } else { angle.sin() / angle };
+        *value /= stamps as f64 * damped.powi(4);
+    }
+    Ok(power)
+}
+
+/// Power of the mean of `exp(2πi f t)` at `count` frequencies from `first` on, `step` apart.
+#[must_use]
+pub fn direct_power(stamps: &[f64], first: f64, step: f64, count: usize) -> Vec<f64> {
+    // A frequency on, every stamp turns by so much: the first and its turns take the place of exponentials.
+    let turn_by = |f: f64| stamps.iter().map(move |t| (2.0 * PI * f * t).sin_cos());
+    let (mut re, mut im) = (
+        Vec::with_capacity(stamps.len()),
+        Vec::with_capacity(stamps.len()),
+    );
+    for (sin, cos) in turn_by(first) {
+        re.push(cos);
+        im.push(sin);
+    }
+    let turns: Vec<(f64, f64)> = turn_by(step).collect();
+    let n = stamps.len() as f64;
+    (0..count)
+        .map(|_| {
+            let sums = (re.iter().sum::<f64>() / n, im.iter().sum::<f64>() / n);
+            for ((x, y), (sin, cos)) in re.iter_mut().zip(im.iter_mut()).zip(&turns) {
+                (*x, *y) = (*x * cos - *y * sin, *x * sin + *y * cos);
+            }
+            sums.0 * sums.0 + sums.1 * sums.1
+        })
+        .collect()
+}

@@ -1,0 +1,104 @@
+"""What an improved scenario says of noise and of moves: recovered from simulated holds and moves of known noise."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.estimate.noise import noise_of_holds
+from trihedron.pipeline.comparing_noise import _are_even
+from trihedron.pipeline.improving import driven, zero_in_moves
+from trihedron.records.hold_noise import Measured
+from trihedron.simulate import (
+    NoiseTerms,
+    Scenario,
+    Smoother,
+    hand_session,
+    make_noise,
+    noise_of_octaves,
+    simulate,
+)
+from trihedron.simulate.profiles import profile_by_name
+from trihedron.simulate.zero_scatter import zero_in_moves as straying
+
+RATE = 100.0
+
+
+@pytest.mark.parametrize(
+    ("N", "B", "low_pass"),
+    [
+        (1e-3, 0.0, Smoother()),
+        (1e-3, 3e-3, Smoother()),
+        (1e-3, 0.0, Smoother(12.0, 2)),
+        (1e-3, 2e-3, Smoother(20.0, 1)),
+    ],
+)
+def test_white_noise_flicker_and_a_low_pass_are_recovered_from_octaves(N, B, low_pass):
+    x = low_pass.apply(make_noise(NoiseTerms(N=(N,) * 3, B=(B,) * 3), 40_000, 1.0 / RATE, 4, "octaves"), 1.0 / RATE)
+    axes = noise_of_holds(x, RATE, [(k * 600, k * 600 + 450) for k in range(25)])
+    bands = [o for o in axes[0].octaves if o.high_hz <= RATE / 2.0]
+    density = np.array([[axis.octaves[k].density.value for axis in axes] for k in range(len(bands))])
+    sigma = np.array([[axis.octaves[k].density.sigma_log for axis in axes] for k in range(len(bands))])
+    noise, found = noise_of_octaves(np.array([(o.low_hz, o.high_hz) for o in bands]), density, sigma, 1.0 / RATE)
+    # Densities of 25 holds are good to some per cent, flicker of one octave beyond the white noise to a quarter.
+    assert pytest.approx((N,) * 3, rel=0.06) == noise.N
+    assert (np.mean(noise.B) == pytest.approx(B, rel=0.3)) if B else np.mean(noise.B) < 0.5 * N
+    # Corners are tried a fifth apart.
+    assert found.corner_hz == pytest.approx(low_pass.corner_hz, rel=0.25)
+
+
+def test_a_zero_that_strays_in_moves_is_nothing_at_rest():
+    stretches = (("hold", 0.0, 2.0), ("move", 2.0, 3.0), ("hold", 3.0, 5.0))
+    labels = tuple(SimpleNamespace(kind=kind, start_s=a, stop_s=b) for kind, a, b in stretches)
+    t = np.arange(0.0, 5.0, 0.01)
+    drawn = np.array([straying(labels, t, (0.1, 0.2, 0.0), np.random.default_rng(k)) for k in range(400)])
+    assert not np.any(drawn[:, (t < 2.0) | (t >= 3.0)])
+    ends = drawn[:, np.searchsorted(t, 2.0)]
+    # 400 draws know a deviation to 3.5 %; four of those.
+    assert ends.std(axis=0) == pytest.approx([0.1, 0.2, 0.0], rel=0.14)
+
+
+def session(seed, strays=0.0):
+    profile = profile_by_name("mpu")
+    accel, gyro = profile.unit(5)
+    gyro = replace(gyro, S=tuple(tuple(2.0 * v for v in row) for row in gyro.S))
+    electronics = replace(gyro.electronics, zero_in_moves=(strays,) * 3)
+    scenario = Scenario(
+        hand_session(20, hold_s=3.0, layout=8), "unit", accel, replace(gyro, electronics=electronics), profile.clock
+    )
+    return scenario, simulate(scenario, seed)[0]
+
+
+def test_what_moves_miss_is_put_on_the_gyros_zero_in_moves_and_then_both_miss_alike():
+    _, recording = session(3, strays=2e-3)
+    clean, other = session(4)
+    own = trihedron.calibrate(recording, gravity_m_s2=9.80665)
+    found = zero_in_moves(clean, recording, own.segments, own.calibration)
+    # Twenty moves, each of two angles: known to a sixth; four of those, and what the poses add.
+    assert found == pytest.approx((2e-3,) * 3, rel=0.6)
+    electronics = replace(clean.gyroscope.electronics, zero_in_moves=found)
+    better = replace(clean, gyroscope=replace(clean.gyroscope, electronics=electronics))
+    assert zero_in_moves(better, recording, own.segments, own.calibration) is None
+    # A recording that misses no more than the scenario asks for nothing.
+    own = trihedron.calibrate(other, gravity_m_s2=9.80665)
+    assert zero_in_moves(clean, other, own.segments, own.calibration) is None
+
+
+def test_stamps_that_scatter_in_a_driven_scenario_are_settled_as_those_of_a_file():
+    clean, recording = session(5)
+    own = trihedron.calibrate(recording, gravity_m_s2=9.80665)
+    shaken = replace(clean, clock=replace(clean.clock, stamp_jitter_s=1.5e-3))
+    made = driven(shaken, recording, own.segments, own.calibration)
+    assert made.sampling.is_even
+    assert np.ptp(np.diff(made.time_s)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("values", "sigma", "even"),
+    [((1.0, 1.03, 0.99), 0.001, True), ((1.0, 1.08, 1.0), 0.03, True), ((1.0, 1.08, 1.0), 0.005, False),
+     ((1.0, 1.3, 1.1), 0.2, False)],
+)  # fmt: skip
+def test_axes_are_of_one_density_within_five_per_cent_or_within_what_they_are_known_to(values, sigma, even):
+    assert _are_even([Measured(v, v, v, sigma) for v in values]) is even

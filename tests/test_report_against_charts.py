@@ -1,0 +1,58 @@
+"""Pictures of a simulation beside its recording: stages, spectra, Allan curves."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from trihedron.records.diagnosis import NoiseDifference, Stage, StageDomain
+from trihedron.report.chart import Line
+from trihedron.report.diagnosis_against_charts import (
+    allan_chart,
+    allan_of,
+    noise_pictures,
+    spectra_chart,
+    stages_chart,
+    stages_pictures,
+)
+
+EDGES = np.array([[2.0**k, 2.0 ** (k + 1)] for k in range(-3, 8)])
+
+
+def test_the_allan_deviation_of_white_octaves_is_that_of_white_noise():
+    tau = np.geomspace(0.05, 0.5, 7)
+    # Octaves from 0.125 to 256 Hz: what lies beyond is below 4 % of the variance there.
+    assert allan_of(EDGES, np.full(len(EDGES), 3e-3), tau) == pytest.approx(3e-3 / np.sqrt(tau), rel=0.03)
+
+
+def octave(sensor, axis, low, model, recording):
+    unit = f"rad/s/sqrt(Hz), {low:g} to {2 * low:g} Hz"
+    return NoiseDifference(sensor, axis, "octave", model, recording, model / recording, None, unit, 0.5, False, "")
+
+
+def test_both_sides_stand_in_one_panel_per_axis_and_what_is_not_known_is_not_drawn():
+    rows = [octave("gyroscope", axis, low, 1e-4, 2e-4) for axis in "xz" for low in (0.5, 1.0, 2.0)]
+    rows += [octave("accelerometer", "x", 1.0, 1e-3, 1e-3)]
+    found = SimpleNamespace(noise_compared=rows)
+    chart = spectra_chart(found)
+    assert [panel.title for panel in chart.panels] == ["gyro x", "gyro z"]
+    recording, model = (mark for mark in chart.panels[0].marks if isinstance(mark, Line))
+    assert model.is_dashed
+    # In °/s/√Hz.
+    assert np.nanmax(model.y) == pytest.approx(np.degrees(1e-4))
+    assert np.nanmin(recording.y) == pytest.approx(np.degrees(2e-4))
+    assert [panel.title for panel in allan_chart(found).panels] == ["gyro x", "gyro z"]
+    assert [picture.name for picture in noise_pictures(found)] == ["spectra-both", "allan-both"]
+    assert noise_pictures(SimpleNamespace(noise_compared=rows[-1:])) == ()
+
+
+def test_stages_are_drawn_domain_by_domain():
+    stages = [
+        Stage(name, (StageDomain("moves", size, None, "deg"), StageDomain("noise", 3.0, None, "dB")))
+        for name, size in (("as-given", 1.0), ("numbers", 0.1), ("noise", 0.1), ("effects", 0.05))
+    ]
+    chart = stages_chart(SimpleNamespace(stages=stages))
+    assert [panel.title for panel in chart.panels] == ["gravity after moves", "noise, octave by octave"]
+    assert chart.panels[0].x.names == ("as given", "numbers", "noise", "effects")
+    assert len(stages_pictures(SimpleNamespace(stages=stages))) == 1
+    assert stages_pictures(SimpleNamespace(stages=())) == ()
