@@ -48,7 +48,8 @@ class LeverArm(DirectEffect):
             w = smooth(context.rate[where])
             a = np.gradient(w, t, axis=0)
             e = smooth(context.force[where] - context.gravity_in_moves[where])
-            columns = np.stack([np.cross(a, r) + np.cross(w, np.cross(w, r)) for r in np.eye(3)], axis=2)
+            # a × r + w × (w × r), as a matrix on r.
+            columns = _cross(a) + _cross(w) @ _cross(w)
             flat, target = columns.reshape(-1, 3), e.reshape(-1)
             normal.append(flat.T @ flat)
             side.append(flat.T @ target)
@@ -88,6 +89,14 @@ class LeverArm(DirectEffect):
             f"{100 * share:.0f} % of the acceleration in moves it was not fitted to.",
             "dynamics", Where(("ax", "ay", "az")), (held,),
         )  # fmt: skip
+
+
+def _cross(v: FloatArray) -> FloatArray:
+    """(n, 3, 3) matrices of the cross product with every row."""
+    x, y, z = v.T
+    nothing = np.zeros_like(x)
+    rows = [[nothing, -z, y], [z, nothing, -x], [-y, x, nothing]]
+    return np.asarray(np.moveaxis(np.array(rows), 2, 0))
 
 
 def _smoothing(context: Context):  # type: ignore[no-untyped-def]

@@ -121,6 +121,7 @@ class Loss:
     per_sensor: tuple[float, ...]
 
 
+@lru_cache(maxsize=4)
 def _joints(w: int, order: int) -> FloatArray:
     """(counts, 2w, 2w) projectors onto what no polynomial of so many coefficients joins across n missing samples."""
     projectors = []
@@ -139,7 +140,9 @@ def _unjoined(projector: FloatArray, windows: FloatArray) -> FloatArray:
 
 def _trials(projectors: FloatArray, windows: FloatArray) -> FloatArray:
     """(k, counts) the same for every count of missing samples."""
-    return np.stack([_unjoined(one, windows) for one in projectors], axis=1)
+    left = projectors.reshape(-1, len(windows)) @ windows.reshape(len(windows), -1)
+    left = left.reshape(len(projectors), *windows.shape)
+    return np.asarray(np.einsum("nikc,nikc->kn", left, left))
 
 
 def find_losses(context: Context) -> list[Loss]:

@@ -177,15 +177,12 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
         rows = np.flatnonzero((system.domain == STATIC_GYRO) & direct)
         error = np.linalg.solve(line.gyro_white, r[rows].reshape(h, 3, 1))[:, :, 0]
         out[STATIC_GYRO] = float(np.sqrt(np.mean(error**2)))
-    angle, speed = [], []
     of_moves = np.flatnonzero(np.isin(system.domain, (MOVES, DYNAMICS)) & direct)
-    for white, own in zip(line.move_white, r[of_moves].reshape(-1, ROWS_OF_MOVE), strict=True):
-        error = np.linalg.solve(white, own)
-        angle.append(float((error[:2] ** 2).sum()) / line.twin.gravity**2)
-        speed.append(float((error[2:] ** 2).mean()))
-    if angle:
+    if len(of_moves):
+        error = np.linalg.solve(line.move_white, r[of_moves].reshape(-1, ROWS_OF_MOVE, 1))[:, :, 0]
+        angle = (error[:, :2] ** 2).sum(axis=1) / line.twin.gravity**2
         out[MOVES] = float(np.degrees(np.sqrt(np.mean(angle))))
-        out[DYNAMICS] = float(np.sqrt(np.mean(speed)))
+        out[DYNAMICS] = float(np.sqrt(np.mean(error[:, 2:] ** 2)))
     return out, {STATIC_ACCEL: "m/s^2", STATIC_GYRO: "rad/s", MOVES: "deg", DYNAMICS: "m/s"}
 
 

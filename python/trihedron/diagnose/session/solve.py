@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
@@ -196,7 +195,7 @@ def score(reduced: Reduced, columns: FloatArray) -> Score:
     length[length == 0] = 1.0
     normal = (projected / length).T @ (projected / length)
     gradient = (projected / length).T @ residual
-    value, vector = eigh(normal)
+    value, vector = np.linalg.eigh(normal)
     seen = value > SEEN
     along = vector[:, seen].T @ gradient
     chi2 = float((along**2 / value[seen]).sum())
