@@ -112,10 +112,11 @@ def _left(values: FloatArray, weights: FloatArray, column: FloatArray | None) ->
 def _solved(values: FloatArray, weights: FloatArray, column: FloatArray | None) -> tuple[FloatArray, FloatArray]:
     k = values.shape[1]
     columns = np.ones((len(values), 1)) if column is None else np.column_stack([np.ones(len(values)), column])
-    normal = sum(np.kron(np.outer(c, c), w) for c, w in zip(columns, weights, strict=True))
-    right = sum(np.kron(c, w @ y) for c, w, y in zip(columns, weights, values, strict=True))
-    covariance: FloatArray = np.linalg.inv(np.asarray(normal).reshape(k * columns.shape[1], -1))
-    return covariance @ np.asarray(right), covariance
+    weighed = columns[:, :, None, None] * weights[:, None, :, :]
+    normal = np.einsum("scij,sd->cidj", weighed, columns).reshape(k * columns.shape[1], -1)
+    right = np.einsum("scij,sj->ci", weighed, values).ravel()
+    covariance: FloatArray = np.linalg.inv(normal)
+    return covariance @ right, covariance
 
 
 def _p(statistic: float, dof: int, name: str, n_sessions: int) -> float:

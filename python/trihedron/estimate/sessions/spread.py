@@ -18,7 +18,7 @@ from functools import cache
 
 import numpy as np
 
-from trihedron.arrays import FloatArray, IntArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.probability import chdtri, stdtrit
 from trihedron.records.sessions import Spread
 
@@ -132,12 +132,23 @@ def _spread(values: FloatArray, variances: FloatArray, members: list[IntArray], 
 
 def _q(values: FloatArray, variances: FloatArray, members: list[IntArray], s2: FloatArray) -> FloatArray:
     """Equation (1) at every σ² (m,)."""
-    out = np.zeros(len(s2))
-    for group in members:
-        weights = 1.0 / (variances[group] + s2[:, None])
-        mean = (weights * values[group]).sum(axis=1) / weights.sum(axis=1)
-        out += (weights * (values[group] - mean[:, None]) ** 2).sum(axis=1)
+    y, v, is_there = _padded(values, variances, members)
+    weights = np.where(is_there, 1.0 / (v + s2[:, None, None]), 0.0)
+    mean = (weights * y).sum(axis=2) / weights.sum(axis=2)
+    out: FloatArray = (weights * (y - mean[:, :, None]) ** 2).sum(axis=(1, 2))
     return out
+
+
+def _padded(
+    values: FloatArray, variances: FloatArray, members: list[IntArray]
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Values, variances and which of them there are, one group a row (g, most): all groups in one sum."""
+    size = np.array([len(group) for group in members])
+    is_there = np.arange(size.max()) < size[:, None]
+    y, v = np.zeros(is_there.shape), np.ones(is_there.shape)
+    together = np.concatenate(members)
+    y[is_there], v[is_there] = values[together], variances[together]
+    return y, v, is_there
 
 
 def _solved(values: FloatArray, variances: FloatArray, members: list[IntArray], targets: FloatArray) -> FloatArray:
@@ -179,14 +190,14 @@ def _restricted(values: FloatArray, variances: FloatArray, members: list[IntArra
     """σ that maximises the restricted likelihood, group means free."""
     largest = max(float(np.sqrt(max(np.ptp(values[group]) for group in members) ** 2 + variances.max())), 1e-300)
 
+    y, v, is_there = _padded(values, variances, members)
+
     def negative(sigma: float) -> float:
-        total = 0.0
-        for group in members:
-            weights = 1.0 / (variances[group] + sigma**2)
-            mean = np.sum(weights * values[group]) / np.sum(weights)
-            total += float(np.sum(weights * (values[group] - mean) ** 2) - np.sum(np.log(weights)))
-            total += float(np.log(np.sum(weights)))
-        return total
+        weights = np.where(is_there, 1.0 / (v + sigma**2), 0.0)
+        total = weights.sum(axis=1)
+        mean = (weights * y).sum(axis=1) / total
+        logarithms = np.log(weights, out=np.zeros_like(weights), where=is_there)
+        return float((weights * (y - mean[:, None]) ** 2).sum() - logarithms.sum() + np.log(total).sum())
 
     from scipy.optimize import minimize_scalar
 
@@ -198,9 +209,7 @@ def _group_means(
     values: FloatArray, variances: FloatArray, members: list[IntArray], s2: float
 ) -> tuple[FloatArray, FloatArray]:
     """Weighted mean of every group and its variance, at a given σ_u²."""
-    means, variance = [], []
-    for group in members:
-        weights = 1.0 / (variances[group] + s2)
-        means.append(float(np.sum(weights * values[group]) / np.sum(weights)))
-        variance.append(1.0 / float(np.sum(weights)))
-    return np.array(means), np.array(variance)
+    y, v, is_there = _padded(values, variances, members)
+    weights = np.where(is_there, 1.0 / (v + s2), 0.0)
+    total = weights.sum(axis=1)
+    return (weights * y).sum(axis=1) / total, 1.0 / total
