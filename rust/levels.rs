@@ -10,6 +10,7 @@ const MOST_CODES: f64 = (1 << 24) as f64;
 
 /// Different values that are numbers, in ascending order, and how many readings are numbers.
 #[must_use]
+#[allow(clippy::float_cmp)] // a code is a whole number to the last bit
 pub fn levels(readings: &[f64]) -> (Vec<f64>, usize) {
     let (mut low, mut high, mut finite, mut is_whole) = (f64::INFINITY, f64::NEG_INFINITY, 0, true);
     for &v in readings {

@@ -86,7 +86,7 @@ fn non_negative(design: &[[f64; 3]], seen: &[f64], weight: &[f64], chosen: &[usi
         else {
             continue;
         };
-        if solution.iter().any(|t| !(*t >= 0.0)) {
+        if solution.iter().any(|t| t.is_nan() || *t < 0.0) {
             continue;
         }
         let left = (&rows * &solution - &side).norm_squared();

@@ -9,7 +9,7 @@ pub fn running_median(values: &[f64], size: usize) -> Vec<f64> {
     }
     let at = |i: usize| values[i.saturating_sub(half).min(n - 1)];
     // `i` counts from half a window before the first number.
-    let mut window: Vec<f64> = (0..2 * half + 1).map(at).collect();
+    let mut window: Vec<f64> = (0..=2 * half).map(at).collect();
     window.sort_unstable_by(f64::total_cmp);
     let mut out = vec![window[half]];
     for i in 1..n {

@@ -105,7 +105,11 @@ mod tests {
                 if c == 0 { phase.cos() } else { phase.sin() }
             });
             let y = nalgebra::DVector::from_column_slice(&x);
-            let theta = basis.clone().svd(true, true).solve(&y, 0.0).unwrap();
+            let theta = basis
+                .clone()
+                .svd(true, true)
+                .solve(&y, 0.0)
+                .expect("both were asked for");
             let plain = (&basis * theta).norm_squared();
             // Rounding of 1700 terms, and of forty turns of a phase.
             assert!(

@@ -91,3 +91,33 @@ def test_motion_above_half_the_rate_is_counted_and_smooth_motion_is_not() -> Non
     # Its area times the share that a flat spectrum has at the sampling frequency: all of it.
     assert np.sqrt(found[0]) == pytest.approx(np.array([8.0, 4.0, 2.0]) * step, rel=0.2)
     assert (found[1] < 0.2 * white).all()
+
+
+def test_two_recordings_of_one_phone_hold_one_g_sensitivity_though_its_walk_takes_it_up(real_data: Path) -> None:
+    def of(k):
+        return next((real_data / "phone").glob(f"rec_{k}*__Acceleration.csv")), next(
+            (real_data / "phone").glob(f"rec_{k}*__AngularVelocity.csv")
+        )
+
+    sizes = []
+    for k in (2, 3):
+        force, rate = of(k)
+        d = diagnosed(9.7974, accelerometer_path=force, gyroscope_path=rate)
+        matrix = next(e for e in d.effects if e.id == "gyro-g-sensitivity")
+        sizes.append(next((p.value, p.std) for p in matrix.parameters if p.name == "G_yz"))
+    (a, sigma_a), (b, sigma_b) = sizes
+    assert abs(a - b) < 3.0 * np.hypot(sigma_a, sigma_b) < 0.9 * abs(a)
+
+
+def test_zeros_that_run_over_a_session_are_said_though_the_walk_takes_them_up(real_data: Path) -> None:
+    d = diagnosed(9.8184, path=real_data / "mimu4444/exp_7.npz", device=1)
+    drift = next(e for e in d.effects if e.id == "accel-hidden-drift")
+    assert not {"gyro-g-sensitivity", "gyro-hidden-drift"} & set(drift.confounded_with)  # another sensor's zero
+    assert not any(t.disagrees for t in d.remaining)
+
+
+def test_moves_left_out_at_a_limit_explain_only_what_they_disagree_by_more_than_others(real_data: Path) -> None:
+    d = diagnosed(9.8127, path=real_data / "openaxes/adxl355.csv")
+    assert d.effects[0].id == "accel-cubic"
+    limit = next(e for e in d.effects if e.id == "accel-saturation")
+    assert limit.share < d.effects[0].share

@@ -55,8 +55,11 @@ fn fraction(a: f64, b: f64, x: f64) -> f64 {
 /// Probability that an F variate of `top` and `bottom` degrees of freedom exceeds `value`.
 #[must_use]
 pub fn f_above(value: f64, top: f64, bottom: f64) -> f64 {
-    if !(value > 0.0) {
-        return if value.is_nan() { f64::NAN } else { 1.0 };
+    if value.is_nan() {
+        return f64::NAN;
+    }
+    if value <= 0.0 {
+        return 1.0;
     }
     let whole = bottom + top * value;
     beta_tails(0.5 * bottom, 0.5 * top, bottom / whole, top * value / whole).0

@@ -246,8 +246,9 @@ mod tests {
         let side = numbers(layout.n(), 1, 5.0);
         let mut whole = fixed.clone();
         whole.add_scaled(&other, 3.7);
-        let factor = whole.factor(RIDGE, None).unwrap();
-        let (log_det, explained) = eliminated(&fixed, &[(&other, 3.7)], &side).unwrap();
+        let factor = whole.factor(RIDGE, None).expect("positive definite");
+        let (log_det, explained) =
+            eliminated(&fixed, &[(&other, 3.7)], &side).expect("positive definite");
         // Rounding of some hundred operations on a matrix of moderate condition.
         assert!((log_det - factor.log_det()).abs() < 1e-9);
         assert!((explained - side.dot(&factor.solve(&side))).abs() < 1e-9 * explained);

@@ -24,7 +24,7 @@ from trihedron.diagnose.selection.prune import judged_again
 from trihedron.diagnose.selection.rivals import chosen_again
 from trihedron.diagnose.selection.score import Scored
 from trihedron.diagnose.selection.stages import held_out_stages
-from trihedron.diagnose.selection.stepwise import MAX_EFFECTS, candidates_of, scores, with_next
+from trihedron.diagnose.selection.stepwise import MAX_EFFECTS, MAX_STEPS, candidates_of, scores, set_apart, with_next
 from trihedron.diagnose.selection.verdict import accounted_for, verdict_of
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
@@ -182,13 +182,16 @@ def _is_direct(effect_id: str) -> bool:
 
 def _grown(model: StepwiseModel, scored: list[Scored], alpha: float, tell: Callable[[float], None]) -> StepwiseModel:
     """Effects added one at a time until none is demanded."""
-    for step in range(MAX_EFFECTS):
-        tell(step / MAX_EFFECTS)
+    before = len(model.accepted)
+    for step in range(MAX_STEPS):
+        tell(step / MAX_STEPS)
+        if sum(not one.effect.is_local for one in model.accepted[before:]) >= MAX_EFFECTS:
+            break
         larger = with_next(model, scored, alpha)
         if larger is None:
             break
-        model = larger
-        scored, _ = scores(model, exclude=model.refused)
+        after, _ = scores(larger, exclude=larger.refused)
+        model, scored = set_apart(larger, scored, after), after
     return model
 
 

@@ -95,7 +95,8 @@ def _by_session(
         more = solution.S_w @ np.diag(measured.attitude.var_zero) @ solution.S_w.T
         covariance[21:, 21:] += np.diag(np.maximum(np.diag(more) - np.diag(covariance[21:, 21:]), 0.0))
     # Turns that are all short by one share look like a scale: S and b = -S z grow with it.
-    lost = lost_share(measured, solution, seen, aligned.used)
+    lost, possible = lost_share(measured, solution, seen, aligned.used)
+    own_sigma = float(np.median(np.sqrt(np.diag(covariance)[[12, 16, 20]]) / np.linalg.norm(solution.S_w, axis=0)))
     along = lost * np.concatenate([solution.S_w.ravel(), solution.b_w])
     covariance[12:, 12:] += np.outer(along, along)
     used = np.where(aligned.used, 1.0, 0.0)
@@ -134,8 +135,19 @@ def _by_session(
         gravity_source=gravity_source,
         recording_source=recording.source,
         recording_sha256=recording.sha256,
-        findings=(*_poses_above_noise(quality, solution), *_findings(aligned, measured, solution)),
+        findings=(
+            *_poses_above_noise(quality, solution),
+            *_findings(aligned, measured, solution),
+            *_possible_losses(possible, own_sigma),
+        ),
     )
+
+
+def _possible_losses(lost: float, sigma_scale: float) -> tuple[Finding, ...]:
+    """Losses that could be more than all else that is known of the scale."""
+    if lost <= sigma_scale:
+        return ()
+    return (Finding.of(FindingCode.SAMPLES_LOST, "possible", lost_share=lost, sigma_scale=sigma_scale),)
 
 
 def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[Finding, ...]:

@@ -22,7 +22,7 @@ from trihedron.estimate.gyroscope import (
     stated_turns,
 )
 from trihedron.estimate.gyroscope.findings import scale_findings
-from trihedron.estimate.gyroscope.missing_samples import missing_samples
+from trihedron.estimate.gyroscope.missing_samples import missing_samples, unless_seen
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.pipeline.choices import settle_gravity
@@ -130,19 +130,19 @@ def calibrate(
             recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
         )
     calibration = in_frame(calibration, wanted)
-    about_gyro = _about_gyro(calibration, recording, segments)
-    findings = (*said, *recording.findings, *_as_they_weigh(segments), *calibration.findings, *about_gyro)
+    of_fit = _of_fit(calibration, recording, segments)
+    findings = (*said, *recording.findings, *_as_they_weigh(segments), *of_fit)
     return CalibrationResult(replace(calibration, findings=findings), segments, recording)
 
 
-def _about_gyro(calibration: Calibration, recording: Recording, segments: Segments) -> Found:
-    """A gyro's scale that its unit does not explain, and samples that its log lost."""
+def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) -> Found:
+    """Findings of the fit, a gyro's scale that its unit does not explain, and samples that its log lost."""
     gyro = calibration.gyroscope
     if gyro is None:
-        return ()
+        return calibration.findings
     relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
-    missing = missing_samples(recording, segments, float(np.median(relative)))
-    return (*scale_findings(gyro.S, recording.gyroscope_unit), *missing)
+    missing = tuple(missing_samples(recording, segments, float(np.median(relative))))
+    return (*unless_seen(calibration.findings, missing), *scale_findings(gyro.S, recording.gyroscope_unit), *missing)
 
 
 def _as_they_weigh(segments: Segments) -> Found:

@@ -27,7 +27,8 @@ class Variant:
     """One shape of an effect: the distortion per unit of each parameter, and the shape numbers it was made with.
 
     ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; each costs as a parameter does.
-    ``scale`` is what one of a linear parameter stands for in the unit that is reported.
+    ``scale`` is what one of a linear parameter stands for in the unit that is reported, ``given`` what is known of the
+    place (its gravity) and bounds what the parameters can be.
     """
 
     distortion: Distortion
@@ -37,6 +38,7 @@ class Variant:
     label: str = ""
     shape_sigma: float = 0.0
     scale: float = 1.0
+    given: dict[str, float] = field(default_factory=dict)
 
 
 class Effect(ABC):
@@ -99,6 +101,10 @@ class Effect(ABC):
     def withstands(self, context: Context) -> bool:  # noqa: ARG002
         """Whether it stands out of everything that zeros do by themselves: scatter, walk and drift together."""
         return True
+
+    def own_p_value(self, context: Context) -> float | None:  # noqa: ARG002
+        """p-value of a test of its own beside all that zeros do by themselves; ``None`` where it has none."""
+        return None
 
     def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
         """Whether the fitted parameters are ones that the mechanism can have."""

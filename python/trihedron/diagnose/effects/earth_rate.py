@@ -2,15 +2,103 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, rate_only
+from trihedron.gravity import EARTH_RATE_RAD_S, normal_gravity
 from trihedron.records.diagnosis import EffectParameter
+from trihedron.units import degrees_from_radians, radians_from_degrees
 
-EARTH_RATE_RAD_S = 7.292115e-5
-"""WGS 84."""
+STEPS = 91, 180
+"""Latitudes and azimuths over which the likelihood is taken: two degrees each."""
+N_STEPS, FINE = 10, np.pi / 90.0
+"""Gauss-Newton steps from the best of them, at most two degrees each; angles better known than four are normal."""
+MISSES = 6.63
+"""χ² of one number, the length, that one Earth in a hundred exceeds: beyond it the vector is another's."""
+NOMINAL = (9.8, 9.80665, 9.807, 9.81)
+"""Gravity that is written down without being known: it tells no latitude."""
+HEIGHTS_M, GRAVITY_SLACK = (-430.0, 5000.0), 0.005
+"""Where sensors are calibrated, and what gravity strays from normal or is rounded to, m/s²."""
+OUTSIDE = 3.0
+"""Sigmas by which a latitude may lie outside what gravity allows."""
+
+
+@dataclass(frozen=True)
+class Turning:
+    """The Earth's turning nearest to a measured vector: angles, their standard errors [rad], χ² of the difference."""
+
+    latitude: float
+    azimuth: float
+    latitude_std: float
+    azimuth_std: float
+    chi2: float
+
+
+def nearest_turning(value: FloatArray, covariance: FloatArray) -> Turning:
+    """The vector of the Earth's length nearest to ``value`` (3,) rad/s in the metric of its covariance.
+
+    The vertical part of a free vector is not told from an isotropic g-sensitivity; that the Earth turns at one rate
+    tells it from the horizontal part, but for its sign.
+    """
+    precision = np.linalg.pinv(covariance, hermitian=True)
+    latitude, azimuth = np.meshgrid(
+        np.linspace(-np.pi / 2, np.pi / 2, STEPS[0]),
+        np.linspace(-np.pi, np.pi, STEPS[1], endpoint=False),
+        indexing="ij",
+    )
+    away = _turning(latitude, azimuth) - value
+    chi2 = ((away @ precision) * away).sum(axis=-1)
+    start = np.unravel_index(int(np.argmin(chi2)), chi2.shape)
+    at = np.array([latitude[start], azimuth[start]])
+    for _ in range(N_STEPS):
+        level, turn = at
+        J = EARTH_RATE_RAD_S * np.array([
+            [-np.sin(level) * np.cos(turn), -np.cos(level) * np.sin(turn)],
+            [-np.sin(level) * np.sin(turn), np.cos(level) * np.cos(turn)],
+            [np.cos(level), 0.0],
+        ])  # fmt: skip
+        spread = np.linalg.pinv(J.T @ precision @ J, hermitian=True)
+        at = at - np.clip(spread @ J.T @ precision @ (_turning(*at) - value), -FINE, FINE)
+    last = _turning(*at) - value
+    std = np.sqrt(np.diag(spread))
+    best = float(min(last @ precision @ last, chi2.min()))
+    if std.max() < 2.0 * FINE:
+        return Turning(float(at[0]), float(at[1]), float(std[0]), float(std[1]), best)
+    # Far from a normal distribution: mean and spread of the likelihood within the hemisphere that fits better.
+    weight = np.exp(-0.5 * (chi2 - chi2.min())) * np.cos(latitude)
+    weight *= (latitude > 0.0) == (weight[latitude > 0.0].sum() >= weight[latitude < 0.0].sum())
+    weight /= weight.sum()
+    level = float((weight * latitude).sum())
+    heading = float(np.angle((weight * np.exp(1j * azimuth)).sum()))
+    turned = np.angle(np.exp(1j * (azimuth - heading)))
+    return Turning(
+        level, heading, float(np.sqrt((weight * (latitude - level) ** 2).sum())),
+        float(np.sqrt((weight * turned**2).sum())), best,
+    )  # fmt: skip
+
+
+def _turning(latitude: FloatArray, azimuth: FloatArray) -> FloatArray:
+    """(..., 3) the Earth's rate in a level frame whose x lies ``azimuth`` from north."""
+    level = np.cos(latitude)
+    unit = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(latitude)], axis=-1)
+    return np.asarray(unit * EARTH_RATE_RAD_S)
+
+
+def latitudes_of(gravity: float) -> tuple[float, float]:
+    """Least and greatest absolute latitude, rad, where gravity has this size at a height where people live."""
+    low, high = HEIGHTS_M
+    if not np.isclose(gravity, NOMINAL, rtol=0.0, atol=1e-9).any():
+        possible = [
+            degree for degree in range(91)
+            if normal_gravity(degree, high) - GRAVITY_SLACK <= gravity <= normal_gravity(degree, low) + GRAVITY_SLACK
+        ]  # fmt: skip
+        if possible:
+            return radians_from_degrees(possible[0]), radians_from_degrees(possible[-1])
+    return 0.0, 0.5 * np.pi
 
 
 class EarthRate(Effect):
@@ -32,38 +120,30 @@ class EarthRate(Effect):
         attitude = np.where(np.isfinite(attitude), attitude, 0.0)
         return [
             Variant(
-                rate_only(context.between_holds(attitude)), ("horizontal_x", "horizontal_y", "vertical"), ("rad/s",) * 3
+                rate_only(context.between_holds(attitude)), ("horizontal_x", "horizontal_y", "vertical"),
+                ("rad/s",) * 3, given={"gravity": context.fitted.twin.gravity},
             )
-        ]
+        ]  # fmt: skip
 
-    def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:
-        # The Earth turns at one rate: a vector of another length is something else that turns with the attitude.
-        size = float(np.linalg.norm(value))
-        sigma = float(np.sqrt(value @ covariance @ value)) / max(size, 1e-30)
-        return abs(size - EARTH_RATE_RAD_S) < 3.0 * sigma
+    def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:
+        # The Earth turns at one rate, and gravity tells the latitude: what turns otherwise is something else.
+        near = nearest_turning(value, covariance)
+        least, most = latitudes_of(variant.given["gravity"])
+        outside = max(least - abs(near.latitude), abs(near.latitude) - most)
+        return near.chi2 < MISSES and outside < OUTSIDE * near.latitude_std
 
     def parameters(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> tuple[EffectParameter, ...]:
-        linear = super().parameters(variant, value, covariance)
-        size = float(np.linalg.norm(value))
-        if size == 0.0:
-            return linear
-        direction = value / size
-        horizontal = max(float(np.hypot(value[0], value[1])), 1e-12)
-        d_latitude = np.array([-value[0] * value[2], -value[1] * value[2], horizontal**2]) / (size**2 * horizontal)
-        d_heading = np.array([-value[1], value[0], 0.0]) / horizontal**2
+        near = nearest_turning(value, covariance)
+        angles = (("latitude", near.latitude, near.latitude_std), ("north_azimuth", near.azimuth, near.azimuth_std))
         return (
-            EffectParameter("rate", size, float(np.sqrt(direction @ covariance @ direction)), "rad/s"),
-            EffectParameter(
-                "latitude",
-                float(np.degrees(np.arctan2(value[2], horizontal))),
-                float(np.degrees(np.sqrt(d_latitude @ covariance @ d_latitude))),
-                "deg",
-            ),
-            EffectParameter(
-                "north_azimuth",
-                float(np.degrees(np.arctan2(value[1], value[0]))),
-                float(np.degrees(np.sqrt(d_heading @ covariance @ d_heading))),
-                "deg",
-            ),
-            *linear,
+            *(EffectParameter(n, degrees_from_radians(v), degrees_from_radians(s), "deg") for n, v, s in angles),
+            *super().parameters(variant, value, covariance),
+        )
+
+    def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
+        by_name = {p.name: p for p in parameters}
+        at, heading = by_name["latitude"], by_name["north_azimuth"]
+        return (
+            f"{self.mechanism} (at its one rate that is a latitude of {abs(at.value):.0f}° ± {at.std:.1g}°; north lies "
+            f"{heading.value:.0f}° ± {heading.std:.1g}° from the first pose's x)."
         )

@@ -26,9 +26,13 @@ class GyroGSensitivity(Effect):
     def withstands(self, context: Context) -> bool:
         if any(ROOM_VECTOR in law.depends_on for law in gyro_zero_laws(context).laws):
             return False  # its vertical part alone would be taken for this
+        p = self.own_p_value(context)
+        return p is None or p < STANDS_OUT
+
+    def own_p_value(self, context: Context) -> float | None:
         found = gyro_evidence(context)
         gravity = None if found is None else found.evidence.groups.get("gravity")
-        return gravity is None or gravity.p_value < STANDS_OUT
+        return None if gravity is None else gravity.p_value
 
     def variants(self, context: Context) -> list[Variant]:
         eye = np.eye(9).reshape(9, 3, 3)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
@@ -60,3 +63,125 @@ def _share(y: FloatArray, x: FloatArray, flats: FloatArray) -> float:
 
     without = left(constant)
     return 1.0 - left(np.column_stack([constant, x.ravel()])) / without if without > 0.0 else 0.0
+
+
+N_BLOCKS = 6
+"""Stretches of a pose whose means tell a rate that dies away from one that stays."""
+SETTLES_S = (0.7, 1.4, 2.8, 5.6)
+"""Time constants with which supports give: foam and skin, not hours of a glue."""
+SIZES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 31)])
+"""Scatter and creep tried, in rms of the readings' error: a quarter of a step of the grid is 10 %."""
+LEVEL = 0.5
+"""Cosine to the vertical that parts the level axes (0) from it (1)."""
+STILL_SCATTERS = 0.01
+"""p-value of a scatter beside creep from which the scatter stands."""
+
+
+@dataclass(frozen=True)
+class Settling:
+    """Rates at rest described by creep alone, by scatter alone, by both: twice the log-likelihood over neither."""
+
+    creep: float
+    scatter: float
+    both: float
+
+    @property
+    def is_motion(self) -> bool:
+        """Whether creep describes them at least as well as scatter and leaves nothing for it to explain."""
+        beside = max(self.both - self.creep, 0.0)
+        p = 0.5 * float(chdtrc(1.0, beside)) if beside > 0.0 else 1.0
+        return self.creep > self.scatter and p > STILL_SCATTERS
+
+
+def settling(context: Context) -> Settling:
+    """Creep against scatter in the rates of the poses: w = z + s + k exp(-t/τ), tilt k τ (1 - exp(-t/τ)) (eq. 8.7d).
+
+    ``s`` and ``k`` are drawn anew in every pose, the same on all axes; the accelerometer shows what of ``k`` lies
+    across the vertical, the shape in time all of it. One zero ``z`` for the session, restricted likelihood.
+    """
+    tables = [table for tau in SETTLES_S if (table := _table(context, tau)) is not None]
+    if not tables:
+        return Settling(0.0, 0.0, 0.0)
+    scale = tables[0].unit
+    none = tables[0].log_likelihood(np.zeros(1), np.zeros(1))[0]
+    scatter = float(tables[0].log_likelihood((scale * SIZES) ** 2, np.zeros(len(SIZES))).max())
+    a, b = ((scale * g.ravel()) ** 2 for g in np.meshgrid(SIZES, SIZES, indexing="ij"))
+    creep, both = [], []
+    for table in tables:
+        values = table.log_likelihood(a, b)
+        creep.append(float(values[a == 0.0].max()))
+        both.append(float(values.max()))
+    return Settling(2.0 * (max(creep) - none), 2.0 * (scatter - none), 2.0 * (max(both) - none))
+
+
+@dataclass(frozen=True, eq=False)
+class _Table:
+    """Sums over the readings of every pose and direction (n,), noise divided out: products of the columns of scatter
+    ``a`` and creep ``b`` with one another and with the readings ``y``; ``axes`` (n, 3) the directions in the body;
+    ``unit`` the error of a pose's mean, rad/s."""
+
+    aa: FloatArray
+    ab: FloatArray
+    bb: FloatArray
+    ay: FloatArray
+    by: FloatArray
+    yy: FloatArray
+    axes: FloatArray
+    unit: float
+
+    def log_likelihood(self, scatter: FloatArray, creep: FloatArray) -> FloatArray:
+        """(m,) restricted log-likelihood of variances (m,) of scatter and creep; the zero has a flat prior."""
+        p, q = scatter[:, None], creep[:, None]
+        # (I + V G)⁻¹ V of two columns, written out.
+        det = (1.0 + p * self.aa) * (1.0 + q * self.bb) - p * q * self.ab**2
+        m00, m11, m01 = p * (1.0 + q * self.bb) / det, q * (1.0 + p * self.aa) / det, -p * q * self.ab / det
+        aa = self.aa - (m00 * self.aa**2 + 2.0 * m01 * self.aa * self.ab + m11 * self.ab**2)
+        ay = self.ay - (
+            m00 * self.aa * self.ay + m01 * (self.aa * self.by + self.ab * self.ay) + m11 * self.ab * self.by
+        )
+        yy = self.yy - (m00 * self.ay**2 + 2.0 * m01 * self.ay * self.by + m11 * self.by**2)
+        N = np.einsum("mn,ni,nj->mij", aa, self.axes, self.axes)
+        side = np.einsum("mn,ni->mi", ay, self.axes)
+        fitted = np.einsum("mi,mi->m", side, np.linalg.solve(N, side[:, :, None])[:, :, 0])
+        _, log_n = np.linalg.slogdet(N)
+        return np.asarray(-0.5 * (np.log(det).sum(axis=1) + yy.sum(axis=1) - fitted + log_n))
+
+
+def _table(context: Context, tau: float) -> _Table | None:
+    obs, twin = context.obs, context.fitted.twin
+    if obs.raw_rate is None or obs.hold_rate_sigma is None:
+        return None
+    contrasts = np.linalg.qr(np.column_stack([np.ones(N_BLOCKS), np.eye(N_BLOCKS)[:, 1:]]))[0][:, 1:].T
+    sums, axes, errors = [], [], []
+    for i, hold in enumerate(obs.segments.holds):
+        n = (hold.stop - hold.start) // N_BLOCKS
+        if n < 2:
+            continue
+        span = slice(hold.start, hold.start + n * N_BLOCKS)
+        rate = np.nanmean(obs.raw_rate[span].reshape(N_BLOCKS, n, 3), axis=1) @ twin.gyro_S.T
+        force = np.nanmean(obs.raw_force[span].reshape(N_BLOCKS, n, 3), axis=1) @ twin.accel_S.T / twin.gravity
+        up = twin.up[i]
+        # What the vertical has turned by since the mean of the pose, across it.
+        angle = np.cross(force - force.mean(axis=0), up)
+        begins = np.arange(N_BLOCKS) * n / obs.recording.rate_hz
+        ends = begins + n / obs.recording.rate_hz
+        fades = tau * (np.exp(-begins / tau) - np.exp(-ends / tau)) / (ends - begins)
+        turned = contrasts @ (tau * (1.0 - fades))
+        for axis in np.linalg.svd(up[None])[2]:
+            is_level = abs(float(axis @ up)) < LEVEL
+            own = float(np.sqrt(((axis @ twin.gyro_S) ** 2 * obs.hold_rate_sigma[i] ** 2).sum() * N_BLOCKS))
+            y, a, b = rate @ axis / own, np.ones(N_BLOCKS) / own, fades / own
+            if is_level:
+                # Turned force reads along the other level axis; its white noise is that of the quiet floor.
+                across = np.cross(axis, up) @ twin.accel_S
+                tilt = float(np.sqrt((across**2 * obs.hold_force_sigma[i] ** 2).sum() * N_BLOCKS)) / twin.gravity
+                y = np.concatenate([y, contrasts @ angle @ axis / tilt])
+                a = np.concatenate([a, np.zeros(N_BLOCKS - 1)])
+                b = np.concatenate([b, turned / tilt])
+            sums.append([a @ a, a @ b, b @ b, a @ y, b @ y, y @ y])
+            axes.append(axis)
+            errors.append(own / np.sqrt(N_BLOCKS))
+    if len(axes) < 3 * FEWEST_POSES:
+        return None
+    aa, ab, bb, ay, by, yy = np.array(sums).T
+    return _Table(aa, ab, bb, ay, by, yy, np.array(axes), float(np.median(errors)))

@@ -21,6 +21,8 @@ ROW_DOMAINS: dict[int, Domain] = {
 }
 N_DOMAINS_TESTED = 6.0
 """Four of poses and moves, two of samples: the rate of false alarms is shared by them."""
+ROWS_OF_MOVE = 5
+"""In order: gravity after it (2), velocity over it (3)."""
 LEAST_DOF = 0.5
 """Degrees of freedom below which the fit has used a domain up."""
 HEAVY, CARRIES = 9.0, 0.2
@@ -91,9 +93,15 @@ def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
     """p (0 or 1), ratio of variances: a walk as strong as the model allows stands in for something else."""
     k = 0 if label == STATIC_ACCEL else 1
     stray = hidden_zeros(fitted)[k]
-    if stray is None or not stray.is_at_edge or stray.rms < AT_EDGE * stray.noise:
+    if stray is None or not stray.is_strayed:
         return 1.0, 1.0, Where()
     return 0.0, (stray.rms / stray.noise) ** 2, Where(_CHANNELS[label])
+
+
+def strayed(fitted: Fit) -> tuple[bool, bool]:
+    """Accelerometer, gyro: whether the walk of its zero stands in for something else (eq. 8.7b)."""
+    accel, gyro = hidden_zeros(fitted)
+    return accel.is_strayed, gyro is not None and gyro.is_strayed
 
 
 @dataclass(frozen=True)
@@ -104,6 +112,11 @@ class HiddenZero:
     rms: float
     noise: float
     is_at_edge: bool
+
+    @property
+    def is_strayed(self) -> bool:
+        """Whether the walk is at the end of its range and farther than noise explains."""
+        return self.is_at_edge and self.rms >= AT_EDGE * self.noise
 
 
 def hidden_zeros(fitted: Fit) -> tuple[HiddenZero, HiddenZero | None]:
@@ -165,9 +178,8 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
         error = np.linalg.solve(line.gyro_white, r[rows].reshape(h, 3, 1))[:, :, 0]
         out[STATIC_GYRO] = float(np.sqrt(np.mean(error**2)))
     of_moves = np.flatnonzero(np.isin(system.domain, (MOVES, DYNAMICS)) & direct)
-    # Five rows a move, in order: gravity after it (2), velocity over it (3).
     if len(of_moves):
-        error = np.linalg.solve(line.move_white, r[of_moves].reshape(-1, 5, 1))[:, :, 0]
+        error = np.linalg.solve(line.move_white, r[of_moves].reshape(-1, ROWS_OF_MOVE, 1))[:, :, 0]
         angle = (error[:, :2] ** 2).sum(axis=1) / line.twin.gravity**2
         out[MOVES] = float(np.degrees(np.sqrt(np.mean(angle))))
         out[DYNAMICS] = float(np.sqrt(np.mean(error[:, 2:] ** 2)))

@@ -10,7 +10,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms, weighted_rms
+from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms, weighted_rms
 from trihedron.diagnose.selection.model import StepwiseModel, held_out
 from trihedron.diagnose.selection.score import Scored, dispersion
 from trihedron.diagnose.session.solve import (
@@ -299,6 +299,21 @@ def domain_chi2(fitted: Fit) -> dict[int, tuple[float, float]]:
 def excess(fitted: Fit) -> float:
     """Chi-square beyond its degrees of freedom, over the domains that have more than they should."""
     return sum(max(chi2 - dof, 0.0) for chi2, dof in domain_chi2(fitted).values())
+
+
+def explained(before: Fit, after: Fit) -> float:
+    """How much excess is gone, over as many rows as there were before.
+
+    Moves that an effect leaves out take their excess with them: that explains something only so far as they disagreed
+    more than those that stay.
+    """
+    left = domain_chi2(after)
+    gone = 0.0
+    for domain, (chi2, dof) in domain_chi2(before).items():
+        still, rows = left.get(domain, (0.0, 0.0))
+        rest = max(still - rows, 0.0) * (dof / rows if rows >= LEAST_DOF else 0.0)
+        gone += max(chi2 - dof, 0.0) - rest
+    return max(gone, 0.0)
 
 
 def held_out_records(before_fit: Fit, before: Prediction, after_fit: Fit, after: Prediction) -> tuple[HeldOut, ...]:

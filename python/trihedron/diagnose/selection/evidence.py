@@ -9,7 +9,7 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.selection.compare import excess, held_out_records, mends
+from trihedron.diagnose.selection.compare import explained, held_out_records, mends
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel, held_out
 from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.twin import stacked
@@ -73,7 +73,7 @@ def _with_one(model: StepwiseModel, effect: DirectEffect, evidence: Evidence) ->
             model.fitted, model.prediction, fitted, after.prediction, evidence.touched
         ):
             return model.refusing(effect.id)
-        gain = max(gain, excess(model.fitted) - excess(fitted))
+        gain = max(gain, explained(model.fitted, fitted))
         if evidence.restate is not None:
             evidence = replace(evidence, parameters=evidence.restate(after.context))
     held = evidence.held_out or held_out_records(model.fitted, model.prediction, after.fitted, after.prediction)

@@ -8,13 +8,14 @@ from trihedron.diagnose.selection.compare import (
     Comparison,
     cost_of,
     domain_chi2,
-    excess,
+    explained,
     held_out_records,
     mends,
     own_domains,
 )
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel, with_only
-from trihedron.diagnose.selection.stepwise import MIN_DELTA_BIC
+from trihedron.diagnose.selection.stepwise import is_demanded
+from trihedron.diagnose.session.twin import DYNAMICS, STATIC_ACCEL, STATIC_GYRO, Distortion
 
 LEAST_SHARE = 0.5
 """Of the misfit in the domain that it helps most an effect must remove this share, all else being in the model: what
@@ -51,7 +52,7 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
     held = held_out_records(without.fitted, without.prediction, model.fitted, model.prediction)
     if one.reobserves:
         assert one.evidence is not None
-        gain = max(excess(without.fitted) - excess(model.fitted), 0.0)
+        gain = explained(without.fitted, model.fitted)
         stands = getattr(one.effect, "is_proof", False) or mends(
             without.fitted, without.prediction, model.fitted, model.prediction, one.evidence.touched
         )
@@ -63,10 +64,10 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
         cost_of(model.fitted, one.rank, len(one.variant.shape)), first, model.prediction,
     )  # fmt: skip
     bic = against.bic_gain
-    gain = max(excess(without.fitted) - excess(model.fitted), 0.0)
+    gain = explained(without.fitted, model.fitted)
     now = replace(one, delta_bic=bic, gain=gain, held_out=held)
     stands = (
-        bic > MIN_DELTA_BIC
+        is_demanded(against, one.effect, without.context)
         and against.predicts
         and against.falls
         and against.has_size
@@ -84,12 +85,25 @@ def explains(against: Comparison) -> bool:
     before, after = domain_chi2(against.base), domain_chi2(against.fitted)
     own = own_domains(against.variant.distortion)
     most = max(before[d][0] - after[d][0] for d in own)
-    return any(_explained(before[d], after[d]) for d in own if before[d][0] - after[d][0] >= COMPARABLE * most)
+    agrees = {DYNAMICS: AGREES * _other_sensor(against.variant.distortion, after)}
+    return any(
+        _explained(before[d], after[d], agrees.get(d, AGREES)) for d in own
+        if before[d][0] - after[d][0] >= COMPARABLE * most
+    )  # fmt: skip
 
 
-def _explained(before: tuple[float, float], after: tuple[float, float]) -> bool:
+def _other_sensor(distortion: Distortion, after: dict[int, tuple[float, float]]) -> float:
+    """χ² per degree of freedom, at least 1, of the other sensor's poses: velocity needs both sensors."""
+    other = STATIC_GYRO if distortion.rate is None else STATIC_ACCEL
+    if distortion.force is not None and distortion.rate is not None:
+        return 1.0
+    chi2, dof = after.get(other, (0.0, 1.0))
+    return max(chi2 / max(dof, 1.0), 1.0)
+
+
+def _explained(before: tuple[float, float], after: tuple[float, float], agrees: float) -> bool:
     """Whether a domain's excess of chi-square (chi-square, degrees of freedom) is gone by the share asked for."""
     (chi2, dof), (left, left_dof) = before, after
-    if chi2 <= AGREES * dof or left <= AGREES * left_dof:
+    if chi2 <= AGREES * dof or left <= agrees * left_dof:
         return True
     return 1.0 - (left - left_dof) / (chi2 - dof) > LEAST_SHARE

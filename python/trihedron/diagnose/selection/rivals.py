@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from trihedron.diagnose.context import Context
 from trihedron.diagnose.selection.compare import Comparison, cost_of
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel, with_only
 from trihedron.diagnose.selection.prune import explains
-from trihedron.diagnose.selection.stepwise import CONFOUNDED_DELTA_BIC, MIN_DELTA_BIC, gives_way
+from trihedron.diagnose.selection.stepwise import CONFOUNDED_DELTA_BIC, gives_way, is_demanded
 
 MOST_ALTERNATIVES = 2
 """Alternatives tried for each effect: those that explained most when it was chosen."""
@@ -48,7 +49,7 @@ def _best_in_place(model: StepwiseModel, k: int) -> StepwiseModel:
         ahead = there.bic_gain_at(rest) - best[1].bic_gain_at(rest)
         held, its = best[0].accepted[k].effect.id, other.effect.id
         needed = CONFOUNDED_DELTA_BIC * (gives_way(its, held) - gives_way(held, its))
-        if ahead > needed and _is_sound(there, other):
+        if ahead > needed and _is_sound(there, other, without.context):
             if ahead < CONFOUNDED_DELTA_BIC:
                 rivals.append(held)
             best = swapped, there
@@ -85,9 +86,9 @@ def _against(without: StepwiseModel, model: StepwiseModel, one: Accepted, first:
     )  # fmt: skip
 
 
-def _is_sound(against: Comparison, other: Alternative) -> bool:
+def _is_sound(against: Comparison, other: Alternative, context: Context) -> bool:
     return (
-        against.bic_gain > MIN_DELTA_BIC
+        is_demanded(against, other.effect, context)
         and against.predicts
         and against.falls
         and against.has_size

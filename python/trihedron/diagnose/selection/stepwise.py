@@ -11,17 +11,26 @@ from scipy.special import chdtrc
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.selection.compare import Refit, refined, refit
+from trihedron.diagnose.effects.contract import Effect
+from trihedron.diagnose.residuals.goodness_of_fit import strayed
+from trihedron.diagnose.selection.compare import Comparison, Refit, refined, refit
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel
 from trihedron.diagnose.selection.score import Scored, score_all
+from trihedron.diagnose.session.solve import CORNER_GRID_S, fit
+from trihedron.diagnose.session.twin import stacked
 from trihedron.records.diagnosis import Candidate
 
 MAX_EFFECTS = 4
-"""Effects accepted at most: a recording of one session does not carry evidence for more."""
+"""Mechanisms accepted at most: a recording of one session does not carry evidence for more. Pushed poses are none."""
+MAX_STEPS = 8
 MIN_DELTA_BIC = 10.0
 """Kass and Raftery's bound for very strong evidence."""
+OWN_TEST = 1e-4
+"""Largest p-value of an effect's own test that stands for evidence: forty effects of the catalogue share 0.4 %."""
 CONFOUNDED_DELTA_BIC = 6.0
 """Below a difference of 6 (strong evidence) two explanations are named together."""
+LEFT_OVER = 0.5
+"""Share of its merit from which a rival explains something of its own."""
 N_REFITS = 4
 """Candidates fitted jointly at each step: the leaders of the score test."""
 FAR_AHEAD = 4.0
@@ -30,8 +39,34 @@ FAR_AHEAD = 4.0
 
 def scores(model: StepwiseModel, exclude: Collection[str] = ()) -> tuple[list[Scored], list[tuple[str, str]]]:
     """Score tests of the effects that the model does not hold yet, best first, and what does not apply."""
-    taken = {one.effect.id for one in model.accepted if not one.effect.repeatable}
-    return score_all(model.context, taken | set(exclude))
+    taken = {one.effect.id for one in model.accepted if not one.effect.repeatable} | set(exclude)
+    scored, missing = score_all(model.context, taken)
+    plain = _without_walk(model)
+    if plain is not None:
+        # A walk at the end of its range takes up whatever is there, and no score test sees through it. Which of the two
+        # it is their joint fits decide, with the walk as strong as it likes on either side.
+        seen, _ = score_all(plain, taken)
+        best = {(one.effect.id, one.variant.label, tuple(one.variant.shape.values())): one for one in scored}
+        for one in seen:
+            key = one.effect.id, one.variant.label, tuple(one.variant.shape.values())
+            if key not in best or one.merit > best[key].merit:
+                best[key] = one
+        scored = sorted(best.values(), key=lambda one: -one.merit)
+    return scored, missing
+
+
+def _without_walk(model: StepwiseModel) -> Context | None:
+    """The session with a walk no stronger than the quietest of parts, where the fit ran it to the end of its range."""
+    accel, gyro = strayed(model.fitted)
+    if not (accel or gyro):
+        return None
+    twin = model.fitted.twin
+    quiet = replace(
+        twin,
+        accel_corner_s=CORNER_GRID_S[-1] if accel else twin.accel_corner_s,
+        gyro_corner_s=CORNER_GRID_S[-1] if gyro else twin.gyro_corner_s,
+    )
+    return Context(model.obs, fit(model.obs, quiet, stacked(model.distortions), model.prior))
 
 
 def candidates_of(
@@ -49,7 +84,8 @@ def candidates_of(
 def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> StepwiseModel | None:
     """The model with the effect that explains most of what is left; ``None`` where none is demanded."""
     n_effects = len(catalogue())
-    leaders = [s for s in scored[:N_REFITS] if s.p_value * n_effects < alpha / 2.0]
+    first = list(dict.fromkeys(s.effect.id for s in scored))[:N_REFITS]
+    leaders = [s for s in scored if s.effect.id in first and s.p_value * n_effects < alpha / 2.0]
     context = model.context
     refits: list[Refit] = []
     sound: list[Refit] = []
@@ -57,7 +93,7 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
         if any(r.scored.merit > FAR_AHEAD * s.merit for r in sound):
             break
         refits.append(refit(model, s))
-        if is_sound(refits[-1]) and s.effect.withstands(context):
+        if is_sound(refits[-1], context) and s.effect.withstands(context):
             sound.append(refits[-1])
     if not sound:
         return None
@@ -67,7 +103,8 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     best = _logged_first(best, sound, rest)
     # What another mechanism explains as well: by its joint fit, or, for all of its shapes, by the score test.
     enough = best.against.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
-    close = [r.scored.effect.id for r in refits if r is not best and r.against.bic_gain_at(rest) > enough]
+    others = [r for r in refits if r.scored.effect is not best.scored.effect]
+    close = [r.scored.effect.id for r in others if r.against.bic_gain_at(rest) > enough]
     close += [
         s.effect.id
         for s in scored
@@ -75,8 +112,8 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     ]
     alternatives = tuple(
         Alternative(r.scored.effect, r.against.variant, r.scored.rank)
-        for r in sorted(refits, key=lambda r: -r.against.bic_gain_at(rest))
-        if r is not best and r.against.bic_gain > MIN_DELTA_BIC
+        for r in sorted(others, key=lambda r: -r.against.bic_gain_at(rest))
+        if r.against.bic_gain > MIN_DELTA_BIC
     )
     best = refined(model, best)
     one = Accepted(
@@ -90,6 +127,25 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
         prediction=best.against.prediction,
         accepted=(*model.accepted, one),
     )
+
+
+def set_apart(model: StepwiseModel, before: list[Scored], after: list[Scored]) -> StepwiseModel:
+    """The model whose last effect keeps those rivals only that have little left to explain beside it.
+
+    What gains as much beside it as it did without it explains something else, and does not stand in its place either.
+    """
+    one = model.accepted[-1]
+    was, still = ({s.effect.id: max(s.merits, default=s.merit) for s in scored} for scored in (before, after))
+
+    def is_rival(effect_id: str) -> bool:
+        return still.get(effect_id, -np.inf) < LEFT_OVER * was.get(effect_id, np.inf)
+
+    kept = replace(
+        one,
+        rivals=tuple(i for i in one.rivals if is_rival(i)),
+        alternatives=tuple(a for a in one.alternatives if is_rival(a.effect.id)),
+    )
+    return replace(model, accepted=(*model.accepted[:-1], kept))
 
 
 def _logged_first(best: Refit, sound: list[Refit], rest: FloatArray) -> Refit:
@@ -108,11 +164,25 @@ def gives_way(one: str, other: str) -> bool:
     return kind == "hidden-drift" and other.startswith(f"{sensor}-thermal")
 
 
-def is_sound(one: Refit) -> bool:
+def is_demanded(against: Comparison, effect: Effect, context: Context) -> bool:
+    """Whether the data ask for an effect: by ΔBIC, or, where a walk at the end of its range stands for whatever is
+    there, or scatter does, by the effect's own test beside scatter, walk and drift (eq. Z.7), paid for by the search.
+
+    Schwarz's log n counts the walk's rows as data; that test counts poses.
+    """
+    if against.bic_gain > MIN_DELTA_BIC:
+        return True
+    if context.obs.zero_scatter is None and not any(strayed(context.fitted)):
+        return False
+    p = effect.own_p_value(context)
+    return p is not None and p < OWN_TEST
+
+
+def is_sound(one: Refit, context: Context) -> bool:
     """The rules of acceptance: evidence, prediction, a fall in physical units, a size, a possible one."""
     a = one.against
     return (
-        a.bic_gain > MIN_DELTA_BIC
+        is_demanded(a, one.scored.effect, context)
         and a.predicts
         and a.falls
         and a.has_size

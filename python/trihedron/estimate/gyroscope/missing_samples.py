@@ -94,6 +94,12 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     ]
 
 
+def unless_seen(of_fit: tuple[Finding, ...], seen: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """Findings of a fit; losses that were seen leave none to be guessed."""
+    is_seen = any(finding.code is FindingCode.SAMPLES_LOST for finding in seen)
+    return tuple(one for one in of_fit if not (is_seen and one.code is FindingCode.SAMPLES_LOST))
+
+
 def _positive(sigma: FloatArray) -> FloatArray:
     """Noise (3,) without zeros: a channel whose codes hide its noise weighs as the noisiest other one."""
     sigma = np.asarray(sigma, dtype=np.float64)

@@ -12,7 +12,10 @@ from trihedron.arrays import BoolArray, FloatArray
 UNDITHERED = 0.5
 """Noise below this part of a step does not dither it: the mean of a rounded reading is off by up to half a step,
 however long it is taken."""
-SOFT_START = 1.0 / (math.sqrt(2.0) - 1.0)
+SETTLING = (0.50, 0.68), (2.5, 1.25)
+"""Of a body that settles as exp(-t/τ), then of one that starts as t² does: time for the second step beside its zero's
+in that for the first, and the samples over which what it still turns, rms over where in its step the zero may lie, is
+a step's uniform error, for each sample that the first step took."""
 CHATTER = 9
 """Readings whose median is free of toggling between neighbouring codes."""
 LEAST_WHITE = 1e-2
@@ -59,16 +62,16 @@ def _of_runs(codes: FloatArray, quantum: float, rest: float) -> FloatArray:
     away = np.abs(steady - rest)
     # Between the two nearest codes a zero may toggle.
     is_rest, is_next = away < 0.75 * quantum, away < 1.75 * quantum
-    at_rest = _stretches(is_rest)
+    at_rest, beyond = _stretches(is_rest), _stretches(away < 2.75 * quantum)
     for first, last in _stretches(is_next):
         inside = [(b - a, a, b) for a, b in at_rest if first <= a and b <= last]
         if not inside:
             continue
         n, begin, end = max(inside)
-        # A rate that grows as t² crosses the first step in at most 1/(√2 − 1) of the time it takes for the next, and
-        # whether the move before and the one after go the same way says nothing.
-        left = math.ceil(SOFT_START * (begin - first)) if first > 0 else 0
-        right = math.ceil(SOFT_START * (last - end)) if last < len(codes) else 0
+        # Whether the move before and the one after go the same way says nothing.
+        outer = next(one for one in beyond if one[0] <= first and last <= one[1])
+        left = _hidden(begin - first, first - outer[0]) if first > 0 else 0
+        right = _hidden(last - end, outer[1] - last) if last < len(codes) else 0
         if n <= min(left, right):
             continue  # passed on the way, or turned back in
         part = np.zeros(n)
@@ -77,6 +80,12 @@ def _of_runs(codes: FloatArray, quantum: float, rest: float) -> FloatArray:
             part[-right:] = np.maximum(part[-right:], min(right, n))
         out[begin:end] = part
     return out * quantum**2 / 12.0
+
+
+def _hidden(first_step: int, second_step: int) -> int:
+    """Samples charged next to the step of the zero, by how long the two steps beside it took."""
+    ratio = second_step / max(first_step, 1)
+    return math.ceil(first_step * float(np.interp(ratio, *SETTLING)))
 
 
 def _stretches(mask: BoolArray) -> list[tuple[int, int]]:

@@ -18,14 +18,27 @@ MANY = 0.3
 one. Below, what was left out was left out rightly."""
 
 
-def lost_share(measured: MoveMeasurements, solution: SessionSolution, seen: Carried, used: BoolArray) -> float:
+EVEN = 1e-4
+"""Scatter of the stamps, in steps, from which on they are a clock's: a loss would show in them."""
+
+
+def lost_share(
+    measured: MoveMeasurements, solution: SessionSolution, seen: Carried, used: BoolArray
+) -> tuple[float, float]:
     """Part of the samples that could be missing though the stamps are even; 0 where the moves miss by their noise.
 
     A lost sample takes ``ω h`` from its turn. Samples lost at random with share ``p`` take ``p ∫ω dt`` in the mean,
     which nothing tells from a scale, and scatter by the variance ``p h ∫ω² dt``, which the moves show: ``p`` follows
     from how far gravity after the moves misses beyond its noise (docs/model-session.md, 11.17). That the excess has
     another cause is the commoner case; the error bars must carry that it has this one.
+
+    Returns
+    -------
+    float, float
+        The share that the error bars carry, and the one with every move that was left out.
     """
+    if solution.inflation[0] <= 1.0 or measured.sigma_time_s > EVEN * measured.nominal_step_s:
+        return 0.0, 0.0
     speed2 = np.sum(((measured.rate - measured.zero_mean) @ solution.S_w.T) ** 2, axis=1)
     step_s = measured.nominal_step_s
     # ∫ω² dt times the step: the variance of a move's angle if one sample was lost in all, times the samples.
@@ -42,7 +55,8 @@ def lost_share(measured: MoveMeasurements, solution: SessionSolution, seen: Carr
         return max(excess, 0.0) / total * (1.0 + np.sqrt(4.0 / max(n, 4.0))) if total > 0.0 else 0.0
 
     is_used, is_known = np.asarray(used, dtype=bool), ~measured.is_lost
-    among_used = share(is_used, solution.moves_dof) if solution.inflation[0] > 1.0 else 0.0
+    among_used = share(is_used, solution.moves_dof)
     n_out = int(np.count_nonzero(is_known & ~is_used))
     each = among_used * float(np.mean(length)) + float(np.log(measured.n_moves / max(measured.n_moves - n_out, 1)))
-    return share(is_known, solution.moves_dof + 2.0 * n_out) if each > MANY else among_used
+    among_all = max(share(is_known, solution.moves_dof + 2.0 * n_out), among_used)
+    return (among_all if each > MANY else among_used), among_all
