@@ -260,7 +260,7 @@ def apply_file(
     if not used:
         raise ValueError(f"{log.source}: the calibration holds none of its sensors.")
     shape = (log.n_samples, 1 + 3 * len(used))
-    part, note = Path(f"{target}.part"), Path(f"{target}.part.json")
+    part, note, next_note = (Path(f"{target}{ending}") for ending in (".part", ".part.json", ".part.json.new"))
     made_of = _made_of(log, calibration_text(known), shape)
     done = _rows_done(part, note, made_of)
     if done == 0:
@@ -275,12 +275,15 @@ def apply_file(
             stream.write(np.hstack(columns).tobytes())
             stream.flush()
             written += rows.stop - start
-            note.write_text(json.dumps({"made_of": made_of, "rows": rows.stop}))
+            # In one step: a run that is killed here leaves the note before.
+            next_note.write_text(json.dumps({"made_of": made_of, "rows": rows.stop}))
+            next_note.replace(note)
             if progress is not None:
                 progress(rows.stop / log.n_samples, f"{rows.stop} of {log.n_samples} rows")
         os.fsync(stream.fileno())
     part.replace(target)
     note.unlink(missing_ok=True)
+    next_note.unlink(missing_ok=True)
     return written
 
 
