@@ -63,6 +63,18 @@ def test_a_zero_that_jumps_in_a_few_poses_is_found_and_a_pose_that_turns_is_not(
     assert min(jumps_in_poses(Poses(moved, turning)).p_value) > JUMPS
 
 
+@pytest.mark.parametrize("n_poses", [0, 1, 11])
+def test_poses_too_short_or_too_few_have_no_jumps(n_poses):
+    rng = np.random.default_rng(52)
+    poses = Poses(white(rng), white(rng))
+    # What is left of the other poses has fewer readings than a step needs blocks.
+    holds = [h if k < n_poses else replace(h, stop=h.start + 20) for k, h in enumerate(poses.segments.holds)]
+    poses.segments.holds = tuple(holds)
+    found = jumps_in_poses(poses)
+    assert found.p_value == (1.0, 1.0)
+    assert [len(h) for h in found.holds] == [0, 0]
+
+
 def test_flicker_and_supports_that_creep_are_no_jumps():
     called = 0
     for seed in range(30):

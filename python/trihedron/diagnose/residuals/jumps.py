@@ -68,10 +68,10 @@ def jumps_in_poses(obs: Observations) -> Jumps:
     still = np.array([not hold.is_unsteady for hold in obs.segments.holds])
     still &= np.array([hold.stop - hold.start >= LEAST_SAMPLES for hold in obs.segments.holds])
     which = np.flatnonzero(still)
-    sides = [None if raw is None else _block_means(obs, raw, which) for raw in (obs.raw_force, obs.raw_rate)]
     p, ratio, holds = [1.0, 1.0], [1.0, 1.0], [np.zeros(0, dtype=np.intp)] * 2
     if len(which) < FEWEST_POSES:
         return Jumps((p[0], p[1]), (ratio[0], ratio[1]), (holds[0], holds[1]))
+    sides = [None if raw is None else _block_means(obs, raw, which) for raw in (obs.raw_force, obs.raw_rate)]
     steps = [None if side is None else _steps(side) for side in sides]
     for k, own in enumerate(steps):
         if own is None:
