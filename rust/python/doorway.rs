@@ -26,7 +26,7 @@ pub(crate) fn run<T: Send>(
     kernel: impl FnOnce() -> KernelResult<T> + Send,
 ) -> PyResult<T> {
     let before = interrupt::requests();
-    let out = py.detach(|| guarded(kernel));
+    let out = py.detach(|| guarded(kernel, Threads::Shared));
     finish(out, before)
 }
 
@@ -39,7 +39,7 @@ pub(crate) fn run_long<T: Send>(
     std::thread::scope(|scope| {
         let (done, mut waiting) = channel::<()>();
         let worker = std::thread::Builder::new().spawn_scoped(scope, move || {
-            let out = guarded(kernel);
+            let out = guarded(kernel, Threads::Own);
             // Nobody waits any more when this fails, which cannot happen before the thread is joined.
             let _ = done.send(());
             out
@@ -77,9 +77,18 @@ enum Failure {
     Panic,
 }
 
-fn guarded<T: Send>(kernel: impl FnOnce() -> KernelResult<T> + Send) -> Guarded<T> {
+/// Whose threads a kernel works on where rayon has only one.
+#[derive(Clone, Copy, PartialEq)]
+enum Threads {
+    /// Those of all callers: a short kernel is done before another thread has begun.
+    Shared,
+    /// One that no other caller has.
+    Own,
+}
+
+fn guarded<T: Send>(kernel: impl FnOnce() -> KernelResult<T> + Send, on: Threads) -> Guarded<T> {
     // The kernel owns what it works on, so that nothing half-changed outlives a panic.
-    match catch_unwind(AssertUnwindSafe(|| with_threads(kernel))) {
+    match catch_unwind(AssertUnwindSafe(|| with_threads(kernel, on))) {
         Ok(out) => out.map_err(Failure::Threads),
         Err(payload) => {
             forget(payload);
@@ -129,9 +138,12 @@ struct Child {
 }
 
 /// Run on threads of this process: those of its parent did not come along when it was forked.
-fn with_threads<T: Send>(kernel: impl FnOnce() -> T + Send) -> Result<T, String> {
+fn with_threads<T: Send>(kernel: impl FnOnce() -> T + Send, on: Threads) -> Result<T, String> {
     let here = std::process::id();
     match HOME.load(Ordering::Acquire) {
+        home if home == here && on == Threads::Own && rayon::current_num_threads() == 1 => {
+            on_one_thread(kernel)
+        }
         home if home == here => Ok(kernel()),
         0 => {
             // Made now, where a system without threads can be reported; rayon would panic at its first use.
@@ -146,6 +158,27 @@ fn with_threads<T: Send>(kernel: impl FnOnce() -> T + Send) -> Result<T, String>
         }
         _ => Ok(pool_of_child(here)?.install(kernel)),
     }
+}
+
+/// Pools of one thread that nobody uses now.
+static IDLE: Mutex<Vec<ThreadPool>> = Mutex::new(Vec::new());
+
+/// Run on a thread that no other caller has: of two callers that shared the only one, the second would wait for the
+/// first. A forked child never comes here, so the lock may be held when a process is forked.
+fn on_one_thread<T: Send>(kernel: impl FnOnce() -> T + Send) -> Result<T, String> {
+    let idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner).pop();
+    let pool = match idle {
+        Some(pool) => pool,
+        None => ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .map_err(|error| error.to_string())?,
+    };
+    let out = pool.install(kernel);
+    IDLE.lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .push(pool);
+    Ok(out)
 }
 
 fn pool_of_child(here: u32) -> Result<&'static ThreadPool, String> {
