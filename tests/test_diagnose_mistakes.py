@@ -179,12 +179,17 @@ def test_the_noise_stage_falls_to_what_the_recordings_own_halves_differ_by():
     fit = model(1.0, 1.0)
     stages = (Stage("as-given", ()), Stage("numbers", (StageDomain("moves", 0.1, 1.0, "deg"),)), Stage("effects", ()))
     segments = Segments(holds=holds, **still(8))
-    out = with_noise_stage(stages, sampled(loud, holds, fit), quiet, segments, fit)
+    given = sampled(loud, holds, fit)
+    differs = NoiseDifference("gyroscope", "x", "N", 2e-4, 1e-4, 2.0, (1.9, 2.1), "rad/s/√Hz", 1e-9, True)
+    out = with_noise_stage(stages, given, quiet, segments, fit, [differs])
     assert [s.stage for s in out] == ["as-given", "numbers", "noise", "effects"]
     misfit = {s.stage: next(d.rms for d in s.domains if d.domain == "noise") for s in out}
     # Half of the figures are off by 6 dB: 4.3 rms; octaves of four holds are known to 1 dB.
     assert 3.5 < misfit["as-given"] == misfit["numbers"] < 5.5
     assert misfit["noise"] == misfit["effects"] < 1.5
+    # What is not said to differ is not replaced.
+    kept = with_noise_stage(stages, given, quiet, segments, fit, [replace(differs, significant=False)])
+    assert len({d.rms for s in kept for d in s.domains if d.domain == "noise"}) == 1
 
 
 def test_stamps_that_reading_made_even_still_count_as_scattered():

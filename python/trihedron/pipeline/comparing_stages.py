@@ -8,21 +8,29 @@ from collections.abc import Sequence
 from trihedron.diagnose.against import FittedModel
 from trihedron.pipeline.comparing_noise import Sampled, Sensor, sampled
 from trihedron.records import Recording, Segments
-from trihedron.records.diagnosis import Stage, StageDomain
+from trihedron.records.diagnosis import NoiseDifference, Stage, StageDomain
 from trihedron.records.hold_noise import HoldNoise
 
 DECIBEL = 20.0 / math.log(10.0)
 FEWEST_HOLDS = 4
 """Two holds for either half."""
+NOISE_IN_HOLDS = frozenset({"N", "B", "Q", "octave", "bandwidth", "resolution", "line"})
+"""Terms of the comparison that change what the octaves of a still pose show."""
 
 
 def with_noise_stage(
-    stages: Sequence[Stage], model: Sampled, recording: Recording, segments: Segments, fit: FittedModel
+    stages: Sequence[Stage],
+    model: Sampled,
+    recording: Recording,
+    segments: Segments,
+    fit: FittedModel,
+    compared: Sequence[NoiseDifference],
 ) -> tuple[Stage, ...]:
     """The stages with the misfit of the noise in each, and the stage ``noise`` after ``numbers``.
 
     Every second hold is predicted: by the given model until its noise is replaced, from then on by the recording's
-    other holds. The misfit is the rms over sensors, axes and octaves of 20 log10 of the ratio of densities [dB].
+    other holds. A model whose noise differs nowhere in ``compared`` keeps it: half the holds know it less well. The
+    misfit is the rms over sensors, axes and octaves of 20 log10 of the ratio of densities [dB].
     """
     if segments.n_holds < FEWEST_HOLDS:
         return tuple(stages)
@@ -30,6 +38,8 @@ def with_noise_stage(
     given, own = _misfit(model, seen), _misfit(taught, seen)
     if given is None or own is None:
         return tuple(stages)
+    if not any(one.significant and one.term in NOISE_IN_HOLDS for one in compared):
+        own = given
     out: list[Stage] = []
     for stage in stages:
         misfit = given if stage.stage in ("as-given", "numbers") else own

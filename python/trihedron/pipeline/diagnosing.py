@@ -159,7 +159,7 @@ def _of_poses(
         fit = model_of_diagnosis(found)
         found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
         if simulated is not None:
-            stages = with_noise_stage(found.stages, simulated.sampled, recording_used, segments_used, fit)
+            stages = with_noise_stage(found.stages, simulated.sampled, recording_used, segments_used, fit, noise)
             found = replace(found, stages=stages)
         updated, used = used, given
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
