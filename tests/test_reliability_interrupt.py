@@ -22,12 +22,12 @@ LOADED = 4.0
 
 @pytest.fixture(scope="module")
 def long_log(tmp_path_factory):
-    """Two million rows: every command on it takes seconds."""
+    """Three million rows: every command on it takes seconds."""
     import polars
 
     path = tmp_path_factory.mktemp("long") / "long.csv"
     rng = np.random.default_rng(1)
-    n = 1_000_000
+    n = 3_000_000
     columns = {"t": np.arange(n) / 1000.0}
     columns |= {name: np.round(rng.normal(0, 0.01, n) + 9.8 * (name == "az"), 4) for name in ("ax", "ay", "az")}
     columns |= {name: np.round(rng.normal(0, 0.01, n), 4) for name in ("gx", "gy", "gz")}
