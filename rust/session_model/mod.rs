@@ -7,6 +7,8 @@
 
 mod blocks;
 pub mod chain;
+mod elimination;
+mod ends;
 mod evidence;
 pub mod factor;
 pub mod fit;
