@@ -28,9 +28,9 @@ class ChunkedLog:
     columns: tuple[int, ...]
     on_disk: RowsOnDisk | None = None
 
-    def chunks(self, rows: int = ROWS) -> Iterator[npt.NDArray[np.float64]]:
-        """Arrays (k, columns) in order, in the type of the file."""
-        for start in range(0, self.n_rows, rows):
+    def chunks(self, rows: int = ROWS, first: int = 0) -> Iterator[npt.NDArray[np.float64]]:
+        """Arrays (k, columns) in order from row ``first`` on, in the type of the file."""
+        for start in range(first, self.n_rows, rows):
             yield self._part(start, min(start + rows, self.n_rows))
 
     def rows(self, start: int, stop: int) -> npt.NDArray[np.float64]:
