@@ -17,8 +17,9 @@ Stream = Annotated[
     bool,
     typer.Option(
         "--stream",
-        help="A .npy or Parquet log larger than memory, in pieces and without audit: --columns, --rate and the units "
-        "say what it holds. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit takes.",
+        help="A .npy, Parquet or CSV log larger than memory, in pieces and without audit: --columns, --rate and the "
+        "units say what it holds. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit "
+        "takes.",
     ),
 ]
 
@@ -56,13 +57,15 @@ def opened(source: LogSource) -> LogOnDisk:
         raise typer.BadParameter("--stream needs LOG, --columns (as in ax,ay,az,gx,gy,gz) and --rate")
     from trihedron.pipeline.streaming import log_on_disk
 
-    return log_on_disk(
-        source.log,
-        columns=source.columns,
-        rate_hz=source.rate,
-        accelerometer_unit=source.accel_unit,
-        gyroscope_unit=source.gyro_unit,
-    )
+    # A text is made a table first, which takes its time.
+    with progress("opening"):
+        return log_on_disk(
+            source.log,
+            columns=source.columns,
+            rate_hz=source.rate,
+            accelerometer_unit=source.accel_unit,
+            gyroscope_unit=source.gyro_unit,
+        )
 
 
 def segment_stream(

@@ -85,7 +85,7 @@ def noise_of_file(
     automatic: bool = True,
     checkpoint: str | os.PathLike[str] | None = None,
 ) -> Noise:
-    """Noise of a .npy or Parquet log of any size in bounded memory; what its columns are is said, not judged.
+    """Noise of a .npy, Parquet or text log of any size in bounded memory; what its columns are is said, not judged.
 
     Up to half a gigabyte the log is read whole; beyond, it is read in one pass (:func:`stream_noise`), which leaves
     nothing out. With ``checkpoint`` that file keeps every half a minute how far the pass is; a run that was stopped

@@ -102,7 +102,7 @@ def log_on_disk(
     accelerometer_unit: str | AccelerationUnit | None = None,
     gyroscope_unit: str | RateUnit | None = None,
 ) -> LogOnDisk:
-    """A .npy or Parquet log whose columns, rate and units are said, not judged.
+    """A .npy, Parquet or text log whose columns, rate and units are said, not judged.
 
     Raises
     ------
