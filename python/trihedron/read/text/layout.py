@@ -11,7 +11,9 @@ MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _NUMBER_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _NUMBERS, _NUMBERS_COMMA = (
-    re.compile(rf"(?:[+-]?(?:(?:\d+{mark}?\d*|{mark}\d+)(?:[eE][+-]?\d+)?|nan|inf|infinity)(?:\n|\Z))+\Z", re.IGNORECASE)
+    re.compile(
+        rf"(?:[+-]?(?:(?:\d+{mark}?\d*|{mark}\d+)(?:[eE][+-]?\d+)?|nan|inf|infinity)(?:\n|\Z))+\Z", re.IGNORECASE
+    )
     for mark in (r"\.", ",")
 )
 """The same of all fields of a line, ends of lines between."""
