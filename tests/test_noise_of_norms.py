@@ -1,4 +1,4 @@
-"""Slow noise of an accelerometer from the lengths of gravity in poses: intervals hold, and two sessions are compared."""
+"""Slow noise of an accelerometer from the lengths of gravity in poses: intervals hold, two sessions are compared."""
 
 import numpy as np
 import pytest
