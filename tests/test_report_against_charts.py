@@ -26,8 +26,10 @@ def test_the_allan_deviation_of_white_octaves_is_that_of_white_noise():
 
 
 def octave(sensor, axis, low, model, recording):
-    unit = f"rad/s/sqrt(Hz), {low:g} to {2 * low:g} Hz"
-    return NoiseDifference(sensor, axis, "octave", model, recording, model / recording, None, unit, 0.5, False, "")
+    unit, band = "rad/s/sqrt(Hz)", (low, 2 * low)
+    return NoiseDifference(
+        sensor, axis, "octave", model, recording, model / recording, None, unit, 0.5, False, "", band
+    )
 
 
 def test_both_sides_stand_in_one_panel_per_axis_and_what_is_not_known_is_not_drawn():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -32,7 +31,6 @@ WORDS = {
 FEWEST_OCTAVES = 2
 PER_OCTAVE = 24
 """Frequencies at which an octave is integrated: sin⁴ has two periods in the highest at the shortest averaging time."""
-BAND = re.compile(r"([\d.]+) to ([\d.]+) Hz")
 SENSORS = ("accelerometer", "gyroscope")
 Spectrum = tuple[FloatArray, FloatArray, FloatArray]
 """Edges (m, 2) [Hz], density of the model and of the recording (m,), printed unit/√Hz."""
@@ -144,11 +142,9 @@ def _spectra(compared: Sequence[NoiseDifference]) -> dict[tuple[str, str], Spect
     """Octaves of both sides by sensor and axis, lowest first."""
     rows: dict[tuple[str, str], list[tuple[float, float, float, float]]] = {}
     for n in compared:
-        band = BAND.search(n.unit) if n.term == "octave" else None
-        if band is not None and n.model and n.recording and n.sensor in SENSORS:
+        if n.band_hz is not None and n.model and n.recording and n.sensor in SENSORS:
             factor = PRINTED["m/s^2" if n.sensor == "accelerometer" else "rad/s"][0]
-            low, high = (float(edge) for edge in band.groups())
-            rows.setdefault((n.sensor, n.axis), []).append((low, high, factor * n.model, factor * n.recording))
+            rows.setdefault((n.sensor, n.axis), []).append((*n.band_hz, factor * n.model, factor * n.recording))
     out = {}
     for key, found in rows.items():
         if len(found) >= FEWEST_OCTAVES:
