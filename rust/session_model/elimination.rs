@@ -8,31 +8,8 @@ use nalgebra::DMatrix;
 
 use super::chain::{Chain, Layout, lengths};
 use super::fit::RIDGE;
-use crate::simd::{Instructions, fma, for_each_instruction_set};
-
-const LANES: usize = 8;
-type Lane = [f64; LANES];
-
-/// Rows of numbers, each filled up to whole lanes.
-struct Rows {
-    data: Vec<Lane>,
-    /// Lanes of a row.
-    n: usize,
-}
-
-impl Rows {
-    fn zeros(rows: usize, columns: usize) -> Self {
-        let n = columns.div_ceil(LANES);
-        Self {
-            data: vec![[0.0; LANES]; rows * n],
-            n,
-        }
-    }
-
-    fn at(&mut self, row: usize, column: usize) -> &mut f64 {
-        &mut self.data[row * self.n + column / LANES][column % LANES]
-    }
-}
+use super::lanes::{Rows, cholesky, forward, take_product};
+use crate::simd::{Instructions, for_each_instruction_set};
 
 /// What the elimination of one pose needs and leaves.
 struct Pass {
@@ -191,14 +168,14 @@ fn advance_body<const FUSED: bool>(pass: &mut Pass, has_before: bool) -> bool {
             &mut pass.coupling,
             pose,
         );
-        add_product::<FUSED>(
+        take_product::<FUSED>(
             &mut pass.block,
             pose,
             &pass.coupling,
             &pass.coupling.data,
             pass.coupling.n,
         );
-        add_product::<FUSED>(
+        take_product::<FUSED>(
             &mut pass.edge,
             pose,
             &pass.coupling,
@@ -211,7 +188,7 @@ fn advance_body<const FUSED: bool>(pass: &mut Pass, has_before: bool) -> bool {
     };
     pass.half_log_det += log_det;
     forward::<FUSED>(&pass.block, &pass.inverse, &mut pass.edge, pose);
-    add_product::<FUSED>(
+    take_product::<FUSED>(
         &mut pass.schur,
         pass.width,
         &pass.edge,
@@ -235,93 +212,6 @@ fn close_body<const FUSED: bool>(pass: &mut Pass) -> Option<f64> {
         explained += pass.schur.at(r, border).powi(2);
     }
     Some(explained)
-}
-
-/// `out += factor row`.
-#[inline(always)]
-#[expect(
-    clippy::inline_always,
-    reason = "it takes the instructions of its caller"
-)]
-fn add_row<const FUSED: bool>(out: &mut [Lane], factor: f64, row: &[Lane]) {
-    for (o, v) in out.iter_mut().zip(row) {
-        for k in 0..LANES {
-            o[k] = fma::<FUSED>(factor, v[k], o[k]);
-        }
-    }
-}
-
-/// `out -= aᵀ b`, the first `columns` of `a`; what is zero in `a` costs nothing.
-#[inline(always)]
-#[expect(
-    clippy::inline_always,
-    reason = "it takes the instructions of its caller"
-)]
-fn add_product<const FUSED: bool>(out: &mut Rows, columns: usize, a: &Rows, b: &[Lane], n: usize) {
-    for (row, values) in a.data.chunks_exact(a.n).zip(b.chunks_exact(n)) {
-        for (c, own) in out.data.chunks_exact_mut(n).take(columns).enumerate() {
-            let value = row[c / LANES][c % LANES];
-            if value != 0.0 {
-                add_row::<FUSED>(own, -value, values);
-            }
-        }
-    }
-}
-
-/// `U` with `UᵀU` the first `n` rows and columns, of which the upper triangle counts, and `½ ln det`; rows may be longer.
-#[inline(always)]
-#[expect(
-    clippy::inline_always,
-    reason = "it takes the instructions of its caller"
-)]
-fn cholesky<const FUSED: bool>(block: &mut Rows, inverse: &mut [f64], n: usize) -> Option<f64> {
-    let lanes = block.n;
-    let mut log_det = 0.0;
-    for j in 0..n {
-        let (upto, after) = block.data.split_at_mut((j + 1) * lanes);
-        let row = &mut upto[j * lanes..];
-        let pivot = row[j / LANES][j % LANES];
-        if !(pivot > 0.0 && pivot.is_finite()) {
-            return None;
-        }
-        let length = pivot.sqrt();
-        log_det += length.ln();
-        inverse[j] = length.recip();
-        for lane in row.iter_mut() {
-            for value in lane {
-                *value *= inverse[j];
-            }
-        }
-        for (k, own) in after.chunks_exact_mut(lanes).take(n - 1 - j).enumerate() {
-            let i = j + 1 + k;
-            let value = row[i / LANES][i % LANES];
-            add_row::<FUSED>(own, -value, row);
-        }
-    }
-    Some(log_det)
-}
-
-/// `U⁻ᵀ rows`.
-#[inline(always)]
-#[expect(
-    clippy::inline_always,
-    reason = "it takes the instructions of its caller"
-)]
-fn forward<const FUSED: bool>(half: &Rows, inverse: &[f64], rows: &mut Rows, n: usize) {
-    let lanes = rows.n;
-    for i in 0..n {
-        let (before, from) = rows.data.split_at_mut(i * lanes);
-        let own = &mut from[..lanes];
-        for (j, other) in before.chunks_exact(lanes).enumerate() {
-            let value = half.data[j * half.n + i / LANES][i % LANES];
-            add_row::<FUSED>(own, -value, other);
-        }
-        for lane in own {
-            for value in lane {
-                *value *= inverse[i];
-            }
-        }
-    }
 }
 
 #[cfg(test)]

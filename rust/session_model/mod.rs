@@ -13,6 +13,7 @@ mod evidence;
 pub mod factor;
 pub mod fit;
 pub mod held_out;
+mod lanes;
 pub mod move_rows;
 pub mod moves;
 mod possible;
