@@ -2,6 +2,7 @@
 
 python benches/read_large.py [ROWS]           stamps rounded to a millisecond
 python benches/read_large.py [ROWS] late      a quarter of the stamps late by up to two steps, one row in 10 000 lost
+python benches/read_large.py [ROWS] swapped   neighbours swapped here and there, so that all rows are put in order
 """
 
 import resource
@@ -17,7 +18,7 @@ import polars as pl
 from trihedron.read import read_recording
 
 
-def write_log(path: Path, n: int, *, late: bool = False) -> None:
+def write_log(path: Path, n: int, *, late: bool = False, swapped: bool = False) -> None:
     """A still log of ``n`` rows, written in parts so that writing takes no more memory than reading."""
     rng = np.random.default_rng(1)
     part, last_s = 1_000_000, 0.0
@@ -37,6 +38,11 @@ def write_log(path: Path, n: int, *, late: bool = False) -> None:
             frame = pl.DataFrame(columns)
             if late:
                 frame = frame.filter(rng.random(rows) > 1e-4)
+            if swapped:
+                order = np.arange(len(frame))
+                left = 2 * rng.choice(len(frame) // 2 - 1, len(frame) // 1000, replace=False)
+                order[left], order[left + 1] = left + 1, left
+                frame = frame[order]
             frame.write_csv(stream, include_header=start == 0)
 
 
@@ -52,7 +58,7 @@ def main() -> None:
     n = int(float(sys.argv[1])) if len(sys.argv) > 1 else 10_000_000
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "long.csv"
-        write_log(path, n, late="late" in sys.argv[2:])
+        write_log(path, n, late="late" in sys.argv[2:], swapped="swapped" in sys.argv[2:])
         print(f"{path.stat().st_size / 1e9:.2f} GB of text")
         subprocess.run([sys.executable, __file__, "child", str(path)], check=True)
 

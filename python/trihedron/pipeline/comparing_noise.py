@@ -268,8 +268,8 @@ def _octaves(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float
         yield NoiseDifference(
             sensor, axis, "octave", math.sqrt(twin.density.value), math.sqrt(octave.density.value),
             math.sqrt(ratio.value), (math.sqrt(ratio.lower), math.sqrt(ratio.upper)),
-            f"{'m/s^2' if sensor == 'accelerometer' else 'rad/s'}/sqrt(Hz), {band}", ratio.p_value,
-            bool(is_far and is_off), remark if is_far and is_off else "",
+            f"{'m/s^2' if sensor == 'accelerometer' else 'rad/s'}/sqrt(Hz)", ratio.p_value,
+            bool(is_far and is_off), remark if is_far and is_off else "", (octave.low_hz, octave.high_hz),
         )  # fmt: skip
 
 

@@ -88,6 +88,7 @@ class NoiseDifference(Plain):
     ``ratio`` is model over recording with its 95 % ``interval``; ``axis`` is empty for what all axes share; ``remark``
     says in words what the number resembles (a density scaled by the rate twice). ``term`` ``unit`` is a reading written
     in another unit than it says, ``frame`` one along other axes (gravity's sign, rates of the world).
+    ``band_hz`` is where an octave begins and ends.
     """
 
     sensor: Literal["accelerometer", "gyroscope", "both"]
@@ -101,6 +102,7 @@ class NoiseDifference(Plain):
     p_value: float | None
     significant: bool
     remark: str = ""
+    band_hz: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

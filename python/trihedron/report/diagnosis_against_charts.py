@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -12,6 +11,7 @@ from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.report.chart import AXIS_COLOURS, Chart, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
+from trihedron.report.drawing import later
 from trihedron.report.numbers import plain_number
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
@@ -31,7 +31,6 @@ WORDS = {
 FEWEST_OCTAVES = 2
 PER_OCTAVE = 24
 """Frequencies at which an octave is integrated: sin⁴ has two periods in the highest at the shortest averaging time."""
-BAND = re.compile(r"([\d.]+) to ([\d.]+) Hz")
 SENSORS = ("accelerometer", "gyroscope")
 Spectrum = tuple[FloatArray, FloatArray, FloatArray]
 """Edges (m, 2) [Hz], density of the model and of the recording (m,), printed unit/√Hz."""
@@ -42,7 +41,7 @@ def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if len(diagnosis.stages) < len(STAGES) - 1:
         return ()
     caption = "What is left of the held-out part, stage by stage: as given, with its own numbers, noise, effects."
-    return (Picture("stages", caption, None, partial(stages_chart, diagnosis)),)
+    return (_picture("stages", caption, partial(stages_chart, diagnosis)),)
 
 
 def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -53,9 +52,13 @@ def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     first = "Noise inside still poses, model (dashed) and recording, octave by octave."
     second = "Allan deviation of that noise, model (dashed) and recording: what the octaves above make of it."
     return (
-        Picture("spectra-both", first, None, partial(spectra_chart, diagnosis)),
-        Picture("allan-both", second, None, partial(allan_chart, diagnosis)),
+        _picture("spectra-both", first, partial(spectra_chart, diagnosis)),
+        _picture("allan-both", second, partial(allan_chart, diagnosis)),
     )
+
+
+def _picture(name: str, caption: str, chart: Callable[[], Chart]) -> Picture:
+    return Picture(name, caption, later("chart_figures", "draw_chart", chart), chart)
 
 
 def stages_chart(diagnosis: Diagnosis) -> Chart:
@@ -139,11 +142,9 @@ def _spectra(compared: Sequence[NoiseDifference]) -> dict[tuple[str, str], Spect
     """Octaves of both sides by sensor and axis, lowest first."""
     rows: dict[tuple[str, str], list[tuple[float, float, float, float]]] = {}
     for n in compared:
-        band = BAND.search(n.unit) if n.term == "octave" else None
-        if band is not None and n.model and n.recording and n.sensor in SENSORS:
+        if n.band_hz is not None and n.model and n.recording and n.sensor in SENSORS:
             factor = PRINTED["m/s^2" if n.sensor == "accelerometer" else "rad/s"][0]
-            low, high = (float(edge) for edge in band.groups())
-            rows.setdefault((n.sensor, n.axis), []).append((low, high, factor * n.model, factor * n.recording))
+            rows.setdefault((n.sensor, n.axis), []).append((*n.band_hz, factor * n.model, factor * n.recording))
     out = {}
     for key, found in rows.items():
         if len(found) >= FEWEST_OCTAVES:

@@ -98,7 +98,7 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             _plain(n.model),
             _plain(n.recording),
             _ratio(n),
-            unit_in_print(n.unit.partition(", ")[0]).replace("sqrt(Hz)", "√Hz"),
+            unit_in_print(n.unit).replace("sqrt(Hz)", "√Hz"),
             "differs" if n.significant else "",
         )
         for n in diagnosis.noise_compared
@@ -112,7 +112,7 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 def _term(n: NoiseDifference) -> str:
     """The term, or the band of an octave."""
-    return n.unit.partition(", ")[2] if n.term == "octave" else n.term
+    return f"{n.band_hz[0]:g} to {n.band_hz[1]:g} Hz" if n.band_hz else n.term
 
 
 def stages_blocks(diagnosis: Diagnosis, size: dict[str, str]) -> tuple[Block, ...]:

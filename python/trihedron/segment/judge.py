@@ -6,10 +6,11 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import BoolArray
+from trihedron.ranges import ranges_of
 from trihedron.records import Finding, FindingCode, Hold, Recording
 from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise
-from trihedron.segment.runs import MIN_HOLD_S, Run, ranges_of
+from trihedron.segment.runs import MIN_HOLD_S, Run
 
 CREEP_CHANCE = 1e-3
 """Chance that some steady hold of a log is called creeping though none is."""

@@ -9,9 +9,8 @@ import numpy as np
 
 from trihedron import _core, probability
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.ranges import Range
 from trihedron.segment.channels import Channels
-
-Range = tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.ranges import ranges_of
 from trihedron.records import Finding, Hold, Move, Recording, Segments
 from trihedron.records.progress import Progress
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
@@ -22,7 +23,6 @@ from trihedron.segment.runs import (
     find_unsteady,
     join_quiet,
     loose_blocks,
-    ranges_of,
     trim_edges,
     widen,
 )

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.ranges import ranges_of
 from trihedron.records import Hold, Move, Recording, Segments
 
 RESTING = 1e-3
@@ -85,11 +86,10 @@ def _drifting(recording: Recording, segments: Segments, block_s: float = 60.0) -
                 continue
             steps = np.diff(values[move.start : move.start + n * block].reshape(n, block, 3), axis=1)
             quiet &= (np.nanvar(steps, axis=1) < 2.0 * 2.0 * sigma**2).all(axis=1)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], quiet.astype(np.int8), [0]]))).reshape(-1, 2)
-        for first, last in edges:
+        for first, last in ranges_of(quiet):
             start, stop = move.start + (first + 1) * block, move.start + (last - 1) * block
             if stop - start >= 0.5 * LONG_S * recording.rate_hz:
-                out.append((int(start), int(stop)))
+                out.append((start, stop))
     return out
 
 
@@ -153,7 +153,7 @@ MAX_TURNING = 0.05
 
 
 def _shaken(
-    recording: Recording, segments: Segments, block_s: float = 0.25, shortest_s: float = 1.5
+    recording: Recording, segments: Segments, block_s: float = 0.1, shortest_s: float = 0.8
 ) -> list[tuple[int, int]]:
     """Stretches of moves whose block means stand still while the samples shake."""
     if recording.gyroscope is None or recording.accelerometer is None or segments.gyroscope_mean is None:
@@ -187,9 +187,8 @@ def _shaken(
         # A hand that swings back and forth is no pose: what only shakes turns slowly beside the session's moves.
         turning = (np.nanstd(gyro, axis=1) > MAX_TURNING * fastest).any(axis=1)
         good = still & calm & shaking & ~turning
-        edges = np.flatnonzero(np.diff(np.r_[0, good.astype(np.int8), 0])).reshape(-1, 2)
-        for first, last in edges:
+        for first, last in ranges_of(good):
             start, stop = a + first * block + block, a + last * block - block
             if stop - start >= shortest_s * recording.rate_hz:
-                out.append((int(start), int(stop)))
+                out.append((start, stop))
     return out

@@ -8,9 +8,10 @@ import numpy as np
 
 from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.ranges import Range, ranges_of
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels
 from trihedron.segment.floor import Activity
-from trihedron.segment.noise import MeanNoise, Range
+from trihedron.segment.noise import MeanNoise
 
 MIN_HOLD_S = 1.0
 """A hand that hesitates stops for a few tenths of a second; a person who holds, holds a second."""
@@ -55,13 +56,6 @@ class Run:
         """The stretches between bumps."""
         edges = [self.first, *(k for bump in self.bumps for k in bump), self.last]
         return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
-
-
-def ranges_of(mask: BoolArray) -> list[Range]:
-    """Runs of true values as ``[first, last)``."""
-    padded = np.concatenate([[False], mask, [False]])
-    flips = np.flatnonzero(padded[1:] != padded[:-1])
-    return [(int(a), int(b)) for a, b in zip(flips[::2], flips[1::2], strict=True)]
 
 
 def loose_blocks(activity: Activity, is_valid: BoolArray) -> BoolArray:

@@ -8,8 +8,8 @@ import numpy as np
 
 from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.ranges import Range
 from trihedron.segment.channels import Channels
-from trihedron.segment.noise import Range
 
 HALVES_S = (0.5, 1.0, 2.0)
 """Half lengths of the windows compared: a turn's trace grows with time as its noise falls, and a hold may be this

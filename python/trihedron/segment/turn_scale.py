@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.ranges import Range
 from trihedron.records import Recording
 from trihedron.segment.channels import Channels
-from trihedron.segment.noise import Range
 from trihedron.units import rate_to_si
 
 LEAST_TURN_RAD = 0.3

@@ -6,8 +6,9 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.ranges import ranges_of
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
-from trihedron.segment.runs import CREEP_PART, MIN_HOLD_S, SAME_POSE, SWAY_RAD, ranges_of, speed_of_moves
+from trihedron.segment.runs import CREEP_PART, MIN_HOLD_S, SAME_POSE, SWAY_RAD, speed_of_moves
 
 TURN_SIGMAS = 6.0
 """A quiet gyro that reads further than this from the common zero, in robust standard deviations, is turning."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.ranges import edges_of, ranges_of
 
 LONGEST_BRIDGE_S = 0.15
 """A hand turns smoothly over this long; a peak cut for longer may have had any shape."""
@@ -69,8 +70,8 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray) -> Clipped | None
         return None
     readings, variance = gyroscope.copy(), np.zeros(gyroscope.shape)
     for axis in range(3):
-        for first, last in _runs(is_clipped[:, axis]):
-            _bridge(time_s, readings[:, axis], variance[:, axis], first, last)
+        for first, stop in ranges_of(is_clipped[:, axis]):
+            _bridge(time_s, readings[:, axis], variance[:, axis], first, stop - 1)
     return Clipped(is_clipped, readings, variance)
 
 
@@ -87,8 +88,8 @@ def _is_cut(column: FloatArray, at: BoolArray, quantum: float, is_known: bool) -
     finite = column[np.isfinite(column)]
     noise = 1.4826 * float(np.median(np.abs(np.diff(finite)))) / np.sqrt(2.0)
     pairs = 0
-    for first, last in _runs(at):
-        count = last - first + 1
+    for first, stop in ranges_of(at):
+        last, count = stop - 1, stop - first
         if count < 2:
             continue
         bend = TOP * 8.0 / ((count - 1) ** 2 - (1 - count % 2)) if count > 2 else PAIR_BEND
@@ -131,13 +132,8 @@ def clipped_time(clipped: Clipped | None, edges: IntArray, step_s: float) -> Flo
     return np.array([step_s * float(np.count_nonzero(any_axis[a:b])) for a, b in edges])
 
 
-def _runs(mask: BoolArray) -> list[tuple[int, int]]:
-    change = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [(int(a), int(b) - 1) for a, b in zip(change[::2], change[1::2], strict=True)]
-
-
 def _longest(mask: BoolArray) -> int:
-    return max((last - first + 1 for first, last in _runs(mask)), default=0)
+    return int(np.diff(edges_of(mask), axis=1).max(initial=0))
 
 
 def _bridge(time_s: FloatArray, column: FloatArray, variance: FloatArray, first: int, last: int) -> None:

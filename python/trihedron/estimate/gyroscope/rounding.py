@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.ranges import ranges_of
 
 UNDITHERED = 0.5
 """Noise below this part of a step does not dither it: the mean of a rounded reading is off by up to half a step,
@@ -62,8 +63,8 @@ def _of_runs(codes: FloatArray, quantum: float, rest: float) -> FloatArray:
     away = np.abs(steady - rest)
     # Between the two nearest codes a zero may toggle.
     is_rest, is_next = away < 0.75 * quantum, away < 1.75 * quantum
-    at_rest, beyond = _stretches(is_rest), _stretches(away < 2.75 * quantum)
-    for first, last in _stretches(is_next):
+    at_rest, beyond = ranges_of(is_rest), ranges_of(away < 2.75 * quantum)
+    for first, last in ranges_of(is_next):
         inside = [(b - a, a, b) for a, b in at_rest if first <= a and b <= last]
         if not inside:
             continue
@@ -86,11 +87,6 @@ def _hidden(first_step: int, second_step: int) -> int:
     """Samples charged next to the step of the zero, by how long the two steps beside it took."""
     ratio = second_step / max(first_step, 1)
     return math.ceil(first_step * float(np.interp(ratio, *SETTLING)))
-
-
-def _stretches(mask: BoolArray) -> list[tuple[int, int]]:
-    change = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in zip(change[::2], change[1::2], strict=True)]
 
 
 def density_without_rounding(density: FloatArray, quantum: FloatArray, step_s: float, axes: BoolArray) -> FloatArray:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.isotonic import never_falling
+from trihedron.ranges import edges_of, ranges_of
 
 MOST_BRIDGED = 0.02
 """Share of missing readings up to which their place is bridged by a line: 2 % of white noise, given back."""
@@ -41,8 +42,7 @@ def scattered_loss(x: FloatArray) -> float:
     if np.isfinite(np.sum(x)):
         return 0.0
     missing = ~np.isfinite(x)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
-    rows = edges[1::2] - edges[::2]
+    rows = np.diff(edges_of(missing), axis=1)
     in_gaps = int(rows[rows > LONGEST_SCATTERED].sum())
     return float((missing.sum() - in_gaps) / max(len(x) - in_gaps, 1))
 
@@ -62,8 +62,7 @@ def bridged(x: FloatArray) -> FloatArray:
     gone = ~np.isfinite(x)
     if not gone.any() or gone.all():
         return x
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], gone, [False]]).astype(np.int8)))
-    start, stop = edges[::2], edges[1::2]
+    start, stop = edges_of(gone).T
     short = stop - start <= LONGEST_SCATTERED
     place = np.zeros(len(x) + 1, dtype=np.int64)
     place[start[short]] += 1
@@ -90,9 +89,8 @@ def block_means(x: FloatArray, block: int) -> list[Run]:
     usual = float(np.median(count[count > 0])) if np.any(count > 0) else float(block)
     hole = 2 * count < usual
     means[hole] = np.nan
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], hole, [True]]).astype(np.int8)))
     joined: list[tuple[int, int]] = []
-    for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for a, b in ranges_of(~hole):
         if joined and a - joined[-1][1] <= max(3, n // 64) and hole[joined[0][0] : b].mean() < 0.05:
             joined[-1] = (joined[-1][0], b)
         else:
@@ -134,8 +132,7 @@ def filled(parts: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _longest(missing: npt.NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(np.int8)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+    return int(np.diff(edges_of(missing), axis=1).max(initial=0))
 
 
 def true_share(x: FloatArray, clusters: npt.NDArray[np.int64], variance: FloatArray, order: int = 2) -> FloatArray:

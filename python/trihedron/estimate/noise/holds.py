@@ -20,6 +20,7 @@ from trihedron.estimate.noise.corner import filter_corner
 from trihedron.estimate.noise.hold_statistics import as_measured, pooled_logarithm, robust_holds
 from trihedron.estimate.noise.resolution import converter_step
 from trihedron.estimate.noise.spectrum import cosine_transform
+from trihedron.ranges import ranges_of
 from trihedron.records.hold_noise import HoldLine, HoldNoise, Measured, OctaveNoise
 
 SHORTEST = 32
@@ -121,8 +122,7 @@ def _axis(x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name:
 
 
 def _unbroken(part: FloatArray) -> list[FloatArray]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], np.isfinite(part), [False]]).astype(np.int8)))
-    return [part[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= SHORTEST]
+    return [part[a:b] for a, b in ranges_of(np.isfinite(part)) if b - a >= SHORTEST]
 
 
 def _root(power: Measured, factor: float) -> Measured:

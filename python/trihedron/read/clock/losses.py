@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.ranges import ranges_of
 from trihedron.read.clock.period import PAUSE_STEPS
 
 LOST = 0.6
@@ -163,10 +164,8 @@ def _settle(first: FloatArray, count: IntArray) -> None:
         far = np.abs(change) > LOST
         if not far.any():
             return
-        starts = np.flatnonzero(np.diff(np.concatenate([[False], far, [False]]).astype(np.int8)) == 1)
-        stops = np.flatnonzero(np.diff(np.concatenate([[False], far, [False]]).astype(np.int8)) == -1)
         moved = False
-        for a, b in zip(starts, stops, strict=True):
+        for a, b in ranges_of(far):
             by = int(np.rint(change[a:b][np.argmax(np.abs(change[a:b]))]))
             at = a + int(np.argmax(np.diff(level)[a:b] if by > 0 else count[a:b]))
             by = max(by, -int(count[at]))
