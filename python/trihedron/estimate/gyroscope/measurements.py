@@ -155,7 +155,7 @@ def measure_moves(
     moves = _moves_of(recording, segments)
     edges, links = _edges_and_links(moves)
     reading, zero = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
-    var_zero = _mean_variance(segments.gyroscope_sigma_mean, segments.gyroscope_sigma, gyroscope)
+    var_zero = _mean_variance(segments.gyroscope_sigma_mean)
     force = reading @ accelerometer.S.T + accelerometer.b
     quantum, undithered = _undithered(gyroscope, segments.gyroscope_sigma)
     attitude = attitude_dependence(zero, var_zero, force) if is_attitude_removed is not False else None
@@ -172,13 +172,17 @@ def measure_moves(
         recording.time_s, rate, edges, np.ascontiguousarray(segments.time_mid_s[links]), links, rate_degree, extra
     )
 
-    var_reading = _mean_variance(segments.accelerometer_sigma_mean, segments.accelerometer_sigma, raw_force)
+    var_reading = _mean_variance(segments.accelerometer_sigma_mean)
     zero_read, var_zero_read = zero, var_zero
     walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_zero[links[:, 1]] + var_zero[links[:, 0]])
     weights, mean, var_mean, excess, _ = pool_zeros(zero, var_zero)
     zero, var_zero = shrink(zero, var_zero, mean)
     if np.any(undithered):
         zero, var_zero = _with_hidden_zero(zero, var_zero, segments, quantum, undithered)
+        # What is hidden in it is the offset that the moves are asked for: counted twice, it makes bars too wide.
+        weights = np.ascontiguousarray(np.where(undithered, 1.0 / len(zero), weights))
+        mean = np.where(undithered, zero.mean(axis=0), mean)
+        var_mean = np.where(undithered, var_zero.mean(axis=0) / len(zero), var_mean)
     density = density_without_rounding(
         rate_noise_density(recording, segments), quantum, 1.0 / recording.rate_hz, undithered
     )
@@ -312,16 +316,11 @@ def _required(readings: FloatArray | None, name: str) -> FloatArray:
     return readings
 
 
-def _mean_variance(sigma_mean: FloatArray | None, sigma: FloatArray | None, readings: FloatArray) -> FloatArray:
-    """Variance of the hold means, (n, 3), with the converter's share where its noise cannot be averaged away."""
+def _mean_variance(sigma_mean: FloatArray | None) -> FloatArray:
+    """Variance of the hold means, (n, 3); what rounding leaves in them is in it (docs/segmentation.md)."""
     if sigma_mean is None:
         raise ValueError("the segments do not say how certain their hold means are")
-    variance = np.asarray(sigma_mean, dtype=np.float64) ** 2
-    if sigma is not None:
-        lsb = resolution_of(readings)
-        # Below half a step of noise the converter's error no longer averages out: it stays uniform within one step.
-        variance = variance + np.where(np.asarray(sigma) < 0.5 * lsb, lsb**2 / 12.0, 0.0)
-    return np.ascontiguousarray(variance)
+    return np.ascontiguousarray(np.asarray(sigma_mean, dtype=np.float64) ** 2)
 
 
 def _without_rounding(sigma: FloatArray, quantum: FloatArray) -> FloatArray:
