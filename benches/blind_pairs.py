@@ -270,6 +270,11 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
         elif group == "gravity":
             must.add(group)
     side = {"missing": "recording", "surplus": "model"}.get(answer["kind"], "")
+    if pair.by_file:
+        # A linear calibration holds no effect: of the recording's it knows none, of its log's it has taken up what it
+        # could in its numbers.
+        side = "recording" if answer["kind"] in ("missing", "both") else ""
+        may |= set(GROUPS) if answer["kind"] == "surplus" else set()
     false = [g for g in said_groups if g in GROUPS and g not in may and not (g == "accel-scale" and "gravity" in may)]
     false += [
         f"{where}:{e}" for where, e, c in effects
@@ -285,7 +290,9 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
         # The faint line of the nuisances stands in an octave of the recording's gyro, and nowhere in the simulation's.
         false += [n for n in noise if not (pair.nuisances and n == "gyroscope octave")]
     expected = "consistent"
-    if must or answer["kind"] in ("noise", "resolution"):
+    if must or (answer["kind"] in ("noise", "resolution") and not pair.by_file):
+        expected = "parameters-differ"
+    if pair.by_file and answer["kind"] == "surplus" and said_groups:
         expected = "parameters-differ"
     if side:
         expected = "missing-physics"
