@@ -9,7 +9,7 @@ from trihedron.pipeline.comparing_correlation import correlation_times
 from trihedron.pipeline.comparing_noise import compare_noise, sampled
 from trihedron.records import Hold, Recording
 
-RATE_HZ, HOLD, EVERY, N_HOLDS = 100.0, 520, 560, 14
+RATE_HZ, HOLD, EVERY, N_HOLDS = 100.0, 900, 1000, 12
 HOLDS = tuple(Hold(k, EVERY * k, EVERY * k + HOLD, EVERY * k, EVERY * k + HOLD) for k in range(N_HOLDS))
 STEP = 1e-4
 SENSORS = {"accelerometer": 1e-2, "gyroscope": 1e-3}
@@ -42,8 +42,16 @@ def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_
     return sampled(made, HOLDS, numbers())
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _without_corners():
+    """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_holds.py has them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("trihedron.estimate.noise.holds.filter_corner", lambda *_: (None, RATE_HZ))
+        yield
+
+
 @pytest.fixture(scope="module")
-def real():
+def real(_without_corners):
     return log(1)
 
 
