@@ -25,9 +25,7 @@ def ours():
 
     nothing = dict.fromkeys(("quantisation", "flicker", "ramp", "gauss_markov", "gauss_markov_rate"), 0.0)
     of_converter = {"resolution": 0.0, "dither": 0.0, "ramp_frequency": 0.0, "ramp_damping": 0.0}
-    model = _core.AxisKalmanModel(
-        white=WHITE, walk=WALK, flicker_rates=[], averages=False, **nothing, **of_converter
-    )
+    model = _core.AxisKalmanModel(white=WHITE, walk=WALK, flicker_rates=[], averages=False, **nothing, **of_converter)
     start = _core.KalmanStart(np.zeros(4), np.full(4, PRIOR_SIGMA), np.zeros(4))
 
     def call(read, force):

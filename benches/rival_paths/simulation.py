@@ -21,11 +21,11 @@ def ours():
     from trihedron import _core
 
     keys = [[10 * axis + term for term in range(4)] for axis in range(3)]
-    return lambda signal, t: _core.simulate_noise(len(t), STEP_S, [[0.0, N, B, K, 0.0]] * 3, keys)
+    return lambda _signal, t: _core.simulate_noise(len(t), STEP_S, [[0.0, N, B, K, 0.0]] * 3, keys)
 
 
 def numpy_noise(flicker):
-    def call(signal, t):
+    def call(_signal, t):
         n, rng = len(t), np.random.default_rng(0)
         white = N / np.sqrt(STEP_S) * rng.standard_normal((n, 3))
         walk = K * np.sqrt(STEP_S) * np.cumsum(rng.standard_normal((n, 3)), axis=0)
@@ -56,20 +56,20 @@ def numba_noise():
     push = B * np.sqrt(1.0 - keep**2)
 
     @numba.njit(fastmath=True)
-    def run(n):
+    def run(n, rng):
         out = np.empty((n, 3))
         for axis in range(3):
             walk, states = 0.0, np.zeros(len(keep))
             for k in range(n):
                 total = 0.0
                 for s in range(len(keep)):
-                    states[s] = keep[s] * states[s] + push[s] * np.random.normal()
+                    states[s] = keep[s] * states[s] + push[s] * rng.standard_normal()
                     total += states[s]
-                walk += K * np.sqrt(STEP_S) * np.random.normal()
-                out[k, axis] = N / np.sqrt(STEP_S) * np.random.normal() + walk + total
+                walk += K * np.sqrt(STEP_S) * rng.standard_normal()
+                out[k, axis] = N / np.sqrt(STEP_S) * rng.standard_normal() + walk + total
         return out
 
-    return lambda signal, t: run(len(t))
+    return lambda _signal, t: run(len(t), np.random.default_rng(0))
 
 
 numba_noise.__name__ = "numba_chain"
@@ -84,7 +84,7 @@ NOISE = {
 def ours_response():
     from trihedron import _core
 
-    return lambda signal, t: _core.simulate_second_order(signal, STEP_S, [RESONANCE_HZ] * 3, [QUALITY] * 3)
+    return lambda signal, _t: _core.simulate_second_order(signal, STEP_S, [RESONANCE_HZ] * 3, [QUALITY] * 3)
 
 
 ours_response.__name__ = "ours"
@@ -99,7 +99,7 @@ def recursion():
     return np.ravel(b), a
 
 
-def scipy_response(signal, t):
+def scipy_response(signal, _t):
     from scipy.signal import lfilter, lfilter_zi
 
     b, a = recursion()
@@ -126,7 +126,7 @@ def numba_response():
 
     b, a = recursion()
     zi = lfilter_zi(b, a)
-    return lambda signal, t: run(signal, b, a, zi)
+    return lambda signal, _t: run(signal, b, a, zi)
 
 
 numba_response.__name__ = "numba_chain"
@@ -150,7 +150,7 @@ def plan(t):
 def ours_motion():
     made = {}
 
-    def call(signal, t):
+    def call(_signal, t):
         if len(t) not in made:
             made[len(t)] = plan(t)
         return made[len(t)].evaluate(np.minimum(t, made[len(t)].duration_s), 9.81)
