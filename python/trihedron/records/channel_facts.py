@@ -33,6 +33,12 @@ class RecordingFacts(Frozen):
     accelerometer: ChannelFacts | None
     gyroscope: ChannelFacts | None
 
+    @property
+    def steps(self) -> FloatArray:
+        """(3,) or (6,) steps of all channels that there are, the accelerometer's first."""
+        out: FloatArray = np.concatenate([one.step for one in (self.accelerometer, self.gyroscope) if one is not None])
+        return out
+
     def of(self, sensor: str) -> ChannelFacts:
         """The facts of one sensor.
 

@@ -112,8 +112,7 @@ def split_into_blocks(recording: Recording) -> Channels:
         gap = np.diff(recording.time_s, prepend=recording.time_s[0]) > step_s
         is_valid &= ~gap[: len(mean) * length].reshape(-1, length).any(axis=1)
     gyroscope = np.repeat([a is recording.gyroscope for a in triads], 3)
-    facts = [f for f in (recording.facts.accelerometer, recording.facts.gyroscope) if f is not None]
-    quantum = _not_below_arithmetic(np.concatenate([f.step for f in facts]), mean)
+    quantum = _not_below_arithmetic(recording.facts.steps, mean)
     return Channels(length, step_s, mean, variance, is_valid, quantum, gyroscope)
 
 

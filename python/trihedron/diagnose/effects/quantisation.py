@@ -175,7 +175,7 @@ class Quantisation(DirectEffect):
         still = np.concatenate(holds)
         scatter = float(np.sqrt(np.median([np.var(values) for values in holds])))
         moving = np.concatenate([x[a:b] for a, b in obs.move_ranges]) if obs.move_ranges else still
-        step = float(obs.steps[c])
+        step = float(obs.recording.facts.steps[c])
         missing = missing_codes(holds, scatter, step)
         if missing is None:
             dead = dead_zone(still, moving[np.isfinite(moving)], step)

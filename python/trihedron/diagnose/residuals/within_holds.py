@@ -216,7 +216,7 @@ def hold_scatter(obs: Observations) -> HoldScatter:
         dof.append((len(part) - 1) * 2.0 / 3.0)
     ratio_array, dof_array = np.array(ratio), np.array(dof)
     # Readings that toggle between two neighbouring codes scatter by up to half a step squared without any shaking.
-    centre = np.maximum(np.median(ratio_array, axis=0), 0.5 * obs.steps**2)
+    centre = np.maximum(np.median(ratio_array, axis=0), 0.5 * obs.recording.facts.steps[: x.shape[1]] ** 2)
     centre[centre == 0] = 1.0
     relative = ratio_array / centre
     p = chdtrc(dof_array[:, None], dof_array[:, None] * relative)

@@ -73,14 +73,6 @@ class Observations:
         return len(self.move_ranges)
 
     @property
-    def steps(self) -> FloatArray:
-        """(3,) or (6,) step of every channel's converter, raw units; 0 where readings lie on no grid."""
-        facts = [self.recording.facts.of("accelerometer")]
-        if self.raw_rate is not None:
-            facts.append(self.recording.facts.of("gyroscope"))
-        return np.concatenate([one.step for one in facts])
-
-    @property
     def hold_force_spread(self) -> FloatArray:
         """(h, 3) what the means at rest may differ by: noise and scatter of the zeros, accelerometer."""
         if self.zero_scatter is None:
