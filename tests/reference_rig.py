@@ -66,6 +66,7 @@ class Unit:
     accel_noise: float = 0.02
     g_sensitivity: np.ndarray | None = None
     cubic: np.ndarray | None = None
+    is_fine: bool = False  # a unit of tactical grade: instants instead of averages, no steps, a hundredth of the walk
 
 
 def unit(rng, mounting_deg=20.0, **more):
@@ -81,6 +82,9 @@ def read_gyro(rng, u, rate, force, step):
     """Readings of fine rates at every ``step``-th instant, averaged over the step as a sigma-delta part does."""
     n = len(rate) // step
     w, f = rate[: n * step].reshape(n, step, 3).mean(1), force[: n * step].reshape(n, step, 3).mean(1)
+    if u.is_fine:
+        k = np.arange(n) * step + step // 2
+        w, f = 0.5 * (rate[k - 1] + rate[k]), 0.5 * (force[k - 1] + force[k])
     out = w @ u.M.T + u.c
     scale = np.linalg.norm(u.M, axis=1)
     if u.g_sensitivity is not None:
@@ -91,6 +95,8 @@ def read_gyro(rng, u, rate, force, step):
     out = out + u.gyro_noise * np.degrees(1) * 0.5 * rng.normal(size=out.shape)
     # A zero that wanders a little: a walk of 0.03 °/s in a minute, about its mean over the session.
     walk = scale * np.radians(0.03) * np.cumsum(rng.normal(size=out.shape), axis=0) / np.sqrt(60 * FINE_HZ / step)
+    if u.is_fine:
+        return out + 0.01 * (walk - walk.mean(axis=0))
     return np.round((out + walk - walk.mean(axis=0)) * 8) / 8
 
 
@@ -133,13 +139,15 @@ class Trial:
     arm: np.ndarray
 
 
-def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, track_hz=100, **more):
-    """A hand before an optical tracker."""
+def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, track_hz=100, earth=None, **more):
+    """A hand before an optical tracker; ``earth`` is the Earth's rate along the tracker's axes [rad/s]."""
     rng = np.random.default_rng(seed)
     u = unit(rng, **more)
     t, C, path = hand(rng, seconds)
     arm = rng.uniform(-0.1, 0.1, 3) if has_path else np.zeros(3)
     f, w = forces(C, path, arm), rates_of(C)
+    if earth is not None:
+        w = w + np.einsum("nji,j->ni", C, earth)
     gyro, accelerometer = read_gyro(rng, u, w, f, 10), read_accelerometer(rng, u, f, 10)
     lead, ppm = rng.uniform(-3, 3), rng.uniform(-100, 100)
     k = np.arange(0, len(t), FINE_HZ // track_hz)

@@ -41,6 +41,55 @@ def test_gyro_clock_and_lever_arm_come_out_within_their_error_bars(posed, found)
     assert np.degrees(np.arccos(found.vertical.value[2])) < 1.0
 
 
+EARTH_RAD_S = 7.292115e-5
+NORTH_OF_48_DEG = EARTH_RAD_S * np.array([np.cos(np.radians(48.0)), 0.0, np.sin(np.radians(48.0))])
+
+
+def fine_unit(seed, earth=None):
+    """A gyro that tells the Earth's rate before a tracker of a hundredth of a degree."""
+    trial = tracked(seed, 60, 0.005, earth=earth, is_fine=True, gyro_noise=5e-4)
+    return trial, fit_reference(trial.log, trial.motion, G)
+
+
+def test_the_earths_rate_is_told_with_its_direction_and_is_neither_a_zero_nor_a_g_sensitivity():
+    z, seen = [], []
+    for seed in range(3):
+        trial, found = fine_unit(seed, NORTH_OF_48_DEG)
+        z.append(z_of(found, trial)[9:])
+        assert found.earth_rate is not None
+        assert np.linalg.norm(found.earth_rate.value) == pytest.approx(EARTH_RAD_S, rel=0.02)
+        seen.append(found.earth_rate.value)
+        assert np.all(
+            np.abs(found.earth_rate.value - NORTH_OF_48_DEG) < 4.5 * found.earth_rate.std + 0.02 * EARTH_RAD_S
+        )
+        assert min(e.p_value for e in found.effects.values()) > 1e-3
+    # Nine zeros; before the Earth was a part of the model they stood 4.5 error bars off (rms of 24).
+    assert np.sqrt(np.mean(np.square(z))) < 2.0
+    lean = np.degrees(np.arcsin(np.mean(seen, axis=0)[2] / EARTH_RAD_S))
+    assert abs(lean - 48.0) < 10.0
+
+
+def test_the_earths_rate_that_is_not_there_is_not_put_in():
+    # A reference that another gyro carried turns with the Earth.
+    trial, found = fine_unit(1)
+    assert found.earth_rate is None
+    assert np.abs(z_of(found, trial)).max() < 5.5
+    coarse = tracked(3, seconds=30)
+    assert fit_reference(coarse.log, coarse.motion, G).earth_rate is None
+
+
+def test_an_earths_rate_that_the_log_cannot_tell_is_in_the_error_bars_of_the_zeros(monkeypatch):
+    for trial in (measured_table(500, 45), tracked(3, seconds=30)):
+        with_earth = np.diag(fit_reference(trial.log, trial.motion, G).gyroscope.covariance)
+        with monkeypatch.context() as patch:
+            patch.setattr("trihedron.estimate.reference.gyroscope.earth_columns", lambda *_: None)
+            without = np.diag(fit_reference(trial.log, trial.motion, G).gyroscope.covariance)
+        added = np.sqrt(np.maximum(with_earth - without, 0.0))
+        # One component of a vector of any direction; attitudes that turn about average part of it away.
+        assert 0.1 * EARTH_RAD_S < added[9:].max() < 0.7 * EARTH_RAD_S
+        assert np.all(with_earth[9:] > without[9:])
+
+
 def test_error_bars_of_a_wobbling_table_cover_the_truth():
     z = np.array([z_of(fit_reference(t.log, t.motion, G), t) for t in (measured_table(500 + k, 45) for k in range(6))])
     # 72 numbers, not independent: 68 % within one sigma, less four standard errors of 12 independent ones a run.

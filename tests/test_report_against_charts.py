@@ -58,3 +58,26 @@ def test_stages_are_drawn_domain_by_domain():
     assert chart.panels[0].x.names == ("as given", "numbers", "noise", "effects")
     assert len(stages_pictures(SimpleNamespace(stages=stages))) == 1
     assert stages_pictures(SimpleNamespace(stages=())) == ()
+
+
+def test_every_picture_can_be_drawn_with_the_model_dashed_and_scales_as_the_page_has_them():
+    rows = [octave("gyroscope", axis, low, 1e-4, 2e-4) for axis in "xyz" for low in (0.5, 1.0, 2.0)]
+    rows += [octave("accelerometer", "x", low, 1e-3, 1e-3) for low in (0.5, 1.0, 2.0)]
+    stages = [
+        Stage(name, (StageDomain("moves", size, None, "deg"), StageDomain("noise", 3.0, None, "dB")))
+        for name, size in (("as-given", 1.0), ("numbers", 0.1), ("noise", 0.1), ("effects", 0.05))
+    ]
+    found = SimpleNamespace(noise_compared=rows, stages=stages)
+    for picture in (*stages_pictures(found), *noise_pictures(found)):
+        figure = picture.draw()
+        shown = [axes for axes in figure.axes if axes.axison]
+        panels = picture.chart().panels
+        # Six places for four panels of three columns: the last two stay blank.
+        assert [axes.get_title(loc="left") for axes in shown] == [panel.title for panel in panels]
+        for axes, panel in zip(shown, panels, strict=True):
+            assert (axes.get_xscale(), axes.get_yscale()) == ("log" if panel.x.is_log else "linear", "log")
+            lines = {line.get_label(): line.get_linestyle() for line in axes.get_lines()}
+            if panel.x.is_log:
+                assert (lines["model"], lines["recording"]) == ("--", "-")
+        # Without a panel below, the names of the stages or the label stand under it.
+        assert all(axes.get_xlabel() or axes.get_xticklabels() for axes in shown[-picture.chart().columns :])

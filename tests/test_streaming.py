@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import tempfile
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ def whole():
     return recorded(Instrument(), 5, rate_hz=100.0)
 
 
-@pytest.fixture(scope="module", params=["npy", "parquet"])
+@pytest.fixture(scope="module", params=["npy", "parquet", "csv"])
 def path(whole, request, tmp_path_factory):
     table = np.hstack([whole.accelerometer, whole.gyroscope])
     out = tmp_path_factory.mktemp("large") / f"log.{request.param}"
@@ -29,7 +30,8 @@ def path(whole, request, tmp_path_factory):
     else:
         import polars
 
-        polars.DataFrame(table, schema=COLUMNS.split(",")).write_parquet(out)
+        frame = polars.DataFrame(table, schema=COLUMNS.split(","))
+        frame.write_csv(out) if request.param == "csv" else frame.write_parquet(out)
     return out
 
 
@@ -150,3 +152,32 @@ def test_the_command_streams_and_says_what_it_needs(whole, path, tmp_path, capsy
     capsys.readouterr()
     assert main(["segment", str(path), "--stream"]) == 1
     assert "--columns" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("t,ax,ay,az\n0,1,2,3\n0.01,4,x,6\n0.02,1,2,3\n", "not every row is 4 numbers"),
+        ("0,1,2,3\n# pause\n0.02,4,3,6\n0.03,4,3,6\n", "not every row is 4 numbers"),
+        ("t ax ay az\n0 1 2 3\n1 1 1 1\n", "comma, a semicolon or a tab"),
+        ("t,ax,ay,az\n# mm\n0,1,2,3\n0.01,4,3,6\n0.02,4,3,6\n", "line 2 above the rows"),
+        ("all words\nand no numbers\n", "read in pieces"),
+    ],
+)
+def test_a_text_that_is_no_table_of_numbers_is_refused_and_leaves_nothing(tmp_path, monkeypatch, text, said):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    log = tmp_path / "log.csv"
+    log.write_text(text)
+    with pytest.raises(ValueError, match=said):
+        streaming.log_on_disk(log, columns="-,ax,ay,az", rate_hz=100.0)
+    assert list(tmp_path.iterdir()) == [log]
+
+
+def test_a_text_with_decimal_commas_missing_fields_and_a_byte_order_mark_is_read_as_it_stands(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    log = tmp_path / "log.csv"
+    log.write_bytes("\ufefft;ax;ay;az\r\n0;1,5;2;3\r\n0,01;-4;;6\r\n0,02;nan;8;9\r\n".encode())
+    held = streaming.log_on_disk(log, columns="-,ax,ay,az", rate_hz=100.0)
+    np.testing.assert_array_equal(held.accelerometer[0:3], [[1.5, 2, 3], [-4, np.nan, 6], [np.nan, 8, 9]])
+    del held
+    assert list(tmp_path.iterdir()) == [log]

@@ -208,26 +208,47 @@ pub fn effect_columns(
     rate: Option<&[f64]>,
     k: usize,
 ) -> DMatrix<f64> {
-    // Row by row, so that the loop runs along the parameters.
+    // Row by row, so that the loop runs along the parameters; few of them in a length that the compiler knows.
     let mut out = vec![0.0; N_MOVE * k];
-    if let Some(rate) = rate.filter(|_| k > 0) {
+    let sum = match k {
+        1 => add_effects::<1>,
+        2 => add_effects::<2>,
+        3 => add_effects::<3>,
+        _ => add_effects::<0>,
+    };
+    if k > 0 {
+        sum(response, force, rate, k, &mut out);
+    }
+    DMatrix::from_row_slice(N_MOVE, k, &out)
+}
+
+/// The sums of [`effect_columns`] with `K` parameters, or with any number where `K` is none.
+fn add_effects<const K: usize>(
+    response: &Response,
+    force: Option<&[f64]>,
+    rate: Option<&[f64]>,
+    k: usize,
+    out: &mut [f64],
+) {
+    let k = if K == 0 { k } else { K };
+    if let Some(rate) = rate {
         for (r, row) in response.by_rate.iter().zip(rate.chunks_exact(3 * k)) {
             for (i, own) in out.chunks_exact_mut(k).enumerate() {
                 subtract_along(own, [r[(i, 0)], r[(i, 1)], r[(i, 2)]], row);
             }
         }
     }
-    if let Some(force) = force.filter(|_| k > 0) {
+    if let Some(force) = force {
         for (f, row) in response.by_force.iter().zip(force.chunks_exact(3 * k)) {
             for (i, own) in out[2 * k..].chunks_exact_mut(k).enumerate() {
                 subtract_along(own, [f[(i, 0)], f[(i, 1)], f[(i, 2)]], row);
             }
         }
     }
-    DMatrix::from_row_slice(N_MOVE, k, &out)
 }
 
 /// Takes `Σ response_i row_i` off, where `row` holds three vectors one after the other.
+#[inline]
 fn subtract_along(out: &mut [f64], response: [f64; 3], row: &[f64]) {
     let k = out.len();
     let (x, rest) = row.split_at(k);

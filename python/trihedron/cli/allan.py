@@ -9,6 +9,7 @@ import typer
 
 from trihedron.cli.options import Force, Json, LogSource, Report, progress, with_options
 from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+from trihedron.cli.streamed import Kept, needs_stream
 from trihedron.files.output import write_whole
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ Stream = Annotated[
     bool,
     typer.Option(
         "--stream",
-        help="Read a .npy or Parquet log in pieces, in at most 1.4 GB and without audit: --columns, "
+        help="Read a .npy, Parquet or CSV log in pieces, in at most 1.5 GB and without audit: --columns, "
         "--rate and the units say what it holds.",
     ),
 ]
@@ -84,6 +85,7 @@ def allan(
     curve: Curve = False,
     samples: Samples = None,
     stream: Stream = False,
+    checkpoint: Kept = None,
     json: Json = None,
     report: Report = None,
     full: Full = False,
@@ -94,6 +96,7 @@ def allan(
     if not 0.0 < accuracy < 1000.0:
         raise typer.BadParameter(f"--accuracy is a positive number of per cent, not {accuracy:g}")
     check_outputs(json, csv, plot, force=force, report=report, inputs=source.files)
+    needs_stream(checkpoint, stream=stream)
     if curve:
         if exclude or stream or keep_events:
             raise typer.BadParameter("--curve has no log: --exclude, --keep-events and --stream do not go with it")
@@ -101,7 +104,10 @@ def allan(
     else:
         options = {"exclude_s": stretches, "automatic": not keep_events}
         found = _of_log(
-            source, stream=stream, options=options | {"gyroscope_lsb": gyro_lsb, "accelerometer_lsb": accel_lsb}
+            source,
+            stream=stream,
+            checkpoint=checkpoint,
+            options=options | {"gyroscope_lsb": gyro_lsb, "accelerometer_lsb": accel_lsb},
         )
     from trihedron.pipeline import recording_lengths
     from trihedron.report.noise import all_findings, noise_report
@@ -128,7 +134,7 @@ def allan(
     leave(all_findings(found))
 
 
-def _of_log(source: LogSource, *, stream: bool, options: dict[str, Any]) -> Noise:
+def _of_log(source: LogSource, *, stream: bool, checkpoint: Path | None, options: dict[str, Any]) -> Noise:
     from trihedron import pipeline
 
     if not stream:
@@ -144,6 +150,7 @@ def _of_log(source: LogSource, *, stream: bool, options: dict[str, Any]) -> Nois
             rate_hz=source.rate,
             accelerometer_unit=source.accel_unit,
             gyroscope_unit=source.gyro_unit,
+            checkpoint=checkpoint,
             **options,
         )
 

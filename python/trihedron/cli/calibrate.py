@@ -10,7 +10,7 @@ import typer
 from trihedron.cli.calibrate_sessions import By, Labels, calibrate_many
 from trihedron.cli.options import Force, GravitySource, Json, LogsSource, Report, progress, with_options
 from trihedron.cli.output import Ending, check_outputs
-from trihedron.cli.streamed import Stream, calibrate_stream
+from trihedron.cli.streamed import Kept, Stream, calibrate_stream, needs_stream
 
 FIRST_SCREEN = 2
 
@@ -76,6 +76,7 @@ def calibrate(
     reference_columns: ReferenceColumns = None,
     extended: Extended = False,
     stream: Stream = False,
+    checkpoint: Kept = None,
     by: By = None,
     labels: Labels = None,
     output: Output = None,
@@ -89,6 +90,7 @@ def calibrate(
     With several logs of one unit: one model, and how far every parameter repeats.
     """
     check_outputs(output, json, force=force, report=report, inputs=sources.files)
+    needs_stream(checkpoint, stream=stream)
     ending = Ending(output, json, report, full, force)
     choices = _choices(method, frame, faces, turns, axis_signs, loss)
     if sources.are_many(by):
@@ -104,14 +106,13 @@ def calibrate(
         if extended:
             raise typer.BadParameter("--extended needs the whole log; leave out --stream")
         options = {**choices, "gyroscope_nominal": gyro_nominal}
-        calibrate_stream(sources.one(), place, options, ending, FIRST_SCREEN)
+        calibrate_stream(sources.one(), place, options, ending, FIRST_SCREEN, checkpoint)
         return
     if labels is not None:
         raise typer.BadParameter("--labels belong to several logs")
     recording = sources.one().read()
     from trihedron import pipeline
     from trihedron.report import calibration_report
-    from trihedron.report.machine import calibration_record
 
     with progress("calibrating") as tell:
         result = pipeline.calibrate(
@@ -128,8 +129,13 @@ def calibrate(
         if extended:
             result = pipeline.extend(result, progress=tell)
     document = calibration_report(result.calibration, result.segments, recording)
-    machine = calibration_record(result.calibration, result.segments, recording)
     more = "Every pose and move: --full, or --report FILE.html with figures."
+
+    def machine() -> dict[str, Any]:
+        from trihedron.report.machine import calibration_record
+
+        return calibration_record(result.calibration, result.segments, recording)
+
     ending.tell(document, machine, result.calibration, FIRST_SCREEN, more)
 
 

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from trihedron.cli.options import Force, Json, LogSource, Report, progress, with_options
 from trihedron.cli.output import check_outputs, leave, show, write_json, write_report
-from trihedron.cli.streamed import Stream, segment_stream
+from trihedron.cli.streamed import Kept, Stream, needs_stream, segment_stream
 
 
 @with_options(source=LogSource)
 def segment(
-    source: LogSource, stream: Stream = False, report: Report = None, json: Json = None, force: Force = False
+    source: LogSource,
+    stream: Stream = False,
+    checkpoint: Kept = None,
+    report: Report = None,
+    json: Json = None,
+    force: Force = False,
 ) -> None:
     """Find the still poses and the moves between them."""
     check_outputs(json, force=force, report=report, inputs=source.files)
+    needs_stream(checkpoint, stream=stream)
     if stream:
-        segment_stream(source, report, json, force=force)
+        segment_stream(source, report, json, checkpoint, force=force)
         return
     recording = source.read()
     from trihedron import pipeline

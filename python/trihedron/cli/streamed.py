@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
@@ -17,10 +17,32 @@ Stream = Annotated[
     bool,
     typer.Option(
         "--stream",
-        help="A .npy or Parquet log larger than memory, in pieces and without audit: --columns, --rate and the units "
-        "say what it holds. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit takes.",
+        help="A .npy, Parquet or CSV log larger than memory, in pieces and without audit: --columns, --rate and the "
+        "units say what it holds. Memory: apply 0.2 GB, segment 0.5 GB and 15 MB an hour, calibrate what its fit "
+        "takes.",
     ),
 ]
+
+Kept = Annotated[
+    Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
+    typer.Option(
+        "--checkpoint",
+        metavar="FILE",
+        help="With --stream: keep how far the pass is in FILE, so that a run that was stopped goes on from there.",
+    ),
+]
+
+
+def needs_stream(checkpoint: Path | None, *, stream: bool) -> None:
+    """Refuse a checkpoint of what is read whole.
+
+    Raises
+    ------
+    typer.BadParameter
+        When there is a checkpoint without a stream.
+    """
+    if checkpoint is not None and not stream:
+        raise typer.BadParameter("--checkpoint belongs to --stream")
 
 
 def opened(source: LogSource) -> LogOnDisk:
@@ -35,16 +57,20 @@ def opened(source: LogSource) -> LogOnDisk:
         raise typer.BadParameter("--stream needs LOG, --columns (as in ax,ay,az,gx,gy,gz) and --rate")
     from trihedron.pipeline.streaming import log_on_disk
 
-    return log_on_disk(
-        source.log,
-        columns=source.columns,
-        rate_hz=source.rate,
-        accelerometer_unit=source.accel_unit,
-        gyroscope_unit=source.gyro_unit,
-    )
+    # A text is made a table first, which takes its time.
+    with progress("opening"):
+        return log_on_disk(
+            source.log,
+            columns=source.columns,
+            rate_hz=source.rate,
+            accelerometer_unit=source.accel_unit,
+            gyroscope_unit=source.gyro_unit,
+        )
 
 
-def segment_stream(source: LogSource, report: Path | None, json: Path | None, *, force: bool) -> None:
+def segment_stream(
+    source: LogSource, report: Path | None, json: Path | None, checkpoint: Path | None, *, force: bool
+) -> None:
     """Still poses of a log on disk."""
     log = opened(source)
     from trihedron.pipeline.streaming import condensed, segment_file
@@ -52,7 +78,7 @@ def segment_stream(source: LogSource, report: Path | None, json: Path | None, *,
     from trihedron.report.machine import segments_record
 
     with progress("segmenting") as tell:
-        segments = segment_file(log, progress=tell)
+        segments = segment_file(log, checkpoint=checkpoint, progress=tell)
     # Figures and times come from the rows of moves and of the ends of holds.
     recording, shown = condensed(log, segments)
     document, machine = segments_report(recording, shown), segments_record(recording, shown)
@@ -68,18 +94,23 @@ def calibrate_stream(
     options: dict[str, Any],
     ending: Ending,
     sections: int,
+    checkpoint: Path | None,
 ) -> None:
     """A calibration from a log on disk."""
     log = opened(source)
     from trihedron.pipeline.streaming import calibrate_file
     from trihedron.report import calibration_report
-    from trihedron.report.machine import calibration_record
 
     where = {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
     with progress("calibrating") as tell:
-        result = calibrate_file(log, progress=tell, **where, **options)
+        result = calibrate_file(log, checkpoint=checkpoint, progress=tell, **where, **options)
     document = calibration_report(result.calibration, result.segments, result.recording)
-    machine = calibration_record(result.calibration, result.segments, result.recording)
+
+    def machine() -> dict[str, Any]:
+        from trihedron.report.machine import calibration_record
+
+        return calibration_record(result.calibration, result.segments, result.recording)
+
     ending.tell(document, machine, result.calibration, sections)
 
 

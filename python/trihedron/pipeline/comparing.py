@@ -80,11 +80,13 @@ def compared(
 def _without_walk(
     effects: tuple[AcceptedEffect, ...], noise: tuple[NoiseDifference, ...]
 ) -> tuple[AcceptedEffect, ...]:
-    """Effects of a simulation less a free curve through its zeros where its slow noise is the larger: that draws it."""
-    slow = [n.ratio for n in noise if n.significant and n.sensor == "gyroscope" and n.term in ("B", "K") and n.ratio]
-    if not slow or min(slow) < 1.0:
-        return effects
-    return tuple(e for e in effects if (e.id, e.model.get("variant")) != ("gyro-hidden-drift", "curve"))
+    """Effects of a simulation less a free curve through zeros of a sensor whose slow noise is larger: that draws it."""
+    drawn = set()
+    for sensor, drift in (("gyroscope", "gyro-hidden-drift"), ("accelerometer", "accel-hidden-drift")):
+        slow = [n.ratio for n in noise if n.significant and n.sensor == sensor and n.term in ("B", "K") and n.ratio]
+        if slow and min(slow) >= 1.0:
+            drawn.add((drift, "curve"))
+    return tuple(e for e in effects if (e.id, e.model.get("variant")) not in drawn)
 
 
 def _span_k(recording: Recording, simulated: tuple[Diagnosis, Recording] | None) -> float | None:

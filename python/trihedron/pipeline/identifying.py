@@ -15,6 +15,7 @@ from trihedron.estimate.noise.grid import readings_of
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s
 from trihedron.estimate.noise.streamed import stream_noise
+from trihedron.files.checkpoint import Checkpoint, made_of
 from trihedron.pipeline.reading import AnyRecording, recording_of
 from trihedron.read.allan_table import read_allan_table
 from trihedron.read.chunks import open_chunks
@@ -82,16 +83,19 @@ def noise_of_file(
     gyroscope_lsb: str | None = None,
     exclude_s: Sequence[tuple[float, float]] = (),
     automatic: bool = True,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Noise:
-    """Noise of a .npy or Parquet log of any size in bounded memory; what its columns are is said, not judged.
+    """Noise of a .npy, Parquet or text log of any size in bounded memory; what its columns are is said, not judged.
 
     Up to half a gigabyte the log is read whole; beyond, it is read in one pass (:func:`stream_noise`), which leaves
-    nothing out.
+    nothing out. With ``checkpoint`` that file keeps every half a minute how far the pass is; a run that was stopped
+    goes on from it, to the same bits, and the end removes it.
 
     Raises
     ------
     ValueError
-        When the file cannot be read in pieces, the columns do not fit, or stretches are to be left out of a stream.
+        When the file cannot be read in pieces, the columns do not fit, stretches are to be left out of a stream, or
+        ``checkpoint`` is a file of something else.
     """
     log = open_chunks(Path(path), columns)
     factor, names, units = [], [], []
@@ -130,11 +134,22 @@ def noise_of_file(
     if exclude_s:
         raise ValueError(f"{path}: nothing can be left out of a log that is read in one pass; cut the file instead.")
 
+    kept = None
+    if checkpoint is not None:
+        kept = Checkpoint(Path(checkpoint), made_of(log.path, "allan", rate_hz, log.roles, factor))
+    done, state = kept.load() if kept else (0, {})
+
     def parts() -> Iterator[npt.NDArray[np.float64]]:
-        for part in log.chunks():
+        for part in log.chunks(first=done):
             yield scaled(part)
 
-    return stream_noise(parts(), rate_hz, n_samples=log.n_rows, names=names, units=units, source=str(path))
+    found = stream_noise(
+        parts(), rate_hz, n_samples=log.n_rows, names=names, units=units, source=str(path), state=state,
+        keep=kept.keep if kept else None,
+    )  # fmt: skip
+    if kept:
+        kept.remove()
+    return found
 
 
 def noise_of_curve(

@@ -6,7 +6,6 @@ of the ends of holds (:func:`calibrate_file`), or one piece (:func:`apply_file`)
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.files.calibration import calibration_text
+from trihedron.files.checkpoint import Checkpoint, made_of
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.results import CalibrationResult
@@ -102,7 +102,7 @@ def log_on_disk(
     accelerometer_unit: str | AccelerationUnit | None = None,
     gyroscope_unit: str | RateUnit | None = None,
 ) -> LogOnDisk:
-    """A .npy or Parquet log whose columns, rate and units are said, not judged.
+    """A .npy, Parquet or text log whose columns, rate and units are said, not judged.
 
     Raises
     ------
@@ -132,29 +132,57 @@ def log_on_disk(
     )
 
 
-def segment_file(log: LogOnDisk, *, progress: Progress | None = None) -> Segments:
-    """Still poses and moves of a log on disk: the same as :func:`trihedron.segment` finds in the whole of it."""
+def segment_file(
+    log: LogOnDisk, *, checkpoint: str | os.PathLike[str] | None = None, progress: Progress | None = None
+) -> Segments:
+    """Still poses and moves of a log on disk: the same as :func:`trihedron.segment` finds in the whole of it.
+
+    With ``checkpoint`` a file keeps every half a minute how far the pass is; a run that was stopped goes on from it, to
+    the same bits, and the end removes it.
+
+    Raises
+    ------
+    ValueError
+        When ``checkpoint`` is a file of something else.
+    """
     tell = progress or (lambda _fraction, _text: None)
     # Types that only read rows: the segmentation asks for no more of a recording.
     view = cast("Recording", log)
     sums = BlockSums(view)
     width = sums.length * max(1, PIECE_ROWS // sums.length)
-    done = 0
-    for part in log.log.chunks(width):
+    kept = None
+    if checkpoint is not None:
+        kept = Checkpoint(Path(checkpoint), made_of(log.log.path, "blocks", log.rate_hz, log.log.roles))
+    done, state = kept.load() if kept else (0, {})
+    if done:
+        sums.restore(done, state)
+    for part in log.log.chunks(width, done):
         triads = [part[:, t.first : t.first + 3] for t in (log.accelerometer, log.gyroscope) if t is not None]
         sums.add([np.ascontiguousarray(t, dtype=np.float64) for t in triads])
         done += len(part)
         tell(0.8 * done / log.n_samples, f"{done} of {log.n_samples} rows")
-    return segment_blocks(view, sums.channels(), progress=lambda f, text: tell(0.8 + 0.2 * f, text))
+        if kept:
+            kept.keep(done, sums.state)
+    segments = segment_blocks(view, sums.channels(), progress=lambda f, text: tell(0.8 + 0.2 * f, text))
+    if kept:
+        kept.remove()
+    return segments
 
 
-def calibrate_file(log: LogOnDisk, *, progress: Progress | None = None, **options: Any) -> CalibrationResult:
+def calibrate_file(
+    log: LogOnDisk,
+    *,
+    checkpoint: str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> CalibrationResult:
     """Calibrate a log on disk from the statistics of its holds and the rows of its moves; options as for ``calibrate``.
 
-    The same as :func:`trihedron.calibrate` of the whole, where no hold is longer than two minutes.
+    ``checkpoint`` as in :func:`segment_file`, whose pass over the log is what takes long. The same as
+    :func:`trihedron.calibrate` of the whole, where no hold is longer than two minutes.
     """
     tell = progress or (lambda _fraction, _text: None)
-    segments = segment_file(log, progress=lambda f, text: tell(0.7 * f, text))
+    segments = segment_file(log, checkpoint=checkpoint, progress=lambda f, text: tell(0.7 * f, text))
     recording, shown = condensed(log, segments)
     tell(0.8, f"fitting {recording.n_samples} of {log.n_samples} rows")
     return calibrate(recording, segments=shown, **options)
@@ -261,8 +289,8 @@ def apply_file(
         raise ValueError(f"{log.source}: the calibration holds none of its sensors.")
     shape = (log.n_samples, 1 + 3 * len(used))
     part, note, next_note = (Path(f"{target}{ending}") for ending in (".part", ".part.json", ".part.json.new"))
-    made_of = _made_of(log, calibration_text(known), shape)
-    done = _rows_done(part, note, made_of)
+    of = made_of(log.log.path, log.rate_hz, log.log.roles, shape, calibration_text(known))
+    done = _rows_done(part, note, of)
     if done == 0:
         np.lib.format.open_memmap(part, mode="w+", dtype=np.float64, shape=shape).flush()
     header = part.stat().st_size - 8 * shape[0] * shape[1]
@@ -276,7 +304,7 @@ def apply_file(
             stream.flush()
             written += rows.stop - start
             # In one step: a run that is killed here leaves the note before.
-            next_note.write_text(json.dumps({"made_of": made_of, "rows": rows.stop}))
+            next_note.write_text(json.dumps({"made_of": of, "rows": rows.stop}))
             next_note.replace(note)
             if progress is not None:
                 progress(rows.stop / log.n_samples, f"{rows.stop} of {log.n_samples} rows")
@@ -287,16 +315,9 @@ def apply_file(
     return written
 
 
-def _made_of(log: LogOnDisk, calibration: str, shape: tuple[int, int]) -> str:
-    """What a half-written output must have been made of to be gone on with; the log by its size and time of change."""
-    status = os.stat(log.log.path)
-    said = [str(log.log.path.resolve()), status.st_size, status.st_mtime_ns, log.rate_hz, log.log.roles, shape]
-    return hashlib.sha256((json.dumps(said) + calibration).encode()).hexdigest()
-
-
-def _rows_done(part: Path, note: Path, made_of: str) -> int:
+def _rows_done(part: Path, note: Path, of: str) -> int:
     try:
         said = json.loads(note.read_text())
     except (OSError, ValueError):
         return 0
-    return int(said["rows"]) if said.get("made_of") == made_of and part.exists() else 0
+    return int(said["rows"]) if said.get("made_of") == of and part.exists() else 0

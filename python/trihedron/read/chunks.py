@@ -1,4 +1,4 @@
-"""Logs larger than memory: rows in pieces, from a NumPy array or a Parquet table."""
+"""Logs larger than memory: rows in pieces, from a NumPy array, a Parquet table or a text."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from trihedron.read.errors import ReadError, check_readable, from_os_error, refuse_after_fork
 from trihedron.read.panics import panics_unprinted
 from trihedron.read.rows_on_disk import RowsOnDisk, rows_on_disk
+from trihedron.read.text_on_disk import TextOnDisk
 
 ROWS = 1 << 18
 ROLES = ("ax", "ay", "az", "gx", "gy", "gz")
@@ -27,10 +28,12 @@ class ChunkedLog:
     roles: tuple[str, ...]
     columns: tuple[int, ...]
     on_disk: RowsOnDisk | None = None
+    table: TextOnDisk | None = None
+    """Of a text: the table that is read in its place."""
 
-    def chunks(self, rows: int = ROWS) -> Iterator[npt.NDArray[np.float64]]:
-        """Arrays (k, columns) in order, in the type of the file."""
-        for start in range(0, self.n_rows, rows):
+    def chunks(self, rows: int = ROWS, first: int = 0) -> Iterator[npt.NDArray[np.float64]]:
+        """Arrays (k, columns) in order from row ``first`` on, in the type of the file."""
+        for start in range(first, self.n_rows, rows):
             yield self._part(start, min(start + rows, self.n_rows))
 
     def rows(self, start: int, stop: int) -> npt.NDArray[np.float64]:
@@ -52,7 +55,7 @@ class ChunkedLog:
 
         try:
             with panics_unprinted():
-                table = polars.scan_parquet(self.path)
+                table = polars.scan_parquet(self.path if self.table is None else self.table.path)
                 names = table.collect_schema().names()
                 wanted = table.select([names[c] for c in self.columns])
                 part = np.ascontiguousarray(wanted.slice(start, stop - start).collect().to_numpy())
@@ -70,12 +73,13 @@ class ChunkedLog:
 
 
 def open_chunks(path: Path, columns: str) -> ChunkedLog:
-    """A NumPy or Parquet log whose columns are said: ``gx,gy,gz,ax,ay,az`` in file order, ``-`` for one not wanted.
+    """A NumPy, Parquet or text log whose columns are said: ``gx,gy,gz,ax,ay,az`` in file order, ``-`` for one not
+    wanted. A text is made a Parquet table first, in the folder for temporary files.
 
     Raises
     ------
     ReadError
-        When the file is neither, or the columns do not fit it.
+        When the file is none of these, or the columns do not fit it.
     """
     check_readable(path)
     try:
@@ -83,25 +87,24 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
             magic = stream.read(6)
     except OSError as error:
         raise from_os_error(path, error) from None
-    on_disk = None
+    on_disk = text = None
     if magic == b"\x93NUMPY":
         on_disk = rows_on_disk(path)
         n_rows, n_columns = on_disk.shape
-    elif magic[:4] == b"PAR1":
+    else:
         import polars
 
         refuse_after_fork(path)
+        text = None if magic[:4] == b"PAR1" else TextOnDisk(path)
         try:
             with panics_unprinted():
-                table = polars.scan_parquet(path)
+                table = polars.scan_parquet(path if text is None else text.path)
                 n_rows = int(table.select(polars.len()).collect().item())
                 n_columns = len(table.collect_schema())
         except polars.exceptions.PanicException:
             raise ReadError(f"{path}: this Parquet file's description of itself is damaged.") from None
         except polars.exceptions.PolarsError as error:
             raise ReadError(f"{path}: this Parquet file is damaged ({str(error).splitlines()[0]}).") from None
-    else:
-        raise ReadError(f"{path}: only .npy and Parquet files are read in pieces; write the log as one of these.")
     words = [word.strip().lower() for word in columns.split(",")]
     if len(words) != n_columns:
         raise ReadError(f"{path}: --columns names {len(words)} columns, the file has {n_columns}; '-' leaves one out.")
@@ -112,4 +115,4 @@ def open_chunks(path: Path, columns: str) -> ChunkedLog:
     roles = tuple(words[i] for i in picked)
     if not picked or len(set(roles)) < len(roles):
         raise ReadError(f"--columns: give each of {' '.join(ROLES)} at most once, and one of them.")
-    return ChunkedLog(path, n_rows, roles, picked, on_disk)
+    return ChunkedLog(path, n_rows, roles, picked, on_disk, text)

@@ -129,6 +129,8 @@ class AgainstReference(Plain):
     """Everything that a reference says of a log: clocks, mounting, lever arm, both sensors, effects, replay.
 
     ``clock_offset_s``: by how much the reference's clock is ahead at ``clock_middle_s`` of the log, and its σ.
+    ``earth_rate``: along the axes of the reference's world, where the log tells where it points; else it is in the
+    error bars of the gyro's numbers.
     """
 
     kind: str
@@ -148,11 +150,12 @@ class AgainstReference(Plain):
     findings: tuple[Finding, ...] = ()
     residual_time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     residual_rate: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    earth_rate: Estimate | None = None
     LAYOUT: ClassVar[Layout] = Layout(
         {},
         (
             "source", "kind", "overlap_s", "correlation", "clock", "mounting", "lever_arm", "vertical", "gyroscope",
-            "accelerometer", "effects", "replay",
+            "accelerometer", "earth_rate", "effects", "replay",
         ),
         lambda found, _: {"clock": found.clock()},
     )  # fmt: skip

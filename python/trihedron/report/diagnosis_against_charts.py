@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -11,6 +11,7 @@ from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.report.chart import AXIS_COLOURS, Chart, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
+from trihedron.report.drawing import later
 from trihedron.report.numbers import plain_number
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
@@ -40,7 +41,7 @@ def stages_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if len(diagnosis.stages) < len(STAGES) - 1:
         return ()
     caption = "What is left of the held-out part, stage by stage: as given, with its own numbers, noise, effects."
-    return (Picture("stages", caption, None, partial(stages_chart, diagnosis)),)
+    return (_picture("stages", caption, partial(stages_chart, diagnosis)),)
 
 
 def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
@@ -51,9 +52,13 @@ def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     first = "Noise inside still poses, model (dashed) and recording, octave by octave."
     second = "Allan deviation of that noise, model (dashed) and recording: what the octaves above make of it."
     return (
-        Picture("spectra-both", first, None, partial(spectra_chart, diagnosis)),
-        Picture("allan-both", second, None, partial(allan_chart, diagnosis)),
+        _picture("spectra-both", first, partial(spectra_chart, diagnosis)),
+        _picture("allan-both", second, partial(allan_chart, diagnosis)),
     )
+
+
+def _picture(name: str, caption: str, chart: Callable[[], Chart]) -> Picture:
+    return Picture(name, caption, later("chart_figures", "draw_chart", chart), chart)
 
 
 def stages_chart(diagnosis: Diagnosis) -> Chart:

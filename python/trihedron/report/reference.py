@@ -13,6 +13,7 @@ from trihedron.report.many_charts import residual_chart
 from trihedron.report.numbers import engineering_exponent, plain_number, power_of_ten, with_sigma
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
+SECONDS_PER_HOUR = 3600.0
 _EFFECTS = {"gyro-g-sensitivity": "g-sensitivity", "gyro-scale-nonlinearity": "nonlinearity of the scale"}
 
 
@@ -34,6 +35,14 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
         )
     if found.vertical is not None:
         facts.append(("up", f"{_vector(found.vertical, 1.0)} in the reference's world"))
+    if found.earth_rate is not None:
+        facts.append(
+            (
+                "Earth's rate",
+                f"{_vector(found.earth_rate, degrees_from_radians(SECONDS_PER_HOUR))} °/h along"
+                f" the axes of the reference's world{_latitude(found)}",
+            )
+        )
     facts.append(("gyro", _left(found.gyroscope, degrees_from_radians(1.0), "°/s")))
     if found.accelerometer is not None:
         facts.append(("accelerometer", _left(found.accelerometer, mm_s2_from_m_s2(1.0), "mm/s²")))
@@ -52,6 +61,17 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
         )
     )
     return tuple(blocks)
+
+
+def _latitude(found: AgainstReference) -> str:
+    """The latitude that the Earth's rate and the vertical enclose."""
+    if found.vertical is None or found.earth_rate is None:
+        return ""
+    up, rate = found.vertical.value, found.earth_rate.value
+    size = float(np.linalg.norm(rate))
+    sine = float(np.clip(up @ rate / size, -1.0, 1.0))
+    sigma = float(np.sqrt(up @ found.earth_rate.covariance @ up)) / size / max(np.sqrt(1.0 - sine**2), 0.1)
+    return f", latitude {with_sigma(degrees_from_radians(np.arcsin(sine)), degrees_from_radians(sigma))}°"
 
 
 def _clock(found: AgainstReference) -> str:

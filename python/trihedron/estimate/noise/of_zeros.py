@@ -98,8 +98,8 @@ def compare_slow(first: Sequence[PoseZeros], second: Sequence[PoseZeros]) -> Slo
     for one, other in zip(first, second, strict=True):
         least = LEAST_SIDE * max(one.spread, other.spread)
         one, other = (replace(z, sigma=np.hypot(z.sigma, LOWEST * least)) for z in (one, other))
-        b = _levels([max(z.spread, least) for z in (one, other)])
-        k = _levels([max(z.spread, least) / math.sqrt(z.span_s / MIDDLE_OF_WALK) for z in (one, other)])
+        b = levels([max(z.spread, least) for z in (one, other)])
+        k = levels([max(z.spread, least) / math.sqrt(z.span_s / MIDDLE_OF_WALK) for z in (one, other)])
         p, q = _table(one, b, k), _table(other, b, k)
         tables.append((b, k, p, q))
         together = float((p + q).max())
@@ -114,7 +114,8 @@ def compare_slow(first: Sequence[PoseZeros], second: Sequence[PoseZeros]) -> Slo
     return SlowDifference(p_value, "B" if by_b > by_k else "K", sides[0], sides[1], ratios, (shows[0], shows[1]))
 
 
-def _levels(sizes: Sequence[float]) -> FloatArray:
+def levels(sizes: Sequence[float]) -> FloatArray:
+    """Strengths to be tried, zero first, for zeros that spread by ``sizes`` (what one unit of strength makes of it)."""
     low, high = LOWEST * min(sizes), HIGHEST * max(sizes)
     n = math.ceil(math.log(high / low) / math.log(SPACING)) + 1
     out: FloatArray = np.concatenate([[0.0], np.geomspace(low, high, n)])
@@ -122,9 +123,25 @@ def _levels(sizes: Sequence[float]) -> FloatArray:
 
 
 def _table(zeros: PoseZeros, b: FloatArray, k: FloatArray) -> FloatArray:
-    """(b, k) log-likelihood, the best scatter for each."""
+    """(b, k) log-likelihood of the contrasts that are free of the constant, the best scatter for each."""
+    basis = np.linalg.qr(np.ones((len(zeros.values), 1)), mode="complete")[0][:, 1:]
+    white, flicker, walk = (basis.T @ kernel @ basis for kernel in (np.diag(zeros.sigma**2), *kernels(zeros)))
+    return best_scatter(basis.T @ zeros.values, (white, flicker, walk), zeros, b, k)
+
+
+def best_scatter(
+    contrasts: FloatArray,
+    covariances: tuple[FloatArray, FloatArray, FloatArray],
+    zeros: PoseZeros,
+    b: FloatArray,
+    k: FloatArray,
+) -> FloatArray:
+    """(b, k) log-likelihood of ``contrasts`` (m,), the best scatter for each.
+
+    ``covariances`` (m, m) are those of white noise, per B² and per K².
+    """
     s = np.concatenate([[0.0], np.geomspace(0.15, 1.5, 5) * zeros.spread]) if zeros.scatters else np.zeros(1)
-    out: FloatArray = _log_likelihood(zeros, *_kernels(zeros), b, k, s).max(axis=2)
+    out: FloatArray = _log_likelihood(contrasts, covariances, b, k, s).max(axis=2)
     return out
 
 
@@ -173,8 +190,8 @@ def _ratios(b: FloatArray, k: FloatArray, p: FloatArray, q: FloatArray) -> dict[
     return out
 
 
-def _kernels(zeros: PoseZeros) -> tuple[FloatArray, FloatArray]:
-    """(n, n) covariance of the means per B² and per K², beside a free constant."""
+def kernels(zeros: PoseZeros) -> tuple[FloatArray, FloatArray]:
+    """(n, n) covariance of the means of the poses per B² and per K², beside a free constant."""
     t, length = zeros.time_s - zeros.time_s[0], zeros.length_s
     begin, end = t - length / 2.0, t + length / 2.0
     mean_log = (
@@ -193,13 +210,10 @@ def _twice_integrated(x: FloatArray) -> FloatArray:
 
 
 def _log_likelihood(
-    zeros: PoseZeros, flicker: FloatArray, walk: FloatArray, b: FloatArray, k: FloatArray, s: FloatArray
+    y: FloatArray, parts: tuple[FloatArray, FloatArray, FloatArray], b: FloatArray, k: FloatArray, s: FloatArray
 ) -> FloatArray:
-    """(b, k, s) restricted log-likelihood of the contrasts that are free of the constant."""
-    basis = np.linalg.qr(np.ones((len(zeros.values), 1)), mode="complete")[0][:, 1:]
-    m = basis.shape[1]
-    y = basis.T @ zeros.values
-    parts = [basis.T @ kernel @ basis for kernel in (np.diag(zeros.sigma**2), flicker, walk)]
+    """(b, k, s) restricted log-likelihood of the contrasts."""
+    m = len(y)
     out = np.empty((len(b), len(k), len(s)))
     for i, strength in enumerate(b):
         V = (

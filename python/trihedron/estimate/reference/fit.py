@@ -97,6 +97,7 @@ def fit_reference(
         vertical=None
         if force is None or force.up is None or force.up_covariance is None
         else Estimate(_AXES, force.up, force.up_covariance, "1"),
+        earth_rate=_earth(gyro),
         effects=MappingProxyType(effects),
         replay=() if motion.attitude is None else _held_out(grid, reference, seen, gyro, given),
         residual_time_s=grid.time_s[windows.middle],
@@ -196,6 +197,12 @@ def _mounting(gyro: GyroFit) -> Estimate:
         axis = np.sqrt(np.maximum((np.diag(turn) + 1.0) / 2.0, 0.0)) if angle > 1.0 else np.zeros(3)
         size = 1.0
     return Estimate(_AXES, axis / size * angle if size > 0.0 else axis, covariance, "rad")
+
+
+def _earth(gyro: GyroFit) -> Estimate | None:
+    """The Earth's rate along the axes of the reference's world, where the log tells it."""
+    earth = gyro.solution.earth
+    return None if earth is None or not earth.is_resolved else Estimate(_AXES, earth.value, earth.covariance, "rad/s")
 
 
 def _refuse_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
@@ -317,6 +324,10 @@ def _held_out(
         turn = (u * np.array([1.0, 1.0, np.linalg.det(u @ vt)])) @ vt
         stages.append(("as given", (grid.gyroscope @ S.T + b) @ turn.T))
     stages.append(("by the reference", grid.gyroscope @ taught.A.T + taught.a))
+    earth = taught.solution.earth
+    if earth is not None and earth.is_resolved:
+        of_room = reference.attitude(time)
+        stages = [(name, rate - np.einsum("nji,j->ni", of_room, earth.value)) for name, rate in stages]
     done = [replay(name, rate, grid, reference, time, last) for name, rate in stages]
     return tuple(stage for stage in done if stage is not None)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.coloured import NoiseModel, Solution, solve
+from trihedron.estimate.reference.earth import earth_columns
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
 
@@ -43,9 +44,10 @@ def fit_gyroscope(
     grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, *,
     clock: int = 2, extra: Signals | None = None, settled_noise: NoiseModel | None = None,
 ) -> GyroFit:  # fmt: skip
-    """``ω_reference(t (1 + ε) + τ) = A w' + a`` by windows; ``clock`` 0 holds τ and ε, 1 frees τ, 2 both."""
+    """``ω_reference(t (1 + ε) + τ) = A w' + a - Cᵀ e`` by windows; ``clock`` 0 holds τ and ε, 1 frees τ, 2 both."""
     middle = float(np.mean(grid.time_s[windows.middle]))
     n_clock = clock
+    earth = earth_columns(grid, reference, windows, offset_s, rate)
     noise = settled_noise
     solution: Solution | None = None
     for _ in range(TURNS if clock else 1):
@@ -65,7 +67,7 @@ def fit_gyroscope(
                 columns.append(by_offset * (grid.time_s[windows.middle] - middle)[:, None])
             design = np.concatenate([design, np.stack(columns, axis=2)], axis=2)
         size = np.linalg.norm(target, axis=1)
-        solution = solve(design, target, windows.start // windows.spacing, size, noise)
+        solution = solve(design, target, windows.start // windows.spacing, size, noise, earth)
         noise = solution.model
         if not n_clock:
             break

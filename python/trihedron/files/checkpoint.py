@@ -1,0 +1,82 @@
+"""How far one pass over a long log is, kept on disk: a run that was stopped goes on from there."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import time
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.files.output import write_whole
+
+EVERY_S = 30.0
+"""Between two times of keeping: what a stopped run does again, and far longer than writing takes."""
+_MADE_OF, _ROWS = "made_of", "rows"
+
+
+def made_of(path: Path, *said: object) -> str:
+    """What a pass must have been over to be gone on with: a file, by its size and time of change, and all that was
+    said about it."""
+    status = os.stat(path)
+    known = [str(path.resolve()), status.st_size, status.st_mtime_ns, *said]
+    return hashlib.sha256(json.dumps(known).encode()).hexdigest()
+
+
+@dataclass(eq=False)
+class Checkpoint:
+    """A file that holds the state of a pass; ``made_of`` says of which log and with which choices."""
+
+    path: Path
+    made_of: str
+    every_s: float = EVERY_S
+    _kept_at: float = field(default_factory=time.monotonic, init=False)
+
+    def load(self) -> tuple[int, dict[str, FloatArray]]:
+        """Rows that are done and the state after them; 0 and nothing where there is no such file.
+
+        Raises
+        ------
+        ValueError
+            When the file is no checkpoint, or one of another log or of other choices: it is left alone.
+        """
+        if not self.path.exists():
+            return 0, {}
+        try:
+            # Written unpacked: a file that unpacks to more than it is was not written here.
+            with zipfile.ZipFile(self.path) as archive:
+                if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
+                    raise ValueError("packed")
+            with np.load(self.path, allow_pickle=False) as held:
+                found = {name: held[name] for name in held.files}
+            of, rows = str(found.pop(_MADE_OF)), int(found.pop(_ROWS))
+        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+            raise ValueError(
+                f"{self.path}: this is no checkpoint and was left alone; name another file with --checkpoint."
+            ) from None
+        if of != self.made_of:
+            raise ValueError(
+                f"{self.path}: this checkpoint is of another log, or of other columns, units or rate; remove it to "
+                "begin anew, or name another file with --checkpoint."
+            )
+        return rows, found
+
+    def keep(self, rows: int, state: Callable[[], Mapping[str, FloatArray]]) -> None:
+        """Write what ``state`` gives after ``rows`` rows, if the last time is long enough ago."""
+        if time.monotonic() - self._kept_at < self.every_s:
+            return
+        stream = io.BytesIO()
+        np.savez(stream, **state(), **{_MADE_OF: np.array(self.made_of), _ROWS: np.array(rows)})  # type: ignore[arg-type]
+        write_whole(self.path, stream.getvalue(), overwrite=True)
+        self._kept_at = time.monotonic()
+
+    def remove(self) -> None:
+        """The pass is over."""
+        self.path.unlink(missing_ok=True)

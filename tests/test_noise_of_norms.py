@@ -1,0 +1,67 @@
+"""Slow noise of an accelerometer from the lengths of gravity in poses: intervals hold, two sessions are compared."""
+
+import numpy as np
+import pytest
+
+from trihedron.estimate.noise.of_norms import PoseNorms, compare_slow_norms
+from trihedron.estimate.noise.of_zeros import PoseZeros
+
+N, HOLD_S, GAP_S, POSES, RATE_HZ = 4e-3, 4.5, 2.0, 26, 20.0
+
+
+def session(seed, walk, scatter=0.0, poses=POSES):
+    """Norms of poses whose zeros walk, sample by sample; ``walk`` of all axes or of each [m/s²/√s]."""
+    rng = np.random.default_rng(seed)
+    every, length = int((HOLD_S + GAP_S) * RATE_HZ), int(HOLD_S * RATE_HZ)
+    up = rng.standard_normal((poses, 3))
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    steps = np.broadcast_to(walk, 3) / np.sqrt(RATE_HZ) * rng.standard_normal((poses * every, 3))
+    zero = np.cumsum(steps, axis=0)
+    means = np.array([zero[k * every : k * every + length].mean(axis=0) for k in range(poses)])
+    sigma = np.full(poses, N / np.sqrt(HOLD_S))
+    norms = (up * means).sum(axis=1) + np.hypot(sigma, scatter) * rng.standard_normal(poses)
+    t = np.arange(poses) * (HOLD_S + GAP_S)
+    return PoseNorms(PoseZeros(norms, sigma, t, np.full(poses, HOLD_S), scatters=True), up)
+
+
+def test_sessions_of_one_unit_are_not_told_apart_and_the_walk_is_inside_its_interval():
+    inside, p = [], []
+    for k, walk in enumerate((0.0, 4e-4, 4e-3, (4e-3, 4e-4, 1e-4))):
+        for seed in range(4):
+            found = compare_slow_norms(session([k, seed], walk), session([k, 50 + seed], walk, scatter=1e-3))
+            p.append(found.p_value)
+            inside += [
+                axis["K"].lower <= true <= axis["K"].upper
+                for side in (found.first, found.second)
+                for axis, true in zip(side, np.broadcast_to(walk, 3), strict=True)
+            ]
+    # Sixteen pairs of one unit: two below 1 % happen in 1 %.
+    assert np.sum(np.array(p) < 0.01) <= 1
+    # 95 % of 96 figures (those of a session hang together a little): fewer than 85 happen in 1 %.
+    assert sum(inside) >= 85
+
+
+def test_a_walk_ten_times_as_large_is_told_from_the_other_and_scatter_is_no_walk():
+    # Seventeen contrasts of one number a pose: most pairs, not all.
+    found = [compare_slow_norms(session(s, 1e-2), session(100 + s, 4e-4)) for s in range(8)]
+    told = [f for f in found if f.p_value < 0.01]
+    assert len(told) >= 5
+    assert {f.term for f in told} == {"K"}
+    assert all(axis["K"].upper < 4e-3 for f in told for axis in f.second)
+    jumps = [compare_slow_norms(session(s, 0.0, scatter=2e-2), session(100 + s, 0.0)).p_value for s in range(8)]
+    assert np.sum(np.array(jumps) < 0.01) <= 1
+
+
+def test_figures_do_not_hang_on_how_the_accelerometer_was_calibrated():
+    one, other = session(1, 4e-3), session(2, 4e-4)
+    x, y, z = one.up.T
+    moved = PoseNorms(
+        PoseZeros(one.norms.values + 0.03 * x - 0.02 * y + 0.01 * z * z + 0.005 * x * y, one.norms.sigma,
+                  one.norms.time_s, one.norms.length_s, scatters=True), one.up)  # fmt: skip
+    first, second = compare_slow_norms(one, other), compare_slow_norms(moved, other)
+    assert first.first[2]["K"].value == pytest.approx(second.first[2]["K"].value, rel=1e-6)
+    assert first.p_value == pytest.approx(second.p_value, rel=1e-6)
+
+
+def test_few_poses_or_poses_of_one_axis_are_not_compared():
+    assert compare_slow_norms(session(1, 1e-3, poses=18), session(2, 1e-3)) is None
