@@ -16,9 +16,9 @@ import numpy.typing as npt
 from scipy.special import chdtri
 
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.step import converter_step
 from trihedron.estimate.noise.corner import filter_corner
 from trihedron.estimate.noise.hold_statistics import as_measured, pooled_logarithm, robust_holds
-from trihedron.estimate.noise.resolution import converter_step
 from trihedron.estimate.noise.spectrum import cosine_transform
 from trihedron.ranges import ranges_of
 from trihedron.records.hold_noise import HoldLine, HoldNoise, Measured, OctaveNoise
