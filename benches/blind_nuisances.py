@@ -50,8 +50,12 @@ def trial(job):
         return judged(answer, said, crash, time.process_time() - start)
 
 
+LEAST_CLIPPED = 1
+"""Readings at the end of the range from which a trial counts."""
+
+
 def judged(answer, said, crash, seconds):
-    """right | shared | named (not first) | nuisance first | silent | wrong | crash."""
+    """right | shared | named (not first) | nuisance first | silent | wrong | crash | hidden (not in the log)."""
     flaw = answer["flaw"]
     out = {"flaw": flaw, "seed": answer["seed"], "rate": answer["rate_hz"], "poses": answer["n_poses"],
            "nuisances": answer["nuisances"], "seconds": seconds, "crash": crash, "verdict": "", "ids": []}  # fmt: skip
@@ -76,7 +80,8 @@ def judged(answer, said, crash, seconds):
     elif false:
         score = "wrong"
     else:
-        score = "silent"
+        # A range whose end no reading of the log reaches is no flaw of that log.
+        score = "silent" if answer.get("visible", LEAST_CLIPPED) >= LEAST_CLIPPED else "hidden"
     return out | {"score": score}
 
 
@@ -138,11 +143,13 @@ def main():
 
 
 def report(results):
-    n = len(results)
+    hidden = sum(r["score"] == "hidden" for r in results)
+    n = len(results) - hidden
     scores = {}
     for r in results:
         scores[r["score"]] = scores.get(r["score"], 0) + 1
-    print(f"\n{n} trials: " + ", ".join(f"{k} {v} ({100 * v / n:.0f} %)" for k, v in sorted(scores.items())))
+    shares = [f"{k} {v} ({100 * v / max(n, 1):.0f} %)" for k, v in sorted(scores.items()) if k != "hidden"]
+    print(f"\n{n} visible trials, {hidden} hidden: {', '.join(shares)}")
     print(f"trials with a mechanism that is not there: {sum(bool(r.get('false')) for r in results)}; "
           f"an effect with no value above its sigma: {sum(bool(r.get('worthless')) for r in results)}")  # fmt: skip
     for sensor in ("accelerometer", "gyroscope"):

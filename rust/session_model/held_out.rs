@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::chain::Chain;
+use super::chain::{Chain, Rows};
+use super::ends::Ends;
 use super::fit::{Fit, gradient};
 use super::predict::{N_DOMAINS, domain_of};
 use crate::error::Result;
@@ -37,13 +38,10 @@ impl Fit {
         let layout = self.layout();
         let firsts = self.first_rows();
         let side = gradient(layout, &self.groups);
-        let scale = self.chain.diagonal().map(|value| {
-            let length = value.max(0.0).sqrt();
-            if length > 0.0 { length } else { 1.0 }
-        });
+        let ends = Ends::of(&self.chain, &side, TRAINING_RIDGE)?;
         let parts: Vec<Result<FoldPart>> = folds
             .par_iter()
-            .map(|fold| self.predicted(fold, &side, &scale))
+            .map(|fold| self.predicted(fold, &side, &ends))
             .collect();
         let mut out = HeldOut {
             chi2: Vec::with_capacity(folds.len()),
@@ -75,24 +73,29 @@ impl Fit {
         Ok(out)
     }
 
-    /// One fold's rows predicted from the others.
-    fn predicted(
-        &self,
-        fold: &[usize],
-        side: &DMatrix<f64>,
-        scale: &DVector<f64>,
-    ) -> Result<FoldPart> {
-        let layout = self.layout();
-        let held = Chain::of(layout, fold.iter().map(|&g| &self.groups[g].rows));
-        let mut train = self.chain.clone();
-        train.add_scaled(&held, -1.0);
-        let factor = train.factor(TRAINING_RIDGE, Some(scale))?;
-        let n: usize = fold.iter().map(|&g| self.groups[g].rows.len()).sum();
+    /// One fold's rows predicted from the others: its own poses and the border alone, the rest eliminated from both ends.
+    fn predicted(&self, fold: &[usize], side: &DMatrix<f64>, ends: &Ends) -> Result<FoldPart> {
+        let mut groups: Vec<Rows> = fold.iter().map(|&g| self.groups[g].rows.clone()).collect();
+        let poses = groups.iter().filter_map(|rows| {
+            let last = |pose| pose + usize::from(rows.next.ncols() > 0);
+            rows.pose.map(|pose| (pose, last(pose)))
+        });
+        let (first, last) = poses.fold((usize::MAX, 0), |(a, b), (from, to)| {
+            (a.min(from), b.max(to))
+        });
+        let first = first.min(last);
+        for pose in groups.iter_mut().filter_map(|rows| rows.pose.as_mut()) {
+            *pose -= first;
+        }
+        let mut train = ends.between(&self.chain, first, last);
+        let layout = train.layout;
+        train.add_scaled(&Chain::of(layout, &groups), -1.0);
+        let factor = train.factor(0.0, Some(&ends.scale_between(layout, first)))?;
+        let n: usize = groups.iter().map(Rows::len).sum();
         let mut jacobian_t = DMatrix::zeros(layout.n(), n);
         let mut residual = DVector::zeros(n);
         let mut at = 0;
-        for &g in fold {
-            let rows = &self.groups[g].rows;
+        for rows in &groups {
             let r = rows.len();
             let mut part = DMatrix::zeros(layout.n(), r);
             rows.add_transposed(layout, &DMatrix::identity(r, r), &mut part);
@@ -101,12 +104,11 @@ impl Fit {
             at += r;
         }
         // The training optimum is one linear step from that of all rows.
-        let others = side - &jacobian_t * &residual;
+        let others = ends.side_between(side, layout, first, last) - &jacobian_t * &residual;
         let solved = factor.solve(&jacobian_t);
         let mut spread = DMatrix::zeros(n, n);
         let mut at = 0;
-        for &g in fold {
-            let rows = &self.groups[g].rows;
+        for rows in &groups {
             spread
                 .rows_mut(at, rows.len())
                 .copy_from(&rows.times(layout, &solved));

@@ -7,10 +7,13 @@
 
 mod blocks;
 pub mod chain;
+mod elimination;
+mod ends;
 mod evidence;
 pub mod factor;
 pub mod fit;
 pub mod held_out;
+mod lanes;
 pub mod move_rows;
 pub mod moves;
 mod possible;

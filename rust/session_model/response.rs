@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
 
 use super::moves::{Carried, Move, MoveCovariance, MoveNoise, N_MOVE, Sees};
-use crate::rotation::{exp_and_left_jacobian, skew};
+use crate::rotation::skew;
 
 /// A step longer than this many usual ones has lost samples.
 const GAP: f64 = 1.5;
@@ -41,16 +41,15 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
         .copy_from(&(lever * skew(&sees.up[0])));
     let var_jitter = noise.jitter_s * noise.jitter_s;
     let mut still_to_come = Vector3::zeros();
-    for step in one.steps.iter().rev() {
+    for (step, turn) in one.steps.iter().zip(&carried.turns).rev() {
         still_to_come += by_force[step.to] * carried.force[step.to];
         to_turn
             .fixed_rows_mut::<3>(2)
             .copy_from(&(-skew(&still_to_come)));
-        let (phi0, phi1) = step.moments(|k| carried.rate[k]);
-        let (_, left) = exp_and_left_jacobian(&(phi0 + phi0.cross(&phi1)));
-        let to_start = to_turn * (carried.attitude[step.from].transpose() * left);
-        let zeroth = to_start - to_start * skew(&phi1);
-        let first = to_start * skew(&phi0);
+        let [phi0, phi1] = &turn.moments;
+        let to_start = to_turn * carried.attitude[step.from].tr_mul(&turn.left);
+        let zeroth = to_start - times_skew(&to_start, phi1);
+        let first = times_skew(&to_start, phi0);
         for j in 0..4 {
             if step.zeroth[j] != 0.0 || step.first[j] != 0.0 {
                 by_rate[step.sample[j]] += zeroth * step.zeroth[j] + first * step.first[j];
@@ -83,6 +82,27 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
     }
 }
 
+/// `M [v]×`.
+fn times_skew(m: &SMatrix<f64, N_MOVE, 3>, v: &Vector3<f64>) -> SMatrix<f64, N_MOVE, 3> {
+    let (x, y, z) = (m.column(0), m.column(1), m.column(2));
+    SMatrix::from_columns(&[y * v.z - z * v.y, z * v.x - x * v.z, x * v.y - y * v.x])
+}
+
+/// Adds the lower triangle of `R C Rᵀ`.
+fn add_square<const N: usize>(
+    r: &SMatrix<f64, N, 3>,
+    covariance: &Matrix3<f64>,
+    out: &mut SMatrix<f64, N, N>,
+) {
+    let half = r * covariance;
+    for j in 0..N {
+        for i in j..N {
+            out[(i, j)] +=
+                half[(i, 0)] * r[(j, 0)] + half[(i, 1)] * r[(j, 1)] + half[(i, 2)] * r[(j, 2)];
+        }
+    }
+}
+
 fn add_white(
     one: &Move,
     sees: &Sees<'_>,
@@ -101,10 +121,14 @@ fn add_white(
     let rate = spread(&sees.rate_scale, &noise.rate_density, &one.unresolved[1]);
     let force = spread(&sees.force_scale, &noise.force_density, &one.unresolved[0]);
     let mut of_velocity = Matrix3::zeros();
+    let mut of_all = MoveCovariance::zeros();
     for (r, f) in by_rate.iter().zip(by_force) {
-        *covariance += r * rate * r.transpose();
-        of_velocity += f * force * f.transpose();
+        add_square(r, &rate, &mut of_all);
+        add_square(f, &force, &mut of_velocity);
     }
+    of_all.fill_upper_triangle_with_lower_triangle();
+    of_velocity.fill_upper_triangle_with_lower_triangle();
+    *covariance += of_all;
     let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
     velocity += of_velocity;
 }
@@ -208,26 +232,47 @@ pub fn effect_columns(
     rate: Option<&[f64]>,
     k: usize,
 ) -> DMatrix<f64> {
-    // Row by row, so that the loop runs along the parameters.
+    // Row by row, so that the loop runs along the parameters; few of them in a length that the compiler knows.
     let mut out = vec![0.0; N_MOVE * k];
-    if let Some(rate) = rate.filter(|_| k > 0) {
+    let sum = match k {
+        1 => add_effects::<1>,
+        2 => add_effects::<2>,
+        3 => add_effects::<3>,
+        _ => add_effects::<0>,
+    };
+    if k > 0 {
+        sum(response, force, rate, k, &mut out);
+    }
+    DMatrix::from_row_slice(N_MOVE, k, &out)
+}
+
+/// The sums of [`effect_columns`] with `K` parameters, or with any number where `K` is none.
+fn add_effects<const K: usize>(
+    response: &Response,
+    force: Option<&[f64]>,
+    rate: Option<&[f64]>,
+    k: usize,
+    out: &mut [f64],
+) {
+    let k = if K == 0 { k } else { K };
+    if let Some(rate) = rate {
         for (r, row) in response.by_rate.iter().zip(rate.chunks_exact(3 * k)) {
             for (i, own) in out.chunks_exact_mut(k).enumerate() {
                 subtract_along(own, [r[(i, 0)], r[(i, 1)], r[(i, 2)]], row);
             }
         }
     }
-    if let Some(force) = force.filter(|_| k > 0) {
+    if let Some(force) = force {
         for (f, row) in response.by_force.iter().zip(force.chunks_exact(3 * k)) {
             for (i, own) in out[2 * k..].chunks_exact_mut(k).enumerate() {
                 subtract_along(own, [f[(i, 0)], f[(i, 1)], f[(i, 2)]], row);
             }
         }
     }
-    DMatrix::from_row_slice(N_MOVE, k, &out)
 }
 
 /// Takes `Σ response_i row_i` off, where `row` holds three vectors one after the other.
+#[inline]
 fn subtract_along(out: &mut [f64], response: [f64; 3], row: &[f64]) {
     let k = out.len();
     let (x, rest) = row.split_at(k);

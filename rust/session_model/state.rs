@@ -50,7 +50,13 @@ impl Distortion {
             columns
                 .chunks_exact(3 * k.max(1))
                 .map(|row| {
-                    Vector3::from_fn(|i, _| (0..k).map(|c| row[i * k + c] * effect[c]).sum::<f64>())
+                    let (x, rest) = row.split_at(k);
+                    let (y, z) = rest.split_at(k);
+                    let along = |own: &[f64]| {
+                        let pairs = own.iter().zip(effect.as_slice());
+                        pairs.map(|(value, size)| value * size).sum::<f64>()
+                    };
+                    Vector3::new(along(x), along(y), along(z))
                 })
                 .collect(),
         )

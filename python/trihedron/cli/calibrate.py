@@ -113,7 +113,6 @@ def calibrate(
     recording = sources.one().read()
     from trihedron import pipeline
     from trihedron.report import calibration_report
-    from trihedron.report.machine import calibration_record
 
     with progress("calibrating") as tell:
         result = pipeline.calibrate(
@@ -130,8 +129,13 @@ def calibrate(
         if extended:
             result = pipeline.extend(result, progress=tell)
     document = calibration_report(result.calibration, result.segments, recording)
-    machine = calibration_record(result.calibration, result.segments, recording)
     more = "Every pose and move: --full, or --report FILE.html with figures."
+
+    def machine() -> dict[str, Any]:
+        from trihedron.report.machine import calibration_record
+
+        return calibration_record(result.calibration, result.segments, recording)
+
     ending.tell(document, machine, result.calibration, FIRST_SCREEN, more)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
@@ -66,9 +67,8 @@ def calibrate_many(
             **place_said,
         )
     document = sessions_report(result.model)
-    machine = sessions_record(result.model)
     more = "What changed and every recording: --full, or --report FILE.html with figures."
-    ending.tell(document, machine, result.calibration, FIRST_SCREEN, more)
+    ending.tell(document, partial(sessions_record, result.model), result.calibration, FIRST_SCREEN, more)
 
 
 def _recordings(sources: list[LogSource], by: str) -> Iterator[Recording]:

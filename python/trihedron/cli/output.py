@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -88,17 +88,27 @@ class Ending:
     force: bool
 
     def tell(
-        self, document: Document, machine: dict[str, Any], calibration: Calibration, sections: int, more: str = ""
+        self,
+        document: Document,
+        machine: Callable[[], dict[str, Any]],
+        calibration: Calibration,
+        sections: int,
+        more: str = "",
     ) -> None:
-        """The report, the files that were asked for, what ``more`` there is; status 2 where it is not to be trusted."""
+        """The report, the files that were asked for, what ``more`` there is; status 2 where it is not to be trusted.
+
+        ``machine`` makes the result for machines, where one is asked for.
+        """
         from trihedron.files.calibration import write_calibration
 
         show(document, self.json, sections=None if self.full else sections)
         if self.output is not None:
             write_calibration(calibration, self.output, overwrite=self.force)
             say(f"calibration: {self.output}")
-        write_json(machine, self.json, force=self.force)
-        write_report(document, machine, self.report, force=self.force)
+        if self.json is not None or self.report is not None:
+            made = machine()
+            write_json(made, self.json, force=self.force)
+            write_report(document, made, self.report, force=self.force)
         if more and not self.full and self.report is None:
             say(more)
         leave(calibration.findings)

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from contextvars import ContextVar
 from dataclasses import replace
 from datetime import datetime, timezone
-from importlib.metadata import version as installed
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -60,6 +59,9 @@ def with_provenance(document: Document) -> Document:
     """The document with what this run was."""
     rows = [("command", shlex.join(["trihedron", *typed.get()]))] if typed.get() else []
     rows.append(("date", datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC")))
+    # Slow to load: a command that ends in words on a screen does without it.
+    from importlib.metadata import version as installed
+
     rows.append(("version", f"trihedron {installed('trihedron')}, Python {platform.python_version()}"))
     rows += [("input", f"{source}, sha256 {sha256 or 'not computed'}") for source, sha256 in _inputs.get()]
     options = [f"{key.replace('_', '-')} {_word(value)}" for key, value in _options.get().items() if _is_said(value)]

@@ -100,13 +100,17 @@ def calibrate_stream(
     log = opened(source)
     from trihedron.pipeline.streaming import calibrate_file
     from trihedron.report import calibration_report
-    from trihedron.report.machine import calibration_record
 
     where = {"gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height}
     with progress("calibrating") as tell:
         result = calibrate_file(log, checkpoint=checkpoint, progress=tell, **where, **options)
     document = calibration_report(result.calibration, result.segments, result.recording)
-    machine = calibration_record(result.calibration, result.segments, result.recording)
+
+    def machine() -> dict[str, Any]:
+        from trihedron.report.machine import calibration_record
+
+        return calibration_record(result.calibration, result.segments, result.recording)
+
     ending.tell(document, machine, result.calibration, sections)
 
 

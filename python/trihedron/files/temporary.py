@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -26,7 +25,7 @@ class Temporary:
         self.target = target
         start = os.fsencode(target.name)[:_MOST_BYTES_OF_NAME].decode(errors="replace").replace("\ufffd", "_")
         while True:
-            name = f".{start}{MARK}{os.getpid()}-{secrets.token_hex(4)}"
+            name = f".{start}{MARK}{os.getpid()}-{os.urandom(4).hex()}"
             self.path = str(target.parent / name)
             _UNDER_WAY.add(self.path)
             self.descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _CLOEXEC, 0o600)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache
 from typing import Any, TypeVar
 
 from trihedron.records import Finding
@@ -46,29 +47,49 @@ _COMMANDS = {
     "trihedron segment LOG": "trihedron.segment(recording)",
     "trihedron segment": "trihedron.segment(recording)",
 }
-_COLUMNS = re.compile(r"--columns ((?:\w[\w.]*=|[\w-]+,)[\w=,.-]*\w)(\.{3})?")
-_TURNS = re.compile(r"--turns (-?\d[\d,.-]*\d),\.\.\.")
-_QUOTED = re.compile(r"(--(?:accel|gyro)-lsb) '([^']*)'")
-_WORD = re.compile(r"--method (\w+)")
-# A place holder behind a flag (`--latitude DEG`) says what the parameter's own name says.
-_FLAG = re.compile(
-    "("
-    + "|".join(sorted(map(re.escape, _PARAMETERS), key=len, reverse=True))
-    + r")(?![\w-])(?: (?:DEG|M_S2|M|HZ|N|NAME|UNIT|LIST|SIZE|ALLAN\.json)\b)?"
-)
-_COMMAND = re.compile("`(" + "|".join(sorted(map(re.escape, _COMMANDS), key=len, reverse=True)) + ")`")
-
 Value = TypeVar("Value")
+
+
+@dataclass(frozen=True)
+class _Patterns:
+    """What is looked for; compiled when first asked for, since a command that works says none of it."""
+
+    columns: re.Pattern[str]
+    turns: re.Pattern[str]
+    quoted: re.Pattern[str]
+    method: re.Pattern[str]
+    flag: re.Pattern[str]
+    command: re.Pattern[str]
+
+
+@cache
+def _patterns() -> _Patterns:
+    # A place holder behind a flag (`--latitude DEG`) says what the parameter's own name says.
+    place = r"(?: (?:DEG|M_S2|M|HZ|N|NAME|UNIT|LIST|SIZE|ALLAN\.json)\b)?"
+    flags, commands = (
+        "|".join(sorted(map(re.escape, words), key=len, reverse=True)) for words in (_PARAMETERS, _COMMANDS)
+    )
+    return _Patterns(
+        columns=re.compile(r"--columns ((?:\w[\w.]*=|[\w-]+,)[\w=,.-]*\w)(\.{3})?"),
+        turns=re.compile(r"--turns (-?\d[\d,.-]*\d),\.\.\."),
+        quoted=re.compile(r"(--(?:accel|gyro)-lsb) '([^']*)'"),
+        method=re.compile(r"--method (\w+)"),
+        flag=re.compile(rf"({flags})(?![\w-]){place}"),
+        command=re.compile(f"`({commands})`"),
+    )
 
 
 def in_python(text: str) -> str:
     """A sentence with ``--columns ax=1`` as ``columns="ax=1"`` and other flags as the parameters they stand for."""
-    text = _COLUMNS.sub(lambda m: f'columns="{m[1]}{m[2] or ""}"', text)
-    text = _TURNS.sub(lambda m: f"turns_deg=[{m[1].replace(',', ', ')}, ...]", text)
-    text = _QUOTED.sub(lambda m: f'{_PARAMETERS[m[1]]}="{m[2]}"', text)
-    text = _WORD.sub(lambda m: f'method="{m[1]}"', text)
-    text = _COMMAND.sub(lambda m: f"`{_COMMANDS[m[1]]}`", text)
-    return _FLAG.sub(lambda m: _PARAMETERS[m[1]], text)
+    if "--" not in text and "`trihedron " not in text:
+        return text
+    said = _patterns()
+    text = said.columns.sub(lambda m: f'columns="{m[1]}{m[2] or ""}"', text)
+    text = said.turns.sub(lambda m: f"turns_deg=[{m[1].replace(',', ', ')}, ...]", text)
+    text = said.quoted.sub(lambda m: f'{_PARAMETERS[m[1]]}="{m[2]}"', text)
+    text = said.method.sub(lambda m: f'method="{m[1]}"', text)
+    text = said.command.sub(lambda m: f"`{_COMMANDS[m[1]]}`", text)
+    return said.flag.sub(lambda m: _PARAMETERS[m[1]], text)
 
 
 def finding_in_python(finding: Finding) -> Finding:

@@ -153,7 +153,7 @@ MAX_TURNING = 0.05
 
 
 def _shaken(
-    recording: Recording, segments: Segments, block_s: float = 0.25, shortest_s: float = 1.5
+    recording: Recording, segments: Segments, block_s: float = 0.1, shortest_s: float = 0.8
 ) -> list[tuple[int, int]]:
     """Stretches of moves whose block means stand still while the samples shake."""
     if recording.gyroscope is None or recording.accelerometer is None or segments.gyroscope_mean is None:

@@ -182,7 +182,8 @@ impl SessionFit {
         let effects = distortion(force.as_ref(), rate.as_ref(), self.session.n_points())?;
         let fit = Arc::clone(&self.fit);
         let session = Arc::clone(&self.session);
-        let parts = run_long(py, || {
+        // Some tenths of a millisecond, hundreds of times: a thread of its own would take longer to begin.
+        let parts = run(py, || {
             session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, &effects)
         })?;
         let n = self.fit.n_rows();

@@ -58,7 +58,11 @@ fn distortion(
                 shape[0], shape[1], shape[2]
             )));
         }
-        Ok(Some((array.as_array().iter().copied().collect(), shape[2])))
+        let values = match array.as_slice() {
+            Ok(flat) if array.is_c_contiguous() => flat.to_vec(),
+            _ => array.as_array().iter().copied().collect(),
+        };
+        Ok(Some((values, shape[2])))
     };
     let force = flat("force", force)?;
     let rate = flat("rate", rate)?;

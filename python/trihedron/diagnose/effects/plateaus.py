@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import pdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
@@ -55,18 +56,20 @@ def plateaus_of(obs: Observations, *, is_gyro: bool) -> list[Plateau]:
     raw, density = (obs.raw_rate, obs.rate_density) if is_gyro else (obs.raw_force, obs.force_density)
     if raw is None or density is None:
         return []
-    return plateaus(raw, density * np.sqrt(obs.recording.rate_hz), obs.move_ranges)
+    step = obs.recording.facts.of("gyroscope" if is_gyro else "accelerometer").step
+    return plateaus(raw, density * np.sqrt(obs.recording.rate_hz), step, obs.move_ranges)
 
 
-def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int], ...]) -> list[Plateau]:
-    """Runs of a raw (n, 3) signal on a common limit inside moves."""
+def plateaus(
+    signal: FloatArray, sigma: FloatArray, step: FloatArray, ranges: tuple[tuple[int, int], ...]
+) -> list[Plateau]:
+    """Runs of a raw (n, 3) signal on a common limit inside moves; ``sigma`` (3,) of a sample, ``step`` (3,) of code."""
     found: list[Plateau] = []
     if not ranges:
         return found
     moves = _Moves.of(ranges)
     for axis in range(signal.shape[1]):
-        codes = np.unique(signal[moves.samples, axis])
-        step_size = float(np.diff(codes).min()) if len(codes) > 1 else 0.0
+        step_size = float(step[axis])
         for sign in (1, -1):
             x = sign * signal[:, axis]
             top = np.maximum.reduceat(x[moves.samples], moves.first)
@@ -87,7 +90,7 @@ def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int
             # Nothing is read beyond a limit but noise.
             if best and float(top.max()) <= best[0].level * sign + BAND_SIGMA * noise:
                 found += best
-    return found
+    return found or _common_end(signal, sigma, moves)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,6 +206,47 @@ def _piled_up(x: FloatArray, step_size: float, sigma: float, axis: int, sign: in
         return []
     runs = moves.runs(x, top, top).tolist()
     return [Plateau(axis, sign, first, last, sign * top, True) for first, last, _, _ in runs]
+
+
+BY_CHANCE = 1e-6
+"""Chance that readings crowd on the outermost code of a sensor, for one sensor of a healthy recording."""
+DITHERED = 1.5
+"""Steps of the converter over the noise (rounding in it) up to which the top of a smooth motion spreads over codes."""
+NEAR = 3
+"""Codes next to the outermost one: a slow peak reads all of these more often than those far below."""
+
+
+def _common_end(signal: FloatArray, sigma: FloatArray, moves: _Moves) -> list[Plateau]:
+    """Readings on one outermost code, the same in size on every channel that comes so far, more than motion puts there.
+
+    A range that ends just above 1 g stops no more than a few readings of each of several channels. Motion reads its
+    outermost code once, and the codes below it at least as often as that one: how many more there are is Poisson's.
+    """
+    inside = signal[moves.samples]
+    end = float(np.nanmax(np.abs(inside)))
+    sides, n_end, expected = [], 0, 0.0
+    for axis in range(signal.shape[1]):
+        codes = np.unique(inside[:, axis])
+        step_size = float(np.diff(codes).min()) if len(codes) > 1 else 0.0
+        if not 0.0 < step_size < DITHERED * float(sigma[axis]):
+            continue
+        for sign in (1, -1):
+            codes_below = np.round((end - sign * inside[:, axis]) / step_size)
+            on = int((codes_below == 0).sum())
+            if on:
+                sides.append((axis, sign, end - 0.5 * step_size))
+                n_end += on
+                expected += max(
+                    max(int(((codes_below > 0) & (codes_below <= reach)).sum()), 1) / reach
+                    for reach in (NEAR, NEIGHBOURS)
+                )
+    if n_end <= len(sides) or float(pdtrc(n_end - len(sides) - 1, expected)) > BY_CHANCE:
+        return []
+    return [
+        Plateau(axis, sign, first, last, sign * end, True)
+        for axis, sign, low in sides
+        for first, last, _, _ in moves.runs(sign * signal[:, axis], low, np.inf).tolist()
+    ]
 
 
 def shared_levels(

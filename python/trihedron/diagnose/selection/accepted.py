@@ -41,7 +41,8 @@ def accepted_effects(model: StepwiseModel, numbers: Fit | None = None) -> tuple[
             statement = found.effect.statement(parameters)
         is_behind = found.effect.is_spread or (_stated(found) is not None and share < HEADLINE)
         record = replace(_accepted(found, values, parameters, statement), share=share)
-        out.append(((is_behind, -share), record))
+        is_beside = found.variant is None and not found.reobserves  # nothing in the fit hangs on it
+        out.append(((is_behind, -share, is_beside), record))
     return tuple(one for _, one in sorted(out, key=lambda pair: pair[0]))
 
 
@@ -63,9 +64,16 @@ def shares(model: StepwiseModel) -> tuple[float, ...]:
 
 
 def are_footnotes(model: StepwiseModel) -> bool:
-    """Whether nothing accepted is an answer: single poses, a faint line, scatter that is little of what zeros do."""
+    """Whether nothing accepted is an answer: single poses, a faint line, scatter that is little of what zeros do, what
+    is seen in the samples and changes nothing in the fit."""
     return all(
-        share < HEADLINE and (_stated(one) is not None or one.effect.is_spread or one.effect.is_local)
+        share < HEADLINE
+        and (
+            _stated(one) is not None
+            or one.effect.is_spread
+            or one.effect.is_local
+            or (one.variant is None and not one.reobserves)
+        )
         for one, share in zip(model.accepted, shares(model), strict=True)
     )
 

@@ -103,7 +103,7 @@ def with_only(model: StepwiseModel, kept: tuple[Accepted, ...]) -> StepwiseModel
     """The model made again from the bare observations with some of its effects, every other number fitted anew.
 
     Where the observations are no longer the same ones (samples put back or taken out), columns are made again from the
-    motion that the mended observations show.
+    motion that the mended observations show; an effect that these do not show (a pose pushed in them alone) goes too.
     """
     obs = model.obs
     if [one for one in kept if one.reobserves] != [one for one in model.accepted if one.reobserves]:
@@ -112,7 +112,7 @@ def with_only(model: StepwiseModel, kept: tuple[Accepted, ...]) -> StepwiseModel
             if one.evidence is not None and one.evidence.reweigh is not None:
                 obs = one.evidence.reweigh(obs)
         plain = Context(obs, tune_noise(obs, _start_on(model, obs), stacked([]), model.prior))
-        kept = tuple(_made_again(one, plain) for one in kept)
+        kept = tuple(again for one in kept if (again := _made_again(one, plain)) is not None)
     distortion = stacked([one.variant.distortion for one in kept if one.variant is not None])
     start = replace(_start_on(model, obs), effect=np.zeros(distortion.n_parameters))
     fitted = tune_noise(obs, start, distortion, model.prior)
@@ -125,8 +125,8 @@ def _start_on(model: StepwiseModel, obs: Observations) -> Twin:
     return replace(twin, effect=np.zeros(0))
 
 
-def _made_again(one: Accepted, context: Context) -> Accepted:
+def _made_again(one: Accepted, context: Context) -> Accepted | None:
     if one.variant is None:
         return one
     again = one.effect.made_again(context, one.variant)
-    return one if again is None else replace(one, variant=again)
+    return None if again is None else replace(one, variant=again)

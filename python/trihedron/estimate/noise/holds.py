@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.step import converter_step
 from trihedron.estimate.noise.corner import filter_corner
 from trihedron.estimate.noise.hold_lines import lines_of_holds, without_lines
 from trihedron.estimate.noise.hold_statistics import as_measured, pooled_logarithm, robust_holds, root_of
-from trihedron.estimate.noise.resolution import converter_step
 from trihedron.estimate.noise.spectrum import cosine_transform
 from trihedron.ranges import ranges_of
 from trihedron.records.hold_noise import HoldNoise, Measured, OctaveNoise

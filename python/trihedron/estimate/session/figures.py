@@ -5,7 +5,7 @@ Norm of gravity at rest with one zero for the session; gravity carried through e
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -94,11 +94,12 @@ def held_out(
         is_held = np.isin(labels[:, 0], (MOVES, DYNAMICS)) & is_reading
         is_held[is_held] = moves[labels[is_held, 1]]
         S, b, S_w, _ = core.without(is_held, observed.force_origin)
-        seen = carried(time_s, measured, anchors_s, S, b - S @ observed.force_origin, S_w)
         which = [number[int(hold)] for hold in observed.before[moves]]
+        part = replace(measured, links=measured.links[which], edges=measured.edges[which])
+        seen = carried(time_s, part, anchors_s[which], S, b - S @ observed.force_origin, S_w)
         for mine, theirs in ((parts.residual, seen.residual), (parts.sigma, seen.sigma),
                              (parts.angle_deg, seen.angle_deg), (parts.floor2, seen.floor2)):  # fmt: skip
-            mine[which] = theirs[which]
+            mine[which] = theirs
     return HeldOut(norm, norm_sigma, parts)
 
 

@@ -138,7 +138,8 @@ def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:
     """Stretches of the log without a pause, each from its own zero, and the mean distance of rows."""
     n = len(time_s)
     width = min(WINDOW, n)
-    starts = np.unique(np.linspace(0, n - width, min(max(n // width, 1), MOST_WINDOWS)).astype(np.int64))
+    # `np.unique` would load masked arrays.
+    starts = sorted(set(np.linspace(0, n - width, min(max(n // width, 1), MOST_WINDOWS)).astype(np.int64).tolist()))
     usual = float(np.median([(time_s[s + width - 1] - time_s[s]) / (width - 1) for s in starts]))
     kept: list[FloatArray] = []
     for s in starts:

@@ -10,6 +10,13 @@ COMMENT_STARTS = ("#", "%", "//")
 MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
 _NUMBER_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?$|[+-]?(nan|inf|infinity)$", re.IGNORECASE)
+_NUMBERS, _NUMBERS_COMMA = (
+    re.compile(
+        rf"(?:[+-]?(?:(?:\d+{mark}?\d*|{mark}\d+)(?:[eE][+-]?\d+)?|nan|inf|infinity)(?:\n|\Z))+\Z", re.IGNORECASE
+    )
+    for mark in (r"\.", ",")
+)
+"""The same of all fields of a line, ends of lines between."""
 _UNIT_WORD = re.compile(
     r"[\[(]?(s|m?secs?|m?seconds?|m?s|us|µs|ns|utc|m?g|m ?/ ?\(?s(?:ec)?(\^?2|²|/s)\)?|m ?s\^?-2|m?dps|rad|deg"
     r"|(m?rad|m?deg|°) ?(/ ?s(?:ec)?|s\^?-1)|counts?|lsb|raw|adc|no_units|u?t|µt|gauss|local_flux|m?v"
@@ -61,6 +68,9 @@ def is_number(text: str, decimal_comma: bool) -> bool:
 
 
 def _numeric_fraction(fields: list[str], decimal_comma: bool) -> float:
+    # Most lines hold nothing but numbers: one look at all of them together.
+    if (_NUMBERS_COMMA if decimal_comma else _NUMBERS).match("\n".join(fields)):
+        return 1.0
     filled = [f for f in fields if f.lower() not in MISSING or f.lower() == "nan"]
     if not filled:
         return 0.0
@@ -70,13 +80,14 @@ def _numeric_fraction(fields: list[str], decimal_comma: bool) -> float:
 def _judge(lines: list[str], separator: str, decimal_comma: bool) -> tuple[float, int]:
     """(how well this separator explains the lines, its usual number of fields)."""
     rows = [split(line, separator) for line in lines]
-    rows = [row for row in rows if _numeric_fraction(row, decimal_comma) >= 0.5]
-    if not rows:
+    judged = [(len(row), _numeric_fraction(row, decimal_comma)) for row in rows]
+    judged = [(count, fraction) for count, fraction in judged if fraction >= 0.5]
+    if not judged:
         return 0.0, 0
-    counts = [len(row) for row in rows]
+    counts = [count for count, _ in judged]
     usual = max(set(counts), key=lambda n: (counts.count(n), n))
-    fitting = [row for row in rows if len(row) == usual]
-    fraction = sum(_numeric_fraction(row, decimal_comma) for row in fitting) / len(fitting)
+    fitting = [fraction for count, fraction in judged if count == usual]
+    fraction = sum(fitting) / len(fitting)
     # One column explains anything: a real separator must always win over it.
     return fraction * len(fitting) / len(lines) * (1.0 if usual > 1 else 0.1), usual
 
