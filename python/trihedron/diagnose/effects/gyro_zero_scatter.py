@@ -5,7 +5,7 @@ from __future__ import annotations
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.laws.find import MOST_FOLLOWS, gyro_zero_laws
-from trihedron.diagnose.residuals.creep import IS_MOTION, settling, share_of_creep
+from trihedron.diagnose.residuals.creep import settling
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
 from trihedron.diagnose.zeros.levels import two_levels
 from trihedron.diagnose.zeros.of_session import (
@@ -42,7 +42,7 @@ class GyroZeroScatter(DirectEffect):
             return None  # a zero that changes inside poses is not drawn anew in each
         if _takes_two_values(context):
             return None
-        if share_of_creep(context) > IS_MOTION or settling(context).is_motion:
+        if settling(context).is_motion:
             return None  # the poses themselves turn
         sigma, si = found.evidence.scatter, context.si_per_raw("gyroscope")
         sizes = ", ".join(f"{degrees_from_radians(s):.2g}" for s in sigma)
