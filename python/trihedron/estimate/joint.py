@@ -10,6 +10,13 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.verdict import covariance_scale
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align_screened
 from trihedron.estimate.gyroscope.findings import findings_of
+from trihedron.estimate.gyroscope.lost_turns import (
+    PossibleLosses,
+    asks_for_losses,
+    losses_that_fit,
+    of_alignment,
+    relative_sigma,
+)
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.moves import gyroscope_of
 from trihedron.estimate.gyroscope.observability import describe
@@ -19,7 +26,6 @@ from trihedron.estimate.session.carried import carried
 from trihedron.estimate.session.figures import held_out as held_out_of_session
 from trihedron.estimate.session.figures import move_quality, norm_quality
 from trihedron.estimate.session.fit import SessionSolution, solve_session
-from trihedron.estimate.session.lost_turns import lost_share
 from trihedron.estimate.session.observed import arranged
 from trihedron.records.calibration import Calibration, FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
@@ -94,11 +100,14 @@ def _by_session(
     if measured.attitude is not None:
         more = solution.S_w @ np.diag(measured.attitude.var_zero) @ solution.S_w.T
         covariance[21:, 21:] += np.diag(np.maximum(np.diag(more) - np.diag(covariance[21:, 21:]), 0.0))
-    # Turns that are all short by one share look like a scale: S and b = -S z grow with it.
-    lost, possible = lost_share(measured, solution, seen, aligned.used)
-    own_sigma = float(np.median(np.sqrt(np.diag(covariance)[[12, 16, 20]]) / np.linalg.norm(solution.S_w, axis=0)))
-    along = lost * np.concatenate([solution.S_w.ravel(), solution.b_w])
-    covariance[12:, 12:] += np.outer(along, along)
+    own_sigma = relative_sigma(covariance[12:, 12:], solution.S_w)
+    losses = PossibleLosses()
+    if asks_for_losses(solution.moves_chi2, solution.moves_dof, len(aligned.outliers)):
+        missed = seen.angle_deg, seen.floor2
+        losses = losses_that_fit(
+            recording.time_s, measured, solution.S_w, gravity_m_s2, missed, solution.moves_dof, aligned.used
+        )
+    covariance[12:, 12:] = losses.widened(covariance[12:, 12:], solution.S_w, solution.b_w, solution.inflation[0] ** 2)
     used = np.where(aligned.used, 1.0, 0.0)
     held = None if left_out is None else left_out.norm
     alone = accelerometer.quality
@@ -138,16 +147,9 @@ def _by_session(
         findings=(
             *_poses_above_noise(quality, solution),
             *_findings(aligned, measured, solution),
-            *_possible_losses(possible, own_sigma),
+            *losses.findings(own_sigma),
         ),
     )
-
-
-def _possible_losses(lost: float, sigma_scale: float) -> tuple[Finding, ...]:
-    """Losses that could be more than all else that is known of the scale."""
-    if lost <= sigma_scale:
-        return ()
-    return (Finding.of(FindingCode.SAMPLES_LOST, "possible", lost_share=lost, sigma_scale=sigma_scale),)
 
 
 def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[Finding, ...]:
@@ -196,6 +198,7 @@ def _by_moves_alone(
     gravity_source: str,
 ) -> Calibration:
     held = held_out(aligned, measured, part, gravity_m_s2, options)
+    aligned, of_losses = of_alignment(recording.time_s, measured, aligned, gravity_m_s2)
     return Calibration(
         accelerometer=SensorCalibration(
             S=np.asarray(aligned.fit.accelerometer_scale),
@@ -214,7 +217,7 @@ def _by_moves_alone(
         gravity_source=gravity_source,
         recording_source=recording.source,
         recording_sha256=recording.sha256,
-        findings=findings_of(aligned, measured, held),
+        findings=(*findings_of(aligned, measured, held), *of_losses),
     )
 
 

@@ -29,7 +29,6 @@ from trihedron.simulate import (
     NoiseTerms,
     Scenario,
     Smoother,
-    converter_step,
     diagnosed_sizes,
     noise_of_octaves,
     read_scenario,
@@ -190,7 +189,7 @@ def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
         readings = getattr(found.recording, name)
         if readings is not None and getattr(given, name).unit.value != fit["raw_unit"]:
             # Codes of another unit: the converter is that of the recording.
-            tables[name]["adc"] = {"lsb": converter_step(readings)}
+            tables[name]["adc"] = {"lsb": found.recording.facts.of(name).common_step}
 
 
 def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:

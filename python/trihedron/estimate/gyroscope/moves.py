@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.estimate.gyroscope.alignment import Aligned, MoveOptions, align_screened, given_accelerometer
 from trihedron.estimate.gyroscope.findings import findings_of
+from trihedron.estimate.gyroscope.lost_turns import of_alignment
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.observability import describe
 from trihedron.estimate.gyroscope.start import starts
@@ -55,7 +56,9 @@ def calibrate_moves(
     part = given_accelerometer(accelerometer)
     aligned = align_screened(measured, part, gravity_m_s2, first, options)
     held = held_out(aligned, measured, part, gravity_m_s2, options)
-    return gyroscope_of(aligned, measured, recording, gravity_m_s2, held, "moves"), findings_of(aligned, measured, held)
+    aligned, of_losses = of_alignment(recording.time_s, measured, aligned, gravity_m_s2)
+    found = (*findings_of(aligned, measured, held), *of_losses)
+    return gyroscope_of(aligned, measured, recording, gravity_m_s2, held, "moves"), found
 
 
 def gyroscope_of(

@@ -1,0 +1,78 @@
+"""Losses that no step shows: believed possible where stamps may have been remade, and carried whatever fitted them."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
+
+from confidence.motion import G
+from confidence.sensor import lower
+from confidence.sessions import hand
+from trihedron import calibrate
+from trihedron.estimate.gyroscope.lost_turns import could_be_remade
+from trihedron.records import FindingCode, Recording
+
+STEP_S = 0.01
+ROWS = np.arange(60_000)
+
+
+def drifting(step_s=STEP_S):
+    """A crystal that warms up by 20 ppm: it leaves the best straight line by 1 to 2 ms in ten minutes."""
+    t = ROWS * step_s
+    return t * (1.0 + 20e-6 * t / t[-1])
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [ROWS * STEP_S, ROWS / 99.746, np.round(ROWS / 99.746, 3), np.round(ROWS / 99.746, 6), np.round(ROWS * 0.0037, 2)],
+    ids=["exact", "odd rate", "to 1 ms", "to 1 µs", "shared stamps"],
+)
+def test_stamps_that_are_a_line_in_the_row_may_have_been_remade(stamps):
+    assert could_be_remade(stamps, float(np.median(np.diff(stamps)[np.diff(stamps) > 0])))
+
+
+@pytest.mark.parametrize("digits", [3, 4, 6])
+def test_stamps_that_leave_the_line_by_more_than_their_rounding_are_a_clocks(digits):
+    assert not could_be_remade(np.round(drifting(), digits), STEP_S)
+
+
+def test_a_gap_that_the_stamps_show_does_not_make_a_line_a_clock():
+    kept = np.random.default_rng(5).random(len(ROWS)) > 0.01
+    assert could_be_remade(ROWS[kept] * STEP_S, STEP_S)
+
+
+def lossy(seed, time_of=None):
+    """A session of slow moves, 18 poses, of which a link lost 0.1 %: about one sample in each."""
+    f, w, rate, truth, _ = hand(seed, move_s=10.0)
+    kept = np.random.default_rng([14, seed]).random(len(f)) >= 1e-3
+    t = np.arange(np.count_nonzero(kept)) / rate if time_of is None else time_of(np.flatnonzero(kept) / rate)
+    recording = Recording(t, f[kept], w[kept], rate, accelerometer_unit="counts", gyroscope_unit="counts")
+    return calibrate(recording, gravity_m_s2=G), lower(truth)
+
+
+@pytest.mark.parametrize("seed", [30000, 20018])
+def test_losses_are_possible_wherever_moves_are_missed(seed):
+    """The joint fit was left, or the moves that missed most were: losses that did it were no longer asked for."""
+    result, truth = lossy(seed)
+    codes = {finding.code for finding in result.findings}
+    assert codes & {FindingCode.JOINT_FIT_LEFT, FindingCode.OUTLIER_MOVE}
+    assert FindingCode.SAMPLES_LOST in codes
+    assert not result.is_trustworthy
+    z = (result.gyroscope.S - truth.S_w) / result.gyroscope.sigma_S
+    # Nine numbers, each within four standard errors; in the second session one was 22 away.
+    assert np.abs(z).max() < 4.0
+
+
+def test_a_clock_of_its_own_rules_losses_out():
+    """The same session with a clock's stamps: what was lost is a gap in them, and no share of the scale."""
+
+    def warming(t):
+        return t * (1.0 + 20e-6 * t / t[-1])
+
+    result, truth = lossy(20018, warming)
+    assert FindingCode.SAMPLES_LOST not in {finding.code for finding in result.findings}
+    z = (result.gyroscope.S - truth.S_w) / result.gyroscope.sigma_S
+    assert np.abs(z).max() < 4.0
