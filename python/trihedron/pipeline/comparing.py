@@ -16,6 +16,7 @@ from trihedron.diagnose.against import (
 )
 from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor
 from trihedron.estimate.verification import verify_calibration
+from trihedron.pipeline.comparing_slow import FREE_CURVES
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import (
     AcceptedEffect,
@@ -85,8 +86,8 @@ def _without_walk(
     for sensor, drift in (("gyroscope", "gyro-hidden-drift"), ("accelerometer", "accel-hidden-drift")):
         slow = [n.ratio for n in noise if n.significant and n.sensor == sensor and n.term in ("B", "K") and n.ratio]
         if slow and min(slow) >= 1.0:
-            drawn.add((drift, "curve"))
-    return tuple(e for e in effects if (e.id, e.model.get("variant")) not in drawn)
+            drawn.add(drift)
+    return tuple(e for e in effects if e.id not in drawn or e.model.get("variant") not in FREE_CURVES)
 
 
 def _span_k(recording: Recording, simulated: tuple[Diagnosis, Recording] | None) -> float | None:
