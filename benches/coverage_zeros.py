@@ -75,7 +75,10 @@ def scores(seed, arguments):
     )
     out = [(value, sigma)]
     n_clipped = (
-        0 if (clipped := bridge_clipping(recording.time_s, recording.gyroscope)) is None else clipped.is_clipped.sum()
+        0
+        if (clipped := bridge_clipping(recording.time_s, recording.gyroscope, recording.facts.of("gyroscope").step))
+        is None
+        else clipped.is_clipped.sum()
     )
     named = []
     if arguments.diagnose:

@@ -62,7 +62,7 @@ def statistics(recording: Recording, gravity: float) -> Iterator[Row]:
     value, spread, _ = common_time_error(step_errors(context), step_s)
     yield "common time error over its standard error", 5.0, value / spread
     yield "jitter in steps", 0.01, float(np.sqrt(max(value, 0.0) / STEP_FACTOR)) / step_s
-    power = context.hold_power("accelerometer").sum(axis=1)
+    power = context.hold_power.sum(axis=1)
     yield "most powerful pose over the median", 1.5, float(power.max() / np.median(power))
     excess = context.vibration_power[: obs.n_holds].sum(axis=1)
     yield "90 % point over median of the poses' excess power", 3.0, float(np.quantile(excess, 0.9) / np.median(excess))

@@ -5,7 +5,8 @@ python benches/rivals.py [--rounds 3] [--rows 1e7] [--only norm] [--write]
 Each method runs in a process of its own, in turn, `--rounds` times; a round is the fastest of some calls after a first.
 Numbers are CPU time on one core (`two cores` and reading: wall time), so that a busy machine shifts them little; quote
 ratios. `--write` puts the tables into docs/speed.md, the short one into README.md, and draws docs/figures/speed.png.
-A rival that is not installed is left out: `pip install numba python-ins bottleneck pandas pyarrow`.
+A rival that is not installed is left out: `pip install numba python-ins bottleneck pandas pyarrow
+filterpy colorednoise`.
 """
 
 from __future__ import annotations
@@ -80,6 +81,37 @@ def subjects(rows: int) -> list[Subject]:
         Subject("norm500", "Accelerometer from 500 poses", "norm", "FIT", 500, "µs", us, {}),
         Subject("norm1e6", "Accelerometer from 10⁶ raw samples", "norm", "FIT", million, "ms", ms, {}),
         Subject("still", "Still detection, 10⁷ × 3", "still", "DETECT", 10 * million, "ns/sample", ns, {}),
+        Subject("kalman", "Kalman filter of one axis, 20 000 poses", "kalman", "TRACK", 20_000, "ns/pose", ns, {}),
+        Subject(
+            "noise",
+            "Noise of a triad, 10⁶ samples: white, flicker, walk",
+            "simulation",
+            "NOISE",
+            million,
+            "ns/sample",
+            ns,
+            {"numba, sixteen Gauss-Markov processes": 100_000},
+        ),
+        Subject(
+            "response",
+            "Second-order response of a triad, 10⁶ samples",
+            "simulation",
+            "RESPONSE",
+            million,
+            "ns/sample",
+            ns,
+            {},
+        ),
+        Subject(
+            "motion",
+            "Motion of a hand session, 10⁶ samples: attitude, rate, its change, force",
+            "simulation",
+            "MOTION",
+            million,
+            "ns/sample",
+            ns,
+            {"SciPy RotationSpline, a knot in five samples": 100_000, "pyins generate_imu": 20_000},
+        ),
         Subject(
             "read", f"Reading {rows:.2g} × 7 numbers of CSV, two cores", "reading", "READ", rows, "s", 1.0, {}, True
         ),

@@ -1,5 +1,7 @@
 //! Signals that effects are made of, along the samples of a session: play, time derivatives and shifts inside moves.
 
+use rayon::prelude::*;
+
 /// Half-open range of the samples of a move.
 type Edges = [usize; 2];
 
@@ -55,22 +57,36 @@ pub fn derivative(time: &[f64], values: &[[f64; 3]], moves: &[Edges]) -> Vec<[f6
 /// outside.
 #[must_use]
 pub fn shifted(time: &[f64], values: &[[f64; 3]], moves: &[Edges], ahead: f64) -> Vec<[f64; 3]> {
+    let each: Vec<Vec<[f64; 3]>> = moves
+        .par_iter()
+        .map(|&[start, stop]| {
+            if stop < start + 2 {
+                return values[start..stop].to_vec();
+            }
+            shifted_move(&time[start..stop], &values[start..stop], ahead)
+        })
+        .collect();
     let mut out = values.to_vec();
-    for &[start, stop] in moves {
-        if stop < start + 2 {
-            continue;
-        }
-        let (t, y) = (&time[start..stop], &values[start..stop]);
-        let slopes = spline_slopes(t, y);
-        let last = t.len() - 1;
-        let mut k = 0;
-        for (i, row) in out[start..stop].iter_mut().enumerate() {
-            let at = (t[i] + ahead).clamp(t[0], t[last]);
+    for (&[start, stop], of_move) in moves.iter().zip(each) {
+        out[start..stop].copy_from_slice(&of_move);
+    }
+    out
+}
+
+/// [`shifted`] of one move of two samples or more.
+fn shifted_move(t: &[f64], y: &[[f64; 3]], ahead: f64) -> Vec<[f64; 3]> {
+    let slopes = spline_slopes(t, y);
+    let last = t.len() - 1;
+    let mut k = 0;
+    t.iter()
+        .map(|time| {
+            let at = (time + ahead).clamp(t[0], t[last]);
             while k + 1 < last && t[k + 1] <= at {
                 k += 1;
             }
             let h = t[k + 1] - t[k];
             let x = (at - t[k]) / h;
+            let mut row = [0.0; 3];
             for c in 0..3 {
                 let (d0, d1) = (slopes[k][c] * h, slopes[k + 1][c] * h);
                 let rise = y[k + 1][c] - y[k][c];
@@ -78,9 +94,9 @@ pub fn shifted(time: &[f64], values: &[[f64; 3]], moves: &[Edges], ahead: f64) -
                 let bend = 3.0 * rise - 2.0 * d0 - d1 + x * (d0 + d1 - 2.0 * rise);
                 row[c] = y[k][c] + x * (d0 + x * bend);
             }
-        }
-    }
-    out
+            row
+        })
+        .collect()
 }
 
 /// Slopes of the spline at its knots: continuous curvature inside, level ends.

@@ -6,6 +6,7 @@
 //! sequential filter gives `V^{-1/2}` of any columns in time linear in the readings: a likelihood costs microseconds.
 
 use crate::error::{Error, Result};
+use crate::simd::{Instructions, for_each_instruction_set};
 
 /// Hidden states of one direction: walk, drift, slope of the drift, walk at the start of the stretch averaged.
 const PART: usize = 4;
@@ -114,14 +115,20 @@ impl Readings {
     /// `V^{-1/2}[y X]` summed into its Gram matrix (sequential Kalman filter; every column is filtered with the same gains).
     #[must_use]
     pub fn whitened(&self, strengths: Strengths) -> Whitened {
+        let instructions = Instructions::detect();
         // Sizes known to the compiler: the loops over states are what it costs.
         match self.direction.len() / self.time.len().max(1) {
-            1 => self.filtered::<{ 1 + PART }>(strengths),
-            2 => self.filtered::<{ 1 + 2 * PART }>(strengths),
-            _ => self.filtered::<{ 1 + 3 * PART }>(strengths),
+            1 => along_one(instructions, self, strengths),
+            2 => along_two(instructions, self, strengths),
+            _ => along_three(instructions, self, strengths),
         }
     }
 
+    #[inline(always)]
+    #[expect(
+        clippy::inline_always,
+        reason = "it takes the instructions of its caller"
+    )]
     fn filtered<const S: usize>(&self, strengths: Strengths) -> Whitened {
         let (c, parts) = (self.columns, (S - 1) / PART);
         let mut covariance = [[0.0_f64; S]; S];
@@ -203,7 +210,51 @@ impl Readings {
     }
 }
 
+for_each_instruction_set! {
+    fn along_one(readings: &Readings, strengths: Strengths) -> Whitened = filtered_along_one
+}
+
+for_each_instruction_set! {
+    fn along_two(readings: &Readings, strengths: Strengths) -> Whitened = filtered_along_two
+}
+
+for_each_instruction_set! {
+    fn along_three(readings: &Readings, strengths: Strengths) -> Whitened = filtered_along_three
+}
+
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "it takes the instructions of its caller"
+)]
+fn filtered_along_one<const FUSED: bool>(readings: &Readings, strengths: Strengths) -> Whitened {
+    readings.filtered::<{ 1 + PART }>(strengths)
+}
+
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "it takes the instructions of its caller"
+)]
+fn filtered_along_two<const FUSED: bool>(readings: &Readings, strengths: Strengths) -> Whitened {
+    readings.filtered::<{ 1 + 2 * PART }>(strengths)
+}
+
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "it takes the instructions of its caller"
+)]
+fn filtered_along_three<const FUSED: bool>(readings: &Readings, strengths: Strengths) -> Whitened {
+    readings.filtered::<{ 1 + 3 * PART }>(strengths)
+}
+
 /// Lets time pass: d ← d + slope·dt, then the noise of walk and integrated walk over dt.
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "it takes the instructions of its caller"
+)]
 fn step<const S: usize>(
     covariance: &mut [[f64; S]; S],
     state: &mut [f64],
@@ -231,6 +282,11 @@ fn step<const S: usize>(
 }
 
 /// Scatter plus, along every direction, the walk's mean over the stretch and the drift in its middle.
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "it takes the instructions of its caller"
+)]
 fn seen<const S: usize>(direction: &[f64], half: f64, states: &[f64; S]) -> f64 {
     states[0]
         + direction
@@ -243,6 +299,11 @@ fn seen<const S: usize>(direction: &[f64], half: f64, states: &[f64; S]) -> f64 
 }
 
 /// The walk as it is now becomes the start of the stretch.
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "it takes the instructions of its caller"
+)]
 fn remember_start<const S: usize>(covariance: &mut [[f64; S]; S], state: &mut [f64], c: usize) {
     for first in (1..S).step_by(PART) {
         let (walk, start) = (first + WALK, first + START);
@@ -254,6 +315,11 @@ fn remember_start<const S: usize>(covariance: &mut [[f64; S]; S], state: &mut [f
     }
 }
 
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "it takes the instructions of its caller"
+)]
 fn forget_scatter<const S: usize>(covariance: &mut [[f64; S]; S], scatter: f64) {
     covariance[0] = [0.0; S];
     for row in covariance.iter_mut() {

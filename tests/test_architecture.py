@@ -15,7 +15,7 @@ COMPOSERS = {"pipeline", "cli", "fleet", "__init__", "__main__"}
 # Records ask for how they are shown (to_dict, plot, a page) and for the reader of plain arrays only when asked.
 LOOKS_UP = {"records/presented.py", "records/recording.py"}
 # Where numbers are made.
-MAY_USE_CORE = {"read", "segment", "estimate", "diagnose", "simulate", "session", "probability.py"}
+MAY_USE_CORE = {"read", "segment", "estimate", "diagnose", "simulate", "session", "channel_facts", "probability.py"}
 LONGEST_FILE, LONGEST_FUNCTION, MOST_ARGUMENTS = 350, 80, 9
 
 

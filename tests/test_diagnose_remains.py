@@ -127,7 +127,7 @@ def test_channels_of_one_part_share_one_exact_limit():
     t = np.arange(n) / 100.0
     turns = 40000.0 * np.sin(2.0 * np.pi * np.array([0.9, 1.1, 0.7]) * t[:, None])
     codes = np.clip(np.round(turns + rng.normal(0.0, 3.0, (n, 3))), -32768, 32767)
-    runs = plateaus(codes, np.full(3, 3.0), ((0, n),))
+    runs = plateaus(codes, np.full(3, 3.0), np.ones(3), ((0, n),))
     levels = shared_levels(runs, np.zeros(3), np.full(3, 3.0))
     assert set(levels) == {(axis, sign) for axis in range(3) for sign in (1, -1)}
     assert {value for value, exact in levels.values() if exact} == {32767.0, -32768.0}

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from trihedron.channel_facts.step import converter_steps
 from trihedron.estimate.gyroscope.clipping import bridge_clipping
 
 RATE_HZ = 100.0
@@ -21,7 +22,7 @@ def turns(rng, n_moves=18, peak=12000.0, tremor=120.0, noise=3.0):
 
 
 def bridged(counts):
-    found = bridge_clipping(np.arange(len(counts)) / RATE_HZ, counts)
+    found = bridge_clipping(np.arange(len(counts)) / RATE_HZ, counts, converter_steps(counts))
     return 0 if found is None else int(found.is_clipped.sum())
 
 

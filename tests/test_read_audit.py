@@ -157,7 +157,7 @@ def test_the_round_top_of_a_swing_is_not_clipping(seed):
     rng = np.random.default_rng(seed)
     t = np.arange(20_000) / 100.0
     swing = np.rint(100 * np.sin(0.7 * t + rng.uniform(0, 6)) + 0.3 * rng.standard_normal(len(t)))
-    assert find_walls(np.column_stack([swing, swing, swing]), np.full(3, 0.3)) == []
+    assert find_walls(np.column_stack([swing, swing, swing]), np.full(3, 0.3), np.ones(3)) == []
 
 
 def test_a_quiet_coarse_sensor_resting_on_its_largest_count_is_coarse_and_neither_clipped_nor_stuck(tmp_path):

@@ -9,7 +9,6 @@ from trihedron.pipeline import calibrate, read, segment
 from trihedron.records import Segments
 from trihedron.sensor_model import correct
 from trihedron.simulate import scenario_by_name, simulate, twin_scenario
-from trihedron.simulate.twin import converter_step
 
 WINDOW = 128
 # Octaves of the spectrum of 128 samples, without the lowest lines, which the removal of the mean touches.
@@ -77,7 +76,8 @@ def test_the_twin_of_a_real_recording_looks_like_it(real_data, which, gravity, a
             octave = np.exp(np.mean(np.log(ratio[low:high]), axis=0))
             assert np.all(octave < factor), (name, low, octave)
             assert np.all(octave > 1.0 / factor), (name, low, octave)
-        assert converter_step(twin_of_it) == pytest.approx(converter_step(original), rel=1e-3)
+        steps = (one.facts.of(name).step for one in (copy, recording))
+        np.testing.assert_allclose(*steps, rtol=1e-3)
 
 
 def test_the_twin_of_a_simulation_has_its_noise_and_poses():
@@ -106,12 +106,3 @@ def test_a_twin_says_what_it_lacks():
     empty = Segments((), (), None, None, none, none, none, none, np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
     with pytest.raises(ValueError, match="at least one still pose"):
         twin_scenario(recording, empty, calibration)
-
-
-def test_converter_steps_are_found_in_counts_decimals_and_denied_to_floats():
-    rng = np.random.default_rng(0)
-    x = rng.normal(size=(3000, 3))
-    assert converter_step(np.round(x * 50)) == 1.0
-    assert converter_step(np.round(np.round(x / 0.0048) * 0.0048, 5)) == pytest.approx(0.0048, rel=0.01)
-    assert converter_step(x) == 0.0
-    assert converter_step(np.zeros((10, 3))) == 0.0

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 
 from trihedron.interruption import SENTENCE, Interrupted, install, status_of
 
+_SELDOM = (50_000, 20, 20)
+"""When Python looks for cycles of objects that nobody holds; a command makes some 100 000 objects as it loads."""
 _FIRST_FREE = 3
 """After standard input, output and error."""
 
@@ -15,6 +18,10 @@ def main() -> int:
     """Run the command line; interrupted while it still loads, it ends as it would later."""
     # The allocator of the library of tables complains aloud where threads are short, and goes on without one.
     os.environ.setdefault("_RJEM_MALLOC_CONF", "background_thread:false")
+    # The kernels have threads of their own: a second pool that waits in a loop would only take a processor from them.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # A command is over soon: what its modules leave need not be looked through after every 700 objects.
+    gc.set_threshold(*_SELDOM)
     try:
         _fill_standard_places()
         install()

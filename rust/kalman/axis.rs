@@ -56,6 +56,8 @@ pub struct AxisFilter {
     moving: usize,
     pub(crate) filter: UdFilter,
     pub(crate) row: Vec<f64>,
+    /// What the slow noise is of all states.
+    slow: Vec<f64>,
     timeline: Timeline,
     steps: Steps,
 }
@@ -94,6 +96,8 @@ impl AxisFilter {
             covariance[(n_noise + i, n_noise + i)] = prior.sigma[i].powi(2);
             x[n_noise + i] = prior.mean[i];
         }
+        let mut slow = shaping.slow_row().as_slice().to_vec();
+        slow.resize(n, 0.0);
         let moving = if prior.walk.iter().any(|w| *w > 0.0) {
             n
         } else {
@@ -102,6 +106,7 @@ impl AxisFilter {
         Ok(Self {
             filter: UdFilter::new(x, Factors::of(&covariance)),
             row: vec![0.0; n],
+            slow,
             model,
             shaping,
             layout,
@@ -139,10 +144,7 @@ impl AxisFilter {
     /// Row of the slow noise over all states.
     #[must_use]
     pub fn slow_row(&self) -> DVector<f64> {
-        let mut row = DVector::zeros(self.filter.n());
-        row.rows_mut(0, self.n_noise())
-            .copy_from(&self.shaping.slow_row());
-        row
+        DVector::from_column_slice(&self.slow)
     }
 
     /// Transition of all states over the last step.
@@ -250,12 +252,9 @@ impl AxisFilter {
     /// Slow noise at the end of the last hold, and its standard error.
     #[must_use]
     pub fn drift(&self) -> (f64, f64) {
-        let row = self.slow_row();
+        let row = &self.slow;
         let value = row.iter().zip(&self.filter.x).map(|(h, x)| h * x).sum();
-        (
-            value,
-            self.filter.factors.variance_along(row.as_slice()).sqrt(),
-        )
+        (value, self.filter.factors.variance_along(row).sqrt())
     }
 }
 

@@ -8,7 +8,7 @@
 use nalgebra::{Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
 
 use crate::poisson::{RateModel, StepWeights, step_weights};
-use crate::rotation::exp;
+use crate::rotation::exp_and_left_jacobian;
 
 /// Residuals of a move: gravity across the vertical after it (2), velocity over it (3).
 pub const N_MOVE: usize = 5;
@@ -139,6 +139,15 @@ pub struct MoveNoise {
     pub inflation: [f64; 2],
 }
 
+/// One step of the attitude.
+#[derive(Debug, Clone, Copy)]
+pub struct Turn {
+    /// Zeroth and first moment of the rate.
+    pub moments: [Vector3<f64>; 2],
+    /// Left Jacobian of the exponential of its rotation vector.
+    pub left: Matrix3<f64>,
+}
+
 /// A move carried forward.
 #[derive(Debug, Clone)]
 pub struct Carried {
@@ -148,6 +157,8 @@ pub struct Carried {
     pub force: Vec<Vector3<f64>>,
     /// Start → each sample.
     pub attitude: Vec<Matrix3<f64>>,
+    /// Every step of it.
+    pub turns: Vec<Turn>,
     /// The five residuals, SI.
     pub residual: SVector<f64, N_MOVE>,
 }
@@ -174,11 +185,16 @@ pub fn carry(one: &Move, sees: &Sees<'_>) -> Carried {
         force.push(f);
     }
     let mut attitude = vec![Matrix3::identity(); n];
+    let mut turns = Vec::with_capacity(one.steps.len());
     let mut velocity = force[0] * one.weight[0];
     let mut done = 0;
     for step in &one.steps {
         let (phi0, phi1) = step.moments(|k| rate[k]);
-        let turn = exp(&(phi0 + phi0.cross(&phi1)));
+        let (turn, left) = exp_and_left_jacobian(&(phi0 + phi0.cross(&phi1)));
+        turns.push(Turn {
+            moments: [phi0, phi1],
+            left,
+        });
         let here = turn.transpose() * attitude[step.from];
         // Samples that share a stamp share its attitude.
         for k in done + 1..step.to {
@@ -201,6 +217,7 @@ pub fn carry(one: &Move, sees: &Sees<'_>) -> Carried {
         rate,
         force,
         attitude,
+        turns,
         residual,
     }
 }

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
 
 use super::moves::{Carried, Move, MoveCovariance, MoveNoise, N_MOVE, Sees};
-use crate::rotation::{exp_and_left_jacobian, skew};
+use crate::rotation::skew;
 
 /// A step longer than this many usual ones has lost samples.
 const GAP: f64 = 1.5;
@@ -41,16 +41,15 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
         .copy_from(&(lever * skew(&sees.up[0])));
     let var_jitter = noise.jitter_s * noise.jitter_s;
     let mut still_to_come = Vector3::zeros();
-    for step in one.steps.iter().rev() {
+    for (step, turn) in one.steps.iter().zip(&carried.turns).rev() {
         still_to_come += by_force[step.to] * carried.force[step.to];
         to_turn
             .fixed_rows_mut::<3>(2)
             .copy_from(&(-skew(&still_to_come)));
-        let (phi0, phi1) = step.moments(|k| carried.rate[k]);
-        let (_, left) = exp_and_left_jacobian(&(phi0 + phi0.cross(&phi1)));
-        let to_start = to_turn * (carried.attitude[step.from].transpose() * left);
-        let zeroth = to_start - to_start * skew(&phi1);
-        let first = to_start * skew(&phi0);
+        let [phi0, phi1] = &turn.moments;
+        let to_start = to_turn * carried.attitude[step.from].tr_mul(&turn.left);
+        let zeroth = to_start - times_skew(&to_start, phi1);
+        let first = times_skew(&to_start, phi0);
         for j in 0..4 {
             if step.zeroth[j] != 0.0 || step.first[j] != 0.0 {
                 by_rate[step.sample[j]] += zeroth * step.zeroth[j] + first * step.first[j];
@@ -83,6 +82,27 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
     }
 }
 
+/// `M [v]×`.
+fn times_skew(m: &SMatrix<f64, N_MOVE, 3>, v: &Vector3<f64>) -> SMatrix<f64, N_MOVE, 3> {
+    let (x, y, z) = (m.column(0), m.column(1), m.column(2));
+    SMatrix::from_columns(&[y * v.z - z * v.y, z * v.x - x * v.z, x * v.y - y * v.x])
+}
+
+/// Adds the lower triangle of `R C Rᵀ`.
+fn add_square<const N: usize>(
+    r: &SMatrix<f64, N, 3>,
+    covariance: &Matrix3<f64>,
+    out: &mut SMatrix<f64, N, N>,
+) {
+    let half = r * covariance;
+    for j in 0..N {
+        for i in j..N {
+            out[(i, j)] +=
+                half[(i, 0)] * r[(j, 0)] + half[(i, 1)] * r[(j, 1)] + half[(i, 2)] * r[(j, 2)];
+        }
+    }
+}
+
 fn add_white(
     one: &Move,
     sees: &Sees<'_>,
@@ -101,10 +121,14 @@ fn add_white(
     let rate = spread(&sees.rate_scale, &noise.rate_density, &one.unresolved[1]);
     let force = spread(&sees.force_scale, &noise.force_density, &one.unresolved[0]);
     let mut of_velocity = Matrix3::zeros();
+    let mut of_all = MoveCovariance::zeros();
     for (r, f) in by_rate.iter().zip(by_force) {
-        *covariance += r * rate * r.transpose();
-        of_velocity += f * force * f.transpose();
+        add_square(r, &rate, &mut of_all);
+        add_square(f, &force, &mut of_velocity);
     }
+    of_all.fill_upper_triangle_with_lower_triangle();
+    of_velocity.fill_upper_triangle_with_lower_triangle();
+    *covariance += of_all;
     let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
     velocity += of_velocity;
 }

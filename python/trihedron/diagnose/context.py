@@ -191,18 +191,13 @@ class Context:
                 out[name] = float(np.nanmean(self.at_points(logged)[: self.obs.n_holds]))
         return out
 
-    def hold_power(self, sensor: str) -> FloatArray:
-        """(holds, 3) variance inside each hold, SI², along the instrument axes."""
-        obs, twin = self.obs, self.fitted.twin
-        raw, S = (obs.raw_force, twin.accel_S) if sensor == "accelerometer" else (obs.raw_rate, twin.gyro_S)
-        assert raw is not None
-        out = np.zeros((obs.n_holds, 3))
-        for i, hold in enumerate(obs.segments.holds):
-            values = raw[hold.samples()] @ S.T
-            # Differences of neighbours forget slow drift; half their mean square is the fast part's variance.
-            out[i] = np.var(values, axis=0)
-            if np.isnan(out[i]).any():
-                out[i] = np.nanvar(values, axis=0)
+    @cached_property
+    def hold_power(self) -> FloatArray:
+        """(holds, 3) variance of the accelerometer inside each hold, SI², along the instrument axes."""
+        obs, S = self.obs, self.fitted.twin.accel_S
+        out: FloatArray = np.einsum("ij,hjk,ik->hi", S, obs.hold_scatter, S)
+        for i in np.flatnonzero(np.isnan(out).any(axis=1)):
+            out[i] = np.nanvar(obs.raw_force[obs.segments.holds[i].samples()] @ S.T, axis=0)
         return out
 
     def si_per_raw(self, sensor: str) -> FloatArray:
@@ -220,7 +215,7 @@ class Context:
         made good by the ratio that the shaken holds show.
         """
         obs = self.obs
-        holds = self.hold_power("accelerometer")
+        holds = self.hold_power
         floor = np.quantile(holds, 0.1, axis=0)
         out = np.zeros((self.n_points, 3))
         out[: obs.n_holds] = np.maximum(holds - floor, 0.0)

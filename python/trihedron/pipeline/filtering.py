@@ -15,7 +15,6 @@ from trihedron.estimate.kalman import (
 )
 from trihedron.estimate.noise import identify_noise, noise_of_holds
 from trihedron.estimate.noise.holds import SHORTEST as SHORTEST_HOLD
-from trihedron.estimate.noise.resolution import converter_step
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
@@ -162,7 +161,7 @@ def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments:
         return
     inside = noise_of_holds(readings, recording.rate_hz, windows)
     # Codes between the poses count too: inside a hold a coarse converter shows one.
-    steps = [converter_step(readings[:, axis]) for axis in range(3)]
+    steps = recording.facts.of("accelerometer").step.tolist()
     octaves = [axis.octaves for axis in inside]
     check_same_converter(given, steps, octaves, recording.rate_hz, recording.source)
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts import facts_of
 from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
@@ -194,14 +195,15 @@ def audited(
         findings += judged.findings
     if sensors.has_clock:
         findings += audit_timing(time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.stamps_s)
+    facts = facts_of(sensors.accelerometer, sensors.gyroscope)
     counter = sensors.columns.counter
     if counter is not None:
         findings += audit_counter(_kept(sensors, counter, n), table.label(counter), sensors.place)
     for done, (name, triad) in enumerate(present.items()):
         if progress is not None:
             progress((done + 1) / (len(present) + 1), f"checking the {name}")
-        findings += audit_readings(name, triad, windows, sensors.place)
-        findings += audit_steps(name, triad, acc_unit if name == "accelerometer" else gyr_unit)
+        findings += audit_readings(name, triad, facts.of(name), windows, sensors.place)
+        findings += audit_steps(name, facts.of(name), windows, acc_unit if name == "accelerometer" else gyr_unit)
     if progress is not None:
         progress(1.0, f"read {n} samples")
     temperature, supply = sensors.columns.temperature, sensors.columns.supply
@@ -227,7 +229,7 @@ def audited(
         auxiliary=MappingProxyType(_auxiliary(sensors, n)),
         rows_in_file=sensors.rows_in_file,
         rows_read=sensors.rows_read,
-    )
+    ).knowing(facts)
 
 
 def _rate_hz(sensors: Sensors) -> float:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.printable import one_line
+from trihedron.records.channel_facts import RecordingFacts
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
 from trihedron.records.finding import Finding
 from trihedron.records.frozen import freeze
@@ -153,7 +156,17 @@ class Recording(Presented):
     def with_distinct_stamps(self) -> Recording:
         """This recording with no two samples at one instant: stamps that are shared, spread (:func:`spread_stamps`)."""
         distinct = spread_stamps(self.time_s, 1.0 / self.rate_hz)
-        return self if distinct is self.time_s else replace(self, time_s=distinct)
+        return self if distinct is self.time_s else self.with_same_readings(time_s=distinct)
+
+    def knowing(self, facts: RecordingFacts) -> Recording:
+        """This recording with the facts of its readings as its reader has found them."""
+        self.__dict__["facts"] = facts
+        return self
+
+    def with_same_readings(self, **changes: Any) -> Recording:
+        """This recording with other fields than its readings, which keep what is known of them."""
+        changed = replace(self, **changes)
+        return changed.knowing(self.facts) if "facts" in self.__dict__ else changed
 
     @classmethod
     def from_arrays(
@@ -190,6 +203,14 @@ class Recording(Presented):
             temperature_degc=temperature_degc,
             supply_v=supply_v,
         )
+
+    @cached_property
+    def facts(self) -> RecordingFacts:
+        """What the readings say of the converters behind them: found when first asked for, which the reader does."""
+        # How facts are found is a room of its own; a record only carries them.
+        from trihedron.channel_facts import facts_of
+
+        return facts_of(self.accelerometer, self.gyroscope)
 
     @property
     def n_samples(self) -> int:

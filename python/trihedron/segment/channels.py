@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.channel_facts.step import converter_steps, probe_stride
 from trihedron.records import Recording
 
 BLOCK_S = 0.1
@@ -18,8 +19,10 @@ BLOCK_SAMPLES = 5
 WINDOW_BLOCKS = 5
 """Stillness is judged over five blocks (half a second): long enough to see a turn of 1 deg/s in gravity, and shorter
 than the shortest hold by half."""
-PROBED = 20000
-"""Readings, evenly spread over a log, from which a converter's step is read off."""
+
+FINEST = 1e-7
+"""Part of a channel's span that stands for its step where it is finer: no converter has 23 bits of what it measures,
+and a simulated channel without noise or converter would be seen to move by any change of its last digit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +67,7 @@ class BlockSums:
         self.is_gyroscope = [recording.accelerometer is None] if recording.gyroscope is None else [True]
         if recording.accelerometer is not None:
             self.is_gyroscope = [False, True] if recording.gyroscope is not None else [False]
-        self.stride = max(1, recording.n_samples // PROBED)
+        self.stride = probe_stride(recording.n_samples)
         self.n = 0
         self.parts: list[tuple[FloatArray, FloatArray, BoolArray]] = []
         self.probes: list[list[FloatArray]] = [[] for _ in self.is_gyroscope]
@@ -92,7 +95,8 @@ class BlockSums:
     def channels(self) -> Channels:
         """All blocks so far."""
         mean, variance, is_valid = (np.concatenate([part[k] for part in self.parts]) for k in range(3))
-        quantum = np.concatenate([_step(np.concatenate(probe)) for probe in self.probes])
+        steps = [converter_steps(np.concatenate(probe)) for probe in self.probes]
+        quantum = _not_below_arithmetic(np.concatenate(steps), mean)
         gyroscope = np.repeat(self.is_gyroscope, 3)
         return Channels(self.length, self.length / self.rate_hz, mean, variance, is_valid, quantum, gyroscope)
 
@@ -121,24 +125,13 @@ def split_into_blocks(recording: Recording) -> Channels:
         gap = np.diff(recording.time_s, prepend=recording.time_s[0]) > step_s
         is_valid &= ~gap[: len(mean) * length].reshape(-1, length).any(axis=1)
     gyroscope = np.repeat([a is recording.gyroscope for a in triads], 3)
-    return Channels(length, step_s, mean, variance, is_valid, np.concatenate([_quantum(a) for a in triads]), gyroscope)
+    quantum = _not_below_arithmetic(recording.facts.steps, mean)
+    return Channels(length, step_s, mean, variance, is_valid, quantum, gyroscope)
 
 
-def _quantum(readings: FloatArray) -> FloatArray:
-    """(3,) smallest step between different readings of each axis, from some 20000 readings."""
-    return _step(readings[:: max(1, len(readings) // PROBED)])
-
-
-def _step(probe: FloatArray) -> FloatArray:
-    out = np.zeros(3)
-    for axis in range(3):
-        values, _ = _core.levels_of(probe[:, axis])
-        if len(values) > 1:
-            steps = np.diff(values)
-            # Rounding of the arithmetic that made the numbers is no step of a converter.
-            real = steps[steps > 1e-12 * np.abs(values).max()]
-            out[axis] = real.min() if len(real) else 0.0
-    return out
+def _not_below_arithmetic(step: FloatArray, mean: FloatArray) -> FloatArray:
+    present = mean[np.isfinite(mean).all(axis=1)]
+    return np.maximum(step, FINEST * np.ptp(present, axis=0)) if len(present) else step
 
 
 def rolling_mean(values: FloatArray, width: int) -> FloatArray:

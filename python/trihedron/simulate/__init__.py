@@ -21,7 +21,7 @@ from trihedron.simulate.sessions import (
     six_faces,
     table_turns,
 )
-from trihedron.simulate.twin import converter_step, twin_scenario
+from trihedron.simulate.twin import twin_scenario
 from trihedron.simulate.twin_noise import noise_of_octaves
 
 __all__ = [
@@ -55,7 +55,6 @@ __all__ = [
     "Thermal",
     "Turn",
     "Vibrate",
-    "converter_step",
     "diagnosed_sizes",
     "dividing_head",
     "effects_of",

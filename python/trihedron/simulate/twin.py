@@ -47,8 +47,12 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
     holds = [(hold.start, hold.stop) for hold in segments.holds]
     dt = 1.0 / recording.rate_hz
     parts: list[dict[str, object]] = []
-    for sensor, raw, name in ((accel, readings[0], "accelerometer"), (gyro, readings[1], "gyroscope")):
-        step = converter_step(raw)
+    facts = recording.facts
+    for sensor, raw, known, name in (
+        (accel, readings[0], facts.of("accelerometer"), "accelerometer"),
+        (gyro, readings[1], facts.of("gyroscope"), "gyroscope"),
+    ):
+        step = known.common_step
         S, b = _matrix(sensor.S), _triple(sensor.b)
         _, gain = sense_axes(S, name)
         noise, low_pass = noise_of_holds(raw / gain, holds, dt, step / gain)
@@ -69,21 +73,6 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
         clock=Clock(recording.rate_hz, instants_s=tuple(float(t) for t in time_s)),
         environment=Environment(gravity_m_s2=calibration.gravity_m_s2),
     )
-
-
-def converter_step(raw: FloatArray) -> float:
-    """Spacing of the codes in (n, 3) readings; 0 where they are not evenly spaced."""
-    values = np.unique(np.round(raw[np.isfinite(raw)], 12))
-    gaps = np.diff(values)
-    gaps = gaps[gaps > 1e-9 * max(float(np.ptp(values)), 1e-300)] if len(values) > 1 else gaps
-    if len(gaps) < 8:
-        return 0.0
-    # Text rounds: the step is the mean of the smallest gaps, and the others must be its multiples.
-    step = float(np.mean(gaps[gaps < 1.5 * gaps.min()]))
-    multiples = gaps / step
-    even = np.abs(multiples - np.round(multiples)) < 0.1
-    near = multiples < 20.0
-    return step if even[near].mean() > 0.95 and len(values) < 0.5 * raw.size else 0.0
 
 
 def _motion(

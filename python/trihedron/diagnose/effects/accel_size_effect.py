@@ -20,13 +20,14 @@ class AccelSizeEffect(Effect):
 
     def variants(self, context: Context) -> list[Variant]:
         w, a = context.rate, context.angular_acceleration
-        to_axes = np.linalg.inv(context.accel_axes)
-        columns = np.zeros((context.n_points, 3, 6))
+        axes, to_axes = context.accel_axes, np.linalg.inv(context.accel_axes)
+        square = np.sum(w**2, axis=1)[:, None]
+        sides = []
         for j in (1, 2):
-            for c in range(3):
-                r = np.eye(3)[c]
-                local = np.cross(a, r) + np.cross(w, np.cross(w, r))
-                along = local @ to_axes[j]
-                columns[:, :, 3 * (j - 1) + c] = along[:, None] * context.accel_axes[:, j]
+            n = to_axes[j]
+            # n · (a × r + w × (w × r)), as a row on r.
+            along = np.cross(n, a) + (w @ n)[:, None] * w - square * n
+            sides.append(axes[:, j, None] * along[:, None, :])
+        columns = np.concatenate(sides, axis=2)
         names = tuple(f"r{j + 1}{axis}-r1{axis}" for j in (1, 2) for axis in AXES)
         return [Variant(force_only(columns), names, ("m",) * 6)]

@@ -134,23 +134,16 @@ def _shows_itself(context: Context) -> npt.NDArray[np.bool_]:
     Moves that disagree on both sides of a pose are no sign of it: whatever else is missing in moves does the same.
     """
     obs, fitted = context.obs, context.fitted
-    rows = (fitted.system.domain == STATIC_ACCEL) & (fitted.system.walk == 0)
-    used = leverage(fitted)
-    out = np.zeros(obs.n_holds, dtype=bool)
-    for i, hold in enumerate(obs.segments.holds):
-        own = rows & (fitted.system.segment == i)
-        chi2, dof = float((fitted.system.residual[own] ** 2).sum()), float((1.0 - used[own]).sum())
-        if chi2 > OWN_SIGMA**2 * max(dof, LEAST_DOF):
-            out[i] = True
-            continue
-        for values, sigma in ((obs.raw_force, obs.hold_force_sigma), (obs.raw_rate, obs.hold_rate_sigma)):
-            if values is None or sigma is None:
-                continue
-            early, late = np.array_split(values[hold.start : hold.stop], 2)
+    rows = np.flatnonzero((fitted.system.domain == STATIC_ACCEL) & (fitted.system.walk == 0))
+    poses, free = fitted.system.segment[rows], 1.0 - leverage(fitted)[rows]
+    chi2 = np.bincount(poses, fitted.system.residual[rows] ** 2, minlength=obs.n_holds)
+    out: npt.NDArray[np.bool_] = chi2 > OWN_SIGMA**2 * np.maximum(
+        np.bincount(poses, free, minlength=obs.n_holds), LEAST_DOF
+    )
+    for halves, sigma in zip(obs.half_means, (obs.hold_force_sigma, obs.hold_rate_sigma), strict=True):
+        if halves is not None and sigma is not None:
             # Each half's mean has twice the variance of the whole's, their difference four times.
-            away = np.abs(np.nanmean(late, axis=0) - np.nanmean(early, axis=0)) / (2.0 * sigma[i])
-            if (away > OWN_SIGMA).any():
-                out[i] = True
+            out |= (np.abs(halves[:, 1] - halves[:, 0]) > 2.0 * OWN_SIGMA * sigma).any(axis=1)
     return out
 
 

@@ -56,18 +56,20 @@ def plateaus_of(obs: Observations, *, is_gyro: bool) -> list[Plateau]:
     raw, density = (obs.raw_rate, obs.rate_density) if is_gyro else (obs.raw_force, obs.force_density)
     if raw is None or density is None:
         return []
-    return plateaus(raw, density * np.sqrt(obs.recording.rate_hz), obs.move_ranges)
+    step = obs.recording.facts.of("gyroscope" if is_gyro else "accelerometer").step
+    return plateaus(raw, density * np.sqrt(obs.recording.rate_hz), step, obs.move_ranges)
 
 
-def plateaus(signal: FloatArray, sigma: FloatArray, ranges: tuple[tuple[int, int], ...]) -> list[Plateau]:
-    """Runs of a raw (n, 3) signal on a common limit inside moves."""
+def plateaus(
+    signal: FloatArray, sigma: FloatArray, step: FloatArray, ranges: tuple[tuple[int, int], ...]
+) -> list[Plateau]:
+    """Runs of a raw (n, 3) signal on a common limit inside moves; ``sigma`` (3,) of a sample, ``step`` (3,) of code."""
     found: list[Plateau] = []
     if not ranges:
         return found
     moves = _Moves.of(ranges)
     for axis in range(signal.shape[1]):
-        codes = np.unique(signal[moves.samples, axis])
-        step_size = float(np.diff(codes).min()) if len(codes) > 1 else 0.0
+        step_size = float(step[axis])
         for sign in (1, -1):
             x = sign * signal[:, axis]
             top = np.maximum.reduceat(x[moves.samples], moves.first)

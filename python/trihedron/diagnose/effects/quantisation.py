@@ -23,8 +23,8 @@ SIGMA_GRID = np.geomspace(0.03, 2.0, 36)
 """Noise before the converter that is tried, in steps."""
 MOST_CODES = 0.2
 """Codes per reading: on a grid every code is read five times or more, readings without one are all different."""
-ONE_STEP, OFF_GRID, ON_GRID = 1.5, 0.02, 0.98
-"""Gaps nearer to one step than to two tell it; 98 % of all gaps must be within 2 % of whole steps (chance: 4 %)."""
+FEWEST_CODES = 3
+"""Codes between which one can be missing."""
 REACHES = 0.5
 """Noise, in steps, that leaves a third of the readings off their code: its neighbours are to be expected then."""
 MOSTLY = 0.5
@@ -58,33 +58,25 @@ class Lattice:
     dead: float
 
 
-def lattice(holds: list[FloatArray], sigma: float) -> tuple[float, int] | None:
-    """Step of the grid on which all values lie and the number of codes skipped amid visited ones, or ``None``."""
+def missing_codes(holds: list[FloatArray], sigma: float, step: float) -> int | None:
+    """Number of codes skipped amid visited ones on the converter's grid, or ``None`` where the holds show no grid."""
     values = np.concatenate(holds)
     codes = np.unique(values)
-    if len(codes) < 3 or len(codes) > MOST_CODES * len(values):
-        return None
-    gaps = np.diff(codes)
-    tiny = 1e-6 * float(np.max(np.abs(codes)) + 1e-300)
-    gaps = gaps[gaps > tiny]
-    if len(gaps) == 0:
-        return None
-    step = float(np.median(gaps[gaps < ONE_STEP * gaps.min()]))
-    ratio = gaps / step
-    if np.mean(np.abs(ratio - np.round(ratio)) < OFF_GRID) < ON_GRID:
+    if step == 0.0 or len(codes) < FEWEST_CODES or len(codes) > MOST_CODES * len(values):
         return None
     # A code is missing where a pose's own readings lie on both sides of it: noise has one summit, so at least the
     # geometric mean of its neighbours' counts was to be expected there.
     expected: dict[int, float] = {}
-    visited = set(np.round((codes - codes[0]) / step).astype(int).tolist())
+    # Gap by gap: over hundreds of codes even a step known to a part in a thousand would miss its place.
+    place = np.concatenate([[0], np.cumsum(np.rint(np.diff(codes) / step))]).astype(int)
+    visited = set(place.tolist())
     for one in holds if sigma > REACHES * step else []:
-        own, seen = np.unique(np.round((one - codes[0]) / step).astype(int), return_counts=True)
+        own, seen = np.unique(place[np.searchsorted(codes, one)], return_counts=True)
         count = dict(zip(own.tolist(), seen.tolist(), strict=True))
         for k in own.tolist():
             if k + 1 not in visited and k + 2 in count:
                 expected[k + 1] = expected.get(k + 1, 0.0) + float(np.sqrt(count[k] * count[k + 2]))
-    missing = sum(value > MISSED for value in expected.values())
-    return step, missing
+    return sum(value > MISSED for value in expected.values())
 
 
 def before_converter(holds: list[FloatArray], step: float) -> tuple[float, FloatArray, FloatArray]:
@@ -122,7 +114,7 @@ def before_converter(holds: list[FloatArray], step: float) -> tuple[float, Float
     return float(SIGMA_GRID[best]), shift, spread
 
 
-def dead_zone(values: FloatArray, everything: FloatArray) -> float:
+def dead_zone(values: FloatArray, everything: FloatArray, step: float) -> float:
     """Half-width of a zone around the commonest still code that no reading of the recording enters, or 0."""
     codes, counts = np.unique(values, return_counts=True)
     zero = float(codes[counts.argmax()])
@@ -134,8 +126,7 @@ def dead_zone(values: FloatArray, everything: FloatArray) -> float:
     nearest = float(away.min())
     # Readings just outside must be common: a gap that the motion merely never stopped in is no zone.
     beyond = int((away < 2.0 * nearest).sum())
-    fine = float(np.diff(np.unique(away)).min())
-    return nearest if nearest > ZONE_STEPS * fine and beyond >= JUST_OUTSIDE else 0.0
+    return nearest if nearest > ZONE_STEPS * step and beyond >= JUST_OUTSIDE else 0.0
 
 
 class Quantisation(DirectEffect):
@@ -184,14 +175,14 @@ class Quantisation(DirectEffect):
         still = np.concatenate(holds)
         scatter = float(np.sqrt(np.median([np.var(values) for values in holds])))
         moving = np.concatenate([x[a:b] for a, b in obs.move_ranges]) if obs.move_ranges else still
-        grid = lattice(holds, scatter)
-        if grid is None:
-            dead = dead_zone(still, moving[np.isfinite(moving)])
+        step = float(obs.recording.facts.steps[c])
+        missing = missing_codes(holds, scatter, step)
+        if missing is None:
+            dead = dead_zone(still, moving[np.isfinite(moving)], step)
             if not dead:
                 return None
             size = np.full(len(holds), dead / np.sqrt(3.0))  # anywhere inside the zone
             return Lattice(c, dead, dead / np.sqrt(3.0), dead, np.zeros(len(holds)), size, 0, dead)
-        step, missing = grid
         if scatter > NOISE_ENOUGH * step and not (missing and scatter < 2.0 * NOISE_ENOUGH * step):
             return None
         sigma, shift, spread = before_converter(holds, step)

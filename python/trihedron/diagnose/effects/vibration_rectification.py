@@ -21,7 +21,7 @@ class VibrationRectification(Effect):
     accounts_for = ("within-static",)  # the shaking that it follows
 
     def unavailable(self, context: Context) -> str | None:
-        power = context.hold_power("accelerometer").sum(axis=1)
+        power = context.hold_power.sum(axis=1)
         if power.max() < STANDS_OUT * np.median(power):
             return "no pose vibrates more than the others"
         return None

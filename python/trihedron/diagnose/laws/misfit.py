@@ -158,19 +158,28 @@ class Misfit:
         ``G = root U half``. Its inverse and determinant follow from the k eigenvalues of ``GᵀG``; directions that it
         takes off whole are those that only the block itself tells.
         """
-        total, log_det, count = 0.0, 0.0, 0.0
-        for block in self._blocks:
-            seen = block.root @ projected[block.rows]
-            along = block.along - seen @ estimate
-            value, vector = np.linalg.eigh((seen @ half).T @ (seen @ half))
-            stays = 1.0 - value
-            open_ = stays > RIGID
-            inside = (seen @ half @ vector).T @ along
-            total += float(along @ along)
-            total += float((inside[open_] ** 2 / stays[open_]).sum())
-            log_det += block.log_det - float(np.log(stays[open_]).sum())
-            count += float(len(along) - (~open_).sum())
-        return max(total, 1e-300), log_det, max(count, 1.0)
+        root, known, first, log_det = self._all_blocks
+        seen = root @ projected
+        along = known - seen @ estimate
+        G = seen @ half
+        value, vector = np.linalg.eigh(np.add.reduceat(G[:, :, None] * G[:, None, :], first))
+        stays = 1.0 - value
+        is_open = stays > RIGID
+        inside = np.einsum("bkj,bk->bj", vector, np.add.reduceat(G * along[:, None], first))
+        total = float(along @ along) + float((inside[is_open] ** 2 / stays[is_open]).sum())
+        count = float(len(along) - np.count_nonzero(~is_open))
+        return max(total, 1e-300), log_det - float(np.log(stays[is_open]).sum()), max(count, 1.0)
+
+    @cached_property
+    def _all_blocks(self) -> tuple[FloatArray, FloatArray, npt.NDArray[np.intp], float]:
+        """Roots of all blocks on all rows, what is along them, the first of every block, and the sum of logarithms."""
+        blocks = [block for block in self._blocks if len(block.root)]
+        first = np.cumsum([0, *(len(block.root) for block in blocks)])
+        root = np.zeros((first[-1], len(self.Py)))
+        for a, b, block in zip(first[:-1], first[1:], blocks, strict=True):
+            root[a:b, block.rows] = block.root
+        along = np.concatenate([np.zeros(0), *(block.along for block in blocks)])
+        return root, along, first[:-1], sum(block.log_det for block in self._blocks)
 
     def squares_with(self, columns: Columns) -> float:
         """What is left of the square with these columns."""

@@ -216,10 +216,7 @@ def hold_scatter(obs: Observations) -> HoldScatter:
         dof.append((len(part) - 1) * 2.0 / 3.0)
     ratio_array, dof_array = np.array(ratio), np.array(dof)
     # Readings that toggle between two neighbouring codes scatter by up to half a step squared without any shaking.
-    still = np.concatenate([x[hold.start : hold.stop] for hold in obs.segments.holds])
-    floor = np.array([0.5 * float(np.diff(np.unique(np.round(c[np.isfinite(c)], 9))).min(initial=np.inf)) ** 2
-                      for c in still.T])  # fmt: skip
-    centre = np.maximum(np.median(ratio_array, axis=0), np.where(np.isfinite(floor), floor, 0.0))
+    centre = np.maximum(np.median(ratio_array, axis=0), 0.5 * obs.recording.facts.steps[: x.shape[1]] ** 2)
     centre[centre == 0] = 1.0
     relative = ratio_array / centre
     p = chdtrc(dof_array[:, None], dof_array[:, None] * relative)

@@ -11,6 +11,7 @@ from scipy.ndimage import gaussian_filter1d
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.zeros.process import ZeroReadings
 from trihedron.records import Recording
+from trihedron.records.channel_facts import ChannelFacts
 
 N_PIECES = 80
 """Pieces of a log: enough for a curve of third order on both branches of a temperature cycle, and quick."""
@@ -81,11 +82,12 @@ def rest_pieces(recording: Recording) -> RestPieces | None:
     if len(starts) < FEWEST_PIECES:
         return None
     sides = [recording.accelerometer] + ([] if recording.gyroscope is None else [recording.gyroscope])
+    facts = [known for known in (recording.facts.accelerometer, recording.facts.gyroscope) if known is not None]
     loud = np.zeros(len(starts), dtype=bool)
     noise = []
-    for values in sides:
+    for values, known in zip(sides, facts, strict=True):
         rough = np.array([np.nanvar(np.diff(values[a : a + 2 * half], axis=0), axis=0) / 2.0 for a in starts])
-        step = _at_least(np.zeros(3), values) ** 2
+        step = _at_least(np.zeros(3), known) ** 2
         quiet = np.maximum(np.nanquantile(rough, QUIET_QUANTILE, axis=0), step)
         limit = LOUD * np.maximum(quiet, 1e-300)
         loud |= ~(rough <= limit).all(axis=1)
@@ -110,17 +112,15 @@ def rest_pieces(recording: Recording) -> RestPieces | None:
     return RestPieces(
         middles.ravel(), count / recording.rate_hz, count, np.repeat(pose, 2),
         np.repeat(np.arange(len(still)), 2), tuple((int(a), int(a) + 2 * half) for a in still),
-        means[0], _at_least(noise[0], recording.accelerometer), means[1] if len(means) > 1 else None,
-        _at_least(noise[1], recording.gyroscope) if len(means) > 1 else None,
+        means[0], _at_least(noise[0], recording.facts.of("accelerometer")), means[1] if len(means) > 1 else None,
+        _at_least(noise[1], recording.facts.of("gyroscope")) if len(means) > 1 else None,
         None if heat is None else heat[0], None if heat is None else heat[1],
     )  # fmt: skip
 
 
-def _at_least(sigma: FloatArray, values: FloatArray | None) -> FloatArray:
+def _at_least(sigma: FloatArray, facts: ChannelFacts) -> FloatArray:
     """Noise of a sample, not below that of a converter's step: a log that repeats one code is not free of noise."""
-    assert values is not None
-    step = np.array([np.diff(np.unique(np.round(c[np.isfinite(c)], 9))).min(initial=np.inf) for c in values.T])
-    return np.asarray(np.maximum(sigma, np.where(np.isfinite(step), step, 0.0) / np.sqrt(12.0)))
+    return np.asarray(np.maximum(sigma, facts.step / np.sqrt(12.0)))
 
 
 def _logged(recording: Recording, starts: npt.NDArray[np.int64], half: int) -> tuple[FloatArray, FloatArray] | None:

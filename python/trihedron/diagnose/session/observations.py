@@ -99,12 +99,33 @@ class Observations:
         """(holds, ...) means over each hold of a whole-recording signal (n, ...), missing readings left out."""
         index, first, n = self._still
         values = samples[index]
-        missing = np.isnan(values)
-        if missing.any():
+        sums = np.add.reduceat(values, first, axis=0)
+        if np.isnan(sums).any():
+            missing = np.isnan(values)
             present = np.add.reduceat(~missing, first, axis=0, dtype=np.float64)
             with np.errstate(invalid="ignore"):
                 return np.asarray(np.add.reduceat(np.where(missing, 0.0, values), first, axis=0) / present)
-        return np.asarray(np.add.reduceat(values, first, axis=0) / n.reshape(-1, *[1] * (values.ndim - 1)))
+        return np.asarray(sums / n.reshape(-1, *[1] * (values.ndim - 1)))
+
+    @cached_property
+    def half_means(self) -> tuple[FloatArray, FloatArray | None]:
+        """(holds, 2, 3) raw means over the first and the second half of every hold, accelerometer and gyro."""
+
+        def of(raw: FloatArray) -> FloatArray:
+            parts = [np.array_split(raw[hold.start : hold.stop], 2) for hold in self.segments.holds]
+            return np.array([[np.nanmean(half, axis=0) for half in halves] for halves in parts])
+
+        return of(self.raw_force), None if self.raw_rate is None else of(self.raw_rate)
+
+    @cached_property
+    def hold_scatter(self) -> FloatArray:
+        """(holds, 3, 3) covariance of raw accelerometer readings inside every hold; NaN where some are missing."""
+        out = np.empty((self.n_holds, 3, 3))
+        for i, hold in enumerate(self.segments.holds):
+            away = self.raw_force[hold.start : hold.stop]
+            away = away - away.mean(axis=0)
+            out[i] = away.T @ away / len(away)
+        return out
 
     @cached_property
     def core_moves(self) -> _core.SessionMoves:

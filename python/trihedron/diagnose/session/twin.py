@@ -84,6 +84,8 @@ def stacked(parts: list[Distortion]) -> Distortion:
     parts = [p for p in parts if p.n_parameters]
     if not parts:
         return NO_DISTORTION
+    if len(parts) == 1:
+        return parts[0]
 
     def side(name: str) -> FloatArray | None:
         given = [getattr(p, name) for p in parts]
@@ -201,11 +203,13 @@ def core_model(
         rate_sigma=contiguous(obs.hold_rate_sigma) if has_rate else None,
         rate_density=contiguous(obs.rate_density) if has_rate else None,
     )
-    # A sensor that does not scatter has a scatter that counts as none.
-    unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma)
-    scatter = (unit, False) if is_scatter_free else None
-    if obs.zero_scatter is not None:
-        scatter = (np.maximum(obs.zero_scatter, START_STRENGTHS[1][0] * unit), True)
+    scatter = None
+    if is_scatter_free or obs.zero_scatter is not None:
+        unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma)
+        scatter = (unit, False)
+        if obs.zero_scatter is not None:
+            # A sensor that does not scatter has a scatter that counts as none.
+            scatter = (np.maximum(obs.zero_scatter, START_STRENGTHS[1][0] * unit), True)
     return _core.SessionModel(
         gravity_m_s2=gravity_m_s2,
         poses=poses,

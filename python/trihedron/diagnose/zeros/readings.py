@@ -42,17 +42,18 @@ class _Halves:
 def _halves(obs: Observations, temperature: FloatArray | None) -> _Halves:
     """Means over both halves of every pose."""
     pose, time_s, length_s, force, rate, heat = [], [], [], [], [], []
+    of_force, of_rate = obs.half_means
     for i, hold in enumerate(obs.segments.holds):
-        for part in np.array_split(hold.samples(), 2):
+        for k, part in enumerate(np.array_split(hold.samples(), 2)):
             if len(part) < 2:
                 continue
             pose.append(i)
             t = obs.time_s[part]
             time_s.append(0.5 * float(t[0] + t[-1]))
             length_s.append(float(t[-1] - t[0]) + 1.0 / obs.recording.rate_hz)
-            force.append(np.nanmean(obs.raw_force[part], axis=0))
-            if obs.raw_rate is not None:
-                rate.append(np.nanmean(obs.raw_rate[part], axis=0))
+            force.append(of_force[i, k])
+            if of_rate is not None:
+                rate.append(of_rate[i, k])
             if temperature is not None:
                 heat.append(float(np.nanmean(temperature[part])))
     return _Halves(

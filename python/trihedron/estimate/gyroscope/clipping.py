@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.ranges import edges_of, ranges_of
 
@@ -40,11 +39,11 @@ class Clipped:
     variance: FloatArray
 
 
-def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray) -> Clipped | None:
+def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray, step: FloatArray) -> Clipped | None:
     """Replace runs at the limit by the cubic that continues the slopes on both sides; ``None`` when there are none.
 
     The limit of an axis is its extreme value if neighbouring samples share it, far from where the gyro rests, and the
-    readings jump to it or from it further than a smooth peak inside one step of the converter would
+    readings jump to it or from it further than a smooth peak inside one ``step`` (3,) of the converter would
     (:func:`_is_cut`). A cubic with slopes ``s₁, s₂`` at the ends of a run of length ``T``
     has the area ``T² (s₁ − s₂)/12`` above the chord; half of it is taken for its standard error.
     """
@@ -58,8 +57,8 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray) -> Clipped | None
         if not np.isfinite(limit):
             continue
         far = abs(limit - float(np.nanmedian(column)))
-        quantum = _quantum(column)
-        if far <= FAR * np.ptp(extremes[[k % 3, k % 3 + 3]]) or quantum == 0.0:
+        quantum = float(step[k % 3])
+        if far <= FAR * np.ptp(extremes[[k % 3, k % 3 + 3]]):
             continue
         at = column == limit
         if _is_cut(
@@ -105,16 +104,10 @@ def _is_cut(column: FloatArray, at: BoolArray, quantum: float, is_known: bool) -
     return pairs > 1
 
 
-def _quantum(column: FloatArray) -> float:
-    """Step of the converter as neighbouring values show it, 0 where the readings never change."""
-    gaps = np.diff(_core.levels_of(column)[0])
-    return float(np.median(gaps[gaps <= 1.5 * np.quantile(gaps, 0.25)])) if len(gaps) else 0.0
-
-
 def _is_end_of_codes(limit: float, others: FloatArray, quantum: float) -> bool:
     """Whether an extreme looks like a limit by its value: the end of a word of bits, or where another axis ends."""
     if quantum <= 0.0:
-        return False
+        return bool(np.any(np.abs(others) == abs(limit)))
     code = abs(limit) / quantum
     if code < FEWEST_CODES:
         return False

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron import _core
 from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
@@ -85,20 +84,6 @@ class MoveMeasurements:
         return len(self.links)
 
 
-def resolution_of(readings: FloatArray) -> FloatArray:
-    """Smallest step between different values of each column, (3,); zero for a column that is not quantised."""
-    steps = np.zeros(readings.shape[1])
-    for axis, column in enumerate(readings.T):
-        values, n_finite = _core.levels_of(column)
-        if len(values) < 2:
-            continue
-        gaps = np.diff(values)
-        # A grid shows when values repeat: far fewer distinct ones than samples.
-        if len(values) < 0.5 * n_finite:
-            steps[axis] = float(np.median(gaps[gaps < 1.5 * np.quantile(gaps, 0.25)]))
-    return steps
-
-
 def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
     """Angle random walk ``N`` of each raw axis in raw unit · √s, (3,), from block means inside the holds.
 
@@ -127,7 +112,7 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
         variance = sums / count
     else:
         raise ValueError("the holds are too short to tell the gyro's noise: hold each pose for at least a second")
-    converter = resolution_of(gyroscope) ** 2 / 12.0 * step_s
+    converter = recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s
     density: FloatArray = np.sqrt(np.maximum(variance, converter))
     return density
 
@@ -155,22 +140,22 @@ def measure_moves(
     moves = _moves_of(recording, segments)
     edges, links = _edges_and_links(moves)
     reading, zero = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
+    quantum = recording.facts.of("gyroscope").step
     var_zero = _mean_variance(segments.gyroscope_sigma_mean)
     force = reading @ accelerometer.S.T + accelerometer.b
-    quantum, undithered = _undithered(gyroscope, segments.gyroscope_sigma)
+    undithered = _undithered(quantum, segments.gyroscope_sigma)
     attitude = attitude_dependence(zero, var_zero, force) if is_attitude_removed is not False else None
     if attitude is not None and (attitude.is_present or is_attitude_removed):
         rate = gyroscope - (raw_force @ accelerometer.S.T + accelerometer.b) @ attitude.A.T
         zero = np.ascontiguousarray(zero - force @ attitude.A.T)
     else:
         attitude, rate = None, gyroscope
-    clipped = bridge_clipping(recording.time_s, gyroscope)
+    clipped = bridge_clipping(recording.time_s, gyroscope, quantum)
     extra = rounding_variance(gyroscope, quantum, np.median(gyroscope_mean, axis=0), undithered)
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope)
-    prepared = Moves(
-        recording.time_s, rate, edges, np.ascontiguousarray(segments.time_mid_s[links]), links, rate_degree, extra
-    )
+    mid_s = np.ascontiguousarray(segments.time_mid_s[links])
+    prepared = Moves(recording.time_s, rate, edges, mid_s, links, rate_degree, extra)
 
     var_reading = _mean_variance(segments.accelerometer_sigma_mean)
     zero_read, var_zero_read = zero, var_zero
@@ -292,11 +277,10 @@ def _edges_and_links(moves: Sequence[Move]) -> tuple[IntArray, IntArray]:
     return edges, links
 
 
-def _undithered(gyroscope: FloatArray, sigma: FloatArray | None) -> tuple[FloatArray, BoolArray]:
-    """(3,) step of the converter, and axes whose noise does not reach it."""
-    quantum = resolution_of(gyroscope)
+def _undithered(quantum: FloatArray, sigma: FloatArray | None) -> BoolArray:
+    """Axes (3,) whose noise does not reach the converter's step ``quantum`` (3,)."""
     white = np.full(3, np.inf) if sigma is None else _without_rounding(np.asarray(sigma), quantum)
-    return quantum, undithered_axes(quantum, white)
+    return undithered_axes(quantum, white)
 
 
 def _both_means(segments: Segments) -> tuple[FloatArray, FloatArray]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from trihedron._core import integrate_raw_rate
 from trihedron.arrays import FloatArray
-from trihedron.estimate.gyroscope.measurements import BLOCK_S, resolution_of
+from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.zeros import pool_zeros
 from trihedron.records.recording import Recording
 from trihedron.units import rate_to_si
@@ -145,7 +145,7 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
         count += len(means) - 1
     if count < 4:
         raise ValueError("the zero turns are too short to tell the gyro's noise: hold still for some seconds")
-    var_rate = np.maximum(sums / count, resolution_of(gyroscope) ** 2 / 12.0 * step_s)
+    var_rate = np.maximum(sums / count, recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s)
     zero_s = np.array(zero_duration)
     rates = zero_angle / zero_s[:, None]
     _, mean, _, excess, spread = pool_zeros(rates, var_rate / zero_s[:, None])

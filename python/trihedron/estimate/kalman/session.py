@@ -23,8 +23,6 @@ from trihedron.records import (
     Segments,
 )
 
-MOST_SAMPLES_FOR_RESOLUTION = 200_000
-
 
 @dataclass(frozen=True, eq=False)
 class PoseReadings:
@@ -107,22 +105,14 @@ def noise_from_holds(recording: Recording, segments: Segments) -> tuple[AxisNois
         raise ValueError(f"{recording.source}: there is no accelerometer to calibrate in this log")
     sigma = segments.accelerometer_sigma
     sigma = np.zeros(3) if sigma is None else sigma
-    noises = []
+    noises, steps = [], recording.facts.of("accelerometer").step
     for axis in range(3):
         white = float(sigma[axis]) / np.sqrt(recording.rate_hz)
-        step = _resolution(a[:MOST_SAMPLES_FOR_RESOLUTION, axis])
+        step = float(steps[axis])
         # A step below the noise is dithered away and already in the scatter.
         resolution = step if step > float(sigma[axis]) else 0.0
         noises.append(AxisNoise(white=white, resolution=resolution, sample_sigma=float(sigma[axis])))
     return noises[0], noises[1], noises[2]
-
-
-def _resolution(readings: FloatArray) -> float:
-    """Smallest difference between two different readings; 0 where all are alike."""
-    steps = np.diff(np.unique(readings[np.isfinite(readings)]))
-    # Steps of a billionth of the largest reading are how decimals are stored, not what a converter does.
-    real = steps[steps > 1e-9 * max(float(np.nanmax(np.abs(readings))), 1e-300)]
-    return float(real.min()) if len(real) else 0.0
 
 
 def _noise(

@@ -15,6 +15,7 @@ from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.step import converter_step
 
 FALSE_ALARM = 1e-4
 """Probability that a clean log shows an event of one kind."""
@@ -139,9 +140,7 @@ def readout(x: FloatArray) -> Readout:
     if len(values) < 2:
         return Readout(0.0, 0.0, 0.0, 0.0)
     change = np.abs(np.concatenate([np.diff(part) for part in parts]))
-    distinct = np.unique(values)
-    steps = np.diff(distinct)
-    resolution = float(np.quantile(steps, 0.05)) if len(distinct) > 1 and len(distinct) < len(values) / 4 else 0.0
+    resolution = converter_step(values)
     sigma = float(np.sqrt(0.5 * np.mean(np.square(change))))
     low, high = float(values.min()), float(values.max())
     return Readout(resolution, sigma, float(np.mean(change == 0.0)), _clipped(values, low, high, resolution))

@@ -19,8 +19,6 @@ STEEP = 5.0
 """The wall is reached by steps this many times the noise: a quiet sensor resting on its largest count is no wall."""
 FLAT = 6
 """So many equal readings in a row at the wall do the same for a sensor whose noise is above its resolution."""
-MOST_LEVELS = 0.2
-"""Different readings, as a part of all, above which they do not step."""
 PILED = 3.0
 """And it holds this many times more samples than the neighbouring values lead up to."""
 
@@ -37,21 +35,24 @@ class Wall:
     sample: int
 
 
-def find_walls(readings: FloatArray, noise: FloatArray) -> list[Wall]:
-    """Walls of a triad (n, 3) with ``noise`` (3,) of one sample at rest."""
+def find_walls(readings: FloatArray, noise: FloatArray, step: FloatArray) -> list[Wall]:
+    """Walls of a triad (n, 3) with ``noise`` (3,) of one sample at rest and ``step`` (3,) of the converter."""
     walls = []
     for axis, (low, n_low, high, n_high) in enumerate(_core.triad_extremes(readings)):
         if not low < high:
             continue
         for value, count in ((high, n_high), (low, n_low)):
-            wall = _wall(readings, axis, value, 0.01 * (high - low), float(noise[axis])) if count > 2 else None
+            is_fine = bool(noise[axis] > step[axis])
+            wall = _wall(readings, axis, value, 0.01 * (high - low), float(noise[axis]), is_fine) if count > 2 else None
             if wall is not None:
                 count, stretches, sample = wall
                 walls.append(Wall(axis, value, value == high, count, stretches, sample))
     return walls
 
 
-def _wall(readings: FloatArray, axis: int, value: float, depth: float, noise: float) -> tuple[int, int, int] | None:
+def _wall(
+    readings: FloatArray, axis: int, value: float, depth: float, noise: float, is_fine: bool
+) -> tuple[int, int, int] | None:
     within, width, at = _core.readings_near(readings, axis, value, depth)
     values, near = readings[:, axis], within - len(at)
     # Towards the top of a smooth peak the density grows as one over the root of the distance, so the share of the
@@ -61,7 +62,7 @@ def _wall(readings: FloatArray, axis: int, value: float, depth: float, noise: fl
     before = np.abs(values[np.maximum(starts - 1, 0)] - value)
     after = np.abs(values[np.minimum(starts + lengths, len(values) - 1)] - value)
     steep = (lengths >= 2) & (np.fmax(before, after) > STEEP * max(noise, width))
-    if noise > quantum(values):
+    if is_fine:
         # Noise that moves the last digit never leaves one value alone for so long, however slowly the wall is reached.
         steep |= lengths >= FLAT
     # One stretch alone may be a channel that froze; at the end of an integer's range it is the range.
@@ -77,20 +78,6 @@ def _is_full_scale(value: float) -> bool:
         return False
     magnitude = int(value) + 1 if value > 0 else -int(value)
     return magnitude & (magnitude - 1) == 0
-
-
-def quantum(values: FloatArray) -> float:
-    """Step between neighbouring possible readings; zero where the values do not repeat, as those of a fine sensor."""
-    probe = values[:: max(1, len(values) // 200_000)]
-    # Where a quarter of them holds that many levels, all do.
-    if len(_core.levels_of(probe[::4])[0]) > MOST_LEVELS * len(probe):
-        return 0.0
-    levels, _ = _core.levels_of(probe)
-    if len(levels) < 2 or len(levels) > MOST_LEVELS * len(probe):
-        return 0.0
-    # Decimals as written may differ in the last digit for one and the same code: the tenth percentile passes over that.
-    step: np.float64 = np.percentile(np.diff(levels), 10.0)
-    return float(step)
 
 
 def _runs(at: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

@@ -7,30 +7,33 @@ from collections.abc import Callable
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.read.audit.clipping import AXES, audit_clipping, find_walls, quantum, short
+from trihedron.read.audit.clipping import AXES, audit_clipping, find_walls, short
 from trihedron.read.audit.repeats import Repeats, longest_by_chance
 from trihedron.read.rest import Windows
 from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records.channel_facts import ChannelFacts
 
 Place = Callable[[int], str]
 MANY, LONG, HALF = 0.05, 0.1, 0.5
 """Shares of a log without readings, frozen, or repeated beyond which what is left no longer speaks for it."""
 
 
-def audit_readings(sensor: str, readings: FloatArray, windows: Windows | None, place: Place) -> list[Finding]:
+def audit_readings(
+    sensor: str, readings: FloatArray, facts: ChannelFacts, windows: Windows | None, place: Place
+) -> list[Finding]:
     """Findings on one triad (n, 3). ``place(i)`` names sample i for people; one pass for the usual log."""
     repeats = Repeats(readings)
     findings = _non_finite(sensor, repeats, place)
     if len(readings) < 8:
         return findings
     findings += _repeated(sensor, repeats, place)
-    walls = find_walls(readings, windows.quiet_noise(sensor) if windows is not None else np.zeros(3))
+    walls = find_walls(readings, windows.quiet_noise(sensor) if windows is not None else np.zeros(3), facts.step)
     findings += audit_clipping(sensor, walls, place)
     for k in range(3):
         at_wall = any(w.axis == k and w.value == readings[repeats.longest_start[k], k] for w in walls)
         # A stuck triad was reported as repeated rows, a value stuck at a wall as clipping.
-        findings += [] if at_wall else _stuck(sensor, k, repeats, readings, windows, place)
-    findings += _coarse(sensor, readings, windows)
+        findings += [] if at_wall else _stuck(sensor, k, repeats, readings, facts.step[k], windows, place)
+    findings += _coarse(sensor, facts.step, windows)
     return findings
 
 
@@ -77,7 +80,7 @@ def _repeated(sensor: str, repeats: Repeats, place: Place) -> list[Finding]:
 
 
 def _stuck(
-    sensor: str, k: int, repeats: Repeats, readings: FloatArray, windows: Windows | None, place: Place
+    sensor: str, k: int, repeats: Repeats, readings: FloatArray, step: float, windows: Windows | None, place: Place
 ) -> list[Finding]:
     """One axis that holds a value far longer than chance while it should not.
 
@@ -90,7 +93,6 @@ def _stuck(
         others = [j for j in range(3) if j != k]
         noise = windows.quiet_noise(sensor)
         stretch = readings[start : start + longest]
-        step = quantum(readings[:, k])
         moving = np.nanstd(stretch[:, others], axis=0) > 5.0 * np.maximum(noise[others], step)
         if step > 2.0 * noise[k] and not moving.any():
             return []
@@ -109,14 +111,14 @@ def _stuck(
     ]
 
 
-def _coarse(sensor: str, readings: FloatArray, windows: Windows | None) -> list[Finding]:
+def _coarse(sensor: str, steps: FloatArray, windows: Windows | None) -> list[Finding]:
     """Steps between possible readings that hide the noise."""
     if windows is None:
         return []
     noise = windows.quiet_noise(sensor)
     found = []
     for k in range(3):
-        step = quantum(readings[:, k])
+        step = float(steps[k])
         if step > 2.0 * noise[k]:
             found.append((k, step, float(noise[k])))
     if not found:

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
-from trihedron.read.audit.clipping import AXES, quantum, short
+from trihedron.read.audit.clipping import AXES, short
+from trihedron.read.rest import Windows
 from trihedron.records import Finding, FindingCode
+from trihedron.records.channel_facts import ChannelFacts
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,
     AccelerationUnit,
@@ -18,17 +19,18 @@ from trihedron.units import (
     rate_to_si,
 )
 
-_OFF_LATTICE = 0.05
-_MIN_ON_LATTICE = 0.95
+LOST_IN_NOISE = 0.01
+"""Steps below this part of the noise are not worth saying: a hundred of them are one deviation of a reading."""
 
 
-def audit_steps(sensor: str, readings: FloatArray, unit: AccelerationUnit | RateUnit) -> list[Finding]:
-    """A note on the step of a triad (n, 3) whose unit is not counts; nothing where readings take any value."""
-    if unit.value == "counts":
+def audit_steps(
+    sensor: str, facts: ChannelFacts, windows: Windows | None, unit: AccelerationUnit | RateUnit
+) -> list[Finding]:
+    """A note on the steps (3,) of readings whose unit is not counts; nothing where they are lost in the noise."""
+    noise = np.zeros(3) if windows is None else windows.quiet_noise(sensor)
+    if unit.value == "counts" or not np.all(facts.step > LOST_IN_NOISE * noise):
         return []
-    steps = [_lattice(readings[:, k]) for k in range(3)]
-    if not all(steps):
-        return []
+    steps = facts.step.tolist()
     scale = acceleration_to_si(unit) if isinstance(unit, AccelerationUnit) else rate_to_si(unit)
     usual = float(np.median(steps))
     return [
@@ -43,25 +45,6 @@ def audit_steps(sensor: str, readings: FloatArray, unit: AccelerationUnit | Rate
             numbers={f"{axis}_step": step for axis, step in zip(AXES, steps, strict=True)},
         )
     ]
-
-
-def _lattice(values: FloatArray) -> float:
-    """The step of one axis where nearly all its readings are whole numbers of it apart; else 0."""
-    probe = values[:: max(1, len(values) // 100_000)]
-    probe = probe[np.isfinite(probe)]
-    if len(probe) < 8:
-        return 0.0
-    step = quantum(probe)
-    if step <= 0.0:
-        return 0.0
-    place = (probe - probe[0]) / step
-    # The smallest steps seen carry the rounding of the text; the whole range tells the step to many more digits.
-    whole = np.rint(place)
-    if np.ptp(whole) > 0:
-        step *= float(np.sum(place * whole) / np.sum(whole * whole))
-        place = (probe - probe[0]) / step
-    on = np.abs(place - np.rint(place)) < _OFF_LATTICE
-    return float(step) if np.mean(on) >= _MIN_ON_LATTICE else 0.0
 
 
 def _is_decimal(step: float) -> bool:

@@ -1,0 +1,127 @@
+"""Facts of a channel, each found by one rule: the step of the converter."""
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trihedron.channel_facts.step import converter_step, converter_steps
+from trihedron.records import Recording
+
+PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
+SCALE = 9.80665 / 16384
+
+
+def session(seed, n=8000, amplitude=3000.0, sigma=1.0):
+    """One channel in counts, not yet rounded: holds of six seconds and swings of four."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(n) / 100.0
+    levels = np.repeat(rng.uniform(-amplitude / 3, amplitude / 3, -(-n // 1000)), 1000)[:n]
+    swings = amplitude * np.sin(2.0 * np.pi * t / 7.3 + rng.random())
+    return np.where(t % 10.0 < 6.0, levels, swings) + sigma * rng.normal(size=n)
+
+
+def written(x, digits):
+    """Counts in a unit, cut to decimals of which ``digits`` make a step."""
+    decimal = SCALE / digits
+    return np.round(np.round(x) * SCALE / decimal) * decimal
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("sigma", [0.05, 0.3, 3.0, 30.0])
+def test_the_step_is_found_in_counts_units_and_decimals_with_and_without_dither(seed, sigma):
+    x = session(seed, sigma=sigma, amplitude=10.0 ** np.random.default_rng(seed).uniform(1.5, 4.3))
+    assert converter_step(np.round(x)) == 1.0
+    assert converter_step(16.0 * np.round(x / 16.0)) % 16.0 == 0.0
+    assert converter_step(SCALE * np.round(x)) == pytest.approx(SCALE, rel=1e-6)
+    assert converter_step(SCALE * np.round(x) - 9.12345) == pytest.approx(SCALE, rel=1e-6)
+    # Two percent: digits have cut an eighth of a step off each of a few levels.
+    assert converter_step(written(x, 30)) == pytest.approx(SCALE, rel=0.02)
+    assert converter_step(written(x, 8)) == pytest.approx(SCALE, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_readings_on_no_grid_have_no_step_and_resampled_ones_none_that_matters(seed):
+    x = session(seed, sigma=0.3)
+    assert converter_step(x) == 0.0
+    assert converter_step(x.astype(np.float32).astype(float)) < 1e-3  # the last bit of a float is a grid too
+    assert converter_step(np.interp(np.arange(8000) * 0.9771, np.arange(8000), np.round(x))) < 1e-2
+    assert converter_step(np.repeat(np.random.default_rng(seed).normal(size=6), 500)) == 0.0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_one_code_in_two_spellings_is_one_code(seed):
+    rng = np.random.default_rng(seed)
+    codes = np.round(session(seed, sigma=3.0))
+    single = codes.astype(np.float32) * np.float32(SCALE)
+    mixed = np.where(rng.random(len(codes)) < 0.5, single.astype(float), codes * SCALE)
+    assert converter_step(mixed) == pytest.approx(SCALE, rel=1e-3)
+
+
+def test_codes_that_were_not_visited_leave_the_step_as_it_is():
+    rng = np.random.default_rng(3)
+    assert converter_step(rng.choice([0, 2, 5, 8, 10, 13, 15], 500) * 0.01) == pytest.approx(0.01)
+    codes = np.round(session(4, sigma=2.0))
+    assert converter_step(np.where(codes % 4 == 3, codes + 1, codes)) == 1.0
+    few = np.round(0.2 * rng.normal(size=3000))  # at rest: two or three codes
+    assert converter_step(0.02 * few) == pytest.approx(0.02)
+    assert converter_step(np.zeros(1000)) == 0.0
+    assert converter_step(np.where(rng.random(8000) < 0.3, np.nan, codes)) == 1.0
+
+
+def test_of_two_steps_in_one_log_the_one_of_most_parts_is_told_and_of_multiples_the_finer():
+    x = session(5, sigma=0.3)
+    fine, coarse = 0.0061, np.sqrt(5.0) / 230.0
+    switched = np.where(np.arange(8000) < 3000, fine * np.round(x), coarse * np.round(x * fine / coarse))
+    assert converter_step(switched) == pytest.approx(coarse, rel=1e-3)
+    codes = np.round(x)
+    assert converter_step(np.where(np.arange(8000) < 3000, codes, 4.0 * np.round(codes / 4.0))) == 1.0
+
+
+def test_a_recording_carries_its_facts_and_another_has_its_own():
+    counts = np.round(np.column_stack([session(k, sigma=2.0) for k in range(3)]))
+    recording = Recording(np.arange(8000) / 100.0, counts, None, 100.0)
+    assert recording.facts is recording.facts
+    assert recording.facts.of("accelerometer").common_step == 1.0
+    np.testing.assert_array_equal(recording.facts.of("accelerometer").step, converter_steps(counts))
+    with pytest.raises(ValueError, match="no gyroscope"):
+        recording.facts.of("gyroscope")
+    scaled = replace(recording, accelerometer=counts * [0.5, 0.5, 0.25])
+    np.testing.assert_allclose(scaled.facts.of("accelerometer").step, [0.5, 0.5, 0.25], rtol=1e-12)
+    assert scaled.facts.of("accelerometer").common_step == 0.0
+    assert recording.with_same_readings(source="elsewhere").facts is recording.facts
+
+
+# Differences of distinct values that are not readings of a converter, or places on a grid whose step is known.
+OF_SOMETHING_ELSE = {
+    "estimate/noise/curve_covariance.py:_nodes",
+    "estimate/noise/planning.py:relative_sigma",
+    "diagnose/effects/quantisation.py:missing_codes",
+}
+
+
+def test_nobody_else_looks_for_a_step():
+    """Differences of sorted distinct values are how a step is found."""
+    elsewhere = {
+        f"{path.relative_to(PACKAGE)}:{node.name}"
+        for path in PACKAGE.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.FunctionDef) and is_difference_of_levels(node)
+    }
+    assert elsewhere - OF_SOMETHING_ELSE == {"channel_facts/step.py:_grid"}
+
+
+def is_difference_of_levels(function):
+    """Whether a function takes differences of distinct values."""
+    named = {"levels"}
+    for node in ast.walk(function):
+        if isinstance(node, ast.Assign) and "np.unique(" in ast.unparse(node.value):
+            named |= {n.id for target in node.targets for n in ast.walk(target) if isinstance(n, ast.Name)}
+    for node in ast.walk(function):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "np.diff" and node.args:
+            used = {n.id for n in ast.walk(node.args[0]) if isinstance(n, ast.Name)}
+            if used & named or "np.unique(" in ast.unparse(node.args[0]):
+                return True
+    return False
