@@ -164,13 +164,9 @@ def measure_moves(
     zero, var_zero = shrink(zero, var_zero, mean)
     if np.any(undithered):
         zero, var_zero = _with_hidden_zero(zero, var_zero, segments, quantum, undithered)
-        # What is hidden in it is the offset that the moves are asked for: counted twice, it makes bars too wide.
-        weights = np.ascontiguousarray(np.where(undithered, 1.0 / len(zero), weights))
-        mean = np.where(undithered, zero.mean(axis=0), mean)
-        var_mean = np.where(undithered, var_zero.mean(axis=0) / len(zero), var_mean)
-    density = density_without_rounding(
-        rate_noise_density(recording, segments), quantum, 1.0 / recording.rate_hz, undithered
-    )
+        weights, mean, var_mean = _pooled_hidden(zero, var_zero, undithered, (weights, mean, var_mean))
+    seen = rate_noise_density(recording, segments)
+    density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
     if attitude is not None:
         var_mean = np.maximum(var_mean, attitude.var_zero)
     steps, nominal, jitter = _steps_of(recording)
@@ -230,6 +226,23 @@ def _with_hidden_zero(
     hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
     own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
     return common_zero(zero, np.where(undithered, own, var_zero), undithered)
+
+
+def _pooled_hidden(
+    zero: FloatArray, var_zero: FloatArray, undithered: BoolArray, pooled: tuple[FloatArray, FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weights, mean and variance of the session's zero, on undithered axes without what their step hides.
+
+    That is the offset that the moves are asked for: counted twice, it makes bars too wide.
+    """
+    weights, mean, var_mean = pooled
+    n = len(zero)
+    weights = np.ascontiguousarray(np.where(undithered, 1.0 / n, weights))
+    return (
+        weights,
+        np.where(undithered, zero.mean(axis=0), mean),
+        np.where(undithered, var_zero.mean(axis=0) / n, var_mean),
+    )
 
 
 def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
