@@ -89,7 +89,7 @@ def _one_law(zeros: FloatArray, sigma: FloatArray, known: FloatArray | None) -> 
         return best
     spread = np.ptp(known, axis=0)
     columns = np.hstack([constant, (known - known.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)])
-    price = 0.5 * known.shape[1] * float(np.log(len(zeros)))
+    price = float(0.5 * known.shape[1] * np.log(len(zeros)))
     return max(best, _normal_about(columns, zeros, sigma) - price)
 
 
