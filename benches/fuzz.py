@@ -20,8 +20,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from attacks.cases import Attack, Commands, Inputs
+from attacks.cases import Attack
+from attacks.commands import Commands
 from attacks.faults import Faults
+from attacks.inputs import Inputs
 
 BATCH = 100
 

@@ -77,6 +77,10 @@ def test_the_json_follows_the_published_schema_and_has_the_fields_of_the_contrac
     contract = {"verdict", "domains", "effects", "remaining", "candidates", "calibration", "noise", "schema_version"}
     assert contract <= set(document)
     assert contract <= set(schema()["required"])
+    assert set(document) <= set(schema()["properties"])
+    assert set(document["figures"]) == {"gravity_at_rest", "gravity_after_moves"}
+    bent = {**document["figures"], "gravity_at_rest": {**document["figures"]["gravity_at_rest"], "unit": "mg"}}
+    assert complaint_about({**document, "figures": bent}).startswith("figures.gravity_at_rest.unit")
     effect = document["effects"][0]
     assert {"id", "statement", "parameters", "p_adjusted", "delta_bic", "heldout", "confounded_with"} <= set(effect)
     assert effect["heldout"]["chi2_per_dof_after"] < 1.3 < effect["heldout"]["chi2_per_dof_before"]

@@ -11,9 +11,12 @@ from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.disturbed_pose import DisturbedPose
 from trihedron.diagnose.effects.lever_arm import LeverArm
 from trihedron.diagnose.effects.plateaus import plateaus
+from trihedron.diagnose.selection import prune
 from trihedron.diagnose.selection.model import Accepted, begin, with_only
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_twin
+from trihedron.diagnose.session.twin import Distortion
+from trihedron.diagnose.zeros.levels import two_levels
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
@@ -125,3 +128,35 @@ def test_a_short_pose_on_a_machine_that_shakes_is_a_pose():
     holds = resegment(shaken, segment_recording(shaken)).holds
     middle = 0.5 * (part.start + part.stop)
     assert any(hold.start < middle < hold.stop for hold in holds)
+
+
+def test_zeros_that_take_two_values_are_told_from_zeros_that_scatter():
+    rng = np.random.default_rng(7)
+    two, scatter = 0, 0
+    for _ in range(40):
+        n = int(rng.integers(15, 40))
+        noise = rng.normal(size=n)
+        # A pose in three lies between the values: the zero jumped in it.
+        between = np.where(rng.random(n) < 0.33, rng.uniform(-1.0, 1.0, n), rng.choice([-1.0, 1.0], n))
+        two += two_levels(10.0 * between + noise, np.ones(n)).is_clear
+        scatter += two_levels(rng.normal(0.0, 10.0, n) + noise, np.ones(n)).is_clear
+    assert two >= 32
+    # One normal session in some 500 (480 drawn): two of 40 are one chance in 300.
+    assert scatter <= 1
+
+
+def test_a_gyro_effect_that_leaves_gravity_unexplained_does_not_live_on_velocity(monkeypatch):
+    before = {prune.STATIC_GYRO: (70.0, 67.0), prune.MOVES: (155.0, 41.0), prune.DYNAMICS: (96.0, 53.0)}
+    after = {prune.STATIC_GYRO: (75.0, 67.0), prune.MOVES: (117.0, 41.0), prune.DYNAMICS: (57.0, 53.0)}
+    monkeypatch.setattr(prune, "domain_chi2", lambda fitted: {"before": before, "after": after}[fitted])
+    column = np.ones((4, 3, 1))
+
+    def against(force, rate):
+        return SimpleNamespace(
+            base="before", fitted="after", variant=SimpleNamespace(distortion=Distortion(force, rate))
+        )
+
+    assert not prune.explains(against(None, column))
+    # A delay moves velocity alone, and gravity's misfit is another's.
+    after[prune.MOVES] = (154.0, 41.0)
+    assert prune.explains(against(None, column))

@@ -100,3 +100,23 @@ def test_missing_readings_cut_holds_and_channels_keep_their_names():
 def test_a_question_without_an_answer_is_refused_in_words(question, words):
     with pytest.raises(ValueError, match=words):
         question()
+
+
+@pytest.mark.parametrize("amplitude", [0.3, 1.0])
+def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave(amplitude):
+    ratios, corners = [], []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        n, holds = 12000, [(k, k + 450) for k in range(0, 12000, 600)]
+        clean = rng.normal(size=(n, 1))
+        wave = amplitude * np.sin(2.0 * np.pi * 18.34 * np.arange(n) / 100.0 + seed)[:, None]
+        plain, lined = (noise_of_holds(x, 100.0, holds)[0] for x in (clean, clean + wave))
+        assert len(lined.lines) == 1
+        ratios.append(lined.white.value / plain.white.value)
+        corners.append(lined.corner_hz)
+        both = zip(plain.octaves, lined.octaves, strict=True)
+        # The same noise: what the line's own two numbers a hold take off, of some 70 in its octave.
+        assert all(abs(np.log(b.density.value / a.density.value)) < 0.1 for a, b in both)
+    # Left in, half its square would be 2 and 22 % of the density.
+    assert np.abs(np.log(ratios)).max() < 0.01
+    assert corners == [None] * 6

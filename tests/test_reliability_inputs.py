@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from attacks.cases import Inputs
+from attacks.inputs import Inputs
 from trihedron import _core
 from trihedron.documents import DocumentError, parse_json, read_text
 from trihedron.files.calibration import CalibrationFileError, read_calibration
@@ -195,11 +195,11 @@ def test_a_forked_child_computes_what_its_parent_computes():
 
 
 def test_mutated_inputs_are_taken_or_refused_in_a_sentence():
-    assert _failures("from attacks.cases import Inputs as Attack", "range(4000)") == "[]"
+    assert _failures("from attacks.inputs import Inputs as Attack", "range(4000)") == "[]"
 
 
 def test_command_lines_end_with_a_status_and_a_sentence():
-    assert _failures("from attacks.cases import Commands as Attack", "range(300)") == "[]"
+    assert _failures("from attacks.commands import Commands as Attack", "range(300)") == "[]"
 
 
 def test_outputs_are_old_or_new_and_whole_under_every_fault():

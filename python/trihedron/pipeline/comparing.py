@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from trihedron.diagnose.against import (
+    FREE_CURVES,
     compare_effects,
     compare_numbers,
     left_open_by,
@@ -85,8 +86,8 @@ def _without_walk(
     for sensor, drift in (("gyroscope", "gyro-hidden-drift"), ("accelerometer", "accel-hidden-drift")):
         slow = [n.ratio for n in noise if n.significant and n.sensor == sensor and n.term in ("B", "K") and n.ratio]
         if slow and min(slow) >= 1.0:
-            drawn.add((drift, "curve"))
-    return tuple(e for e in effects if (e.id, e.model.get("variant")) not in drawn)
+            drawn.add(drift)
+    return tuple(e for e in effects if e.id not in drawn or e.model.get("variant") not in FREE_CURVES)
 
 
 def _span_k(recording: Recording, simulated: tuple[Diagnosis, Recording] | None) -> float | None:

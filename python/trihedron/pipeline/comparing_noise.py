@@ -35,6 +35,8 @@ LEAST_OCTAVE_RATIO = 1.5
 """Octaves below the white floor hold a few periods a hold each: smaller differences belong to the day."""
 LEAST_JITTER = 0.05
 """Scatter of the stamps, in steps, from which on it matters to a session (0.05 of 10 ms is 0.5 ms)."""
+PERFECT_CLOCK = 1e-6
+"""Scatter of the stamps, in steps, that only a clock without any has: what is left is rounding of the file."""
 SAME_ON_ALL_AXES = 1.05
 """Three axes of a real part agree within 5 % by chance in a few of a hundred parts."""
 UNLIKE_AXES = 1.1
@@ -304,6 +306,8 @@ def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
     is_far = larger > LEAST_JITTER and larger > 2.0 * smaller
     which = "model" if m > r else "recording"
     remark = f"The stamps of the {which} scatter by {1e3 * max(m, r):.2g} ms, the other's by {1e3 * min(m, r):.2g} ms."
+    if which == "recording" and model.jitter_steps < PERFECT_CLOCK:
+        remark = f"The clock of the model is perfect; the stamps of the recording scatter by {1e3 * r:.2g} ms."
     yield NoiseDifference(
         "both", "", "jitter", m, r, m / r if r > 0.0 else None, None, "s", None, is_far, remark if is_far else ""
     )

@@ -17,6 +17,7 @@ from trihedron.pipeline.beside import beside, shared_log
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
+from trihedron.pipeline.comparing_correlation import correlation_times
 from trihedron.pipeline.comparing_frames import rates_of_world, sign_of_gravity
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
 from trihedron.pipeline.comparing_slow import slow_noise
@@ -264,5 +265,6 @@ def _noise(
     theirs = (simulated.diagnosis, simulated.recording, simulated.segments)
     return (
         *compare_noise(simulated.sampled, ours, alpha=alpha),
+        *correlation_times(simulated.sampled, ours, alpha=alpha),
         *slow_noise(theirs, (found, recording, segments), alpha=alpha),
     )

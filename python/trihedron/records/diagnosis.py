@@ -60,7 +60,8 @@ class ParameterDifference(Plain):
     """One number of a given model against the value that the recording has.
 
     ``id`` is the group (``gyro-zero``, ``accel-scale``, ...), ``name`` the component. ``difference`` is recording minus
-    model; ``p_value`` and ``significant`` are those of the group, the search over all groups paid for.
+    model; ``p_value`` and ``significant`` are those of the group, the search over all groups paid for. ``remark`` says
+    in words what the numbers resemble (zeros that were drawn and never added).
     """
 
     id: str
@@ -73,11 +74,12 @@ class ParameterDifference(Plain):
     unit: str
     p_value: float
     significant: bool
+    remark: str = ""
 
 
 NoiseTerm = Literal[
     "N", "B", "K", "Q", "bandwidth", "line", "resolution", "range", "rate", "jitter", "octave", "distribution",
-    "unit", "frame",
+    "unit", "frame", "correlation-time",
 ]  # fmt: skip
 
 

@@ -52,6 +52,7 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
             for p, s in zip(members, size, strict=True)
             if s > NAMED_SIGMAS or s == max(size)
         ]
+        said += list(dict.fromkeys(p.remark for p in members if p.remark))
     return said
 
 

@@ -20,6 +20,10 @@ FRAME_TOLERANCE = 0.03
 """Parameters of one effect are stated along the axes of each side's own fit: 3 % (the angle between the two frames and
 the first order of the mechanisms) is no difference."""
 
+FREE_CURVES = frozenset({"curve", "smooth"})
+"""Variants of a drift that have no mechanism: waves over a session, and a curve drawn through its zeros. Of sessions of
+unlike length, or begun at another warmth, they are no numbers to compare."""
+
 LARGEST_READ: Mapping[str, float] = MappingProxyType({"accel-zero": STANDARD_GRAVITY_M_S2, "gyro-zero": 1.0})
 """What a scale that follows temperature is a share of where it is taken for a zero: gravity; a turn by hand [rad/s]."""
 
@@ -29,16 +33,22 @@ def left_open_by(effects: Iterable[AcceptedEffect], span_k: float | None = None)
 
     ``effects`` of either side, those that both have included: two sessions at other temperatures, or begun at another
     state of warmth, count the level of one and the same effect from other places. The size is that of the effect's
-    parameters, those per kelvin times ``span_k`` (all temperatures of both logs), each up to two standard errors more;
-    infinite where that is not known. An effect that both sides have counts once, with its larger size.
+    parameters, those per kelvin times ``span_k`` (all temperatures of both logs), each up to two standard errors more,
+    those of one axis added up (waves of one curve stand at their crests together where it begins); infinite where that
+    is not known. An effect that both sides have counts once, with its larger size.
     """
     named = {effect.id: effect.leaves_open for effect in catalogue()}
     by_effect: dict[tuple[str, str], float] = {}
     for effect in effects:
         for number in named.get(effect.id, ()):
             unit = {"accel-zero": "m/s^2", "gyro-zero": "rad/s"}.get(number, "1")
-            sizes = (_moved(p, number, unit, span_k) for p in effect.parameters)
-            size = max((s for s in sizes if s is not None), default=math.inf)
+            by_axis: dict[str, float] = {}
+            for parameter in effect.parameters:
+                moved = _moved(parameter, number, unit, span_k)
+                if moved is not None:
+                    axis = parameter.name.rpartition("_")[2]
+                    by_axis[axis] = by_axis.get(axis, 0.0) + moved
+            size = max(by_axis.values(), default=math.inf)
             by_effect[number, effect.id] = max(by_effect.get((number, effect.id), 0.0), size)
     out: dict[str, float] = {}
     for (number, _), size in by_effect.items():
@@ -86,8 +96,10 @@ def compare_effects(
     it may be there, and hidden.
     """
     of_session = {effect.id for effect in catalogue() if effect.is_of_session}
-    # What the recording's own test calls likely is not lacking, even where it did not earn its place there.
-    excluded = {c.id for c in candidates if c.applicable and (c.p_value is None or c.p_value > alpha)}
+    # What the recording's own test calls likely, the search paid for, is not lacking, even where it did not earn its
+    # place there.
+    tried = [c for c in candidates if c.applicable]
+    excluded = {c.id for c in tried if c.p_value is None or len(tried) * c.p_value > alpha}
     pairs: list[tuple[AcceptedEffect, AcceptedEffect]] = []
     missing: list[AcceptedEffect] = []
     left = list(model)
@@ -105,8 +117,15 @@ def compare_effects(
         and effect.id in excluded
         and not {seen.domain for seen in effect.held_out[:1]} & set(unexplained)
     ]
-    parameters = [p for m, r in pairs if m.id == r.id and m.id not in of_session for p in _parameters(m, r, alpha)]
+    alike = [
+        (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
+    ]
+    parameters = [p for m, r in alike for p in _parameters(m, r, alpha)]
     return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))
+
+
+def _is_free(effect: AcceptedEffect) -> bool:
+    return effect.model.get("variant") in FREE_CURVES
 
 
 def _are_one(a: AcceptedEffect, b: AcceptedEffect) -> bool:

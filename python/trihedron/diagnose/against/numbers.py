@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
 from trihedron.arrays import FloatArray
@@ -49,6 +50,10 @@ MISTAKEN_UNITS: Mapping[str, tuple[tuple[float, str, str], ...]] = MappingProxyT
     }
 )
 """Reading over truth where it is written in the first unit and taken for the second."""
+NO_ZERO = 0.05
+"""Three zeros that are none look like this, or less, by chance in one model of twenty."""
+WOULD_SHOW = 0.1
+"""A model knows its zeros ten times better than the recording's are large."""
 ADRIFT = 1e-9
 """Variance, relative to its group's largest, below which a covariance is not told from zero."""
 
@@ -69,6 +74,7 @@ class _Group:
     covariance: FloatArray
     unit: str
     dof: float = SPREAD_DOF
+    remark: str = ""
 
     @property
     def p_value(self) -> float:
@@ -152,6 +158,7 @@ def compare_numbers(
                 named.unit,
                 float(p_value),
                 bool(is_significant),
+                named.remark if is_significant else "",
             )
             for k in range(len(named.names))
         ]
@@ -231,7 +238,8 @@ def _sensor(
     assert len(names) == len(PAIRS)
     # S is SI per raw unit: what reads a larger count for the same truth has the smaller S, so a scale is -ln k.
     groups = [
-        _Group(f"{prefix}-zero", sensor, _AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit, WANDER_DOF),
+        _Group(f"{prefix}-zero", sensor, _AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit, WANDER_DOF,
+               _never_added(prefix, a.zero, r.zero, J_m @ covariances[0] @ J_m.T, wander_model)),
         _Group(
             f"{prefix}-scale", sensor, _AXES, np.exp(log_m), np.exp(log_r), change, scale_covariance, "1"
         ),
@@ -240,6 +248,19 @@ def _sensor(
         ),
     ]  # fmt: skip
     return groups, common
+
+
+def _never_added(
+    prefix: str, model: FloatArray, recording: FloatArray, covariance: FloatArray, wander: FloatArray
+) -> str:
+    """What a model whose zeros are none resembles, where it would show zeros like the recording's."""
+    sigma = np.sqrt(np.maximum(np.diag(covariance)[:3] + wander, 1e-300))
+    is_none = float(np.sum((model / sigma) ** 2)) < float(chi2.isf(NO_ZERO, 3))
+    would_show = bool(np.all(sigma < WOULD_SHOW * np.sqrt(np.mean(recording**2))))
+    if not (is_none and would_show):
+        return ""
+    name = "accelerometer" if prefix == "accel" else "gyro"
+    return f"All zeros of the model's {name} are none: a bias was drawn and never added, or there is none."
 
 
 def _sizes_in_si(a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> tuple[float, float] | None:

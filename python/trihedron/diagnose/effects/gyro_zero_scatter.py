@@ -5,8 +5,9 @@ from __future__ import annotations
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.laws.find import MOST_FOLLOWS, gyro_zero_laws
-from trihedron.diagnose.residuals.creep import IS_MOTION, settling, share_of_creep
+from trihedron.diagnose.residuals.creep import settling
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
+from trihedron.diagnose.zeros.levels import two_levels
 from trihedron.diagnose.zeros.of_session import (
     FEWEST_FOR_SIZE,
     exceeds_noise,
@@ -39,7 +40,9 @@ class GyroZeroScatter(DirectEffect):
             return None  # what follows something is a law, not scatter
         if jumps_in_poses(context.obs).p_value[1] < JUMPS:
             return None  # a zero that changes inside poses is not drawn anew in each
-        if share_of_creep(context) > IS_MOTION or settling(context).is_motion:
+        if _takes_two_values(context):
+            return None
+        if settling(context).is_motion:
             return None  # the poses themselves turn
         sigma, si = found.evidence.scatter, context.si_per_raw("gyroscope")
         sizes = ", ".join(f"{degrees_from_radians(s):.2g}" for s in sigma)
@@ -53,3 +56,11 @@ class GyroZeroScatter(DirectEffect):
             reweigh=lambda obs: with_gyro_scatter(obs, sigma, si),
             share=share_of_zeros(found),
         )
+
+
+def _takes_two_values(context: Context) -> bool:
+    """A zero that some axis has one of two of (a trap, a play) is drawn from no law of scatter."""
+    rate, sigma = context.obs.hold_rate, context.obs.hold_rate_sigma
+    if rate is None or sigma is None:
+        return False
+    return any(two_levels(rate[:, axis], sigma[:, axis]).is_clear for axis in range(3))

@@ -15,7 +15,7 @@ from trihedron.diagnose.selection.compare import (
 )
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel, with_only
 from trihedron.diagnose.selection.stepwise import is_demanded
-from trihedron.diagnose.session.twin import DYNAMICS, STATIC_ACCEL, STATIC_GYRO, Distortion
+from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO, Distortion
 
 LEAST_SHARE = 0.5
 """Of the misfit in the domain that it helps most an effect must remove this share, all else being in the model: what
@@ -86,10 +86,11 @@ def explains(against: Comparison) -> bool:
     own = own_domains(against.variant.distortion)
     most = max(before[d][0] - after[d][0] for d in own)
     agrees = {DYNAMICS: AGREES * _other_sensor(against.variant.distortion, after)}
-    return any(
-        _explained(before[d], after[d], agrees.get(d, AGREES)) for d in own
-        if before[d][0] - after[d][0] >= COMPARABLE * most
-    )  # fmt: skip
+    helped = [d for d in own if before[d][0] - after[d][0] >= COMPARABLE * most]
+    if against.variant.distortion.force is None and MOVES in helped:
+        # Rates that err turn gravity first, and velocity by that: it cannot speak where gravity stays unexplained.
+        helped = [d for d in helped if d != DYNAMICS]
+    return any(_explained(before[d], after[d], agrees.get(d, AGREES)) for d in helped)
 
 
 def _other_sensor(distortion: Distortion, after: dict[int, tuple[float, float]]) -> float:

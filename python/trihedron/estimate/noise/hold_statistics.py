@@ -104,3 +104,9 @@ def _quantile(dof: float) -> float:
     from scipy.stats import t
 
     return float(t.ppf(0.975, min(dof, 1e9)))
+
+
+def root_of(power: Measured, factor: float) -> Measured:
+    """The amplitude of a power times ``factor``."""
+    value, lower, upper = (math.sqrt(factor * p) for p in (power.value, power.lower, power.upper))
+    return Measured(value, lower, upper, 0.5 * power.sigma_log, power.dof)

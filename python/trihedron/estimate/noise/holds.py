@@ -13,15 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import chdtri
 
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.step import converter_step
 from trihedron.estimate.noise.corner import filter_corner
-from trihedron.estimate.noise.hold_statistics import as_measured, pooled_logarithm, robust_holds
+from trihedron.estimate.noise.hold_lines import lines_of_holds, without_lines
+from trihedron.estimate.noise.hold_statistics import as_measured, pooled_logarithm, robust_holds, root_of
 from trihedron.estimate.noise.spectrum import cosine_transform
 from trihedron.ranges import ranges_of
-from trihedron.records.hold_noise import HoldLine, HoldNoise, Measured, OctaveNoise
+from trihedron.records.hold_noise import HoldNoise, Measured, OctaveNoise
 
 SHORTEST = 32
 """Readings of a hold that is used: fewer hold no octave below the uppermost two."""
@@ -29,8 +29,6 @@ LEAST_DITHER = 0.4
 """Noise over step below which the rounding is not noise of step²/12 any more, and what lies under it is hidden."""
 LAGS = 8
 """Lags over which squared differences are correlated: filters of a sensor remember no more readings."""
-LINE_CHANCE = 1e-4
-"""Probability that the holds of one axis show a line by chance."""
 LONGEST_SEGMENT = 4096
 FEWEST_HOLDS = 3
 """Holds that must show an octave, where there are as many: the scatter of one is not known."""
@@ -91,6 +89,9 @@ def _axis(x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name:
     power = _Power.of(parts)
     keep = robust_holds(power.variance, power.dof)
     parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
+    # A line is stated as one; it is neither white noise nor a filter's corner.
+    lines = lines_of_holds(*_segments(parts, rate_hz), rate_hz)
+    parts = without_lines(parts, lines, rate_hz)
     # Correlation and tails are those of what is kept: a knock would lend its own to all.
     power = _Power.of(parts)
     rounding = step**2 / 12.0
@@ -101,7 +102,7 @@ def _axis(x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name:
         # The rounding is known: what is left carries the whole error.
         share = total / (total - rounding)
         sensor = as_measured(total - rounding, share * pooled.sigma, pooled.dof)
-        white = _root(sensor, 1.0 / rate_hz)
+        white = root_of(sensor, 1.0 / rate_hz)
     octaves = _octaves(parts, rate_hz)
     spectrum = _segments(parts, rate_hz)
     corner, above = filter_corner(*spectrum, rate_hz, rounding / total if total > 0.0 else 1.0, pooled.scatter)
@@ -114,7 +115,7 @@ def _axis(x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name:
         white=white,
         step=step,
         octaves=octaves,
-        lines=_lines(*spectrum, rate_hz),
+        lines=lines,
         corner_hz=corner,
         corner_above_hz=above,
         scatter=pooled.scatter,
@@ -123,12 +124,6 @@ def _axis(x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name:
 
 def _unbroken(part: FloatArray) -> list[FloatArray]:
     return [part[a:b] for a, b in ranges_of(np.isfinite(part)) if b - a >= SHORTEST]
-
-
-def _root(power: Measured, factor: float) -> Measured:
-    """The amplitude of a power times ``factor``."""
-    value, lower, upper = (math.sqrt(factor * p) for p in (power.value, power.lower, power.upper))
-    return Measured(value, lower, upper, 0.5 * power.sigma_log, power.dof)
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,32 +191,3 @@ def _segments(parts: Sequence[FloatArray], rate_hz: float) -> tuple[FloatArray, 
     power = np.mean(cosine_transform(stack)[:, 1:] ** 2, axis=0) / rate_hz
     frequency: FloatArray = np.arange(1.0, length) * (rate_hz / (2.0 * length))
     return frequency, np.asarray(power), len(rows)
-
-
-def _lines(frequency: FloatArray, power: FloatArray, count: int, rate_hz: float) -> tuple[HoldLine, ...]:
-    """Ordinates above their neighbourhood, of the lowest eight of which no period was seen often."""
-    n = len(power)
-    level = np.array([np.median(power[max(0, i - 16) : i + 17]) for i in range(n)])
-    centre = (1.0 - 2.0 / (9.0 * count)) ** 3 if count > 1 else 0.4549
-    ratio = power * centre / np.maximum(level, 1e-300)
-    limit = float(chdtri(count, LINE_CHANCE / n)) / count
-    # The neighbourhood's median is itself known to 1.25/√33 of a deviation.
-    limit *= 1.0 + 3.0 * 1.25 * math.sqrt(2.0 / count / 33.0)
-    out: list[HoldLine] = []
-    taken = np.zeros(n, dtype=bool)
-    taken[:8] = True
-    for i in np.argsort(-ratio).tolist():
-        if ratio[i] < limit or len(out) >= 8:
-            break
-        if taken[i]:
-            continue
-        near = slice(max(0, i - 3), min(n, i + 4))
-        taken[near] = True
-        floor = float(level[i] / centre)
-        excess = float(np.sum(power[near] - floor))
-        # Power of an ordinate over twice the length of its segment in seconds.
-        square = 2.0 * max(excess, float(power[i] - floor)) * rate_hz / (n + 1)
-        sigma_log = math.sqrt(2.0 / count) * math.sqrt(1.0 + 7.0 * (floor / max(excess, floor)) ** 2)
-        amplitude = _root(as_measured(square, sigma_log, math.inf), 1.0)
-        out.append(HoldLine(float(frequency[i]), amplitude, float(ratio[i])))
-    return tuple(sorted(out, key=lambda line: line.frequency_hz))

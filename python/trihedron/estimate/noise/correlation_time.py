@@ -1,0 +1,106 @@
+"""The time in which a sensor's coloured noise forgets: a first-order Gauss-Markov process in the octaves of its holds.
+
+    S(f) = N² + q / (1 + (2πfτ)²)                                                             (docs/noise.md, eq. 8.1)
+
+with one τ for the axes of a sensor, N and q of each its own. It is stated only where such a corner explains the octaves
+better than any straight slope (1/f, a walk), and where it lies among them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import chi2
+
+from trihedron.arrays import FloatArray
+from trihedron.records.hold_noise import HoldNoise, Measured
+
+TIMES_PER_OCTAVE = 8
+BEYOND_OCTAVES = 4.0
+"""Corners are tried up to two octaves outside those seen: there the fit says that they are not among them."""
+SLOPES = np.linspace(0.5, 2.0, 7)
+"""Powers of 1/f of the rivals: from a shallow slope over 1/f to a walk."""
+BETTER = 6.63
+"""χ² by which a corner must beat the best slope: 1 % of one degree of freedom."""
+FLOOR = 0.5
+"""Share of the floor in the uppermost octave: a low-pass filter has such a corner too, and no floor above it."""
+SMALLEST = 1e-6
+"""Part of a density that a prediction is at least: its logarithm is taken."""
+TURNS = 4
+"""Turns of the relative errors: the third changes no digit that is used."""
+FEWEST_OCTAVES = 5
+"""Five octaves hold a floor, a slope and a plateau."""
+
+
+def correlation_time(axes: Sequence[HoldNoise]) -> Measured | None:
+    """τ [s] of a sensor's axes with its 95 % interval; ``None`` where none shows."""
+    tables = [_Octaves(axis) for axis in axes if axis.white is not None and len(axis.octaves) >= FEWEST_OCTAVES]
+    if not tables:
+        return None
+    lowest, highest = min(t.low[0] for t in tables), max(t.high[-1] for t in tables)
+    ends = 1.0 / (2.0 * math.pi * highest * BEYOND_OCTAVES), BEYOND_OCTAVES / (2.0 * math.pi * lowest)
+    n = math.ceil(math.log2(ends[1] / ends[0]) * TIMES_PER_OCTAVE)
+    tau = np.geomspace(*ends, n)
+    misfit = np.array([sum(t.misfit(t.corner(one)) for t in tables) for one in tau])
+    rival = min(sum(t.misfit(t.slope(power)) for t in tables) for power in SLOPES)
+    dof = sum(len(t.low) - 2 for t in tables) - 1
+    best = int(np.argmin(misfit))
+    # Octaves that no corner explains leave it known less well (Birge).
+    scale = max(float(misfit[best]) / max(dof, 1), 1.0)
+    inside = np.flatnonzero(misfit < misfit[best] + float(chi2.isf(0.05, 1)) * scale)
+    if rival - float(misfit[best]) < BETTER * scale or inside[0] == 0 or inside[-1] == n - 1:
+        return None
+    if min(t.floor(t.corner(float(tau[best]))) / t.density[-1] for t in tables) < FLOOR:
+        return None
+    lower, upper = float(tau[inside[0] - 1]), float(tau[inside[-1] + 1])
+    return Measured(float(tau[best]), lower, upper, math.log(upper / lower) / 3.92)
+
+
+class _Octaves:
+    """Edges (m,) [Hz], densities (m,) and the standard errors of their logarithms (m,) of one axis."""
+
+    def __init__(self, axis: HoldNoise) -> None:
+        self.low = np.array([o.low_hz for o in axis.octaves])
+        self.high = np.array([o.high_hz for o in axis.octaves])
+        self.density = np.array([o.density.value for o in axis.octaves])
+        self.sigma = np.array([o.density.sigma_log for o in axis.octaves])
+
+    def corner(self, tau: float) -> FloatArray:
+        """(m,) mean over each octave of 1/(1 + (2πfτ)²)."""
+        a, b = 2.0 * math.pi * tau * self.low, 2.0 * math.pi * tau * self.high
+        return np.asarray((np.arctan(b) - np.arctan(a)) / (b - a))
+
+    def slope(self, power: float) -> FloatArray:
+        """(m,) mean over each octave of f^-power."""
+        if power == 1.0:
+            return np.asarray(np.log(self.high / self.low) / (self.high - self.low))
+        p = 1.0 - power
+        return np.asarray((self.high**p - self.low**p) / p / (self.high - self.low))
+
+    def misfit(self, shape: FloatArray) -> float:
+        """χ² of the logarithms at the best floor and the best size of ``shape`` (m,)."""
+        floor, size = self._best(shape)
+        predicted = np.maximum(floor + size * shape, SMALLEST * self.density)
+        away = np.log(self.density / predicted) / self.sigma
+        return float(away @ away)
+
+    def floor(self, shape: FloatArray) -> float:
+        """The density that is left above ``shape`` (m,)."""
+        return self._best(shape)[0]
+
+    def _best(self, shape: FloatArray) -> tuple[float, float]:
+        """Floor and size of ``shape``, neither below zero, by relative errors."""
+        predicted, found = self.density, np.zeros(2)
+        for _ in range(TURNS):
+            weight = 1.0 / (self.sigma * predicted)
+            A = np.column_stack([np.ones_like(shape), shape]) * weight[:, None]
+            y = self.density * weight
+            found = np.linalg.solve(A.T @ A + 1e-12 * np.diag((A**2).sum(axis=0)), A.T @ y)
+            if found.min() < 0.0:
+                alone = int(np.argmax(found))
+                found = np.zeros(2)
+                found[alone] = max(float(A[:, alone] @ y / (A[:, alone] @ A[:, alone])), 0.0)
+            predicted = np.maximum(found[0] + found[1] * shape, SMALLEST * self.density)
+        return float(found[0]), float(found[1])

@@ -1,0 +1,129 @@
+"""Mistakes that simulators have made in noise and sampling, each told by its numbers."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from trihedron.diagnose.against import FittedModel, compare_numbers
+from trihedron.pipeline.comparing_correlation import correlation_times
+from trihedron.pipeline.comparing_noise import compare_noise, sampled
+from trihedron.records import Hold, Recording
+
+RATE_HZ, HOLD, EVERY, N_HOLDS = 100.0, 900, 1000, 12
+HOLDS = tuple(Hold(k, EVERY * k, EVERY * k + HOLD, EVERY * k, EVERY * k + HOLD) for k in range(N_HOLDS))
+STEP = 1e-4
+SENSORS = {"accelerometer": 1e-2, "gyroscope": 1e-3}
+"""Noise of a reading, SI."""
+
+
+def numbers(accel_zero=(0.0, 0.0, 0.0), gyro_zero=(0.0, 0.0, 0.0)):
+    sigma = np.r_[np.full(9, 1e-5), np.full(3, 1e-3), np.full(9, 1e-5), np.full(3, 1e-5)]
+    return FittedModel(
+        np.eye(3), -np.array(accel_zero), "m/s^2", np.eye(3), -np.array(gyro_zero), "rad/s", np.diag(sigma**2),
+        np.zeros(3), np.zeros(3),
+    )  # fmt: skip
+
+
+def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_s=None, jitter_s=0.0):
+    """Readings at rest; ``tau_s``: a Gauss-Markov process of twice the noise's size beside it, per sensor."""
+    rng = np.random.default_rng(seed)
+    n = EVERY * N_HOLDS
+    readings = {}
+    for sensor, noise in SENSORS.items():
+        x = rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), (n, 3)) if uniform else rng.standard_normal((n, 3))
+        x = size * noise * x * np.array(axes)
+        if tau_s:
+            keep = np.exp(-1.0 / (RATE_HZ * tau_s[sensor]))
+            x = x + lfilter([2.0 * noise * np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal((n, 3)), axis=0)
+        lsb = step * noise / SENSORS["gyroscope"]
+        readings[sensor] = lsb * np.round(x / lsb) if lsb else x
+    time = np.arange(n) / RATE_HZ + (jitter_s * rng.standard_normal(n) if jitter_s else 0.0)
+    made = Recording.from_arrays(time, **readings, accelerometer_unit="m/s^2", gyroscope_unit="rad/s")
+    return sampled(made, HOLDS, numbers())
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _without_corners():
+    """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_holds.py has them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("trihedron.estimate.noise.holds.filter_corner", lambda *_: (None, RATE_HZ))
+        yield
+
+
+@pytest.fixture(scope="module")
+def real(_without_corners):
+    return log(1)
+
+
+def said(model, recording):
+    rows = (*compare_noise(model, recording, alpha=0.01), *correlation_times(model, recording, alpha=0.01))
+    return {(n.sensor, n.term): n.remark for n in rows if n.significant}
+
+
+def test_the_same_unit_again_has_made_no_mistake(real):
+    assert said(log(2), real) == {}
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (10.0, "multiplied by the root of the rate once too often"),
+        (0.1, "was not multiplied by the root of the rate"),
+    ],
+)
+def test_a_density_scaled_by_the_root_of_the_rate_is_named(real, factor, words):
+    for sensor in SENSORS:
+        assert words in said(log(3, size=factor, step=STEP * min(factor, 1.0)), real)[sensor, "N"]
+
+
+def test_uniform_noise_is_told_from_normal_noise_of_the_same_size(real):
+    found = said(log(4, uniform=True), real)
+    assert set(found) == {("accelerometer", "distribution"), ("gyroscope", "distribution")}
+    assert "uniformly distributed" in found["gyroscope", "distribution"]
+    # The other way round: a recording is what it is.
+    assert said(real, log(4, uniform=True)) == {}
+
+
+def test_the_same_noise_on_all_axes_is_named_where_the_recordings_axes_differ(real):
+    found = said(log(5, axes=(1.1, 1.1, 1.1)), real)
+    assert "the same on all axes of the model" in found["gyroscope", "N"]
+    even = log(6, axes=(1.1, 1.1, 1.1))
+    assert not any("same on all axes" in words for words in said(log(5, axes=(1.3, 1.3, 1.3)), even).values())
+
+
+def test_readings_without_steps_are_named_where_the_recordings_steps_matter():
+    coarse = log(7, step=3e-3)
+    found = said(log(8, step=0.0), coarse)
+    assert "The model has no converter steps" in found["gyroscope", "resolution"]
+    # Steps of a tenth of the noise are not missed.
+    assert said(log(8, step=0.0), log(1)) == {}
+
+
+def test_a_perfect_clock_is_named_where_the_recordings_scatters():
+    found = said(log(9), log(10, jitter_s=1.5e-3))
+    assert "The clock of the model is perfect" in found["both", "jitter"]
+
+
+def test_one_time_constant_for_both_sensors_is_named_with_all_four_times():
+    real = log(11, tau_s={"accelerometer": 0.15, "gyroscope": 0.03})
+    shared = log(12, tau_s={"accelerometer": 0.03, "gyroscope": 0.03})
+    found = said(shared, real)
+    assert "one time constant was used for both" in found["accelerometer", "correlation-time"]
+    assert ("gyroscope", "correlation-time") not in found
+    # Sensors that do forget alike, and two units of one kind, are no mistake.
+    assert ("accelerometer", "correlation-time") not in said(shared, log(13, tau_s=dict.fromkeys(SENSORS, 0.03)))
+    again = log(14, tau_s={"accelerometer": 0.15, "gyroscope": 0.03})
+    assert not any(term == "correlation-time" for _, term in said(again, real))
+    # White noise forgets at once: nothing to compare.
+    assert not any(n.term == "correlation-time" for n in correlation_times(log(2), real, alpha=0.01))
+
+
+def test_a_bias_that_was_drawn_and_never_added_is_named_and_a_drawn_one_is_not():
+    real = numbers((0.05, -0.03, 0.08), (0.01, -0.02, 0.005))
+    rows = compare_numbers(numbers(), real, alpha=0.01).parameters
+    assert {(p.id, bool(p.remark)) for p in rows if p.significant} == {("accel-zero", True), ("gyro-zero", True)}
+    assert "drawn and never added" in next(p.remark for p in rows if p.id == "gyro-zero")
+    other = numbers((-0.02, 0.06, 0.01), (0.02, 0.01, -0.01))
+    assert not any(p.remark for p in compare_numbers(other, real, alpha=0.01).parameters)
+    # A recording whose zeros are as good as none refutes nothing.
+    assert not any(p.remark for p in compare_numbers(numbers(), numbers(), alpha=0.01).parameters)
