@@ -123,7 +123,8 @@ def fitted(
 def _misfits(core: _core.SessionFit) -> tuple[FloatArray, FloatArray]:
     """χ² and degrees of freedom of every domain."""
     domain = core.labels[:, 0]
-    return np.bincount(domain, core.residual**2, DYNAMICS + 1), np.bincount(domain, 1.0 - core.leverage(), DYNAMICS + 1)
+    chi2, dof = (np.bincount(domain, of_rows, DYNAMICS + 1) for of_rows in (core.residual**2, 1.0 - core.leverage()))
+    return np.asarray(chi2, dtype=np.float64), np.asarray(dof, dtype=np.float64)
 
 
 def _inflation(core: _core.SessionFit, now: tuple[float, float]) -> tuple[float, float]:
