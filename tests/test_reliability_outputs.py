@@ -231,6 +231,21 @@ def test_a_reader_that_leaves_early_is_no_failure(session):
         assert err == b""
 
 
+def test_a_reader_that_leaves_early_does_not_cost_the_files_that_were_asked_for(session):
+    out, page = session / "left.json", session / "left.html"
+    # The pipe is closed before anything is said.
+    read, write = os.pipe()
+    os.close(read)
+    status, _, err = run(
+        "calibrate", session / "log.csv", "-o", out, "--report", page, "--gravity", str(G), stdout=write
+    )
+    os.close(write)
+    assert status in (0, 2), err
+    assert out.exists(), err
+    assert page.exists(), err
+    assert "Traceback" not in err
+
+
 # Two writers at the same moment
 
 

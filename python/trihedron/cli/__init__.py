@@ -7,7 +7,6 @@ file per command; options that several commands share are in ``options.py``.
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import io
 import os
@@ -30,6 +29,7 @@ from trihedron.cli.fleet import fleet
 from trihedron.cli.guide import guide
 from trihedron.cli.help import WIDEST, Command, Group
 from trihedron.cli.kalman import kalman
+from trihedron.cli.output import silence_stdout
 from trihedron.cli.plan import plan
 from trihedron.cli.ports import ports
 from trihedron.cli.provenance import begin
@@ -125,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # broke inside a command, typer has made an exit of it.
         if isinstance(error, SystemExit):
             sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__
-        _silence_stdout()
+        silence_stdout()
         return 0
     except MemoryError:
         return _refuse(_memory_sentence())
@@ -133,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if os.environ.get("TRIHEDRON_TRACEBACK"):
             raise
         if error.filename is None and error.errno in _OF_STDOUT:
-            _silence_stdout()
+            silence_stdout()
             return _refuse(f"standard output could not be written ({error.strerror}).")
         return _refuse(str(error))
     except ValueError as error:
@@ -172,12 +172,6 @@ def _make_writable() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-
-
-def _silence_stdout() -> None:
-    """Let nothing of what could not be written be tried again when the interpreter ends."""
-    with contextlib.suppress(OSError, ValueError, AttributeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _memory_sentence() -> str:

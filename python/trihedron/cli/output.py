@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import sys
@@ -141,8 +142,20 @@ def has_colour() -> bool:
 
 
 def put(text: str) -> None:
-    """Text for people on stdout, with its colours where it has any."""
-    typer.echo(text, nl=False, color=has_colour())
+    """Text for people on stdout, with its colours where it has any.
+
+    A reader who has left (`| head`) does not cost the files that were asked for beside it.
+    """
+    try:
+        typer.echo(text, nl=False, color=has_colour())
+    except BrokenPipeError:
+        silence_stdout()
+
+
+def silence_stdout() -> None:
+    """Let nothing of what could not be written be tried again, not even when the interpreter ends."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def say(sentence: str) -> None:
