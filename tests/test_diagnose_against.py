@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import trihedron
-from trihedron.diagnose.against import FittedModel, compare_numbers, left_open_by
+from trihedron.diagnose.against import FittedModel, compare_effects, compare_numbers, left_open_by
 from trihedron.invariants import invariants, jacobian, rotation_vector, triad_jacobian, triad_rotation
-from trihedron.records.diagnosis import AcceptedEffect, EffectParameter
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter
 from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.profiles import profile_by_name
@@ -247,6 +247,35 @@ def test_a_level_that_both_logs_count_from_their_own_temperature_is_open_by_what
     assert left_open_by(bias, 2.0)["accel-zero"] == pytest.approx(4e-3 + 2e-3 * 9.80665)
     assert left_open_by([thermal(0.004, "m/s^2", "accel-hidden-drift")])["accel-zero"] == pytest.approx(0.004)
     assert left_open_by([thermal(0.004, "rad/s", "gyro-hidden-drift")])["gyro-zero"] == pytest.approx(0.004)
+
+
+def waves(sizes, variant="curve"):
+    names = [f"cosine{k}_{axis}" for k in (1, 2) for axis in "xyz"]
+    parameters = tuple(EffectParameter(n, v, 1e-5, "rad/s") for n, v in zip(names, sizes, strict=True))
+    return AcceptedEffect("gyro-hidden-drift", "", parameters, 0.0, 0.0, (), model={"variant": variant})
+
+
+def test_waves_of_a_drift_leave_the_zero_open_by_their_sum_and_are_no_numbers_of_two_sessions():
+    one, other = waves((1e-3, 0, 0, -5e-4, 0, 0)), waves((2e-3, 0, 0, 0, 0, 0))
+    # Both crests of x where the session begins, two standard errors each.
+    assert left_open_by([one])["gyro-zero"] == pytest.approx(1.5e-3 + 4e-5)
+    assert compare_effects([one], [other], [], alpha=0.01).parameters == ()
+    warm = [replace(e, model={"variant": "warm-up"}) for e in (one, other)]
+    assert any(p.significant for p in compare_effects([warm[0]], [warm[1]], [], alpha=0.01).parameters)
+
+
+def test_an_effect_is_surplus_unless_the_recordings_own_test_calls_it_likely_with_the_search_paid_for():
+    (bent,) = [replace(waves((1e-3, 0, 0, 0, 0, 0)), id="gyro-scale-nonlinearity")]
+
+    def said(p):
+        tried = [
+            Candidate("gyro-scale-nonlinearity", p, True),
+            *(Candidate(f"other-{k}", 0.5, True) for k in range(20)),
+        ]
+        return [e.id for e in compare_effects([bent], [], tried, alpha=0.01).surplus]
+
+    assert said(0.3) == said(6e-3) == ["gyro-scale-nonlinearity"]
+    assert said(1e-4) == []
 
 
 def test_an_effect_of_temperature_that_both_logs_have_makes_no_scale_at_other_temperatures(unit):

@@ -1,6 +1,6 @@
 """Misses of the second blind trial (benches/blind_nuisances.py), one small case for each cause that was mended."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +12,7 @@ from trihedron.diagnose.effects.disturbed_pose import DisturbedPose
 from trihedron.diagnose.effects.lever_arm import LeverArm
 from trihedron.diagnose.effects.plateaus import plateaus
 from trihedron.diagnose.selection import prune
-from trihedron.diagnose.selection.model import Accepted, begin, with_only
+from trihedron.diagnose.selection.model import Accepted, begin, observed_with, with_only
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.diagnose.session.twin import Distortion
@@ -40,12 +40,13 @@ def test_a_range_that_stops_a_few_readings_is_seen_and_one_that_stops_none_is_no
     free = peaks(rng, 99.0)
     # Peaks of two to six readings above the limit: too short for a plateau of its own.
     limit = np.round((np.sort(np.abs(free).ravel())[-12] - 0.004) / STEP) * STEP
-    sigma, move = np.full(3, 0.01), ((0, len(free)),)
+    sigma, step, move = np.full(3, 0.01), np.full(3, STEP), ((0, len(free)),)
     clipped = np.clip(free, -limit, limit)
-    runs = plateaus(clipped, sigma, move)
-    assert runs
-    assert all(run.is_rail and abs(abs(run.level) - limit) < 1e-9 for run in runs)
-    assert not plateaus(free, sigma, move)
+    assert not plateaus(free, sigma, step, move)
+    for origin in (np.zeros(3), np.array([0.4, -0.7, 0.2])):
+        runs = plateaus(clipped - origin, sigma, step, move, origin)
+        assert runs
+        assert all(run.is_rail and abs(abs(run.level + origin[run.axis]) - limit) < 1e-9 for run in runs)
 
 
 def hand(rng, arm, n_moves=24, rate_hz=100.0):
@@ -116,6 +117,24 @@ def test_an_effect_that_other_observations_do_not_show_goes_with_what_changed_th
     assert left.fitted.twin.effect.size == 0
 
 
+def test_samples_are_put_back_before_moves_are_left_out():
+    def put_back(old):
+        return replace(old, move_ranges=((0, 60), (70, 120), (130, 180)), move_holds=((0, 1), (1, 2), (2, 3)))
+
+    def left_out(old):
+        return replace(old, move_ranges=old.move_ranges[:1], move_holds=old.move_holds[:1])
+
+    @dataclass(frozen=True)
+    class Observed:
+        move_ranges: tuple = ((0, 50), (60, 110), (120, 170))
+        move_holds: tuple = ((0, 1), (1, 2), (2, 3))
+
+    clipped = SimpleNamespace(reweigh=left_out, touched=None)
+    lost = SimpleNamespace(reweigh=put_back, touched=(0,))
+    for order in ([clipped, lost], [lost, clipped]):
+        assert observed_with(Observed(), order).move_ranges == ((0, 60),)
+
+
 def test_a_short_pose_on_a_machine_that_shakes_is_a_pose():
     recording, truth = small_session(hold_s=1.4)
     part = [p for p in truth.segments if p.kind == "hold"][6]
@@ -141,6 +160,10 @@ def test_zeros_that_take_two_values_are_told_from_zeros_that_scatter():
         two += two_levels(10.0 * between + noise, np.ones(n)).is_clear
         scatter += two_levels(rng.normal(0.0, 10.0, n) + noise, np.ones(n)).is_clear
     assert two >= 32
+    # A g-sensitivity of poses that lie on faces has two values too, and gravity is known.
+    faces = np.repeat([-1.0, 1.0], 10)
+    assert two_levels(10.0 * faces + rng.normal(size=20), np.ones(20)).is_clear
+    assert not two_levels(10.0 * faces + rng.normal(size=20), np.ones(20), faces[:, None]).is_clear
     # One normal session in some 500 (480 drawn): two of 40 are one chance in 300.
     assert scatter <= 1
 

@@ -9,7 +9,7 @@ import pytest
 import trihedron
 from trihedron.estimate.noise import noise_of_holds
 from trihedron.pipeline.comparing_noise import _are_even
-from trihedron.pipeline.improving import driven, zero_in_moves
+from trihedron.pipeline.improving import driven, zero_in_moves, zero_of_poses
 from trihedron.records.hold_noise import Measured
 from trihedron.simulate import (
     NoiseTerms,
@@ -84,6 +84,24 @@ def test_what_moves_miss_is_put_on_the_gyros_zero_in_moves_and_then_both_miss_al
     # A recording that misses no more than the scenario asks for nothing.
     own = trihedron.calibrate(other, gravity_m_s2=9.80665)
     assert zero_in_moves(clean, other, own.segments, own.calibration) is None
+
+
+def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_alike():
+    profile = profile_by_name("mpu")
+    accel, gyro = profile.unit(5)
+    clean = Scenario(hand_session(24, hold_s=3.0, layout=8), "unit", accel, gyro, profile.clock)
+    electronics = replace(accel.electronics, zero_scatter=(0.02,) * 3)
+    scattered = replace(clean, accelerometer=replace(accel, electronics=electronics))
+    own = trihedron.calibrate(simulate(scattered, 6)[0], gravity_m_s2=9.80665)
+    found = zero_of_poses(clean, own.recording, own.segments, own.calibration)
+    # 24 poses less nine numbers, by medians: a root known to 30 %, two standard errors.
+    assert found == pytest.approx((0.02,) * 3, rel=0.6)
+    better = replace(accel, electronics=replace(accel.electronics, zero_scatter=found))
+    assert zero_of_poses(replace(clean, accelerometer=better), own.recording, own.segments, own.calibration) is None
+    healthy = trihedron.calibrate(simulate(clean, 7)[0], gravity_m_s2=9.80665)
+    assert zero_of_poses(clean, healthy.recording, healthy.segments, healthy.calibration) is None
+    # What the scenario has too much is taken out.
+    assert zero_of_poses(scattered, healthy.recording, healthy.segments, healthy.calibration) == (0.0, 0.0, 0.0)
 
 
 def test_stamps_that_scatter_in_a_driven_scenario_are_settled_as_those_of_a_file():

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import f as f_distribution
 
 from trihedron.diagnose.against import (
+    FREE_CURVES,
     compare_effects,
     compare_numbers,
     left_open_by,
@@ -16,7 +17,6 @@ from trihedron.diagnose.against import (
 )
 from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor
 from trihedron.estimate.verification import verify_calibration
-from trihedron.pipeline.comparing_slow import FREE_CURVES
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import (
     AcceptedEffect,

@@ -10,6 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.diagnose.against import FREE_CURVES
 from trihedron.estimate.noise.of_norms import PoseNorms, compare_slow_norms
 from trihedron.estimate.noise.of_zeros import PoseZeros, SlowDifference, compare_slow
 from trihedron.pipeline.comparing_noise import Sensor
@@ -29,8 +30,6 @@ TESTS = 24.0
 NO_SHAPE = frozenset({"gyro-zero-scatter", "accel-zero-scatter", "disturbed-pose", "periodic-interference"})
 """Effects that leave the course of a zero from pose to pose as it is."""
 DOMAINS: Mapping[str, Domain] = MappingProxyType({"gyroscope": "static-gyro", "accelerometer": "static-accel"})
-FREE_CURVES = frozenset({"curve", "smooth"})
-"""Variants of a drift that have no mechanism: waves, and a curve drawn through the zeros."""
 AXES = ("x", "y", "z")
 Side = tuple[Diagnosis, Recording, Segments]
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import tomllib
+from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
 from trihedron.diagnose.against import model_of_diagnosis
@@ -39,6 +40,9 @@ from trihedron.simulate import (
 
 FEWEST_OCTAVES = 4
 FEWEST_MOVES = 6
+FEWEST_POSES = 8
+OF_MEDIANS = 0.37
+"""A median of squares knows a variance as well as the mean of that share of them."""
 BY_CHANCE = 0.01
 """Two sessions of one unit miss so unlike in one of a hundred."""
 SEED = 20
@@ -103,11 +107,51 @@ def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
     text = improved_scenario(scenario, tables, sizes, surplus)
     own = found.updated
     if own is not None and own.gyroscope is not None:
-        strays = zero_in_moves(scenario_from_table(tomllib.loads(text)), found.recording, found.segments, own)
-        if strays is not None:
-            tables["gyroscope"]["electronics"] = {"zero_in_moves": strays}
-            text = improved_scenario(scenario, tables, sizes, surplus)
+        # Poses first: a force that is another in every pose also turns the gravity that moves are judged by.
+        for sensor, key, of in (
+            ("accelerometer", "zero_scatter", zero_of_poses), ("gyroscope", "zero_in_moves", zero_in_moves),
+        ):  # fmt: skip
+            strays = of(scenario_from_table(tomllib.loads(text)), found.recording, found.segments, own)
+            if strays is not None:
+                tables[sensor]["electronics"] = {key: strays}
+                text = improved_scenario(scenario, tables, sizes, surplus)
     return Improvement(text, left_out)
+
+
+def zero_of_poses(
+    better: Scenario, recording: Recording, segments: Segments, own: Calibration
+) -> tuple[float, float, float] | None:
+    """By how much the accelerometer's zero must be another in every pose [m/s²] for lengths of gravity to miss alike.
+
+    Medians, so that a pose that was pushed makes no scatter for all of them. ``None`` where both miss alike within
+    chance.
+    """
+    simulated = driven(better, recording, segments, own)
+    try:
+        of_it = calibrate(simulated, gravity_m_s2=better.environment.gravity)
+    except ValueError:
+        return None
+    ours, theirs = _scale_of_poses(own), _scale_of_poses(of_it.calibration)
+    if ours is None or theirs is None:
+        return None
+    (seen, dof), (made, dof_made) = ours, theirs
+    ratio = max(seen / made, made / seen) if made > 0.0 else np.inf
+    if f_distribution.sf(ratio, OF_MEDIANS * dof, OF_MEDIANS * dof_made) > BY_CHANCE:
+        return None
+    before = np.array(better.accelerometer.electronics.zero_scatter)
+    wanted = float(np.mean(before**2)) + seen - made
+    if wanted <= 0.0:
+        return (0.0, 0.0, 0.0) if np.any(before) else None
+    return (float(np.sqrt(wanted)),) * 3
+
+
+def _scale_of_poses(calibration: Calibration) -> tuple[float, int] | None:
+    """Variance of a pose's length of gravity [(m/s²)²] by the median, and its degrees of freedom."""
+    quality = calibration.accelerometer.quality
+    if quality is None or quality.dof < FEWEST_POSES:
+        return None
+    share = quality.dof / len(quality.residual)
+    return float(np.median(quality.residual**2)) / float(chi2.ppf(0.5, 1)) / share, quality.dof
 
 
 def zero_in_moves(

@@ -20,6 +20,10 @@ FRAME_TOLERANCE = 0.03
 """Parameters of one effect are stated along the axes of each side's own fit: 3 % (the angle between the two frames and
 the first order of the mechanisms) is no difference."""
 
+FREE_CURVES = frozenset({"curve", "smooth"})
+"""Variants of a drift that have no mechanism: waves over a session, and a curve drawn through its zeros. Of sessions of
+unlike length, or begun at another warmth, they are no numbers to compare."""
+
 LARGEST_READ: Mapping[str, float] = MappingProxyType({"accel-zero": STANDARD_GRAVITY_M_S2, "gyro-zero": 1.0})
 """What a scale that follows temperature is a share of where it is taken for a zero: gravity; a turn by hand [rad/s]."""
 
@@ -113,8 +117,15 @@ def compare_effects(
         and effect.id in excluded
         and not {seen.domain for seen in effect.held_out[:1]} & set(unexplained)
     ]
-    parameters = [p for m, r in pairs if m.id == r.id and m.id not in of_session for p in _parameters(m, r, alpha)]
+    alike = [
+        (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
+    ]
+    parameters = [p for m, r in alike for p in _parameters(m, r, alpha)]
     return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))
+
+
+def _is_free(effect: AcceptedEffect) -> bool:
+    return effect.model.get("variant") in FREE_CURVES
 
 
 def _are_one(a: AcceptedEffect, b: AcceptedEffect) -> bool:

@@ -139,6 +139,7 @@ class DroppedSamples(DirectEffect):
                 moves_inflation=old.moves_inflation,
                 dynamics_inflation=old.dynamics_inflation,
                 jitter_s=old.jitter_s,
+                zero_scatter=old.zero_scatter,
             )
 
         where = Where(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.laws.find import MOST_FOLLOWS, gyro_zero_laws
@@ -60,7 +62,8 @@ class GyroZeroScatter(DirectEffect):
 
 def _takes_two_values(context: Context) -> bool:
     """A zero that some axis has one of two of (a trap, a play) is drawn from no law of scatter."""
-    rate, sigma = context.obs.hold_rate, context.obs.hold_rate_sigma
-    if rate is None or sigma is None:
+    obs = context.obs
+    if obs.hold_rate is None or obs.hold_rate_sigma is None:
         return False
-    return any(two_levels(rate[:, axis], sigma[:, axis]).is_clear for axis in range(3))
+    known = np.column_stack([obs.hold_force, obs.hold_time_s])
+    return any(two_levels(obs.hold_rate[:, k], obs.hold_rate_sigma[:, k], known).is_clear for k in range(3))

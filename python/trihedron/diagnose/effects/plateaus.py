@@ -57,13 +57,19 @@ def plateaus_of(obs: Observations, *, is_gyro: bool) -> list[Plateau]:
     if raw is None or density is None:
         return []
     step = obs.recording.facts.of("gyroscope" if is_gyro else "accelerometer").step
-    return plateaus(raw, density * np.sqrt(obs.recording.rate_hz), step, obs.move_ranges)
+    origin = obs.rate_origin if is_gyro else obs.force_origin
+    return plateaus(raw, density * np.sqrt(obs.recording.rate_hz), step, obs.move_ranges, origin)
 
 
 def plateaus(
-    signal: FloatArray, sigma: FloatArray, step: FloatArray, ranges: tuple[tuple[int, int], ...]
+    signal: FloatArray,
+    sigma: FloatArray,
+    step: FloatArray,
+    ranges: tuple[tuple[int, int], ...],
+    origin: FloatArray | None = None,
 ) -> list[Plateau]:
-    """Runs of a raw (n, 3) signal on a common limit inside moves; ``sigma`` (3,) of a sample, ``step`` (3,) of code."""
+    """Runs of a raw (n, 3) signal on a common limit inside moves; ``sigma`` (3,) of a sample, ``step`` (3,) of code,
+    ``origin`` (3,) what was taken off the codes."""
     found: list[Plateau] = []
     if not ranges:
         return found
@@ -90,7 +96,7 @@ def plateaus(
             # Nothing is read beyond a limit but noise.
             if best and float(top.max()) <= best[0].level * sign + BAND_SIGMA * noise:
                 found += best
-    return found or _common_end(signal, sigma, moves)
+    return found or _common_end(signal, sigma, step, np.zeros(3) if origin is None else origin, moves)
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,18 +222,19 @@ NEAR = 3
 """Codes next to the outermost one: a slow peak reads all of these more often than those far below."""
 
 
-def _common_end(signal: FloatArray, sigma: FloatArray, moves: _Moves) -> list[Plateau]:
+def _common_end(
+    signal: FloatArray, sigma: FloatArray, step: FloatArray, origin: FloatArray, moves: _Moves
+) -> list[Plateau]:
     """Readings on one outermost code, the same in size on every channel that comes so far, more than motion puts there.
 
     A range that ends just above 1 g stops no more than a few readings of each of several channels. Motion reads its
     outermost code once, and the codes below it at least as often as that one: how many more there are is Poisson's.
     """
-    inside = signal[moves.samples]
+    inside = signal[moves.samples] + origin
     end = float(np.nanmax(np.abs(inside)))
     sides, n_end, expected = [], 0, 0.0
     for axis in range(signal.shape[1]):
-        codes = np.unique(inside[:, axis])
-        step_size = float(np.diff(codes).min()) if len(codes) > 1 else 0.0
+        step_size = float(step[axis])
         if not 0.0 < step_size < DITHERED * float(sigma[axis]):
             continue
         for sign in (1, -1):
@@ -243,9 +250,9 @@ def _common_end(signal: FloatArray, sigma: FloatArray, moves: _Moves) -> list[Pl
     if n_end <= len(sides) or float(pdtrc(n_end - len(sides) - 1, expected)) > BY_CHANCE:
         return []
     return [
-        Plateau(axis, sign, first, last, sign * end, True)
+        Plateau(axis, sign, first, last, sign * end - float(origin[axis]), True)
         for axis, sign, low in sides
-        for first, last, _, _ in moves.runs(sign * signal[:, axis], low, np.inf).tolist()
+        for first, last, _, _ in moves.runs(sign * (signal[:, axis] + origin[axis]), low, np.inf).tolist()
     ]
 
 

@@ -10,7 +10,8 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.selection.compare import explained, held_out_records, mends
-from trihedron.diagnose.selection.model import Accepted, StepwiseModel, held_out
+from trihedron.diagnose.selection.model import Accepted, StepwiseModel, held_out, observed_with, on_observations
+from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.twin import stacked
 from trihedron.records.diagnosis import Candidate
@@ -62,13 +63,18 @@ def _with_one(model: StepwiseModel, effect: DirectEffect, evidence: Evidence) ->
     gain = float(evidence.strength)
     after = model
     if evidence.reweigh is not None or evidence.variant is not None:
-        obs = model.obs if evidence.reweigh is None else evidence.reweigh(model.obs)
+        obs = _observed(model, evidence)
+        kept, known = model.accepted, model.fitted.twin.effect
+        if (obs.move_ranges, obs.n_holds) != (model.obs.move_ranges, model.obs.n_holds):
+            # Samples were put in or moves left out: columns made for the old ones do not fit the new.
+            kept = on_observations(model, obs, kept)
+            known = np.zeros(sum(one.variant.distortion.n_parameters for one in kept if one.variant is not None))
         added = [] if evidence.variant is None else [evidence.variant.distortion]
-        distortion = stacked([*model.distortions, *added])
+        distortion = stacked([*(one.variant.distortion for one in kept if one.variant is not None), *added])
         n_new = sum(d.n_parameters for d in added)
-        start = replace(model.fitted.twin, effect=np.concatenate([model.fitted.twin.effect, np.zeros(n_new)]))
+        start = replace(model.fitted.twin, effect=np.concatenate([known, np.zeros(n_new)]))
         fitted = tune_noise(obs, start, distortion, model.prior)
-        after = replace(model, context=Context(obs, fitted), prediction=held_out(fitted))
+        after = replace(model, context=Context(obs, fitted), prediction=held_out(fitted), accepted=kept)
         if not effect.is_proof and not mends(
             model.fitted, model.prediction, fitted, after.prediction, evidence.touched
         ):
@@ -79,3 +85,11 @@ def _with_one(model: StepwiseModel, effect: DirectEffect, evidence: Evidence) ->
     held = evidence.held_out or held_out_records(model.fitted, model.prediction, after.fitted, after.prediction)
     one = Accepted(effect, evidence.variant, evidence, p_adjusted, gain, gain, held, evidence.confounded_with)
     return replace(after, accepted=(*after.accepted, one))
+
+
+def _observed(model: StepwiseModel, evidence: Evidence) -> Observations:
+    if evidence.reweigh is None:
+        return model.obs
+    if evidence.touched is None:
+        return evidence.reweigh(model.obs)
+    return observed_with(model.bare, [*(one.evidence for one in model.accepted if one.evidence is not None), evidence])

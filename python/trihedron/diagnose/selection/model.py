@@ -107,16 +107,28 @@ def with_only(model: StepwiseModel, kept: tuple[Accepted, ...]) -> StepwiseModel
     """
     obs = model.obs
     if [one for one in kept if one.reobserves] != [one for one in model.accepted if one.reobserves]:
-        obs = model.bare
-        for one in kept:
-            if one.evidence is not None and one.evidence.reweigh is not None:
-                obs = one.evidence.reweigh(obs)
-        plain = Context(obs, tune_noise(obs, _start_on(model, obs), stacked([]), model.prior))
-        kept = tuple(again for one in kept if (again := _made_again(one, plain)) is not None)
+        obs = observed_with(model.bare, [one.evidence for one in kept if one.evidence is not None])
+        kept = on_observations(model, obs, kept)
     distortion = stacked([one.variant.distortion for one in kept if one.variant is not None])
     start = replace(_start_on(model, obs), effect=np.zeros(distortion.n_parameters))
     fitted = tune_noise(obs, start, distortion, model.prior)
     return replace(model, context=Context(obs, fitted), prediction=held_out(fitted), accepted=kept)
+
+
+def observed_with(bare: Observations, found: list[Evidence]) -> Observations:
+    """The bare observations as what was found changes them; samples are put back first, for that makes them anew."""
+    for evidence in sorted(found, key=lambda one: one.touched is None):
+        if evidence.reweigh is not None:
+            bare = evidence.reweigh(bare)
+    return bare
+
+
+def on_observations(model: StepwiseModel, obs: Observations, kept: tuple[Accepted, ...]) -> tuple[Accepted, ...]:
+    """Effects with their columns as other observations show the motion, without those that these do not show."""
+    if not any(one.variant is not None for one in kept):
+        return kept
+    plain = Context(obs, tune_noise(obs, _start_on(model, obs), stacked([]), model.prior))
+    return tuple(again for one in kept if (again := _made_again(one, plain)) is not None)
 
 
 def _start_on(model: StepwiseModel, obs: Observations) -> Twin:

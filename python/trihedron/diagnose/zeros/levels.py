@@ -44,8 +44,12 @@ class TwoLevels:
 NONE = TwoLevels((0.0, 0.0), (0, 0), 0, 0.0)
 
 
-def two_levels(zeros: FloatArray, sigma: FloatArray) -> TwoLevels:
-    """Two values with noise ``sigma`` (n,), some poses between them, against a normal law, for zeros (n,)."""
+def two_levels(zeros: FloatArray, sigma: FloatArray, known: FloatArray | None = None) -> TwoLevels:
+    """Two values with noise ``sigma`` (n,), some poses between them, against a normal law, for zeros (n,).
+
+    ``known`` (n, k): what zeros may follow (gravity, time); the normal law is about a straight line in these, for poses
+    on six faces have two values of a g-sensitivity too.
+    """
     n = len(zeros)
     if n < FEWEST_POSES:
         return NONE
@@ -70,15 +74,29 @@ def two_levels(zeros: FloatArray, sigma: FloatArray) -> TwoLevels:
                 best, at = float(total.max()), int(total.argmax())
                 likeliest = parts[:, at].argmax(axis=0)
                 poses = int((likeliest == 0).sum()), int((likeliest == 1).sum())
-    return TwoLevels((float(low[at]), float(high[at])), poses, n, best - _one_law(zeros, sigma))
+    return TwoLevels((float(low[at]), float(high[at])), poses, n, best - _one_law(zeros, sigma, known))
 
 
 def _log_normal(away: FloatArray, error: FloatArray) -> FloatArray:
     return np.asarray(-0.5 * (away / error) ** 2 - np.log(error * np.sqrt(2.0 * np.pi)))
 
 
-def _one_law(zeros: FloatArray, sigma: FloatArray) -> float:
-    """Log-likelihood of a normal law about a mean, its variance beside the noise as is best."""
-    variance = sigma**2 + (SCATTERS[:, None] * float(np.median(sigma))) ** 2
-    mean = (zeros / variance).sum(axis=1) / (1.0 / variance).sum(axis=1)
-    return float(_log_normal(zeros - mean[:, None], np.sqrt(variance)).sum(axis=1).max())
+def _one_law(zeros: FloatArray, sigma: FloatArray, known: FloatArray | None) -> float:
+    """Log-likelihood of a normal law, or of one about a line in what is known, which pays for its coefficients."""
+    constant = np.ones((len(zeros), 1))
+    best = _normal_about(constant, zeros, sigma)
+    if known is None:
+        return best
+    spread = np.ptp(known, axis=0)
+    columns = np.hstack([constant, (known - known.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)])
+    price = float(0.5 * known.shape[1] * np.log(len(zeros)))
+    return max(best, _normal_about(columns, zeros, sigma) - price)
+
+
+def _normal_about(columns: FloatArray, zeros: FloatArray, sigma: FloatArray) -> float:
+    best = float("-inf")
+    for scatter in SCATTERS * float(np.median(sigma)):
+        error = np.hypot(sigma, scatter)
+        found, *_ = np.linalg.lstsq(columns / error[:, None], zeros / error, rcond=None)
+        best = max(best, float(_log_normal(zeros - columns @ found, error).sum()))
+    return best

@@ -12,7 +12,6 @@ from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.rounding import (
-    UNDITHERED,
     common_zero,
     density_without_rounding,
     rounding_variance,
@@ -141,8 +140,8 @@ def measure_moves(
     moves = _moves_of(recording, segments)
     edges, links = _edges_and_links(moves)
     reading, zero = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
-    step, quantum = (recording.facts.of(name).step for name in ("accelerometer", "gyroscope"))
-    var_zero = _mean_variance(segments.gyroscope_sigma_mean, segments.gyroscope_sigma, quantum)
+    quantum = recording.facts.of("gyroscope").step
+    var_zero = _mean_variance(segments.gyroscope_sigma_mean)
     force = reading @ accelerometer.S.T + accelerometer.b
     undithered = _undithered(quantum, segments.gyroscope_sigma)
     attitude = attitude_dependence(zero, var_zero, force) if is_attitude_removed is not False else None
@@ -158,16 +157,16 @@ def measure_moves(
     mid_s = np.ascontiguousarray(segments.time_mid_s[links])
     prepared = Moves(recording.time_s, rate, edges, mid_s, links, rate_degree, extra)
 
-    var_reading = _mean_variance(segments.accelerometer_sigma_mean, segments.accelerometer_sigma, step)
+    var_reading = _mean_variance(segments.accelerometer_sigma_mean)
     zero_read, var_zero_read = zero, var_zero
     walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_zero[links[:, 1]] + var_zero[links[:, 0]])
     weights, mean, var_mean, excess, _ = pool_zeros(zero, var_zero)
     zero, var_zero = shrink(zero, var_zero, mean)
     if np.any(undithered):
         zero, var_zero = _with_hidden_zero(zero, var_zero, segments, quantum, undithered)
-    density = density_without_rounding(
-        rate_noise_density(recording, segments), quantum, 1.0 / recording.rate_hz, undithered
-    )
+        weights, mean, var_mean = _pooled_hidden(zero, var_zero, undithered, (weights, mean, var_mean))
+    seen = rate_noise_density(recording, segments)
+    density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
     if attitude is not None:
         var_mean = np.maximum(var_mean, attitude.var_zero)
     steps, nominal, jitter = _steps_of(recording)
@@ -227,6 +226,23 @@ def _with_hidden_zero(
     hidden = np.where(undithered, quantum**2 / 12.0, 0.0)
     own = np.maximum(np.asarray(segments.gyroscope_sigma_mean, dtype=np.float64) ** 2 - hidden, 0.0)
     return common_zero(zero, np.where(undithered, own, var_zero), undithered)
+
+
+def _pooled_hidden(
+    zero: FloatArray, var_zero: FloatArray, undithered: BoolArray, pooled: tuple[FloatArray, FloatArray, FloatArray]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weights, mean and variance of the session's zero, on undithered axes without what their step hides.
+
+    That is the offset that the moves are asked for: counted twice, it makes bars too wide.
+    """
+    weights, mean, var_mean = pooled
+    n = len(zero)
+    weights = np.ascontiguousarray(np.where(undithered, 1.0 / n, weights))
+    return (
+        weights,
+        np.where(undithered, zero.mean(axis=0), mean),
+        np.where(undithered, var_zero.mean(axis=0) / n, var_mean),
+    )
 
 
 def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
@@ -297,15 +313,11 @@ def _required(readings: FloatArray | None, name: str) -> FloatArray:
     return readings
 
 
-def _mean_variance(sigma_mean: FloatArray | None, sigma: FloatArray | None, step: FloatArray) -> FloatArray:
-    """Variance of the hold means, (n, 3), with the converter's share where its noise cannot be averaged away."""
+def _mean_variance(sigma_mean: FloatArray | None) -> FloatArray:
+    """Variance of the hold means, (n, 3); what rounding leaves in them is in it (docs/segmentation.md)."""
     if sigma_mean is None:
         raise ValueError("the segments do not say how certain their hold means are")
-    variance = np.asarray(sigma_mean, dtype=np.float64) ** 2
-    if sigma is not None:
-        # Below half a step of noise the converter's error no longer averages out: it stays uniform within one step.
-        variance = variance + np.where(np.asarray(sigma) < UNDITHERED * step, step**2 / 12.0, 0.0)
-    return np.ascontiguousarray(variance)
+    return np.ascontiguousarray(np.asarray(sigma_mean, dtype=np.float64) ** 2)
 
 
 def _without_rounding(sigma: FloatArray, quantum: FloatArray) -> FloatArray:

@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from trihedron.estimate.noise import remarks
 from trihedron.estimate.noise.lines import find_lines, misfit_groups, white_limit
+from trihedron.estimate.noise.rounded import with_level
 from trihedron.estimate.noise.screening import Event, Readout
 from trihedron.estimate.noise.selection import Selection, select
 from trihedron.estimate.noise.spectrum import Ordinates
@@ -42,9 +43,11 @@ def identify_axis(bands: Sequence[Ordinates], blank: NoiseAxis, curve: AllanCurv
     usable = curve.tau_s[curve.edf[:, channel] >= LEAST_EDF]
     found = invert(selection)
     pair = slow_pair_of(found)
+    terms = terms_of(found, pair)
+    terms[TermName.WHITE] = with_level(terms[TermName.WHITE], blank.sample_sigma, blank.resolution)
     axis = replace(
         blank,
-        terms=MappingProxyType(terms_of(found, pair)),
+        terms=MappingProxyType(terms),
         gauss_markov=gauss_markov_of(found, selection),
         slow_pair=pair,
         lines=tuple(lines),

@@ -68,7 +68,7 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
             replace(observed, inflation=inflation), core.force_scale, core.force_bias, core.rate_scale, core,
             is_tuned=False,
         )  # fmt: skip
-    chi2, dof = _misfit(core, MOVES)
+    chi2, dof = (float(of_domains[MOVES]) for of_domains in _misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
     away = core.force_zero @ S_a.T, (core.rate_zero - core.rate_zero.mean(axis=0)) @ S_w.T
@@ -120,10 +120,11 @@ def fitted(
     )
 
 
-def _misfit(core: _core.SessionFit, domain: int) -> tuple[float, float]:
-    rows = core.labels[:, 0] == domain
-    used = core.leverage()
-    return float((core.residual[rows] ** 2).sum()), float((1.0 - used[rows]).sum())
+def _misfits(core: _core.SessionFit) -> tuple[FloatArray, FloatArray]:
+    """χ² and degrees of freedom of every domain."""
+    domain = core.labels[:, 0]
+    chi2, dof = (np.bincount(domain, of_rows, DYNAMICS + 1) for of_rows in (core.residual**2, 1.0 - core.leverage()))
+    return np.asarray(chi2, dtype=np.float64), np.asarray(dof, dtype=np.float64)
 
 
 def _inflation(core: _core.SessionFit, now: tuple[float, float]) -> tuple[float, float]:
@@ -133,10 +134,11 @@ def _inflation(core: _core.SessionFit, now: tuple[float, float]) -> tuple[float,
     to its size it still pulled a real accelerometer by five of its standard errors.
     """
     moves, dynamics = now
-    chi2, dof = _misfit(core, DYNAMICS)
+    every_chi2, every_dof = _misfits(core)
+    chi2, dof = float(every_chi2[DYNAMICS]), float(every_dof[DYNAMICS])
     if dynamics < DEAF and dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
         return moves, DEAF  # and gravity after the moves is judged once it no longer bends the fit
-    chi2, dof = _misfit(core, MOVES)
+    chi2, dof = float(every_chi2[MOVES]), float(every_dof[MOVES])
     if dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
         moves *= float(np.sqrt(chi2 / dof))
     return moves, dynamics
