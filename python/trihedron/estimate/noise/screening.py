@@ -15,7 +15,6 @@ from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.limits import find_limits
 from trihedron.channel_facts.step import converter_step
 
 FALSE_ALARM = 1e-4
@@ -143,14 +142,21 @@ def readout(x: FloatArray) -> Readout:
     change = np.abs(np.concatenate([np.diff(part) for part in parts]))
     resolution = converter_step(values)
     sigma = float(np.sqrt(0.5 * np.mean(np.square(change))))
-    return Readout(resolution, sigma, float(np.mean(change == 0.0)), _clipped(values, sigma, resolution))
+    low, high = float(values.min()), float(values.max())
+    return Readout(resolution, sigma, float(np.mean(change == 0.0)), _clipped(values, low, high, resolution))
 
 
-def _clipped(values: FloatArray, sigma: float, step: float) -> float:
-    """Share of readings (n,) on a limit."""
-    triad = np.repeat(values[:, np.newaxis], 3, axis=1)
-    limits = find_limits(triad, np.full(3, sigma), np.full(3, step))
-    return sum(limit.count for limit in limits if limit.axis == 0) / len(values)
+def _clipped(values: FloatArray, low: float, high: float, resolution: float) -> float:
+    """Share of readings on an extreme value, if that is a wall: a tail thins out towards its end, a wall does not."""
+    if high - low < 8.0 * resolution or high == low:
+        return 0.0
+    shares = []
+    for edge in (low, high):
+        at_edge = np.count_nonzero(values == edge) / len(values)
+        near = np.count_nonzero(np.abs(values - edge) <= 1.5 * resolution) / len(values)
+        if at_edge > 1e-3 and at_edge > 0.6 * near and at_edge * len(values) > 10:
+            shares.append(at_edge)
+    return float(sum(shares))
 
 
 def repeated_rows(x: npt.NDArray[np.float64]) -> float:
