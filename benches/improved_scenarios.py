@@ -60,7 +60,7 @@ def octaves(diagnosis, sensor):
     by = {}
     for n in diagnosis.noise_compared:
         if n.term == "octave" and n.sensor == sensor and n.ratio:
-            by.setdefault(n.unit, []).append(np.log(n.ratio))
+            by.setdefault(n.band_hz, []).append(np.log(n.ratio))
     means = [float(np.exp(np.mean(v))) for v in by.values()]
     return f"{min(means):.2f} to {max(means):.2f}" if means else "–"
 

@@ -27,6 +27,8 @@ LEAST_RATIO = 1.05
 """White noise of one part differs by 5 % over 30 K (its resistors' noise goes with the root of temperature)."""
 LEAST_STEP_RATIO = math.sqrt(2.0)
 """Ranges of a converter come in powers of two: halfway between two of them."""
+DIGITS = 0.1
+"""Steps of a tenth of the noise add a thousandth to its variance: whether they are a converter's changes nothing."""
 LEAST_CORNER_RATIO = 1.2
 """Filters are chosen from lists whose neighbours differ by 1.5 to 2; within a fifth they are the same entry."""
 LEAST_RATE_RATIO = 1.02
@@ -228,7 +230,10 @@ def _step(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise) -> Iterator[Noi
         yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, None, None, unit, None, matters, remark)
         return
     ratio = m.step / r.step
-    is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO
+    levels = [one.white.value * math.sqrt(one.rate_hz) for one in (m, r) if one.white is not None]
+    # Steps far below the noise are as likely the digits of a file as a converter's.
+    is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
+    is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
     remark = f"The converter steps of the {name} are {ratio:.3g} times the recording's." if is_far else ""
     yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
 
