@@ -94,6 +94,46 @@ def test_a_recording_carries_its_facts_and_another_has_its_own():
     assert recording.with_same_readings(source="elsewhere").facts is recording.facts
 
 
+def cut(seed, limit=None, sigma=2.0, scale=1.0):
+    """Hand turns of up to 6000 counts, cut off at a limit."""
+    rng = np.random.default_rng(seed)
+    n = 6000
+    turns = np.zeros((n, 3))
+    first = 200
+    while first < n - 700:
+        length = int(rng.uniform(100, 250))
+        u = np.linspace(0.0, 1.0, length)
+        turns[first : first + length, rng.integers(3)] = (
+            rng.uniform(3000, 6000) * 16.0 * (u * (1.0 - u)) ** 2 * rng.choice([-1, 1])
+        )
+        first += length + int(rng.uniform(250, 400))
+    codes = np.round(turns + sigma * rng.normal(size=turns.shape))
+    return scale * (codes if limit is None else np.clip(codes, -limit, limit))
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.00106])
+@pytest.mark.parametrize("seed", range(10))
+def test_limits_are_told_from_peaks_and_carried_by_the_recording(seed, scale):
+    limit = float(np.random.default_rng(seed).integers(1500, 2500))
+    time_s = np.arange(6000) / 100.0
+    facts = Recording(time_s, None, cut(seed, limit, scale=scale), 100.0).facts.of("gyroscope")
+    assert facts.limits
+    np.testing.assert_allclose([abs(one.value) for one in facts.limits], limit * scale)
+    # The quietest windows are chosen: their noise is a little low (2 counts were added, rounding adds 1/12).
+    np.testing.assert_allclose(facts.noise, 2.02 * scale, rtol=0.2)
+    assert Recording(time_s, None, cut(seed, scale=scale), 100.0).facts.of("gyroscope").limits == ()
+
+
+def test_a_log_at_rest_on_its_limit_and_one_that_is_merely_coarse_are_told_apart():
+    rng = np.random.default_rng(8)
+    resting = np.round(rng.normal([0.0, 0.0, 8192.0], 8.0, (6000, 3)))
+    held = np.minimum(resting, 8190.0)
+    limits = Recording(np.arange(6000) / 100.0, held, None, 100.0).facts.of("accelerometer").limits
+    assert [(one.axis, one.value, one.is_high) for one in limits] == [(2, 8190.0, True)]
+    coarse = np.round(resting / 64.0)
+    assert Recording(np.arange(6000) / 100.0, coarse, None, 100.0).facts.of("accelerometer").limits == ()
+
+
 # Differences of distinct values that are not readings of a converter, or places on a grid whose step is known.
 OF_SOMETHING_ELSE = {
     "estimate/noise/curve_covariance.py:_nodes",

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from test_read import HEADER, codes, finding, write
+from trihedron.channel_facts.limits import find_limits
 from trihedron.read import read_recording
 from trihedron.read.audit import audit_counter
-from trihedron.read.audit.clipping import find_walls
 from trihedron.read.audit.repeats import Repeats
 from trihedron.records import FindingCode, Severity
 
@@ -157,7 +157,7 @@ def test_the_round_top_of_a_swing_is_not_clipping(seed):
     rng = np.random.default_rng(seed)
     t = np.arange(20_000) / 100.0
     swing = np.rint(100 * np.sin(0.7 * t + rng.uniform(0, 6)) + 0.3 * rng.standard_normal(len(t)))
-    assert find_walls(np.column_stack([swing, swing, swing]), np.full(3, 0.3), np.ones(3)) == []
+    assert find_limits(np.column_stack([swing, swing, swing]), np.full(3, 0.3), np.ones(3)) == ()
 
 
 def test_a_quiet_coarse_sensor_resting_on_its_largest_count_is_coarse_and_neither_clipped_nor_stuck(tmp_path):

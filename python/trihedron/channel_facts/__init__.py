@@ -2,14 +2,31 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.limits import find_limits
+from trihedron.channel_facts.quiet import Windows, look
 from trihedron.channel_facts.step import converter_steps
 from trihedron.records.channel_facts import ChannelFacts, RecordingFacts
 
-__all__ = ["facts_of"]
+__all__ = ["facts_in", "facts_of"]
 
 
-def facts_of(accelerometer: FloatArray | None, gyroscope: FloatArray | None) -> RecordingFacts:
-    """What raw readings (n, 3) of the sensors that are there say of their converters."""
-    accel, gyro = (None if one is None else ChannelFacts(converter_steps(one)) for one in (accelerometer, gyroscope))
-    return RecordingFacts(accel, gyro)
+def facts_of(accelerometer: FloatArray | None, gyroscope: FloatArray | None, rate_hz: float) -> RecordingFacts:
+    """What raw readings (n, 3) of the sensors that are there, sampled at a rate, say of their converters."""
+    named = {"accelerometer": accelerometer, "gyroscope": gyroscope}
+    present = {name: readings for name, readings in named.items() if readings is not None}
+    return facts_in(present, look(present, rate_hz))
+
+
+# Absurd readings (1e300) overflow squares; the noise they are told is infinite then.
+@np.errstate(over="ignore", invalid="ignore")
+def facts_in(sensors: dict[str, FloatArray], windows: Windows | None) -> RecordingFacts:
+    """The same of sensors (n, 3) by name whose quiet windows are known."""
+    facts: dict[str, ChannelFacts] = {}
+    for name, readings in sensors.items():
+        step = converter_steps(readings)
+        noise = np.zeros(3) if windows is None else windows.quiet_noise(name)
+        facts[name] = ChannelFacts(step, noise, find_limits(readings, noise, step))
+    return RecordingFacts(facts.get("accelerometer"), facts.get("gyroscope"))

@@ -12,14 +12,14 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts import facts_of
+from trihedron.channel_facts import facts_in
+from trihedron.channel_facts.quiet import look
 from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.memory import table_of
-from trihedron.read.rest import look
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
@@ -195,7 +195,7 @@ def audited(
         findings += judged.findings
     if sensors.has_clock:
         findings += audit_timing(time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.stamps_s)
-    facts = facts_of(sensors.accelerometer, sensors.gyroscope)
+    facts = facts_in(present, windows)
     counter = sensors.columns.counter
     if counter is not None:
         findings += audit_counter(_kept(sensors, counter, n), table.label(counter), sensors.place)

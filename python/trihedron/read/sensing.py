@@ -9,8 +9,8 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.quiet import Windows, is_integer, look
 from trihedron.read.errors import ReadError
-from trihedron.read.rest import Windows, is_integer, look
 from trihedron.read.turning import Turning, unit_by_turning
 from trihedron.read.turning import turn_ratio as gyroscope_turns
 from trihedron.records import Finding, FindingCode

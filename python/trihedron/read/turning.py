@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.read.rest import Windows
+from trihedron.channel_facts.quiet import Windows
 from trihedron.units import RateUnit, rate_to_si
 
 MIN_TURN_RAD = 0.5

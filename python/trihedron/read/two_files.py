@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.quiet import is_integer
 from trihedron.read.columns import Columns
 from trihedron.read.errors import ReadError
 from trihedron.read.merge import merge
-from trihedron.read.rest import is_integer
 from trihedron.read.sensing import WHOLE
 from trihedron.read.sensors import Sensors, settled
 

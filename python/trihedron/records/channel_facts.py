@@ -13,11 +13,30 @@ SAME_STEP = 0.02
 """Part by which one step of three converters may be measured differently where text has cut its digits."""
 
 
+@dataclass(frozen=True)
+class Limit:
+    """One channel's extreme value, if it is where readings end: ``count`` samples in ``stretches``, the first steep one
+    at ``sample``."""
+
+    axis: int
+    value: float
+    is_high: bool
+    count: int
+    stretches: int
+    sample: int
+
+
 @dataclass(frozen=True, eq=False)
 class ChannelFacts(Frozen):
-    """One sensor's three channels, raw units: ``step`` (3,) of the converter, 0 where readings lie on no grid."""
+    """One sensor's three channels, raw units.
+
+    ``step`` (3,) of the converter, 0 where readings lie on no grid; ``noise`` (3,) of one sample in the quietest half
+    seconds of the log, 0 where it has none; ``limits`` that readings were cut off at.
+    """
 
     step: FloatArray
+    noise: FloatArray
+    limits: tuple[Limit, ...]
 
     @property
     def common_step(self) -> float:

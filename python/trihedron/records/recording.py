@@ -210,7 +210,7 @@ class Recording(Presented):
         # How facts are found is a room of its own; a record only carries them.
         from trihedron.channel_facts import facts_of
 
-        return facts_of(self.accelerometer, self.gyroscope)
+        return facts_of(self.accelerometer, self.gyroscope, self.rate_hz)
 
     @property
     def n_samples(self) -> int:

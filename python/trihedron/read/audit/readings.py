@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.read.audit.clipping import AXES, audit_clipping, find_walls, short
+from trihedron.channel_facts.quiet import Windows
+from trihedron.read.audit.clipping import AXES, audit_clipping, short
 from trihedron.read.audit.repeats import Repeats, longest_by_chance
-from trihedron.read.rest import Windows
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.channel_facts import ChannelFacts
 
@@ -27,7 +27,7 @@ def audit_readings(
     if len(readings) < 8:
         return findings
     findings += _repeated(sensor, repeats, place)
-    walls = find_walls(readings, windows.quiet_noise(sensor) if windows is not None else np.zeros(3), facts.step)
+    walls = facts.limits
     findings += audit_clipping(sensor, walls, place)
     for k in range(3):
         at_wall = any(w.axis == k and w.value == readings[repeats.longest_start[k], k] for w in walls)

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from trihedron.channel_facts.quiet import Windows
 from trihedron.read.audit.clipping import AXES, short
-from trihedron.read.rest import Windows
 from trihedron.records import Finding, FindingCode
 from trihedron.records.channel_facts import ChannelFacts
 from trihedron.units import (
