@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.ranges import edges_of, ranges_of
+from trihedron.ranges import Range, edges_of, ranges_of
 
 LONGEST_BRIDGE_S = 0.15
 """A hand turns smoothly over this long; a peak cut for longer may have had any shape."""
@@ -23,6 +23,8 @@ FEWEST_CODES = 100.0
 """From so many steps on, two axes that end at one code, or one that ends at a power of two, do so hardly by chance."""
 TOP = 3.0
 """Sharper by this much than that parabola falls a peak upon which a tremor rides."""
+FLAT = 1.5
+"""Steps that an axis at rest between two codes may go to and fro; a hand's tremor is several degrees per second."""
 PAIR_BEND = 8.0
 """Bend, in steps, that two equal samples are allowed: more is no evidence by itself."""
 NOISE_JUMP = 5.0
@@ -61,9 +63,11 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray, step: FloatArray)
         if far <= FAR * np.ptp(extremes[[k % 3, k % 3 + 3]]):
             continue
         at = column == limit
-        if _is_cut(
-            column, at, quantum, _is_end_of_codes(limit, np.array([extremes[j] for j in lasting if j != k]), quantum)
-        ):
+        is_known = _is_end_of_codes(limit, np.array([extremes[j] for j in lasting if j != k]), quantum)
+        runs = ranges_of(at)
+        if not is_known:
+            runs = _without_steady_turns(time_s, gyroscope, runs, k % 3, step)
+        if _is_cut(column, runs, quantum, is_known):
             is_clipped[:, k % 3] |= at
     if not np.any(is_clipped):
         return None
@@ -74,8 +78,32 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray, step: FloatArray)
     return Clipped(is_clipped, readings, variance)
 
 
-def _is_cut(column: FloatArray, at: BoolArray, quantum: float, is_known: bool) -> bool:
-    """Some run at the extreme is no smooth peak, and no steady turn, that happens to share a code.
+def _without_steady_turns(
+    time_s: FloatArray, gyroscope: FloatArray, runs: list[Range], axis: int, step: FloatArray
+) -> list[Range]:
+    """The runs of an axis without those in which the other axes stand still as well.
+
+    A converter coarser than the noise shows a table's steady turn as one code: the wall and the turn look alike on the
+    axis, but whoever turns a gyro by hand beyond its limit moves the other axes meanwhile.
+    """
+    column = gyroscope[:, axis]
+    if float(np.nanmedian(np.abs(np.diff(column)))) > 0.0:
+        return runs  # noise moves the last digit: a turn that is not at a wall would show it
+    others = [k for k in range(3) if k != axis]
+    out = []
+    for first, stop in runs:
+        # The turn sets in and ends while the axis is at its extreme code already, or still.
+        edge = max((stop - first) // 6, 1)
+        part = gyroscope[first + edge : stop - edge][:, others]
+        is_long = len(part) > 2 and float(time_s[stop - 1] - time_s[first]) > LONGEST_BRIDGE_S
+        if is_long and np.all(np.ptp(part, axis=0) < FLAT * step[others]):
+            continue
+        out.append((first, stop))
+    return out
+
+
+def _is_cut(column: FloatArray, runs: list[Range], quantum: float, is_known: bool) -> bool:
+    """Some of ``runs`` at the extreme is no smooth peak, and no steady turn, that happens to share a code.
 
     A parabola of which n samples stay within a step q has a curvature of at most 8 q/((n − 1)² − 1), n even, or
     8 q/(n − 1)², n odd. One sample further it has fallen by half of that times n, two further by that times n + 1;
@@ -87,7 +115,7 @@ def _is_cut(column: FloatArray, at: BoolArray, quantum: float, is_known: bool) -
     finite = column[np.isfinite(column)]
     noise = 1.4826 * float(np.median(np.abs(np.diff(finite)))) / np.sqrt(2.0)
     pairs = 0
-    for first, stop in ranges_of(at):
+    for first, stop in runs:
         last, count = stop - 1, stop - first
         if count < 2:
             continue
