@@ -189,6 +189,8 @@ impl Stream {
     /// # Errors
     /// `BadInput` when the state is of another stream, or damaged.
     pub fn restore(&mut self, [numbers, fine, window, kept]: [Vec<f64>; 4]) -> Result<()> {
+        // Counts that were written as numbers: exact below 2⁵³, and checked.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let whole = |v: f64| (v >= 0.0 && v.fract() == 0.0 && v < 9e15).then_some(v as usize);
         let counted =
             <[f64; 6]>::try_from(numbers)
