@@ -147,3 +147,20 @@ def test_a_step_of_a_quarter_of_the_noise_is_another_converter_and_digits_of_a_f
     assert said(counts(3, 1.0), fine) == {}
     # Readings that somebody corrected lie on no codes.
     assert said(counts(4, 1e-4, 0.1234), fine) == {}
+
+
+def test_a_distance_of_readings_far_below_the_noise_is_no_converter_of_theirs(real):
+    # Resampled readings: what two of them happen to differ by. The other log has steps of half its noise.
+    from dataclasses import replace
+
+    def with_steps(log, step):
+        noise = {s: tuple(replace(one, step=step * SENSORS[s]) for one in axes) for s, axes in log.noise.items()}
+        return replace(log, noise=noise)
+
+    coarse = with_steps(real, 0.5)
+    for chance in (0.0, 1e-8, 5e-5):
+        for pair in ((coarse, with_steps(real, chance)), (with_steps(real, chance), coarse)):
+            found = compare_noise(*pair, alpha=0.01)
+            assert not [n for n in found if n.term == "resolution" and n.significant], chance
+    finer = compare_noise(coarse, with_steps(real, 0.05), alpha=0.01)
+    assert [n for n in finer if n.term == "resolution" and n.significant]

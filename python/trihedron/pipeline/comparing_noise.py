@@ -29,6 +29,8 @@ LEAST_STEP_RATIO = math.sqrt(2.0)
 """Ranges of a converter come in powers of two: halfway between two of them."""
 DIGITS = 0.1
 """Steps of a tenth of the noise add a thousandth to its variance: whether they are a converter's changes nothing."""
+LEAST_SEEN_STEP = 1e-3
+"""Of the noise: no converter has a thousand codes to a standard deviation; resampled readings come that near."""
 LEAST_CORNER_RATIO = 1.2
 """Filters are chosen from lists whose neighbours differ by 1.5 to 2; within a fifth they are the same entry."""
 LEAST_RATE_RATIO = 1.02
@@ -218,14 +220,15 @@ def _are_even(white: Sequence[Measured | None]) -> bool:
 def _step(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise) -> Iterator[NoiseDifference]:
     unit = "m/s^2" if sensor == "accelerometer" else "rad/s"
     name = "accelerometer" if sensor == "accelerometer" else "gyro"
-    if m.step == 0.0 and r.step == 0.0:
+    m_shows, r_shows = _shows_steps(m), _shows_steps(r)
+    if not (m_shows or r_shows):
         return
-    if m.step == 0.0 or r.step == 0.0:
+    if not (m_shows and r_shows):
         # Readings finer than their noise shows: only a step that matters beside the noise is missed.
-        step, noise = (r.step, r.white) if m.step == 0.0 else (m.step, m.white)
+        step, noise = (m.step, m.white) if m_shows else (r.step, r.white)
         floor = None if noise is None else noise.value * math.sqrt(r.rate_hz)
         matters = floor is None or step > floor
-        side = "model" if m.step == 0.0 else "recording"
+        side = "recording" if m_shows else "model"
         remark = f"The {side} has no converter steps on the {name}." if matters else ""
         yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, None, None, unit, None, matters, remark)
         return
@@ -236,6 +239,12 @@ def _step(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise) -> Iterator[Noi
     is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
     remark = f"The converter steps of the {name} are {ratio:.3g} times the recording's." if is_far else ""
     yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
+
+
+def _shows_steps(one: HoldNoise) -> bool:
+    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of a converter."""
+    level = 0.0 if one.white is None else one.white.value * math.sqrt(one.rate_hz)
+    return one.step > LEAST_SEEN_STEP * level
 
 
 def _corner(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> Iterator[NoiseDifference]:
