@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import tomllib
@@ -39,10 +39,13 @@ class Improvement:
     left_out: Mapping[str, str]
 
 
-def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
+def improve(
+    scenario: str | Path, found: DiagnosisResult, *, stage: Literal["numbers", "noise", "effects"] = "effects"
+) -> Improvement:
     """The user's scenario file with numbers, noise, sampling and physics of the recording.
 
     Only what differs is replaced; comments, order and all else stay. Effects that only the scenario has are taken out.
+    ``stage`` stops after the numbers, or after noise and sampling.
 
     Raises
     ------
@@ -53,7 +56,11 @@ def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
     tables: dict[str, dict[str, Any]] = {"accelerometer": {}, "gyroscope": {}, "clock": {}, "environment": {}}
     _numbers(tables, given, found)
     _gravity(tables, given, found)
+    if stage == "numbers":
+        return Improvement(improved_scenario(scenario, tables, [], []), {})
     _noise(tables, given, found)
+    if stage == "noise":
+        return Improvement(improved_scenario(scenario, tables, [], []), {})
     physics = [effect for effect in found.effects if effect.side == "recording"]
     shared = {p.id for p in found.parameters if p.significant}
     sizes, left_out = diagnosed_sizes([e.to_dict() for e in (*physics, *_shared(found, shared))])
