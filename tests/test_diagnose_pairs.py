@@ -61,6 +61,13 @@ def test_mechanisms_of_either_side_are_named_before_scatter_and_faint_lines():
     ]  # fmt: skip
 
 
+def test_scatter_of_the_model_is_surplus_only_beyond_what_the_recording_misses_anyway():
+    tried = [Candidate("accel-zero-scatter", 0.4, True)]
+    model = [effect("accel-zero-scatter", 1.5e-3, 1.0e-3, variant="")]
+    assert not compare_effects(model, [], tried, alpha=0.01, misses={"static-accel": 1.4e-3}).surplus
+    assert compare_effects(model, [], tried, alpha=0.01, misses={"static-accel": 0.8e-3}).surplus
+
+
 def scattered(recording, sigma, seed):
     """Zeros of the gyro that are others in every pose, by ``sigma`` of its raw unit."""
     rng = np.random.default_rng(seed)

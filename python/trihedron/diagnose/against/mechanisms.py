@@ -101,7 +101,7 @@ def compare_effects(
     Effects of one session (a pushed pose, a table that was not level) belong to that session: they are never surplus.
     Nor is an effect that would show in a domain of which the recording leaves more ``unexplained`` than its noise:
     it may be there, and hidden. ``misses``: rms of the recording's residuals in each domain before any effect; an
-    effect of a channel that the recording did not log is surplus only if it makes more than that.
+    effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than that.
     """
     by_id = {effect.id: effect for effect in catalogue()}
     of_session = {effect.id for effect in by_id.values() if effect.is_of_session}
@@ -133,6 +133,7 @@ def compare_effects(
         if effect.id not in of_session
         and effect.id in excluded
         and not {seen.domain for seen in effect.held_out[:1]} & set(unexplained)
+        and (_would_show(effect, misses) or not by_id[effect.id].is_spread)
     ]
     alike = [
         (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
@@ -151,8 +152,7 @@ def _is_beside(effect: AcceptedEffect) -> bool:
 def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:
     """Whether an effect of this size made some domain's residuals larger than all that the recording's are."""
     return any(
-        seen.domain in misses and seen.rms_before**2 - seen.rms_after**2 > misses[seen.domain] ** 2
-        for seen in effect.held_out[:1]
+        seen.rms_before**2 - seen.rms_after**2 > misses.get(seen.domain, 0.0) ** 2 for seen in effect.held_out[:1]
     )
 
 
