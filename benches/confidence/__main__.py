@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from confidence.arm import carried
 from confidence.judge import judge
+from confidence.machine import box, robot, swing
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import hand, manual, table
@@ -56,6 +57,21 @@ SETTINGS = {
     "arm, held in the hand": (carried, {"rest": "in hand"}),
     "arm, 50 Hz": (carried, {"rate_hz": 50.0}),
     "arm, 12 bit": (carried, {"gyro_bits": 12, "accel_bits": 12}),
+    **{make.__name__: (make, {}) for make in (box, robot, swing)},
+    **{
+        f"robot, noise {kind}": (robot, {"noise": kind})
+        for kind in ("telegraph", "tails", "spikes", "laplace", "filtered", "mains", "unequal")
+    },
+    "robot, 12 bit": (robot, {"gyro_bits": 12}),
+    "robot, 12 bit, lost 0.3 %, remade": (robot, {"gyro_bits": 12, "lost": 0.003, "is_remade": True}),
+    "robot, 10 bit, poses of 1.5 s, lost 1 %": (
+        robot,
+        {"hold_s": 1.5, "gyro_bits": 10, "accel_bits": 12, "lost": 0.01},
+    ),
+    "swing, 10 bit, poses of 1.5 s, lost 0.5 %, remade": (
+        swing,
+        {"hold_s": 1.5, "gyro_bits": 10, "accel_bits": 12, "lost": 0.005, "is_remade": True},
+    ),
     "manual's session, moves": (manual, {}),
     "manual's session, stated turns": (manual, {"is_stated": True}),
 }

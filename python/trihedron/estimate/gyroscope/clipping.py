@@ -132,6 +132,21 @@ def _is_cut(column: FloatArray, runs: list[Range], quantum: float, is_known: boo
     return pairs > 1
 
 
+def is_at_end_of_word(gyroscope: FloatArray | None) -> bool:
+    """Whether readings (n, 3) in whole counts end at a power of two, as those of a converter at its limit do."""
+    if gyroscope is None:
+        return False
+    ends = np.concatenate([np.nanmax(gyroscope, axis=0), np.nanmin(gyroscope, axis=0)])
+    return any(_is_of_word(float(end)) for end in ends)
+
+
+def _is_of_word(limit: float) -> bool:
+    code = abs(limit)
+    if not np.isfinite(limit) or code < FEWEST_CODES or code != round(code):
+        return False
+    return any(end > 0 and end & (end - 1) == 0 for end in (int(code), int(code) + (limit > 0)))
+
+
 def _is_end_of_codes(limit: float, others: FloatArray, quantum: float) -> bool:
     """Whether an extreme looks like a limit by its value: the end of a word of bits, or where another axis ends."""
     if quantum <= 0.0:
@@ -139,7 +154,7 @@ def _is_end_of_codes(limit: float, others: FloatArray, quantum: float) -> bool:
     code = abs(limit) / quantum
     if code < FEWEST_CODES:
         return False
-    is_word = quantum == 1.0 and any(end > 0 and end & (end - 1) == 0 for end in (int(code), int(code) + (limit > 0)))
+    is_word = quantum == 1.0 and _is_of_word(limit)
     # Both ends of a word are a step apart; ends on one side are the same.
     apart = np.where(others * limit > 0.0, 0.1, 1.1) * quantum
     return is_word or bool(np.any(np.abs(np.abs(others) - abs(limit)) < apart))

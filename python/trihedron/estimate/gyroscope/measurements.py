@@ -123,8 +123,10 @@ def measure_moves(
     accelerometer: SensorCalibration,
     rate_degree: int,
     is_attitude_removed: bool | None = None,
+    *,
+    is_bridged: bool = True,
 ) -> MoveMeasurements:
-    """Collect hold means, moves and noise.
+    """Collect hold means, moves and noise; readings that look like the gyro's limit are bridged if ``is_bridged``.
 
     With ``is_attitude_removed`` (``None``: where the holds show it beyond chance) a zero reading that follows specific
     force is subtracted sample by sample: interpolating it between two attitudes would be wrong in the middle of a move.
@@ -150,7 +152,7 @@ def measure_moves(
         zero = np.ascontiguousarray(zero - force @ attitude.A.T)
     else:
         attitude, rate = None, gyroscope
-    clipped = bridge_clipping(recording.time_s, gyroscope, quantum)
+    clipped = bridge_clipping(recording.time_s, gyroscope, quantum) if is_bridged else None
     extra = rounding_variance(gyroscope, quantum, np.median(gyroscope_mean, axis=0), undithered)
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope)
