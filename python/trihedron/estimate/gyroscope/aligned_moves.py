@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.channel_facts.limits import is_end_of_word
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align_screened
-from trihedron.estimate.gyroscope.clipping import is_at_end_of_word
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.start import starts
 from trihedron.estimate.gyroscope.verification import predict
@@ -26,7 +26,9 @@ def measured_and_aligned(
     Where gravity is carried far better than that, nothing was cut, unless the code is the end of a converter's word.
     """
     bridged = _measured(recording, segments, part, options, is_bridged=True)
-    if np.any(bridged.clipped_s > 0.0) and not is_at_end_of_word(recording.gyroscope):
+    facts = recording.facts.of("gyroscope")
+    is_word = any(is_end_of_word(limit.value, float(facts.step[limit.axis])) for limit in facts.limits)
+    if np.any(bridged.clipped_s > 0.0) and not is_word:
         measured = _measured(recording, segments, part, options, is_bridged=False)
         plain = _aligned(recording, measured, part, gravity_m_s2, options)
         if _denies_cut(plain, bridged, measured):
