@@ -106,8 +106,8 @@ def test_a_rate_that_steps_between_samples_is_charged_with_what_its_integral_mis
     ranges = tuple((k * n + 50, k * n + 150) for k in range(moves))
     holds = [(k * n + 5, k * n + 45) for k in range(moves)]
     charged = unresolved_variance(rate, ranges, holds, step, np.zeros(3))
-    # 900 squares of a jump times a phase have a mean certain to 7 %: two of those, and a tenth for the width of the band,
-    # over which a step's power is above that at its middle.
+    # 900 squares of a jump times a phase have a mean certain to 7 %: two of those, and a tenth for the width of the
+    # band, over which a step's power is above that at its middle.
     assert np.mean(missed**2) == pytest.approx(np.mean(charged), rel=0.25)
 
 
