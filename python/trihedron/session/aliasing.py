@@ -7,8 +7,8 @@ c ν^-p on either side of zero, what the samples show at f/4, at f/2 and falsely
     D₁ = c (f/4)^-p Z,   D₂ = 2 c (f/2)^-p Z,   A = 2 c f^-p Z / (1 - 2^-p),   Z = 1 + 3^-p + 5^-p + ...
 
 so that D₁/D₂ = 2^p/2 and A = D₂/(2 D₁/D₂ - 1): all of it for what is white among the samples (D₁ = D₂), no more, and a
-third of it for a rate that steps (p = 2). Less is not believed: D₁ holds slower motion too, which makes the fall look
-steep, and a sensor's own filter leaves little of D₂.
+third of it for a rate that steps (p = 2). D₁ holds slower motion too, which makes the fall look steep: up to the third,
+a part of it is believed to be of its band.
 """
 
 from __future__ import annotations
@@ -23,6 +23,9 @@ _AT_HALF = [1.0 / 16.0, -4.0 / 16.0, 6.0 / 16.0, -4.0 / 16.0, 1.0 / 16.0]
 _AT_QUARTER = [-0.25, 0.0, 0.5, 0.0, -0.25]
 OF_A_STEP = 1.0 / 3.0
 """Part of the power at half the sampling frequency that a rate with steps has falsely at zero: 1/(2^p - 1) of p = 2."""
+OF_ITS_BAND = 0.4
+"""Part of the power around a quarter of the sampling frequency that is not slower motion, where a body knocks and rocks
+at a tenth of it."""
 MARGIN = 3.0
 """Standard deviations of the noise's own power that are not yet motion."""
 
@@ -70,5 +73,7 @@ def unresolved_variance(
     total, falls = at_quarter.sum(axis=1), at_half.sum(axis=1)
     both = (total > 0) & (falls > 0)
     fall = min(float(np.median(falls[both] / total[both])), 1.0) if np.any(both) else 1.0
-    variance: FloatArray = at_half * max(fall / (2.0 - fall), OF_A_STEP) * step_s**2
+    slowest = min(fall / OF_ITS_BAND, 1.0)
+    part = max(fall / (2.0 - fall), min(slowest / (2.0 - slowest), OF_A_STEP))
+    variance: FloatArray = at_half * part * step_s**2
     return variance

@@ -139,8 +139,7 @@ def measure_moves(
     gyroscope = _required(recording.gyroscope, "gyroscope")
     raw_force = _required(recording.accelerometer, "accelerometer")
     accelerometer_mean, gyroscope_mean = _both_means(segments)
-    moves = _moves_of(recording, segments)
-    edges, links = _edges_and_links(moves)
+    edges, links = _edges_and_links(_moves_of(recording, segments))
     reading, zero = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
     quantum = recording.facts.of("gyroscope").step
     var_zero = _mean_variance(segments.gyroscope_sigma_mean)
