@@ -168,8 +168,7 @@ def measure_moves(
         weights, mean, var_mean = _pooled_hidden(zero, var_zero, undithered, (weights, mean, var_mean))
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
-    if attitude is not None:
-        var_mean = np.maximum(var_mean, attitude.var_zero)
+    var_mean = var_mean if attitude is None else np.maximum(var_mean, attitude.var_zero)
     steps, nominal, jitter = _steps_of(recording)
     return MoveMeasurements(
         moves=prepared,
