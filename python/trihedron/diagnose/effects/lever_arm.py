@@ -37,8 +37,9 @@ SAMPLES_PER_SHAPE = 3
 SHORT = 0.2
 FEWEST_PER_SHAPE = 2
 """Moves with fewer readings for each shape are left out: their shapes are no longer different curves."""
-SHRUNK = 0.02
-"""Of the mean variance of a shape, added to each: 24 by 24 covariances come from as few as 18 curves."""
+SHRUNK = (0.02, 100.0)
+"""Of the mean variance of a shape, added to each: 24 by 24 covariances come from as few as 18 curves. With the second,
+shapes count alike, which a few moves with long arms need; the better of the two answers, paid for twice."""
 N_WEIGHINGS, N_AGAIN = 6, 3
 """Rounds from nothing known, and from where one move less changes little."""
 QUIETEST = 0.5
@@ -71,10 +72,10 @@ class LeverArm(DirectEffect):
         flat = np.einsum("mkia,mkib->ab", moves.columns, moves.columns)[:N_ARM, :N_ARM]
         if len(moves.target) < FEWEST_MOVES or np.linalg.cond(flat) > TOO_FLAT:
             return None
-        found, by = _fitted(moves)
+        found, by = min((_fitted(moves, one) for one in SHRUNK), key=lambda one: one[0].p_value)
         before, after = (float(by.weight @ one) for one in _held_out(moves, found, by.shapes))
         share = 1.0 - after / before
-        if share < MIN_SHARE or found.p_value > P_LIMIT:
+        if share < MIN_SHARE or len(SHRUNK) * found.p_value > P_LIMIT:
             return None
         # Rms of what hands do little of: every shape and move by its weight, the same before and after.
         scale = 3.0 * float(np.trace(by.shapes)) * float(by.weight.sum())
@@ -91,7 +92,7 @@ class LeverArm(DirectEffect):
         whole, left = (float(one.sum()) for one in _held_out(moves, found, np.eye(moves.n_shapes)))
         strength = float(len(by.weight) * np.log(whole / left)) if 1.0 - left / whole > MOSTLY else 0.0
         return Evidence(
-            max(found.p_value, 1e-300), strength, parameters,
+            max(len(SHRUNK) * found.p_value, 1e-300), strength, parameters,
             f"The accelerometers sit {100 * length:.1f} cm from the centre of rotation: one arm predicts "
             f"{100 * share:.0f} % of the acceleration in moves it was not fitted to (what hands do most weighs least).",
             "dynamics", Where(("ax", "ay", "az")), (held,),
@@ -183,13 +184,13 @@ def _normal(moves: _Moves, by: _Weighed) -> tuple[FloatArray, FloatArray]:
     return normal, np.einsum("mkia,mki->ma", weighted, moves.target)
 
 
-def _weighed(moves: _Moves, by: _Weighed, n: int) -> _Weighed:
+def _weighed(moves: _Moves, by: _Weighed, shrunk: float, n: int) -> _Weighed:
     """The answer again, ``n`` times, in the noise that the last one left."""
     for _ in range(n):
         left = moves.target - moves.columns @ by.value
         covariance = np.einsum("mki,mli->kl", left * by.weight[:, None, None], left) / (3.0 * len(left))
         mean = float(np.trace(covariance)) / moves.n_shapes
-        shapes = np.linalg.inv(covariance + SHRUNK * mean * np.eye(moves.n_shapes))
+        shapes = np.linalg.inv(covariance + shrunk * mean * np.eye(moves.n_shapes))
         squares = _squares(left, shapes)
         weight = 1.0 / np.maximum(squares, QUIETEST * float(np.median(squares)))
         by = _Weighed(by.value, shapes, weight / weight.mean())
@@ -198,19 +199,19 @@ def _weighed(moves: _Moves, by: _Weighed, n: int) -> _Weighed:
     return by
 
 
-def _fitted(moves: _Moves) -> tuple[_Arm, _Weighed]:
+def _fitted(moves: _Moves, shrunk: float) -> tuple[_Arm, _Weighed]:
     """The arm, each move left out in turn for its error bar: covariance and weights are made again without it.
 
     A move that decides alone, or makes the noise in which it stands out, makes that wide.
     """
     m = len(moves.target)
     start = _Weighed(np.zeros(N_ARM + 1), np.eye(moves.n_shapes), np.ones(m))
-    whole = _weighed(moves, start, N_WEIGHINGS)
+    whole = _weighed(moves, start, shrunk, N_WEIGHINGS)
     without_one = np.empty((m, N_ARM + 1))
     for k in range(m):
         others = np.arange(m) != k
         few = _Moves(moves.target[others], moves.columns[others])
-        without_one[k] = _weighed(few, replace(whole, weight=whole.weight[others]), N_AGAIN).value
+        without_one[k] = _weighed(few, replace(whole, weight=whole.weight[others]), shrunk, N_AGAIN).value
     away = (without_one - whole.value)[:, :N_ARM]
     covariance = away.T @ away * ((m - 1) / (m - 3))
     arm = whole.value[:N_ARM]
