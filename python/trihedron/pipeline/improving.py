@@ -25,6 +25,7 @@ from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.hold_noise import HoldNoise
+from trihedron.refused import REFUSALS
 from trihedron.segment import resegment
 from trihedron.simulate import (
     NoiseTerms,
@@ -129,7 +130,7 @@ def zero_of_poses(
     simulated = driven(better, recording, segments, own)
     try:
         of_it = calibrate(simulated, gravity_m_s2=better.environment.gravity)
-    except ValueError:
+    except REFUSALS:
         return None
     ours, theirs = _scale_of_poses(own), _scale_of_poses(of_it.calibration)
     if ours is None or theirs is None:
@@ -165,7 +166,7 @@ def zero_in_moves(
     simulated = driven(better, recording, segments, own)
     try:
         of_it = calibrate(simulated, gravity_m_s2=better.environment.gravity)
-    except ValueError:
+    except REFUSALS:
         return None
     ours = carried_misses(own, recording, resegment(recording, segments))
     theirs = carried_misses(of_it.calibration, simulated, resegment(simulated, of_it.segments))
