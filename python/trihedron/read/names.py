@@ -48,7 +48,6 @@ _TIME_WORDS = {
     "tempo",
 }
 _TIME_WORDS |= {"millis", "micros", "seconds", "secs", "ticks", "unix"}
-_TIME_ANYWHERE = {"time", "timestamp", "timestamps", "stamp", "datetime", "tow", "itow"}
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
 _TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
 _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}

@@ -24,6 +24,7 @@ from trihedron.read.unread_time import refuse_unread_time
 from trihedron.records import Finding, FindingCode, Sampling
 from trihedron.records.progress import Progress
 from trihedron.records.sampling import UNJUDGED
+from trihedron.records.words import Words, words
 
 ASSUMED_RATE_HZ = 100.0
 FEWEST_ROWS = 2
@@ -76,9 +77,9 @@ class Sensors:
         at = sample + self.offset
         return int(self.rows[at]) if self.rows is not None else at
 
-    def place(self, sample: int) -> str:
+    def place(self, sample: int) -> Words:
         """A sample's number, file line and time, for people."""
-        return f"sample {sample}, {self.table.place(self.row(sample))}, {self.time_s[sample]:.3f} s"
+        return words("sample", sample=sample, row=self.table.place(self.row(sample)), time_s=self.time_s[sample])
 
 
 def _triad(
