@@ -34,6 +34,7 @@ from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Candidate, Diagnosis
 from trihedron.records.domains import DomainTest
 from trihedron.records.progress import Progress
+from trihedron.refused import RefusedError
 
 LARGEST_ALPHA = 0.5
 """A false-alarm rate of a half or more is a coin, not a test."""
@@ -69,7 +70,7 @@ def diagnose_recording(
     """
     tell = progress or (lambda _fraction, _text: None)
     if not 0.0 < alpha < LARGEST_ALPHA:
-        raise ValueError(f"alpha is a small probability such as 0.01, got {alpha}")
+        raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments)
     start = start_twin(obs, calibration)
     prior = prior_of(obs, calibration) if calibration_is_given else None
@@ -186,14 +187,15 @@ def _with_late(
     if len(late.accepted) == len(model.accepted):
         return late, candidates  # the same model, which remembers what was looked for in vain
     # What was needless, or too little, in the noise of a model without them may stand beside them.
-    late = replace(late, refused=frozenset(one for one in late.refused if _is_direct(one)))
+    late = replace(late, refused=frozenset(one for one in late.refused if not _competes(one)))
     scored, _ = scores(late, exclude=late.refused)
     return judged_again(_grown(late, scored, alpha, lambda _part: None)), candidates
 
 
-def _is_direct(effect_id: str) -> bool:
-    """Whether an effect brings evidence of its own: refused, it is not looked for again."""
-    return any(one.id == effect_id and isinstance(one, DirectEffect) for one in catalogue())
+def _competes(effect_id: str) -> bool:
+    """Whether an effect has columns that compete; one with nothing but evidence of its own is not looked for again."""
+    effect = next((one for one in catalogue() if one.id == effect_id), None)
+    return not isinstance(effect, DirectEffect) or type(effect).variants is not DirectEffect.variants
 
 
 def _grown(model: StepwiseModel, scored: list[Scored], alpha: float, tell: Callable[[float], None]) -> StepwiseModel:
