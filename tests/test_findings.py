@@ -1,14 +1,17 @@
 """The catalogue of findings is closed: stages give codes and values, every sentence stands under report/."""
 
 import ast
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records.words import words
 from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
 from trihedron.report.findings.page import page
+from trihedron.report.findings.phrases import PHRASES
 from trihedron.report.findings.wording import filled
 
 PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
@@ -139,6 +142,11 @@ def test_a_finding_carries_its_numbers_for_machines():
     assert dict(found.numbers) == {"holds": 1.0, "duration_s": 12.5, "needed": 9.0}
 
 
+def test_what_is_not_a_number_is_no_figure_that_a_file_would_choke_on():
+    found = Finding.of(FindingCode.FEW_POSES, holds=np.inf, duration_s=np.nan, needed=9, numbers={"of_x": -np.inf})
+    assert dict(found.numbers) == {"needed": 9.0}
+
+
 def test_a_value_that_is_missing_or_a_case_that_is_not_there_is_refused():
     with pytest.raises(KeyError):
         Finding.of(FindingCode.FEW_POSES, holds=1)
@@ -149,3 +157,22 @@ def test_a_value_that_is_missing_or_a_case_that_is_not_there_is_refused():
 def test_the_documents_list_the_catalogue_as_it_is():
     documented = (Path(__file__).parents[1] / "docs" / "findings.md").read_text()
     assert documented == page(), "python -m trihedron.report.findings.page > docs/findings.md"
+
+
+def test_every_phrase_is_chosen_somewhere_and_every_chosen_one_is_in_the_catalogue():
+    written = "\n".join(path.read_text() for path in PACKAGE.rglob("*.py") if path.name != "phrases.py")
+    rust = "\n".join(path.read_text() for path in (PACKAGE.parents[1] / "rust" / "gauss_newton").rglob("*.rs"))
+    assert {name for name in PHRASES if f'"{name}"' not in written + rust} == set()
+    chosen = set(re.findall(r'\b(?:words|phrase)\(\s*"([a-z-]+)"', written))
+    assert len(chosen) > 30
+    assert chosen <= set(PHRASES)
+
+
+def test_a_value_with_words_of_its_own_is_refused():
+    # What `stages_write_no_words` (conftest) watches in every test.
+    refused = pytest.raises(AssertionError, match="weakest")
+    with refused:
+        Finding.of(FindingCode.WEAKLY_OBSERVABLE, "kalman-norm", weakest="the second axis", condition=200.0)
+    chosen = words("zero-of-axis", axis=2)
+    seen = Finding.of(FindingCode.WEAKLY_OBSERVABLE, "kalman-norm", weakest=chosen, condition=200.0).seen
+    assert "zero of axis 2" in seen

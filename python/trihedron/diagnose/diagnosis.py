@@ -13,6 +13,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.diagnose.laws.find import laws_of_rest
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
+from trihedron.diagnose.residuals.creep import settling, with_settling
 from trihedron.diagnose.residuals.goodness_of_fit import hidden_zeros, judge_rows
 from trihedron.diagnose.residuals.timing import judge_timing
 from trihedron.diagnose.residuals.within_holds import judge_within_holds
@@ -33,6 +34,7 @@ from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Candidate, Diagnosis
 from trihedron.records.domains import DomainTest
 from trihedron.records.progress import Progress
+from trihedron.refused import RefusedError
 
 LARGEST_ALPHA = 0.5
 """A false-alarm rate of a half or more is a coin, not a test."""
@@ -68,7 +70,7 @@ def diagnose_recording(
     """
     tell = progress or (lambda _fraction, _text: None)
     if not 0.0 < alpha < LARGEST_ALPHA:
-        raise ValueError(f"alpha is a small probability such as 0.01, got {alpha}")
+        raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments)
     start = start_twin(obs, calibration)
     prior = prior_of(obs, calibration) if calibration_is_given else None
@@ -132,7 +134,7 @@ class _Run:
 
 def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
     tell(0.05, "fitting the session")
-    bare = begin(obs, start, prior)
+    bare = _with_creep(begin(obs, start, prior))
     tell(0.2, "looking at the samples")
     model, candidates = with_evidence(bare, alpha)
     domains = _all_domains(bare.context, alpha, model.refused)
@@ -158,6 +160,21 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
     return _Run(bare, judged, domains, accounted_for(judged, remaining), candidates)
 
 
+def _with_creep(bare: StepwiseModel) -> StepwiseModel:
+    """The session with rates at rest and moves that allow for poses which turn while they settle, where they do."""
+    rates = [one for one in judge_rows(bare.fitted, CREEP_ALPHA) if one.domain == "static-gyro"]
+    if not any(one.disagrees for one in rates):
+        return bare
+    found = settling(bare.context)
+    if not found.is_seen:
+        return bare
+    return begin(with_settling(bare.context, found), bare.start, bare.prior)
+
+
+CREEP_ALPHA = 0.01
+"""False alarms of the rates at rest above which creep is looked for at all."""
+
+
 def _with_late(
     model: StepwiseModel, candidates: dict[str, Candidate], alpha: float
 ) -> tuple[StepwiseModel, dict[str, Candidate]]:
@@ -170,14 +187,15 @@ def _with_late(
     if len(late.accepted) == len(model.accepted):
         return late, candidates  # the same model, which remembers what was looked for in vain
     # What was needless, or too little, in the noise of a model without them may stand beside them.
-    late = replace(late, refused=frozenset(one for one in late.refused if _is_direct(one)))
+    late = replace(late, refused=frozenset(one for one in late.refused if not _competes(one)))
     scored, _ = scores(late, exclude=late.refused)
     return judged_again(_grown(late, scored, alpha, lambda _part: None)), candidates
 
 
-def _is_direct(effect_id: str) -> bool:
-    """Whether an effect brings evidence of its own: refused, it is not looked for again."""
-    return any(one.id == effect_id and isinstance(one, DirectEffect) for one in catalogue())
+def _competes(effect_id: str) -> bool:
+    """Whether an effect has columns that compete; one with nothing but evidence of its own is not looked for again."""
+    effect = next((one for one in catalogue() if one.id == effect_id), None)
+    return not isinstance(effect, DirectEffect) or type(effect).variants is not DirectEffect.variants
 
 
 def _grown(model: StepwiseModel, scored: list[Scored], alpha: float, tell: Callable[[float], None]) -> StepwiseModel:

@@ -18,6 +18,7 @@ from trihedron.records import Hold, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.hold_noise import HoldNoise, Measured
 from trihedron.records.sampling import StampKind
+from trihedron.refused import REFUSALS
 
 Sensor = Literal["accelerometer", "gyroscope"]
 
@@ -30,8 +31,11 @@ LEAST_STEP_RATIO = math.sqrt(2.0)
 """Ranges of a converter come in powers of two: halfway between two of them."""
 DIGITS = 0.1
 """Steps of a tenth of the noise add a thousandth to its variance: whether they are a converter's changes nothing."""
-LEAST_SEEN_STEP = 1e-3
-"""Of the noise: no converter has a thousand codes to a standard deviation; resampled readings come that near."""
+LEAST_SEEN_STEP = 1e-2
+"""Of the noise: hardly a converter has a hundred codes to a standard deviation; sums of readings and what was taken off
+them come that near to a grid, and steps as fine cannot be told from the digits of a file."""
+FEWEST_ALIKE = 2
+"""Axes with one step, of which a converter shows."""
 LEAST_CORNER_RATIO = 1.2
 """Filters are chosen from lists whose neighbours differ by 1.5 to 2; within a fifth they are the same entry."""
 LEAST_RATE_RATIO = 1.02
@@ -88,7 +92,7 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
         si = readings / np.linalg.norm(np.linalg.inv(S), axis=1)
         try:
             noise[sensor] = noise_of_holds(si, recording.rate_hz, holds)
-        except ValueError:
+        except REFUSALS:
             continue  # no hold is long enough: nothing to compare
         differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in holds if b - a > 2])
         differences = differences[np.isfinite(differences).all(axis=1)]
@@ -128,7 +132,7 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
             len({one.corner_hz for one in side}) == 1 for side in (model.noise[sensor], recording.noise[sensor])
         )
         for axis, m, r in pairs:
-            out += _step(sensor, axis, m, r)
+            out += _step(sensor, axis, (m, model.noise[sensor]), (r, recording.noise[sensor]))
             # Axes that share a filter have one corner, measured on all of them: one question.
             corners = [] if is_one_part and axis != _AXES[0] else [*_corner(sensor, axis, m, r, alpha * SHARE / 6.0)]
             out += [replace(row, axis="") if is_one_part else row for row in corners]
@@ -230,10 +234,17 @@ def _are_even(white: Sequence[Measured | None]) -> bool:
     return chance > UNLIKE_BY_CHANCE and float(np.ptp(logs)) < math.log(UNLIKE_AXES)
 
 
-def _step(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise) -> Iterator[NoiseDifference]:
+def _step(
+    sensor: Sensor,
+    axis: str,
+    model: tuple[HoldNoise, Sequence[HoldNoise]],
+    recording: tuple[HoldNoise, Sequence[HoldNoise]],
+) -> Iterator[NoiseDifference]:
+    """One axis of either side, with all axes of its sensor."""
+    m, r = model[0], recording[0]
     unit = "m/s^2" if sensor == "accelerometer" else "rad/s"
     name = "accelerometer" if sensor == "accelerometer" else "gyro"
-    m_shows, r_shows = _shows_steps(m), _shows_steps(r)
+    m_shows, r_shows = _shows_steps(*model), _shows_steps(*recording)
     if not (m_shows or r_shows):
         return
     if not (m_shows and r_shows):
@@ -253,8 +264,14 @@ def _step(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise) -> Iterator[Noi
     yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
 
 
-def _shows_steps(one: HoldNoise) -> bool:
-    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of a converter."""
+def _shows_steps(one: HoldNoise, axes: Sequence[HoldNoise]) -> bool:
+    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of a converter.
+
+    Nor is one that no other axis has: the axes of a sensor share a converter.
+    """
+    alike = sum(max(one.step, other.step) < LEAST_STEP_RATIO * min(one.step, other.step) for other in axes)
+    if one.step > 0.0 and alike < min(FEWEST_ALIKE, len(axes)):
+        return False
     return one.step > LEAST_SEEN_STEP * one.reading_sigma
 
 

@@ -16,6 +16,8 @@ from trihedron.records import Calibration, Finding, FindingCode, SensorCalibrati
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain
 from trihedron.records.progress import Progress
+from trihedron.records.words import words
+from trihedron.refused import RefusedError
 
 
 def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress | None = None) -> CalibrationResult:
@@ -32,7 +34,7 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
         raise WrongTypeError(f"trihedron.extend takes what trihedron.calibrate gave, not {type(result).__name__}.")
     base = result.calibration
     if base.frame != "lower":
-        raise ValueError(
+        raise RefusedError(
             f"an extended calibration is made in frame lower, not {base.frame}: "
             "use method joint or separate and leave the frame out."
         )
@@ -147,7 +149,7 @@ def _modelled(diagnosis: Diagnosis) -> Finding:
         FindingCode.EFFECTS_MODELLED,
         "fitted-but-disagree" if left else "fitted",
         effects=[effect.id for effect in diagnosis.effects],
-        statements=[effect.statement.rstrip(".") for effect in diagnosis.effects],
+        statements=[words("because", sentence=effect.statement) for effect in diagnosis.effects],
         left=left,
         n_effects=len(diagnosis.effects),
         n_domains_left=len(left),

@@ -18,7 +18,6 @@ from trihedron.read.table import StatedClock, Table, file_sha256
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.records import Finding, FindingCode
 
-MAGIC = b"\xa3\x95"
 _TYPES = ["IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
 _STAMPS = (("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS", "ms"))
 _FIELDS = {
@@ -65,7 +64,7 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     streams = imu + raw
     offered = streams if choice.topic is not None or not imu else imu
     taken = pick(path, offered, choice, "this log")
-    note = (*choice_note("This log", taken, streams), *_skipped(said.getvalue()))
+    note = (*choice_note("log", taken, streams), *_skipped(said.getvalue()))
     sha256 = file_sha256(path)
     if taken.topic == "IMU":
         return (_table(path, ("IMU", taken.instance), rows, names, sha256, note, None),)

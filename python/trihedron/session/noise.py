@@ -9,6 +9,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.refused import RefusedError
 from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.coloured_noise import coloured_variance
 
@@ -49,7 +50,7 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         or segments.accelerometer_sigma_mean is None
         or segments.accelerometer_mean is None
     ):
-        raise ValueError("the segments do not say how certain their hold means are")
+        raise RefusedError("the segments do not say how certain their hold means are")
     step_s = 1.0 / recording.rate_hz
     floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), 1e-300)
     has_rate = recording.gyroscope is not None and segments.gyroscope_sigma is not None
@@ -69,7 +70,8 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         sigma, density = sigmas[k], densities[k]
         if readings is None or not ranges:
             continue
-        variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s)
+        quantum = recording.facts.of(("accelerometer", "gyroscope")[k]).step
+        variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s, quantum)
         if sigma is not None and density is not None:
             halves = np.array([_second_half_minus_first(readings[a:b]) for a, b in spans])
             variances[:, k] += coloured_variance(sigma, halves, density, lasts, moves_last)

@@ -13,6 +13,7 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.probability import chdtrc, chdtri
 from trihedron.records.calibration import SensorCalibration
+from trihedron.refused import RefusedError
 
 RateDegree = Literal[0, 1, 3]
 """Degree of the rate polynomial over a sample: 0 constant, 1 linear, 3 coning-corrected."""
@@ -22,6 +23,9 @@ CAUCHY_SCALE = 3.0
 
 FALSE_ALARM = 1e-3
 """Chance that a sound recording raises a statistical finding of one kind."""
+
+AT_LEAST = 0.84
+"""One standard error: as much of the rounding charged as misses with this chance would be larger than those seen."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ class MoveOptions:
         if value.ndim == 0:
             return float(value) * np.eye(3)
         if value.shape != (3, 3):
-            raise ValueError(f"nominal_scale must be a number or (3, 3), got shape {value.shape}")
+            raise RefusedError(f"nominal_scale must be a number or (3, 3), got shape {value.shape}")
         return value
 
 
@@ -138,7 +142,7 @@ def align_screened(
     """
     used = ~measured.is_lost
     if not np.any(used):
-        raise ValueError("the gyro met its limit in every move: turn more slowly or set a wider range")
+        raise RefusedError("the gyro met its limit in every move: turn more slowly or set a wider range")
     outliers: tuple[int, ...] = ()
     is_near = False
     n_parameters = 9 + (3 if options.is_offset_free else 0)
@@ -210,6 +214,9 @@ def assemble(
     k = accelerometer.basis.shape[1]
     p = fit.covariance.shape[0]
     inner = inflation * (np.asarray(fit.covariance) + _unseen(fit, S, k))
+    narrower = np.ones(p)
+    narrower[k : k + 9] = _narrowing(fit, measured)
+    inner = inner * np.outer(narrower, narrower)
     cov_accelerometer = accelerometer.model.covariance if accelerometer.is_given else np.zeros((12, 12))
     response = np.asarray(fit.wrt_accelerometer)
     # y = (fit parameters, z̄, given accelerometer).
@@ -244,6 +251,17 @@ def assemble(
         inflation=inflation,
         n_gyroscope=p - k,
     )
+
+
+def _narrowing(fit: AlignmentFit, measured: MoveMeasurements) -> float:
+    """Factor, at most one, on the scale's standard errors where readings are coarser than their noise.
+
+    What rounding may hide is charged for the usual hand; what it did hide shows in the misses, up to their own chance.
+    The offset, which all moves share, does not show in them, and keeps the whole charge.
+    """
+    if fit.dof < 1 or not np.any(measured.is_undithered):
+        return 1.0
+    return min(1.0, float(np.sqrt(fit.chi2 / chdtri(fit.dof, AT_LEAST))))
 
 
 def _unseen(fit: AlignmentFit, S: FloatArray, k: int) -> FloatArray:

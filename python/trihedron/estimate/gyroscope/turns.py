@@ -36,6 +36,8 @@ from trihedron.records.calibration import FitQuality, Observability, SensorCalib
 from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.records.words import words
+from trihedron.refused import RefusedError
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import rate_to_si
 
@@ -165,17 +167,17 @@ def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_],
         vectors = np.array([turn.vector for turn in known])[used]
         directions = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
         if len(vectors) < 3 or np.linalg.svd(directions, compute_uv=False)[-1] < MIN_SPREAD:
-            raise ValueError(
+            raise RefusedError(
                 f"the {len(vectors)} usable turns are about fewer than three directions that are not parallel: turn "
                 "the sensor on a table by known angles on three of its sides"
             )
         return
     missing = [axis for axis in range(3) if not any(t.axis == axis and u for t, u in zip(known, used, strict=True))]
     if missing and recording_is_counts and any(turn.is_ambiguous for turn in known):
-        raise ValueError(AMBIGUOUS)
+        raise RefusedError(AMBIGUOUS)
     if missing:
         names = " and ".join(str(axis + 1) for axis in missing)
-        raise ValueError(
+        raise RefusedError(
             f"no usable turn about body axis {names} was found among {len(known)}: turn the sensor about it by a known "
             "angle, there and back, or give the angle of each turn"
         )
@@ -206,7 +208,7 @@ def _quality(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solution, S: 
         held_out_rms=float(np.sqrt(np.mean(held[is_held] ** 2))) if np.any(is_held) else None,
         weights=np.where(used, 1.0, 0.0),
         n_iterations=1,
-        stopped_because="closed form",
+        stopped_because=words("closed-form"),
     )
 
 
@@ -215,5 +217,5 @@ def _observability(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solutio
     singular = np.linalg.svd(matrix / np.linalg.norm(matrix, axis=0), compute_uv=False)
     sigma = np.sqrt(np.diag(fit.covariance)[:9]).reshape(3, 3) / np.linalg.norm(fit.S_w, 2)
     i, j = (int(v) for v in np.unravel_index(int(np.argmax(sigma)), (3, 3)))
-    weakest = f"answer of gyro axis {i + 1} to turns about case axis {j + 1}, known to {100 * sigma[i, j]:.2g} %"
+    weakest = words("gyro-answer", axis=i + 1, about=j + 1, share=sigma[i, j])
     return Observability(12, 12, float(singular[0] / singular[-1]), singular, weakest)

@@ -12,6 +12,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.records.hold_noise import Measured
+from trihedron.refused import RefusedError
 
 EARNED = 16.0
 """Drop of the deviance that a corner must earn: it is searched over a grid and five shapes."""
@@ -249,7 +250,7 @@ def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: flo
         When ``low_pass`` has no corner.
     """
     if low_pass.corner_hz is None:
-        raise ValueError("no corner shows: the density is that of all readings")
+        raise RefusedError("no corner shows: the density is that of all readings")
     corner = low_pass.corner_hz.value
     axes = []
     for spectrum in spectra:
