@@ -183,7 +183,7 @@ def audited(
             sensors.accelerometer, windows, sensors.columns.accelerometer_unit, accelerometer_unit
         )
         acc_unit = AccelerationUnit(judged.unit)
-        findings += judged.findings
+        findings += [*judged.findings, *unnamed_gyro(sensors, rate)]
     if sensors.gyroscope is not None:
         judged = judge_gyroscope(
             sensors.gyroscope,
@@ -196,7 +196,6 @@ def audited(
         )
         gyr_unit = RateUnit(judged.unit)
         findings += judged.findings
-    findings += unnamed_gyro(sensors, rate)
     if sensors.has_clock:
         findings += audit_timing(time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.stamps_s)
     facts = facts_in(present, windows)
