@@ -70,7 +70,8 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         sigma, density = sigmas[k], densities[k]
         if readings is None or not ranges:
             continue
-        variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s)
+        quantum = recording.facts.of(("accelerometer", "gyroscope")[k]).step
+        variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s, quantum)
         if sigma is not None and density is not None:
             halves = np.array([_second_half_minus_first(readings[a:b]) for a, b in spans])
             variances[:, k] += coloured_variance(sigma, halves, density, lasts, moves_last)
