@@ -245,8 +245,7 @@ impl AxisFilter {
     /// Standard errors of the constants.
     #[must_use]
     pub fn sigma(&self) -> [f64; N_CONSTANTS] {
-        let k = self.n_noise();
-        std::array::from_fn(|i| self.filter.factors.variance(k + i).sqrt())
+        self.filter.factors.last_variances().map(f64::sqrt)
     }
 
     /// Slow noise at the end of the last hold, and its standard error.

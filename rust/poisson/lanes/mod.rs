@@ -4,21 +4,24 @@
 //! many stretches as a vector has lanes; each is integrated from its own start, and stretches are joined at the end:
 //! `B = B₂ B₁`, `G = G₁ + B₁ᵀ G₂`, `C = C₁ + B₁ᵀ C₂ B₁`.
 
+mod moments;
 mod sensitivities;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
+pub(super) use self::moments::REACH;
+use self::moments::{Moments, cubic_moments};
 use self::sensitivities::add_steps;
 use super::{Turn, WrtScale};
 use crate::simd::Instructions;
 
 /// Stretches of a move.
-const LANES: usize = 8;
+pub(super) const LANES: usize = 8;
 type Row = [f64; LANES];
 const ZERO: Row = [0.0; LANES];
 
 /// One step of a move, reduced to what does not depend on the calibration.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Step {
     /// `∫ w' dτ`.
     pub moment0: Vector3<f64>,
@@ -45,9 +48,18 @@ struct StepRow {
     var_extra: [Row; 3],
 }
 
+const EMPTY: StepRow = StepRow {
+    moment0: [ZERO; 3],
+    moment1: [ZERO; 3],
+    change: [ZERO; 3],
+    h: ZERO,
+    fraction: ZERO,
+    var_extra: [ZERO; 3],
+};
+
 /// The steps of a move: step `i` is row `i % rows` of lane `i / rows`; the last lane is filled up with steps of no
 /// duration, which change nothing.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Steps {
     rows: Vec<StepRow>,
     n: usize,
@@ -84,18 +96,12 @@ struct Sums {
 }
 
 impl Steps {
-    pub(super) fn new(n: usize) -> Self {
-        let empty = StepRow {
-            moment0: [ZERO; 3],
-            moment1: [ZERO; 3],
-            change: [ZERO; 3],
-            h: ZERO,
-            fraction: ZERO,
-            var_extra: [ZERO; 3],
-        };
-        Self {
-            rows: vec![empty; n.div_ceil(LANES)],
-            n,
+    /// Steps still to be set, in the memory of others.
+    pub(super) fn reset(&mut self, n: usize) {
+        self.n = n;
+        self.rows.resize(n.div_ceil(LANES), EMPTY);
+        for i in n..self.rows.len() * LANES {
+            self.set(i, &Step::default());
         }
     }
 
@@ -110,6 +116,42 @@ impl Steps {
         }
         row.h[lane] = step.h;
         row.fraction[lane] = step.fraction;
+    }
+
+    /// As many steps from `i` on as there are lanes, from the samples before the first of them to the one after the last
+    /// one's end; whether no step is too uneven for a cubic.
+    pub(super) fn set_cubics(
+        &mut self,
+        i: usize,
+        time_s: &[f64; REACH],
+        raw: &[Vector3<f64>; REACH],
+        var_extra: Option<&[Vector3<f64>]>,
+        anchors: (f64, f64),
+    ) -> bool {
+        let mut all = Moments::EMPTY;
+        if !cubic_moments(Instructions::detect(), time_s, raw, &mut all) {
+            return false;
+        }
+        let (anchor_before_s, span_s) = anchors;
+        let fraction = all.middle.map(|middle| (middle - anchor_before_s) / span_s);
+        let n_rows = self.rows.len();
+        let (mut at, mut lane) = (i % n_rows, i / n_rows);
+        for l in 0..LANES {
+            let row = &mut self.rows[at];
+            for k in 0..3 {
+                row.moment0[k][lane] = all.zeroth[k][l];
+                row.moment1[k][lane] = all.first[k][l];
+                row.change[k][lane] = all.change[k][l];
+                row.var_extra[k][lane] = var_extra.map_or(0.0, |var| var[l][k]);
+            }
+            row.h[lane] = all.h[l];
+            row.fraction[lane] = fraction[l];
+            at += 1;
+            if at == n_rows {
+                (at, lane) = (0, lane + 1);
+            }
+        }
+        true
     }
 
     pub(super) fn len(&self) -> usize {
