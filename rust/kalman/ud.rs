@@ -201,11 +201,17 @@ impl UdFilter {
         let (u, d, h, x) = (&mut u[..n * n], &mut d[..n], &h[..n], &mut self.x[..n]);
         let gain = &mut self.work[..n];
         let mut alpha = r;
+        // Of a number too small to have an inverse the quotients are formed themselves.
+        let inverse_of = |alpha: f64| (alpha >= f64::MIN_POSITIVE).then(|| alpha.recip());
+        let over = |value: f64, alpha: f64, inverse: Option<f64>| {
+            inverse.map_or(value / alpha, |one| value * one)
+        };
+        let mut inverse = inverse_of(alpha);
         for j in 0..n {
             let column = &mut u[j * n..j * n + n];
             let f: f64 = column[..j].iter().zip(h).map(|(u, h)| u * h).sum::<f64>() + h[j];
             let v = d[j] * f;
-            let before = alpha;
+            let (before, inverse_before) = (alpha, inverse);
             alpha += f * v;
             gain[j] = v;
             if v == 0.0 {
@@ -213,9 +219,14 @@ impl UdFilter {
                 continue;
             }
             // Without noise so far (`before == 0`) the gain's earlier entries are all zero and λ multiplies nothing.
-            let lambda = if before > 0.0 { -f / before } else { 0.0 };
+            let lambda = if before > 0.0 {
+                -over(f, before, inverse_before)
+            } else {
+                0.0
+            };
+            inverse = inverse_of(alpha);
             if alpha > 0.0 {
-                d[j] *= before / alpha;
+                d[j] *= over(before, alpha, inverse).min(1.0);
             }
             for i in 0..j {
                 let old = column[i];
@@ -225,7 +236,7 @@ impl UdFilter {
         }
         if alpha > 0.0 {
             for (g, x) in gain.iter_mut().zip(x) {
-                *g /= alpha;
+                *g = over(*g, alpha, inverse);
                 *x += *g * innovation;
             }
         } else {

@@ -147,13 +147,11 @@ pub fn integrate_once(
     ranges
         .par_iter()
         .zip(bias_before.par_iter().zip(bias_after))
-        .map_init(
-            PreparedMove::default,
-            |prepared, (range, (before, after))| {
-                prepared.prepare(time_s, raw, None, range, model)?;
-                Ok(prepared.integrate(scale, before, after, noise))
-            },
-        )
+        .map(|(range, (before, after))| {
+            prepared::integrate_once(time_s, raw, range, model, |span_s| {
+                noise.beside(scale, before, after, span_s)
+            })
+        })
         .collect()
 }
 

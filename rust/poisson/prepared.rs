@@ -2,13 +2,13 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::lanes::{LANES, REACH, Rate, Step, Steps};
+use super::lanes::{Rate, Step, Steps, Whole, integrate_whole};
 use super::{MoveRange, RateModel, RateNoise, StepWeights, Turn};
 use crate::error::{Error, Result};
 use crate::simd::Instructions;
 
 /// A move prepared for repeated integration: the moments of its raw readings.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct PreparedMove {
     steps: Steps,
     span_s: f64,
@@ -28,71 +28,66 @@ pub fn prepare(
     range: &MoveRange,
     model: RateModel,
 ) -> Result<PreparedMove> {
-    let mut out = PreparedMove::default();
-    out.prepare(time_s, raw, var_extra, range, model)?;
-    Ok(out)
+    let samples = Samples {
+        time_s,
+        raw,
+        var_extra,
+        range,
+        model,
+    };
+    let span_s = samples.span_s()?;
+    let steps = if let Some(whole) = samples.whole(span_s) {
+        Steps::of(&whole, model, |i| samples.step_of_whole(i, span_s))
+    } else {
+        samples.steps(span_s)?
+    };
+    Ok(PreparedMove { steps, span_s })
 }
 
-/// Samples of a move that are numbers, of rising time: all of them, nearly always.
-enum Used {
-    All { first: usize, n: usize },
-    Some(Vec<usize>),
+/// [`prepare`] and [`PreparedMove::integrate`] in one, for a move that is integrated once.
+pub(super) fn integrate_once(
+    time_s: &[f64],
+    raw: &[Vector3<f64>],
+    range: &MoveRange,
+    model: RateModel,
+    rate: impl FnOnce(f64) -> Rate,
+) -> Result<Turn> {
+    let samples = Samples {
+        time_s,
+        raw,
+        var_extra: None,
+        range,
+        model,
+    };
+    let span_s = samples.span_s()?;
+    let (instructions, rate) = (Instructions::detect(), rate(span_s));
+    Ok(if let Some(whole) = samples.whole(span_s) {
+        let odd = |i| samples.step_of_whole(i, span_s);
+        integrate_whole(instructions, &whole, model, &rate, odd)
+    } else {
+        samples.steps(span_s)?.integrate(instructions, &rate)
+    })
 }
 
-impl Used {
-    /// # Errors
-    /// When time runs backward.
-    fn of(time_s: &[f64], raw: &[Vector3<f64>], range: &MoveRange) -> Result<Self> {
-        let is_number = |k: usize| raw[k].iter().all(|x| x.is_finite()) && time_s[k].is_finite();
-        let mut stamps = time_s[range.start..range.stop].windows(2);
-        if stamps.all(|pair| pair[0] < pair[1]) && (range.start..range.stop).all(is_number) {
-            return Ok(Self::All {
-                first: range.start,
-                n: range.stop - range.start,
-            });
-        }
-        let mut used: Vec<usize> = Vec::with_capacity(range.stop - range.start);
-        for k in (range.start..range.stop).filter(|&k| is_number(k)) {
-            if let Some(&last) = used.last() {
-                if time_s[k] < time_s[last] {
-                    return Err(Error::bad_input(format!(
-                        "time runs backward at sample {k}: sort the record first"
-                    )));
-                }
-                if time_s[k] <= time_s[last] {
-                    continue;
-                }
-            }
-            used.push(k);
-        }
-        Ok(Self::Some(used))
-    }
-
-    fn len(&self) -> usize {
-        match self {
-            Self::All { n, .. } => *n,
-            Self::Some(used) => used.len(),
-        }
-    }
-
-    fn at(&self, i: usize) -> usize {
-        match self {
-            Self::All { first, .. } => first + i,
-            Self::Some(used) => used[i],
-        }
-    }
+/// What a move is prepared from.
+struct Samples<'a> {
+    time_s: &'a [f64],
+    raw: &'a [Vector3<f64>],
+    var_extra: Option<&'a [Vector3<f64>]>,
+    range: &'a MoveRange,
+    model: RateModel,
 }
 
-impl PreparedMove {
-    /// As [`prepare`], in the memory of a move that is done with.
-    pub(super) fn prepare(
-        &mut self,
-        time_s: &[f64],
-        raw: &[Vector3<f64>],
-        var_extra: Option<&[Vector3<f64>]>,
-        range: &MoveRange,
-        model: RateModel,
-    ) -> Result<()> {
+impl<'a> Samples<'a> {
+    /// Time between the anchors, of a range that can be integrated.
+    fn span_s(&self) -> Result<f64> {
+        let Self {
+            time_s,
+            raw,
+            var_extra,
+            range,
+            ..
+        } = self;
         if var_extra.is_some_and(|var| var.len() != raw.len()) {
             return Err(Error::bad_input(
                 "the extra variance must have one row per reading",
@@ -113,52 +108,78 @@ impl PreparedMove {
                 range.start
             )));
         }
-        self.span_s = span_s;
-        let used = Used::of(time_s, raw, range)?;
-        let n = used.len();
-        self.steps.reset(n.saturating_sub(1));
-        let mut i = 0;
-        while i + 1 < n {
-            let mut stop = i + 1;
-            // Steps with a neighbour on both sides, nearly always as even as a cubic wants them.
-            if let Used::All { first, .. } = used
-                && model == RateModel::Coning
-                && i > 0
-                && i + REACH <= n + 1
-            {
-                let p = first + i;
-                if let (Some(time_s), Some(raw)) =
-                    (time_s[p - 1..].first_chunk(), raw[p - 1..].first_chunk())
-                {
-                    let var = var_extra.map(|var| &var[p..]);
-                    let anchors = (range.anchor_before_s, span_s);
-                    if self.steps.set_cubics(i, time_s, raw, var, anchors) {
-                        i += LANES;
-                        continue;
-                    }
-                }
-                stop = i + LANES;
-            }
-            while i < stop {
-                let step = StepWeights::at(time_s, |k| used.at(k), n, i, model);
-                let (moment0, moment1) = step.moments(|k| raw[k]);
-                let (p, q) = (step.from, step.to);
-                let middle_s = 0.5 * (time_s[p] + time_s[q]);
-                let step = Step {
-                    moment0,
-                    moment1,
-                    change: raw[q] - raw[p],
-                    h: step.h,
-                    fraction: (middle_s - range.anchor_before_s) / span_s,
-                    var_extra: var_extra.map_or_else(Vector3::zeros, |var| var[p]),
-                };
-                self.steps.set(i, &step);
-                i += 1;
-            }
-        }
-        Ok(())
+        Ok(span_s)
     }
 
+    fn is_number(&self, k: usize) -> bool {
+        self.raw[k].iter().all(|x| x.is_finite()) && self.time_s[k].is_finite()
+    }
+
+    /// The samples where all of them are numbers of rising time, as nearly always.
+    fn whole(&self, span_s: f64) -> Option<Whole<'a>> {
+        let MoveRange { start, stop, .. } = *self.range;
+        let time_s = &self.time_s[start..stop];
+        let is_whole = stop - start > 1
+            && time_s.windows(2).all(|pair| pair[0] < pair[1])
+            && (start..stop).all(|k| self.is_number(k));
+        is_whole.then(|| Whole {
+            time_s,
+            raw: &self.raw[start..stop],
+            var_extra: self.var_extra.map(|var| &var[start..stop]),
+            anchor_before_s: self.range.anchor_before_s,
+            span_s,
+        })
+    }
+
+    fn step_of_whole(&self, i: usize, span_s: f64) -> Step {
+        let MoveRange { start, stop, .. } = *self.range;
+        self.step(|k| start + k, stop - start, i, span_s)
+    }
+
+    /// The steps between those samples that are numbers of rising time.
+    fn steps(&self, span_s: f64) -> Result<Steps> {
+        let range = self.range;
+        let mut used: Vec<usize> = Vec::with_capacity(range.stop - range.start);
+        for k in (range.start..range.stop).filter(|&k| self.is_number(k)) {
+            if let Some(&last) = used.last() {
+                if self.time_s[k] < self.time_s[last] {
+                    return Err(Error::bad_input(format!(
+                        "time runs backward at sample {k}: sort the record first"
+                    )));
+                }
+                if self.time_s[k] <= self.time_s[last] {
+                    continue;
+                }
+            }
+            used.push(k);
+        }
+        let n = used.len();
+        let mut steps = Steps::new(n.saturating_sub(1));
+        for i in 0..n.saturating_sub(1) {
+            steps.set(i, &self.step(|k| used[k], n, i, span_s));
+        }
+        Ok(steps)
+    }
+
+    /// Step `i` of the `n` samples `used(0), used(1), …`.
+    fn step(&self, used: impl Fn(usize) -> usize, n: usize, i: usize, span_s: f64) -> Step {
+        let (time_s, raw) = (self.time_s, self.raw);
+        let step = StepWeights::at(time_s, used, n, i, self.model);
+        let (moment0, moment1) = step.moments(|k| raw[k]);
+        let (p, q) = (step.from, step.to);
+        let middle_s = 0.5 * (time_s[p] + time_s[q]);
+        Step {
+            moment0,
+            moment1,
+            change: raw[q] - raw[p],
+            h: step.h,
+            fraction: (middle_s - self.range.anchor_before_s) / span_s,
+            var_extra: self.var_extra.map_or_else(Vector3::zeros, |var| var[p]),
+        }
+    }
+}
+
+impl PreparedMove {
     /// Number of integration steps.
     #[must_use]
     pub fn n_steps(&self) -> usize {
@@ -211,15 +232,28 @@ impl PreparedMove {
         bias_after: &Vector3<f64>,
         noise: &RateNoise,
     ) -> Turn {
-        let at = Rate {
+        let at = noise.beside(scale, bias_before, bias_after, self.span_s);
+        self.steps.integrate(instructions, &at)
+    }
+}
+
+impl RateNoise {
+    /// With what the rate itself is made of.
+    pub(super) fn beside(
+        &self,
+        scale: &Matrix3<f64>,
+        bias_before: &Vector3<f64>,
+        bias_after: &Vector3<f64>,
+        span_s: f64,
+    ) -> Rate {
+        Rate {
             scale: *scale,
             bias: *bias_before,
             change: bias_after - bias_before,
-            span_s: self.span_s,
-            variance: noise.density.component_mul(&noise.density),
-            var_time: noise.sigma_time_s * noise.sigma_time_s,
-            gap_s: 1.5 * noise.nominal_step_s,
-        };
-        self.steps.integrate(instructions, &at)
+            span_s,
+            variance: self.density.component_mul(&self.density),
+            var_time: self.sigma_time_s * self.sigma_time_s,
+            gap_s: 1.5 * self.nominal_step_s,
+        }
     }
 }

@@ -9,14 +9,14 @@ mod sensitivities;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
-pub(super) use self::moments::REACH;
-use self::moments::{Moments, cubic_moments};
+pub(super) use self::moments::Whole;
+use self::moments::fill;
 use self::sensitivities::add_steps;
-use super::{Turn, WrtScale};
+use super::{RateModel, Turn, WrtScale};
 use crate::simd::Instructions;
 
 /// Stretches of a move.
-pub(super) const LANES: usize = 8;
+const LANES: usize = 8;
 type Row = [f64; LANES];
 const ZERO: Row = [0.0; LANES];
 
@@ -96,62 +96,24 @@ struct Sums {
 }
 
 impl Steps {
-    /// Steps still to be set, in the memory of others.
-    pub(super) fn reset(&mut self, n: usize) {
-        self.n = n;
-        self.rows.resize(n.div_ceil(LANES), EMPTY);
-        for i in n..self.rows.len() * LANES {
-            self.set(i, &Step::default());
+    pub(super) fn new(n: usize) -> Self {
+        Self {
+            rows: vec![EMPTY; n.div_ceil(LANES)],
+            n,
         }
+    }
+
+    /// The steps of a move without missing readings; `odd` makes those that no cubic suits.
+    pub(super) fn of(of: &Whole<'_>, model: RateModel, odd: impl Fn(usize) -> Step) -> Self {
+        let mut out = Self::new(of.n_steps());
+        let n_rows = out.rows.len();
+        set_rows(&mut out.rows, 0, n_rows, of, model, &odd);
+        out
     }
 
     pub(super) fn set(&mut self, i: usize, step: &Step) {
         let (row, lane) = (i % self.rows.len(), i / self.rows.len());
-        let row = &mut self.rows[row];
-        for k in 0..3 {
-            row.moment0[k][lane] = step.moment0[k];
-            row.moment1[k][lane] = step.moment1[k];
-            row.change[k][lane] = step.change[k];
-            row.var_extra[k][lane] = step.var_extra[k];
-        }
-        row.h[lane] = step.h;
-        row.fraction[lane] = step.fraction;
-    }
-
-    /// As many steps from `i` on as there are lanes, from the samples before the first of them to the one after the last
-    /// one's end; whether no step is too uneven for a cubic.
-    pub(super) fn set_cubics(
-        &mut self,
-        i: usize,
-        time_s: &[f64; REACH],
-        raw: &[Vector3<f64>; REACH],
-        var_extra: Option<&[Vector3<f64>]>,
-        anchors: (f64, f64),
-    ) -> bool {
-        let mut all = Moments::EMPTY;
-        if !cubic_moments(Instructions::detect(), time_s, raw, &mut all) {
-            return false;
-        }
-        let (anchor_before_s, span_s) = anchors;
-        let fraction = all.middle.map(|middle| (middle - anchor_before_s) / span_s);
-        let n_rows = self.rows.len();
-        let (mut at, mut lane) = (i % n_rows, i / n_rows);
-        for l in 0..LANES {
-            let row = &mut self.rows[at];
-            for k in 0..3 {
-                row.moment0[k][lane] = all.zeroth[k][l];
-                row.moment1[k][lane] = all.first[k][l];
-                row.change[k][lane] = all.change[k][l];
-                row.var_extra[k][lane] = var_extra.map_or(0.0, |var| var[l][k]);
-            }
-            row.h[lane] = all.h[l];
-            row.fraction[lane] = fraction[l];
-            at += 1;
-            if at == n_rows {
-                (at, lane) = (0, lane + 1);
-            }
-        }
-        true
+        set(&mut self.rows[row], lane, step);
     }
 
     pub(super) fn len(&self) -> usize {
@@ -175,7 +137,68 @@ impl Steps {
     }
 
     pub(super) fn integrate(&self, instructions: Instructions, rate: &Rate) -> Turn {
-        let mut sums = Sums {
+        let mut sums = Sums::new();
+        sums.add(instructions, &self.rows, rate);
+        sums.joined(rate.span_s, self.duration_s())
+    }
+}
+
+/// Rows that are made, integrated and forgotten: they stay where the processor is quickest.
+const BLOCK: usize = 16;
+
+/// The turn over a move without missing readings, integrated once.
+pub(super) fn integrate_whole(
+    instructions: Instructions,
+    of: &Whole<'_>,
+    model: RateModel,
+    rate: &Rate,
+    odd: impl Fn(usize) -> Step,
+) -> Turn {
+    let n_rows = of.n_steps().div_ceil(LANES);
+    let mut block = [EMPTY; BLOCK];
+    let mut sums = Sums::new();
+    for first in (0..n_rows).step_by(BLOCK) {
+        let rows = &mut block[..BLOCK.min(n_rows - first)];
+        set_rows(rows, first, n_rows, of, model, &odd);
+        sums.add(instructions, rows, rate);
+    }
+    sums.joined(rate.span_s, of.time_s[of.n_steps()] - of.time_s[0])
+}
+
+fn set_rows(
+    rows: &mut [StepRow],
+    first: usize,
+    n_rows: usize,
+    of: &Whole<'_>,
+    model: RateModel,
+    odd: &impl Fn(usize) -> Step,
+) {
+    let mut others = Vec::new();
+    fill(rows, first, n_rows, of, model, &mut others);
+    for i in others {
+        let step = if i < of.n_steps() {
+            odd(i)
+        } else {
+            Step::default()
+        };
+        set(&mut rows[i % n_rows - first], i / n_rows, &step);
+    }
+}
+
+fn set(row: &mut StepRow, lane: usize, step: &Step) {
+    for k in 0..3 {
+        row.moment0[k][lane] = step.moment0[k];
+        row.moment1[k][lane] = step.moment1[k];
+        row.change[k][lane] = step.change[k];
+        row.var_extra[k][lane] = step.var_extra[k];
+    }
+    row.h[lane] = step.h;
+    row.fraction[lane] = step.fraction;
+}
+
+impl Sums {
+    fn new() -> Self {
+        let mut sums = Self {
             rotation: [ZERO; 9],
             wrt_scale: [ZERO; 27],
             wrt_bias: [[ZERO; 9]; 3],
@@ -184,17 +207,17 @@ impl Steps {
         for k in [0, 4, 8] {
             sums.rotation[k] = [1.0; LANES];
         }
-        // Stamps with errors let the rate's change over every step count, lost samples that over some.
-        let is_jumpy = rate.var_time > 0.0
-            || self
-                .rows
-                .iter()
-                .any(|row| row.h.iter().any(|&h| h > rate.gap_s));
-        add_steps(instructions, &self.rows, rate, is_jumpy, &mut sums);
-        self.joined(&sums, rate.span_s)
+        sums
     }
 
-    fn joined(&self, sums: &Sums, span_s: f64) -> Turn {
+    fn add(&mut self, instructions: Instructions, rows: &[StepRow], rate: &Rate) {
+        // Stamps with errors let the rate's change over every step count, lost samples that over some.
+        let is_jumpy =
+            rate.var_time > 0.0 || rows.iter().any(|row| row.h.iter().any(|&h| h > rate.gap_s));
+        add_steps(instructions, rows, rate, is_jumpy, self);
+    }
+
+    fn joined(&self, span_s: f64, duration_s: f64) -> Turn {
         let mut rotation = Matrix3::identity();
         let mut wrt_scale = WrtScale::zeros();
         let mut wrt_bias = [Matrix3::zeros(); 3];
@@ -203,15 +226,15 @@ impl Steps {
             let back = rotation.transpose();
             wrt_scale += back
                 * SMatrix::<f64, 3, 9>::from_row_slice(
-                    sums.wrt_scale.map(|row| row[lane]).as_slice(),
+                    self.wrt_scale.map(|row| row[lane]).as_slice(),
                 );
-            for (sum, part) in wrt_bias.iter_mut().zip(&sums.wrt_bias) {
+            for (sum, part) in wrt_bias.iter_mut().zip(&self.wrt_bias) {
                 *sum += back * Matrix3::from_row_slice(part.map(|row| row[lane]).as_slice());
             }
-            let [xx, xy, xz, yy, yz, zz] = sums.cov.map(|row| row[lane]);
+            let [xx, xy, xz, yy, yz, zz] = self.cov.map(|row| row[lane]);
             cov_noise += back * Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * rotation;
             rotation =
-                Matrix3::from_row_slice(sums.rotation.map(|row| row[lane]).as_slice()) * rotation;
+                Matrix3::from_row_slice(self.rotation.map(|row| row[lane]).as_slice()) * rotation;
         }
         let [whole, late, slope] = wrt_bias;
         Turn {
@@ -220,7 +243,7 @@ impl Steps {
             wrt_bias_before: whole - late - slope / span_s,
             wrt_bias_after: late + slope / span_s,
             cov_noise,
-            duration_s: self.duration_s(),
+            duration_s,
         }
     }
 }

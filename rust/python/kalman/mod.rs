@@ -261,10 +261,10 @@ fn kalman_track(
         rows4(py, out.constants)?,
         rows4(py, out.sigma)?,
         matrix(py, &out.covariance)?.unbind(),
-        column(out.steps.iter().map(|s| s.innovation).collect()),
-        column(out.steps.iter().map(|s| s.innovation_variance).collect()),
-        column(out.drift.iter().map(|d| d.0).collect()),
-        column(out.drift.iter().map(|d| d.1).collect()),
+        column(out.innovation),
+        column(out.innovation_variance),
+        column(out.drift),
+        column(out.drift_sigma),
     ))
 }
 

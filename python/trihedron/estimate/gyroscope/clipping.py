@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.ranges import Range, edges_of, ranges_of
 
@@ -50,15 +50,14 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray, step: FloatArray)
     has the area ``T² (s₁ − s₂)/12`` above the chord; half of it is taken for its standard error.
     """
     is_clipped = np.zeros(gyroscope.shape, dtype=bool)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # an axis without a reading ends nowhere
-        extremes = np.concatenate([np.nanmax(gyroscope, axis=0), np.nanmin(gyroscope, axis=0)])
+    largest, smallest, middle, step_size = _core.channel_extents(gyroscope).T
+    extremes = np.concatenate([largest, smallest])
     lasting = [j for j, end in enumerate(extremes) if _longest(gyroscope[:, j % 3] == end) > 1]
     for k, limit in enumerate(extremes):
         column = gyroscope[:, k % 3]
         if not np.isfinite(limit):
             continue
-        far = abs(limit - float(np.nanmedian(column)))
+        far = abs(limit - float(middle[k % 3]))
         quantum = float(step[k % 3])
         if far <= FAR * np.ptp(extremes[[k % 3, k % 3 + 3]]):
             continue
@@ -66,8 +65,8 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray, step: FloatArray)
         is_known = _is_end_of_codes(limit, np.array([extremes[j] for j in lasting if j != k]), quantum)
         runs = ranges_of(at)
         if not is_known:
-            runs = _without_steady_turns(time_s, gyroscope, runs, k % 3, step)
-        if _is_cut(column, runs, quantum, is_known):
+            runs = _without_steady_turns(time_s, gyroscope, runs, k % 3, step, float(step_size[k % 3]))
+        if _is_cut(column, runs, quantum, is_known, float(step_size[k % 3])):
             is_clipped[:, k % 3] |= at
     if not np.any(is_clipped):
         return None
@@ -79,15 +78,15 @@ def bridge_clipping(time_s: FloatArray, gyroscope: FloatArray, step: FloatArray)
 
 
 def _without_steady_turns(
-    time_s: FloatArray, gyroscope: FloatArray, runs: list[Range], axis: int, step: FloatArray
+    time_s: FloatArray, gyroscope: FloatArray, runs: list[Range], axis: int, step: FloatArray, step_size: float
 ) -> list[Range]:
     """The runs of an axis without those in which the other axes stand still as well.
 
     A converter coarser than the noise shows a table's steady turn as one code: the wall and the turn look alike on the
-    axis, but whoever turns a gyro by hand beyond its limit moves the other axes meanwhile.
+    axis, but whoever turns a gyro by hand beyond its limit moves the other axes meanwhile. ``step_size`` is the middle
+    size of the axis' steps from reading to reading.
     """
-    column = gyroscope[:, axis]
-    if float(np.nanmedian(np.abs(np.diff(column)))) > 0.0:
+    if step_size > 0.0:
         return runs  # noise moves the last digit: a turn that is not at a wall would show it
     others = [k for k in range(3) if k != axis]
     out = []
@@ -102,7 +101,7 @@ def _without_steady_turns(
     return out
 
 
-def _is_cut(column: FloatArray, runs: list[Range], quantum: float, is_known: bool) -> bool:
+def _is_cut(column: FloatArray, runs: list[Range], quantum: float, is_known: bool, step_size: float) -> bool:
     """Some of ``runs`` at the extreme is no smooth peak, and no steady turn, that happens to share a code.
 
     A parabola of which n samples stay within a step q has a curvature of at most 8 q/((n − 1)² − 1), n even, or
@@ -112,8 +111,7 @@ def _is_cut(column: FloatArray, runs: list[Range], quantum: float, is_known: boo
     extreme. Two equal samples may lie on either side of any peak: they are the limit's only where it is ``is_known``
     otherwise, or two peaks end at it.
     """
-    finite = column[np.isfinite(column)]
-    noise = 1.4826 * float(np.median(np.abs(np.diff(finite)))) / np.sqrt(2.0)
+    noise = 1.4826 * step_size / np.sqrt(2.0)
     pairs = 0
     for first, stop in runs:
         last, count = stop - 1, stop - first
