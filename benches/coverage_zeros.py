@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron import calibrate, diagnose
-from trihedron.estimate.gyroscope.clipping import bridge_clipping
 from trihedron.pipeline.demonstrating import truth_of_the_day
 from trihedron.segment import segment_recording
 from trihedron.simulate import hand_session, scenario_by_name, simulate
@@ -74,12 +73,7 @@ def scores(seed, arguments):
         [accelerometer.sigma_S[LOWER], accelerometer.sigma_b, gyroscope.sigma_S.ravel(), gyroscope.sigma_b]
     )
     out = [(value, sigma)]
-    n_clipped = (
-        0
-        if (clipped := bridge_clipping(recording.time_s, recording.gyroscope, recording.facts.of("gyroscope").step))
-        is None
-        else clipped.is_clipped.sum()
-    )
+    n_clipped = int(recording.facts.of("gyroscope").at_limits(recording.n_samples).sum())
     named = []
     if arguments.diagnose:
         diagnosis = diagnose(recording, gravity_m_s2=truth.gravity_m_s2)

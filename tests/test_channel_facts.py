@@ -1,6 +1,7 @@
-"""Facts of a channel, each found by one rule: the step of the converter."""
+"""Facts of a channel, each found by one rule: the step of the converter, its noise, the limits it ends at."""
 
 import ast
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -134,6 +135,59 @@ def test_a_log_at_rest_on_its_limit_and_one_that_is_merely_coarse_are_told_apart
     assert Recording(np.arange(6000) / 100.0, coarse, None, 100.0).facts.of("accelerometer").limits == ()
 
 
+@pytest.mark.parametrize("sigma", [0.05, 0.3, 0.7, 3.0])
+def test_swings_of_one_height_end_on_no_limit(sigma):
+    # Never at rest: what looks like noise is motion, and a thousand peaks end on one code.
+    for seed in range(4):
+        rng = np.random.default_rng([11, seed])
+        t = np.arange(6000) / 100.0
+        phase = 2 * np.pi * rng.uniform(0.05, 2.0, 3) * t[:, None] + rng.uniform(0.0, 6.0, 3)
+        swings = np.round(rng.uniform(5.0, 3000.0, 3) * np.sin(phase) + sigma * rng.normal(size=(6000, 3)))
+        assert Recording(t, None, swings, 100.0).facts.of("gyroscope").limits == (), seed
+
+
+@pytest.mark.parametrize("sigma", [1.0, 5.0])
+def test_noise_that_ends_abruptly_ends_on_a_limit(sigma):
+    # A wall at half to one and a half sigma; with noise of one step half of these looked like tails to older rules.
+    for seed in range(6):
+        rng = np.random.default_rng([12, seed])
+        at_rest = np.round(rng.normal(rng.uniform(-100.0, 100.0, 3), sigma, (6000, 3)))
+        wall = np.round(np.mean(at_rest, axis=0) + sigma * rng.uniform(0.5, 1.5, 3))
+        limits = Recording(np.arange(6000) / 100.0, None, np.minimum(at_rest, wall), 100.0).facts.of("gyroscope").limits
+        assert {(one.axis, one.value) for one in limits} <= set(enumerate(wall.tolist())), seed
+        assert Recording(np.arange(6000) / 100.0, None, at_rest, 100.0).facts.of("gyroscope").limits == (), seed
+        if sigma > 1.0:
+            assert len(limits) == 3, seed
+
+
+def test_a_limit_carries_every_reading_on_it_and_moves_with_samples_that_are_put_in():
+    codes = cut(3, 2000.0)
+    facts = Recording(np.arange(6000) / 100.0, None, codes, 100.0).facts
+    at = facts.of("gyroscope").at_limits(6000)
+    np.testing.assert_array_equal(at, np.abs(codes) == 2000.0)
+    places = np.arange(6000) + (np.arange(6000) >= 50)
+    moved = facts.moved(places).of("gyroscope").at_limits(6001)
+    np.testing.assert_array_equal(moved[places], at)
+    assert not moved[50].any()
+
+
+@pytest.mark.parametrize("are_still", [False, True])
+def test_a_level_under_noise_is_a_possible_limit_unless_everything_stands_still_on_it(are_still):
+    # Half a second at one level between motions, time and again: a pickup that ends, or a sensor held near 1 g.
+    rng = np.random.default_rng(14)
+    n = 6000
+    moving = 3.0 * np.sin(2.0 * np.pi * np.array([0.31, 0.43, 0.37, 0.29, 0.53, 0.41]) * np.arange(n)[:, None] / 100.0)
+    level = np.minimum(moving[:, 0], 1.0)
+    if are_still:
+        moving[level == 1.0, 1:] = moving[np.argmax(level), 1:]
+    moving[:, 0] = level
+    noisy = moving + 0.01 * rng.normal(size=moving.shape)
+    possible = Recording(np.arange(n) / 100.0, noisy[:, :3], noisy[:, 3:], 100.0).possible_limits["accelerometer"]
+    found = [one for one in possible if one.axis == 0 and one.is_high]
+    assert len(found) == (0 if are_still else 1)
+    assert all(abs(one.value - 1.0) < 5.0 * one.sigma for one in found)
+
+
 # Differences of distinct values that are not readings of a converter, or places on a grid whose step is known.
 OF_SOMETHING_ELSE = {
     "estimate/noise/curve_covariance.py:_nodes",
@@ -165,3 +219,19 @@ def is_difference_of_levels(function):
             if used & named or "np.unique(" in ast.unparse(node.args[0]):
                 return True
     return False
+
+
+def test_limits_are_decided_in_one_room_and_read_by_the_audit_the_gyro_the_rest_and_the_diagnosis():
+    def using(*words):
+        texts = ((str(path.relative_to(PACKAGE)), path.read_text()) for path in PACKAGE.rglob("*.py"))
+        return {name for name, text in texts if any(re.search(rf"\b{word}\b", text) for word in words)}
+
+    assert {name.split("/")[0] for name in using("readings_near", "find_limits", "is_end_of_word")} == {"channel_facts"}
+    outside = using(r"(facts|\))\.limits", "share_at_limits", "possible_limits")
+    assert {name for name in outside if not name.startswith(("channel_facts/", "records/"))} == {
+        "read/audit/readings.py",
+        "estimate/gyroscope/clipping.py",
+        "estimate/noise/screening.py",
+        "diagnose/effects/plateaus.py",
+        "diagnose/effects/saturation.py",
+    }

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.diagnose.effects.plateaus import plateaus, shared_levels
+from trihedron.channel_facts.limits import find_limits
 from trihedron.diagnose.effects.table_tilt import _error_of_mean
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
 from trihedron.diagnose.selection import verdict
@@ -127,10 +127,9 @@ def test_channels_of_one_part_share_one_exact_limit():
     t = np.arange(n) / 100.0
     turns = 40000.0 * np.sin(2.0 * np.pi * np.array([0.9, 1.1, 0.7]) * t[:, None])
     codes = np.clip(np.round(turns + rng.normal(0.0, 3.0, (n, 3))), -32768, 32767)
-    runs = plateaus(codes, np.full(3, 3.0), np.ones(3), ((0, n),))
-    levels = shared_levels(runs, np.zeros(3), np.full(3, 3.0))
-    assert set(levels) == {(axis, sign) for axis in range(3) for sign in (1, -1)}
-    assert {value for value, exact in levels.values() if exact} == {32767.0, -32768.0}
+    limits = find_limits(codes, np.full(3, 3.0), np.ones(3))
+    assert {(one.axis, one.is_high) for one in limits} == {(axis, side) for axis in range(3) for side in (True, False)}
+    assert {one.value for one in limits} == {32767.0, -32768.0}
 
 
 @pytest.mark.parametrize(("after", "stays"), [(0.004, False), (0.006, True)])

@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from trihedron.channel_facts.limits import find_limits
 from trihedron.diagnose.effects import lever_arm
 from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
 from trihedron.diagnose.effects.disturbed_pose import DisturbedPose
 from trihedron.diagnose.effects.lever_arm import LeverArm
-from trihedron.diagnose.effects.plateaus import plateaus
 from trihedron.diagnose.selection import prune
 from trihedron.diagnose.selection.model import Accepted, begin, observed_with, with_only
 from trihedron.diagnose.session.observations import observe
@@ -40,13 +40,11 @@ def test_a_range_that_stops_a_few_readings_is_seen_and_one_that_stops_none_is_no
     free = peaks(rng, 99.0)
     # Peaks of two to six readings above the limit: too short for a plateau of its own.
     limit = np.round((np.sort(np.abs(free).ravel())[-12] - 0.004) / STEP) * STEP
-    sigma, step, move = np.full(3, 0.01), np.full(3, STEP), ((0, len(free)),)
-    clipped = np.clip(free, -limit, limit)
-    assert not plateaus(free, sigma, step, move)
-    for origin in (np.zeros(3), np.array([0.4, -0.7, 0.2])):
-        runs = plateaus(clipped - origin, sigma, step, move, origin)
-        assert runs
-        assert all(run.is_rail and abs(abs(run.level + origin[run.axis]) - limit) < 1e-9 for run in runs)
+    sigma, step = np.full(3, 0.01), np.full(3, STEP)
+    assert not find_limits(free, sigma, step)
+    limits = find_limits(np.clip(free, -limit, limit), sigma, step)
+    assert limits
+    assert all(abs(abs(one.value) - limit) < 1e-9 for one in limits)
 
 
 def hand(rng, arm, n_moves=24, rate_hz=100.0):

@@ -1,14 +1,17 @@
 """The catalogue of findings is closed: stages give codes and values, every sentence stands under report/."""
 
 import ast
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from trihedron.records import Finding, FindingCode, Severity
+from trihedron.records.words import words
 from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
 from trihedron.report.findings.page import page
+from trihedron.report.findings.phrases import PHRASES
 from trihedron.report.findings.wording import filled
 
 PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
@@ -149,3 +152,22 @@ def test_a_value_that_is_missing_or_a_case_that_is_not_there_is_refused():
 def test_the_documents_list_the_catalogue_as_it_is():
     documented = (Path(__file__).parents[1] / "docs" / "findings.md").read_text()
     assert documented == page(), "python -m trihedron.report.findings.page > docs/findings.md"
+
+
+def test_every_phrase_is_chosen_somewhere_and_every_chosen_one_is_in_the_catalogue():
+    written = "\n".join(path.read_text() for path in PACKAGE.rglob("*.py") if path.name != "phrases.py")
+    rust = "\n".join(path.read_text() for path in (PACKAGE.parents[1] / "rust" / "gauss_newton").rglob("*.rs"))
+    assert {name for name in PHRASES if f'"{name}"' not in written + rust} == set()
+    chosen = set(re.findall(r'\b(?:words|phrase)\(\s*"([a-z-]+)"', written))
+    assert len(chosen) > 30
+    assert chosen <= set(PHRASES)
+
+
+def test_a_value_with_words_of_its_own_is_refused():
+    # What `stages_write_no_words` (conftest) watches in every test.
+    refused = pytest.raises(AssertionError, match="weakest")
+    with refused:
+        Finding.of(FindingCode.WEAKLY_OBSERVABLE, "kalman-norm", weakest="the second axis", condition=200.0)
+    chosen = words("zero-of-axis", axis=2)
+    seen = Finding.of(FindingCode.WEAKLY_OBSERVABLE, "kalman-norm", weakest=chosen, condition=200.0).seen
+    assert "zero of axis 2" in seen

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from trihedron.channel_facts.step import converter_steps
 from trihedron.estimate.gyroscope.clipping import bridge_clipping
+from trihedron.records import Recording
 
 RATE_HZ = 100.0
 
@@ -22,7 +22,7 @@ def turns(rng, n_moves=18, peak=12000.0, tremor=120.0, noise=3.0):
 
 
 def bridged(counts):
-    found = bridge_clipping(np.arange(len(counts)) / RATE_HZ, counts, converter_steps(counts))
+    found = bridge_clipping(Recording(np.arange(len(counts)) / RATE_HZ, None, counts, RATE_HZ))
     return 0 if found is None else int(found.is_clipped.sum())
 
 
@@ -92,7 +92,7 @@ def test_a_steady_turn_of_a_table_under_a_coarse_converter_is_not_at_a_limit(hol
         rng = np.random.default_rng([6, seed])
         quantum = rng.choice([0.5, 1.0, 4.0])
         codes = on_a_table(rng, rng.integers(1, 7), hold_s, ramp_s, quantum)
-        found = bridge_clipping(np.arange(len(codes)) / RATE_HZ, codes, np.full(3, quantum))
+        found = bridge_clipping(Recording(np.arange(len(codes)) / RATE_HZ, None, codes, RATE_HZ))
         assert found is None, seed
 
 
@@ -108,5 +108,5 @@ def test_hands_beyond_the_limit_of_a_coarse_converter_are_seen_still():
             parts += [180.0 * bump[:, None] * along + shake[:, None], np.zeros((300, 3))]
         rate = np.concatenate(parts) + rng.uniform(-2.0, 2.0, 3)
         codes = np.clip(np.round((rate + 0.02 * rng.normal(size=rate.shape)) / 0.5) * 0.5, -100.0, 100.0)
-        found = bridge_clipping(np.arange(len(codes)) / RATE_HZ, codes, np.full(3, 0.5))
+        found = bridge_clipping(Recording(np.arange(len(codes)) / RATE_HZ, None, codes, RATE_HZ))
         assert found is not None, seed

@@ -259,3 +259,29 @@ def test_counts_that_were_interpolated_onto_the_other_clock_are_still_counts(tmp
     )
     assert recording.gyroscope_unit is RateUnit.COUNTS
     assert recording.accelerometer_unit is AccelerationUnit.COUNTS
+
+
+def coarse_readings_on_arrival(n: int = 20_000, seed: int = 5):
+    """Codes of one noise sigma at 1 kHz, stamped on arrival: stamps and readings agree with those before by chance."""
+    rng = np.random.default_rng(seed)
+    codes = np.round(rng.normal([0.0, 0.0, 400.0, 0.0, 0.0, 0.0], 1.0, (n, 6)))
+    stamps = np.maximum.accumulate(np.arange(n) * 1e-3 + rng.exponential(3e-3, n)).round(6)
+    return np.column_stack([stamps, codes * 0.0245])
+
+
+def test_equal_readings_under_equal_stamps_are_samples_where_codes_are_coarse(tmp_path):
+    table = coarse_readings_on_arrival()
+    again = (np.diff(table[:, 0]) == 0) & (np.diff(table[:, 1:], axis=0) == 0).all(axis=1)
+    assert again.sum() >= 3, "this log holds no chance copies: it tests nothing"
+    recording = read_recording(text(tmp_path, HEADER + "\n".join(rows_of(table)) + "\n"))
+    assert recording.n_samples == len(table)
+    assert "repeated-rows" not in [f.code.value for f in recording.findings if "rows_left_out" in f.numbers]
+
+
+def test_rows_written_twice_are_left_out_of_coarse_codes_too(tmp_path):
+    table = coarse_readings_on_arrival()
+    twice = np.sort(np.random.default_rng(1).choice(np.arange(1, len(table)), 300, replace=False))
+    whole = np.insert(table, twice, table[twice], axis=0)
+    recording = read_recording(text(tmp_path, HEADER + "\n".join(rows_of(whole)) + "\n"))
+    assert 0 <= len(table) - recording.n_samples < 0.001 * len(table)  # the few that are alike by chance go too
+    assert accounts(recording)

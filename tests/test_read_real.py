@@ -233,7 +233,11 @@ def test_mpu6050_tomi_preamble_and_clipping(real_data, name, n, clipped):
     assert (FindingCode.CLIPPING in codes(recording)) is clipped
     if clipped:
         assert finding(recording, FindingCode.CLIPPING).numbers["x_low_value"] == -32768
-        assert "line 6668" in finding(recording, FindingCode.CLIPPING).seen
+        # The whole word: two samples at one end of x, ten at the other, six of z.
+        numbers = finding(recording, FindingCode.CLIPPING).numbers
+        assert (numbers["x_high_value"], numbers["x_high_count"]) == (32767, 2)
+        assert (numbers["x_low_count"], numbers["z_low_count"]) == (10, 6)
+        assert "line 3916" in finding(recording, FindingCode.CLIPPING).seen
 
 
 @pytest.mark.parametrize("run", [1, 2, 3])

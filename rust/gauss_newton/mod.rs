@@ -89,15 +89,15 @@ impl Stop {
         )
     }
 
-    /// In words.
+    /// As an id; its words are the report's.
     #[must_use]
-    pub fn in_words(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
-            Self::SmallStep => "converged: the Gauss-Newton step no longer moves the parameters",
-            Self::SmallGradient => "converged: the residual is orthogonal to every parameter",
-            Self::ZeroResidual => "converged: the residual vanishes to rounding",
-            Self::NoDescent => "stopped: no step lowers the cost any further",
-            Self::TooManyIterations => "stopped: iteration limit reached before convergence",
+            Self::SmallStep => "small-step",
+            Self::SmallGradient => "small-gradient",
+            Self::ZeroResidual => "zero-residual",
+            Self::NoDescent => "no-descent",
+            Self::TooManyIterations => "too-many-iterations",
         }
     }
 }

@@ -275,6 +275,6 @@ fn finish(
         model: at.model,
         iterations,
         is_converged: settled && solution.stop.is_converged(),
-        stopped_because: solution.stop.in_words(),
+        stopped_because: solution.stop.name(),
     })
 }

@@ -145,7 +145,7 @@ impl NormFit {
 
     #[getter]
     fn stopped_because(&self) -> &'static str {
-        self.0.stop.in_words()
+        self.0.stop.name()
     }
 
     #[getter]

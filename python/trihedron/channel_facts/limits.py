@@ -1,76 +1,85 @@
-"""Limits of a converter or a sensor: extreme values that readings run into and stay at, never a nominal range."""
+"""Limits of a converter or a sensor: extreme values that readings end at, never a nominal range. The only place that
+looks for them.
+
+A value is a limit by several kinds of evidence that healthy readings give too seldom to matter: peaks that were
+cut (:mod:`~trihedron.channel_facts.cut_peaks`), readings that arrive steeply and stay, noise that ends abruptly, codes
+that repeat or are read more often than those before them (:mod:`~trihedron.channel_facts.crowded_ends`). From a channel
+that stands still while all others stand still as well nothing follows: it is a pose, or a steady turn.
+"""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.crowded_ends import crowded_together, is_crowded, is_cut_noise, is_repeated, is_wall
+from trihedron.channel_facts.cut_peaks import is_cut
+from trihedron.channel_facts.ends import End
 from trihedron.records.channel_facts import Limit
 
-STEEP = 5.0
-"""The wall is reached by steps this many times the noise: a quiet sensor resting on its largest count is no wall."""
-FLAT = 6
-"""So many equal readings in a row at the wall do the same for a sensor whose noise is above its resolution."""
 FEWEST = 8
 """Readings from which an end is told."""
-PILED = 3.0
-"""And it holds this many times more samples than the neighbouring values lead up to."""
+FEWEST_CODES = 100.0
+"""From so many steps on, two channels end at one code hardly by chance."""
+SHORTEST_WORD = 128.0
+"""Codes of a word of seven bits and a sign, the shortest: smaller powers of two are met by chance."""
 
 
 def find_limits(readings: FloatArray, noise: FloatArray, step: FloatArray) -> tuple[Limit, ...]:
     """Limits of a triad (n, 3) with ``noise`` (3,) of one sample at rest and ``step`` (3,) of the converter."""
-    found: list[Limit] = []
     if len(readings) < FEWEST:
         return ()
-    for axis, (low, n_low, high, n_high) in enumerate(_core.triad_extremes(readings)):
-        if not low < high or math.isinf(low) or math.isinf(high):
-            continue
-        for value, count in ((high, n_high), (low, n_low)):
-            is_fine = bool(noise[axis] > step[axis])
-            wall = _wall(readings, axis, value, 0.01 * (high - low), float(noise[axis]), is_fine) if count > 2 else None
-            if wall is not None:
-                count, stretches, sample = wall
-                found.append(Limit(axis, value, value == high, count, stretches, sample))
-    return tuple(found)
+    ends = [
+        End(readings, axis, value, is_high, count, high - low, float(noise[axis]), step)
+        for axis, (low, n_low, high, n_high) in enumerate(_core.triad_extremes(readings))
+        if low < high and not math.isinf(low) and not math.isinf(high)
+        for value, count, is_high in ((high, n_high, True), (low, n_low, False))
+    ]
+    lasting = [end for end in ends if end.lasts]
+    found = [end for end in ends if _is_limit(end, lasting)]
+    found += [end for end in crowded_together(ends) if end not in found]
+    # Channels of one part that come as far end there too, be it for a single reading.
+    found += [end for end in ends if end not in found and any(_is_same_code(end, other) for other in found)]
+    return tuple(Limit(end.axis, end.value, end.is_high, end.runs) for end in ends if end in found)
 
 
-def _wall(
-    readings: FloatArray, axis: int, value: float, depth: float, noise: float, is_fine: bool
-) -> tuple[int, int, int] | None:
-    within, width, at = _core.readings_near(readings, axis, value, depth)
-    values, near = readings[:, axis], within - len(at)
-    # Towards the top of a smooth peak the density grows as one over the root of the distance, so the share of the
-    # topmost level among all within `depth` is the root of its width.
-    by_shape = near * min(math.sqrt(width / depth), 1.0)
-    starts, lengths = _runs(at)
-    before = np.abs(values[np.maximum(starts - 1, 0)] - value)
-    after = np.abs(values[np.minimum(starts + lengths, len(values) - 1)] - value)
-    steep = (lengths >= 2) & (np.fmax(before, after) > STEEP * max(noise, width))
-    if is_fine:
-        # Noise that moves the last digit never leaves one value alone for so long, however slowly the wall is reached.
-        steep |= lengths >= FLAT
-    # One stretch alone may be a channel that froze; at the end of an integer's range it is the range.
-    enough = 1 if _is_full_scale(value) else 2
-    if np.count_nonzero(steep) < enough or len(at) <= PILED * by_shape:
-        return None
-    return len(at), len(starts), int(starts[np.argmax(steep)])
+def share_at_limits(readings: FloatArray, noise: float, step: float) -> float:
+    """Share of one channel's readings (n,) that lie at its limits."""
+    alone = np.zeros((len(readings), 3))
+    alone[:, 0] = readings
+    limits = find_limits(alone, np.array([noise, 0.0, 0.0]), np.array([step, 0.0, 0.0]))
+    return sum(limit.count for limit in limits) / max(len(readings), 1)
 
 
-def _is_full_scale(value: float) -> bool:
-    """A code at the end of a converter's range: 2^k - 1, or -2^k, k from 7."""
-    if value != round(value) or abs(value) < 127:
+def is_end_of_word(value: float, step: float) -> bool:
+    """The code at the end of a word of bits: 2^k - 1, or -2^k, in counts; codes of converted units are not known."""
+    code = value / step if step >= 1.0 else 0.0
+    if code != round(code) or abs(code) < SHORTEST_WORD - 1.0:
         return False
-    magnitude = int(value) + 1 if value > 0 else -int(value)
+    magnitude = int(code) + 1 if code > 0 else -int(code)
     return magnitude & (magnitude - 1) == 0
 
 
-def _runs(at: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """(start, length) of runs of consecutive indices."""
-    breaks = np.flatnonzero(np.diff(at) > 1)
-    starts = np.concatenate([at[:1], at[breaks + 1]])
-    ends = np.concatenate([at[breaks], at[-1:]])
-    return starts, ends - starts + 1
+def _is_limit(end: End, lasting: list[End]) -> bool:
+    if end.count < 2:
+        return False
+    is_word = is_end_of_word(end.value, end.step)
+    is_known = is_word or any(_is_same_code(end, other) for other in lasting if other is not end)
+    return (
+        is_cut(end, is_known=is_known)
+        or is_wall(end, is_known=is_word)
+        or is_repeated(end, is_known=is_word)
+        or is_cut_noise(end)
+        or is_crowded(end)
+    )
+
+
+def _is_same_code(one: End, other: End) -> bool:
+    """Whether two ends are one limit: both ends of a word are a step apart, ends on one side are the same."""
+    if one.step <= 0.0:
+        return abs(one.value) == abs(other.value)
+    apart = 0.1 if one.value * other.value > 0.0 else 1.1
+    return abs(one.value) >= FEWEST_CODES * one.step and abs(abs(one.value) - abs(other.value)) < apart * one.step

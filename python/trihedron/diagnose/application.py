@@ -21,6 +21,7 @@ from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records import Recording
+from trihedron.records.words import words
 
 N_ITERATIONS = 2
 """Effects are per mille of the motion: the second pass of the fixed point leaves their square."""
@@ -163,9 +164,9 @@ def _variant(
         raise ValueError(f"effect {effect_id!r} has no model with its variant and values")
     effect = known.get(effect_id)
     if effect is None:
-        left_out[effect_id] = "this version does not know it"
+        left_out[effect_id] = words("effect-unknown")
     elif not effect.applies_elsewhere:
-        left_out[effect_id] = "it belongs to that session, not to the sensor"
+        left_out[effect_id] = words("effect-of-session")
     else:
         try:
             for variant in effect.variants(context):
@@ -175,5 +176,5 @@ def _variant(
                 f"effect {effect_id!r} has no variant {model['variant']!r} of {len(model['values'])} values"
             )
         except SignalMissing as missing:
-            left_out[effect_id] = str(missing)
+            left_out[effect_id] = words("because", sentence=missing)
     return None

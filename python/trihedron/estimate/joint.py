@@ -31,6 +31,7 @@ from trihedron.records.calibration import Calibration, FitQuality, Frame, Sensor
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.records.words import words
 from trihedron.sensor_model import in_frame, reframing
 
 
@@ -279,7 +280,7 @@ def _norm_quality(
         rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
         floor=float(np.sqrt(np.mean(sigma**2))),
         n_iterations=aligned.fit.iterations,
-        stopped_because=aligned.fit.stopped_because,
+        stopped_because=words(aligned.fit.stopped_because),
     )
     if alone is None:
         return quality

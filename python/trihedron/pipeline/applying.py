@@ -16,6 +16,7 @@ from trihedron.pipeline.reading import AnyRecording, recording_of
 from trihedron.pipeline.results import CheckResult
 from trihedron.pipeline.temperature import check_range, thermally_corrected
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
+from trihedron.records.words import words
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -165,9 +166,9 @@ def doubted(calibration: Calibration) -> tuple[Finding, ...]:
     grave = [finding for finding in calibration.findings if finding.severity is Severity.SERIOUS]
     if not grave:
         return ()
-    return (Finding.of(FindingCode.CALIBRATION_DOUBTED, seen=grave[0].seen),)
+    return (Finding.of(FindingCode.CALIBRATION_DOUBTED, seen=words("quoted", sentence=grave[0].seen)),)
 
 
 def _not_applied(effect_id: str, why: str) -> Finding:
-    is_of_session = "session" in why
+    is_of_session = why == words("effect-of-session")
     return Finding.of(FindingCode.EFFECT_NOT_APPLIED, "of-session" if is_of_session else "", effect=effect_id, why=why)

@@ -23,6 +23,7 @@ from trihedron.pipeline.results import DiagnosisResult
 from trihedron.read.reference import of_recording
 from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.reference import AgainstReference
+from trihedron.records.words import words
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit, rate_to_si
 
@@ -66,7 +67,7 @@ def beside(
         calibration = (
             calibration_by(found, recording, gravity, source, None) if recording.accelerometer is not None else given
         )
-        why = Finding.of(FindingCode.REFERENCE_ONLY, why=str(error).rstrip("."))  # fmt: skip
+        why = Finding.of(FindingCode.REFERENCE_ONLY, why=words("because", sentence=error))  # fmt: skip
         return DiagnosisResult(
             **values,
             findings=(*said, *recording.findings, *found.findings, why),

@@ -30,6 +30,7 @@ from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.progress import Progress
+from trihedron.records.words import words
 from trihedron.sensor_model import in_frame
 from trihedron.units import rate_to_si
 
@@ -342,5 +343,5 @@ def _without_gyroscope(alone: Calibration, why: str) -> Calibration:
     if why == AMBIGUOUS:
         finding = Finding.of(FindingCode.TURN_ANGLE_UNKNOWN)
     else:
-        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "not-calibrated", why=why.rstrip("."))
+        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "not-calibrated", why=words("because", sentence=why))
     return replace(alone, findings=(*alone.findings, finding))

@@ -7,6 +7,7 @@ from trihedron.pipeline.reading import AnyRecording, recording_of, segment
 from trihedron.pipeline.results import CheckResult
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
+from trihedron.records.words import Words, words
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
@@ -22,11 +23,15 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     try:
         result = calibrate(recording, segments=segments, gravity_m_s2=STANDARD_GRAVITY_M_S2)
     except ValueError as error:
+        why = words("because", sentence=error)
         return CheckResult(
-            recording, segments, None, (*recording.findings, *segments.findings, _impossible(str(error)))
+            recording,
+            segments,
+            None,
+            (*recording.findings, *segments.findings, _impossible(why)),
         )
     return CheckResult(recording, segments, result.calibration, result.findings)
 
 
-def _impossible(why: str) -> Finding:
+def _impossible(why: Words) -> Finding:
     return Finding.of(FindingCode.NOT_FIT, "no-calibration", why=why)

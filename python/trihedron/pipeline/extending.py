@@ -16,6 +16,7 @@ from trihedron.records import Calibration, Finding, FindingCode, SensorCalibrati
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain
 from trihedron.records.progress import Progress
+from trihedron.records.words import words
 
 
 def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress | None = None) -> CalibrationResult:
@@ -147,7 +148,7 @@ def _modelled(diagnosis: Diagnosis) -> Finding:
         FindingCode.EFFECTS_MODELLED,
         "fitted-but-disagree" if left else "fitted",
         effects=[effect.id for effect in diagnosis.effects],
-        statements=[effect.statement.rstrip(".") for effect in diagnosis.effects],
+        statements=[words("because", sentence=effect.statement) for effect in diagnosis.effects],
         left=left,
         n_effects=len(diagnosis.effects),
         n_domains_left=len(left),

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.estimate.accelerometer.poses import ENTRIES, NAMES, design_rows, pose_in_words
+from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows, parameter_names, pose_in_words
 from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.planning_poses import (
     Known,
@@ -269,7 +269,7 @@ def _ratio(now: FloatArray, covariance: FloatArray) -> float:
 
 
 def _uncertain(now: FloatArray, after: FloatArray, wanted: FloatArray, *, has_gyroscope: bool) -> tuple[Uncertain, ...]:
-    names = [*(("accelerometer", name) for name in NAMES), *(("gyro", name) for name in GYRO_NAMES)]
+    names = [*(("accelerometer", name) for name in parameter_names()), *(("gyro", name) for name in GYRO_NAMES)]
 
     def number(value: float) -> float | None:
         return float(value) if np.isfinite(value) else None

@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron.records import Finding, FindingCode
 from trihedron.records.sessions import Change, SessionsModel
+from trihedron.records.words import Words, words
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
 
 FEW = 5
@@ -24,7 +25,7 @@ _KINDS = ("zero", "scale", "misalignment", "alignment")
 def findings_about(model: SessionsModel) -> tuple[Finding, ...]:
     """Sessions left out, changes, few sessions, temperatures."""
     out = [
-        Finding.of(FindingCode.SESSION_LEFT_OUT, name=Path(name).name, why=why.rstrip("."), path=name)
+        Finding.of(FindingCode.SESSION_LEFT_OUT, name=Path(name).name, why=words("because", sentence=why), path=name)
         for name, why in model.left_out
     ]
     n = len({session.group for session in model.sessions}) if model.by in ("date", "device") else len(model.sessions)
@@ -59,7 +60,7 @@ def _changed(change: Change, model: SessionsModel) -> Finding:
     )
 
 
-def _amount(change: Change) -> str:
+def _amount(change: Change) -> Words:
     k = int(np.argmax(np.abs(change.size)))
     value, std = change.size[k], change.std[k]
     factor, unit = {
@@ -70,5 +71,5 @@ def _amount(change: Change) -> str:
     }[change.unit]
     name = change.names[k]
     if change.kind == "scatter":
-        return f"{value * factor:.3g} {unit} in {name}"
-    return f"{value * factor:+.3g} ± {std * factor:.2g} {unit} in {name}"
+        return words("amount-of-scatter", value=value * factor, unit=unit, name=name)
+    return words("amount-of-change", value=value * factor, std=std * factor, unit=unit, name=name)

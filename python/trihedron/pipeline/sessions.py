@@ -21,6 +21,7 @@ from trihedron.records import Calibration, Frame, Recording, SensorCalibration
 from trihedron.records.presented import Presented
 from trihedron.records.progress import Progress
 from trihedron.records.sessions import By, Session, SessionsModel
+from trihedron.records.words import Words, words
 from trihedron.sensor_model import in_frame
 
 BYS: tuple[By, ...] = get_args(By)
@@ -120,29 +121,29 @@ def calibrate_sessions(
         results.append(result)
         groups.append(label)
     if len(results) < 2:
-        why = "; ".join(f"{Path(name).name}: {reason}" for name, reason in left_out) or "one recording was given"
-        raise ValueError(f"two recordings at least are needed to see what repeats ({why}).")
+        reasons = "; ".join(f"{Path(name).name}: {reason}" for name, reason in left_out) or "one recording was given"
+        raise ValueError(f"two recordings at least are needed to see what repeats ({reasons}).")
     sessions = sessions_of(results, groups)
     model = combine(sessions, by, results[0].calibration, frame=frame, alpha=alpha, left_out=tuple(left_out))
     return SessionsResult(model, tuple(results))
 
 
-def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> str:
-    """Why a calibration does not go with the others; empty where it does."""
+def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Words | None:
+    """Why a calibration does not go with the others; None where it does."""
     if not result.is_trustworthy:
         serious = next(finding for finding in result.findings if finding.severity.value == "serious")
-        return f"its own calibration is not to be trusted: {serious.seen}"
+        return words("not-trusted", seen=serious.seen)
     if others:
         first, own = others[0].calibration, result.calibration
         for name in ("accelerometer", "gyroscope"):
             a, b = getattr(first, name), getattr(own, name)
             if (a is None) != (b is None):
-                return f"its {name} was not calibrated" if b is None else f"the first recording has no {name}"
+                return words("sensor-not-calibrated" if b is None else "first-lacks-sensor", sensor=name)
             if a is not None and a.raw_unit != b.raw_unit:
-                return f"its {name} is in {b.raw_unit}, that of the first recording in {a.raw_unit}"
+                return words("another-unit", sensor=name, unit=b.raw_unit, first_unit=a.raw_unit)
         if not math.isclose(first.gravity_m_s2, own.gravity_m_s2, rel_tol=1e-6):
-            return "it was calibrated with another gravity"
-    return ""
+            return words("another-gravity")
+    return None
 
 
 def _label(recording: Recording, by: By) -> str:

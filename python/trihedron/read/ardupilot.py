@@ -65,7 +65,7 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     streams = imu + raw
     offered = streams if choice.topic is not None or not imu else imu
     taken = pick(path, offered, choice, "this log")
-    note = (*choice_note("This log", taken, streams), *_skipped(said.getvalue()))
+    note = (*choice_note("log", taken, streams), *_skipped(said.getvalue()))
     sha256 = file_sha256(path)
     if taken.topic == "IMU":
         return (_table(path, ("IMU", taken.instance), rows, names, sha256, note, None),)

@@ -11,6 +11,8 @@ import numpy.typing as npt
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
+from trihedron.records.words import Words
+from trihedron.records.words import words as phrase
 
 MAX_DEVICES = 16
 _DEVICE_NAMES = frozenset(
@@ -64,7 +66,7 @@ def one_device(table: Table, choice: Choice, used: set[int]) -> Table:
             )
         return table
     counts = np.bincount(codes, minlength=len(words))
-    listed = ", ".join(f"{word} ({count} rows)" for word, count in zip(words, counts, strict=True))
+    listed = phrase("devices", devices=list(zip(words, counts, strict=True)))
     if choice.instance is None:
         raise ReadError(
             f"{table.path}: column {table.label(column)} tells {len(words)} devices apart: {listed}; read one of them "
@@ -76,10 +78,11 @@ def one_device(table: Table, choice: Choice, used: set[int]) -> Table:
         )
     rows = np.flatnonzero(codes == words.index(choice.instance)).astype(np.int64)
     left = table.n_rows - len(rows)
-    return table.take(rows, table.n_in_file, chosen(f"column {table.label(column)}", choice.instance, listed, left))
+    where = phrase("column", column=table.label(column))
+    return table.take(rows, table.n_in_file, chosen(where, choice.instance, listed, left))
 
 
-def chosen(where: str, what: str, listed: str, rows_left_out: int) -> Finding:
+def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Finding:
     """The statement that one of several was taken."""
     return Finding.of(
         FindingCode.DEVICE_CHOSEN,
@@ -127,8 +130,9 @@ def by_sensor(table: Table) -> tuple[Table, ...]:
         if min(len(r) for r in rows.values()) < 2:
             continue
         left = len(codes) - sum(len(r) for r in rows.values())
-        counts = ", ".join(f"{word} ({int(np.count_nonzero(codes == k))})" for k, word in enumerate(words))
-        note = chosen(f"column {table.label(i)}", f"{acc} and {gyr}", counts, left)
+        counts = phrase("counted", words=[(word, np.count_nonzero(codes == k)) for k, word in enumerate(words)])
+        both = phrase("both", one=acc, other=gyr)
+        note = chosen(phrase("column", column=table.label(i)), both, counts, left)
         reported = table.n_in_file - table.n_rows
         first = table.take(rows[acc], len(rows[acc]) + left + reported, note)
         second = replace(table.take(rows[gyr], len(rows[gyr])), findings=())

@@ -58,7 +58,7 @@ def read_objects(path: Path, choice: Choice) -> tuple[Table, ...]:
             )
     streams = [Stream(name, tables[name].n_rows) for name in found]
     taken = pick(path, streams, choice, "this MATLAB file")
-    note = choice_note("This MATLAB file", taken, streams)
+    note = choice_note("MATLAB file", taken, streams)
     table = tables[taken.topic]
     return (replace(table, sha256=file_sha256(path), findings=(*table.findings, *note)),)
 

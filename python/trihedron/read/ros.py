@@ -121,4 +121,4 @@ def _table(
     if not np.any(rows[:, 0] != 0) and not np.any(rows[:, 1] != 0):
         # No clock in the headers: the one of whoever recorded is all there is.
         names, columns = ["time [s]", *names[2:8]], [columns[8], *columns[2:8]]
-    return Table(path, tuple(names), tuple(columns), sha256, findings=choice_note("This bag", stream, streams))
+    return Table(path, tuple(names), tuple(columns), sha256, findings=choice_note("bag", stream, streams))

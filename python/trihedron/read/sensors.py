@@ -14,6 +14,7 @@ from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz, sett
 from trihedron.read.clock.order import in_order
 from trihedron.read.clock.steps import steps_of
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
+from trihedron.read.copies import copied_rows
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
@@ -23,8 +24,11 @@ from trihedron.read.text.store import side_by_side
 from trihedron.records import Finding, FindingCode, Sampling
 from trihedron.records.progress import Progress
 from trihedron.records.sampling import UNJUDGED
+from trihedron.records.words import Words, words
 
 ASSUMED_RATE_HZ = 100.0
+FEWEST_ROWS = 2
+"""What makes a recording: copies that would leave less are none."""
 WITNESS_ROWS = 200_000
 LONGEST_MTI_STEP = 5000.0
 """Counts of 100 µs between samples at 2 Hz, below an MTi's usual rates; a DOT's are 8333 µs apart at least."""
@@ -73,9 +77,9 @@ class Sensors:
         at = sample + self.offset
         return int(self.rows[at]) if self.rows is not None else at
 
-    def place(self, sample: int) -> str:
+    def place(self, sample: int) -> Words:
         """A sample's number, file line and time, for people."""
-        return f"sample {sample}, {self.table.place(self.row(sample))}, {self.time_s[sample]:.3f} s"
+        return words("sample", sample=sample, row=self.table.place(self.row(sample)), time_s=self.time_s[sample])
 
 
 def _triad(
@@ -194,16 +198,11 @@ def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[
     """Rows written twice (same stamp, same readings) once; they are no samples."""
     if chosen.time is None or not steps_of(clock.time_s).same:
         return clock
-    again = np.flatnonzero(np.diff(clock.time_s) == 0) + 1
     rows = np.arange(table.n_rows) if clock.rows is None else clock.rows
-    copied = np.ones(len(again), dtype=bool)
-    for column in (*(chosen.accelerometer or ()), *(chosen.gyroscope or ())):
-        values = table.columns[column]
-        if len(values):
-            copied &= values[rows[again]] == values[rows[again - 1]]
-    if not copied.any() or np.count_nonzero(~copied) + 2 > len(clock.time_s):
+    used = (*(chosen.accelerometer or ()), *(chosen.gyroscope or ()))
+    drop = copied_rows([table.columns[column] for column in used], clock.time_s, rows)
+    if not len(drop) or len(clock.time_s) - len(drop) < FEWEST_ROWS:
         return clock
-    drop = again[copied]
     findings.append(
         Finding.of(
             FindingCode.REPEATED_ROWS,

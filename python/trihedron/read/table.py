@@ -13,6 +13,7 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.read.errors import from_os_error
 from trihedron.records import Finding
+from trihedron.records.words import Words, words
 
 
 @dataclass(frozen=True)
@@ -92,10 +93,10 @@ class Table:
             return int(self.line_of_row[row])
         return self.first_line + int(row) if self.first_line else 0
 
-    def place(self, row: int) -> str:
+    def place(self, row: int) -> Words:
         """``line 37`` or, in formats without lines, ``row 37`` (both counted from 1)."""
         line = self.line(row)
-        return f"line {line}" if line else f"row {int(row) + 1}"
+        return words("line", line=line) if line else words("row", row=int(row) + 1)
 
     def label(self, column: int) -> str:
         """A column's name in quotes, or its number (from 1)."""

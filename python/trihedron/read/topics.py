@@ -9,6 +9,7 @@ from trihedron.read.devices import Choice
 from trihedron.read.errors import ReadError
 from trihedron.read.table import StatedClock
 from trihedron.records import Finding
+from trihedron.records.words import Words, words
 
 SECONDS = StatedClock(unit="s")
 MICROSECONDS = StatedClock(unit="us")
@@ -22,14 +23,20 @@ class Stream:
     count: int
     instance: str = ""
 
-    def __str__(self) -> str:
-        name = f"{self.topic} {self.instance}".strip()
-        return f"{name} ({self.count} messages)"
+    @property
+    def name(self) -> str:
+        """Topic and instance."""
+        return f"{self.topic} {self.instance}".strip()
 
 
-def listed(streams: list[Stream]) -> str:
+MOST_LISTED = 24
+"""Streams that are named."""
+
+
+def listed(streams: list[Stream]) -> Words:
     """Every stream with its count."""
-    return ", ".join(str(stream) for stream in streams[:24]) + (" ..." if len(streams) > 24 else "")
+    named = [(stream.name, stream.count) for stream in streams[:MOST_LISTED]]
+    return words("streams", streams=named, has_more=len(streams) > MOST_LISTED)
 
 
 def pick(path: Path, streams: list[Stream], choice: Choice, what: str) -> Stream:
@@ -63,13 +70,13 @@ def pick(path: Path, streams: list[Stream], choice: Choice, what: str) -> Stream
     return filled[0]
 
 
-def choice_note(what: str, taken: Stream, streams: list[Stream]) -> tuple[Finding, ...]:
+def choice_note(kind: str, taken: Stream, streams: list[Stream]) -> tuple[Finding, ...]:
     """Which of several streams was read; nothing where there was one."""
     if len(streams) < 2:
         return ()
     from trihedron.read.devices import chosen
 
-    return (chosen(what, f"{taken.topic} {taken.instance}".strip(), listed(streams), 0),)
+    return (chosen(words("this-container", kind=kind), taken.name, listed(streams), 0),)
 
 
 def missing_extra(path: Path, what: str, package: str, extra: str) -> ReadError:

@@ -129,7 +129,10 @@ def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
     taken = pick(path, streams, choice, what)
     chosen = tables[taken.topic]
     return replace(
-        chosen, path=path, sha256=file_sha256(path), findings=(*chosen.findings, *choice_note(what, taken, streams))
+        chosen,
+        path=path,
+        sha256=file_sha256(path),
+        findings=(*chosen.findings, *choice_note(what.removeprefix("this "), taken, streams)),
     )
 
 

@@ -61,7 +61,7 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
         if choice.instance is not None and not any(s.instance == choice.instance for s in offered):
             offered = streams
     taken = pick(path, offered, choice, "this log")
-    findings = (*choice_note("This log", taken, streams), *_losses(log))
+    findings = (*choice_note("log", taken, streams), *_losses(log))
     sha256 = file_sha256(path)
     if taken.topic == _COMBINED:
         return (_table(path, data[(_COMBINED, 0)], "", sha256, findings),)

@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.records.frozen import Frozen
 
 SAME_STEP = 0.02
 """Part by which one step of three converters may be measured differently where text has cut its digits."""
 
 
-@dataclass(frozen=True)
-class Limit:
-    """One channel's extreme value, if it is where readings end: ``count`` samples in ``stretches``, the first steep one
-    at ``sample``."""
+@dataclass(frozen=True, eq=False)
+class Limit(Frozen):
+    """One channel's end of range: ``value`` in raw units and its standard error ``sigma``, 0 where readings show it
+    exactly; ``runs`` (k, 2) of readings that lie there, the first sample of each and the one behind its last."""
 
     axis: int
     value: float
     is_high: bool
-    count: int
-    stretches: int
-    sample: int
+    runs: IntArray
+    sigma: float = 0.0
+
+    @property
+    def count(self) -> int:
+        """Readings at the limit."""
+        return int(np.sum(self.runs[:, 1] - self.runs[:, 0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +41,22 @@ class ChannelFacts(Frozen):
     step: FloatArray
     noise: FloatArray
     limits: tuple[Limit, ...]
+
+    def at_limits(self, n: int) -> BoolArray:
+        """(n, 3) which of the channel's n readings lie at a limit."""
+        out = np.zeros((n, 3), dtype=np.bool_)
+        for limit in self.limits:
+            for first, stop in limit.runs.tolist():
+                out[first:stop, limit.axis] = True
+        return out
+
+    def moved(self, to: IntArray) -> ChannelFacts:
+        """The facts of a log into which samples were put: ``to`` (n,) are the places of its own among them."""
+        limits = tuple(
+            replace(limit, runs=np.stack([to[limit.runs[:, 0]], to[limit.runs[:, 1] - 1] + 1], axis=1))
+            for limit in self.limits
+        )
+        return replace(self, limits=limits)
 
     @property
     def common_step(self) -> float:
@@ -57,6 +77,10 @@ class RecordingFacts(Frozen):
         """(3,) or (6,) steps of all channels that there are, the accelerometer's first."""
         out: FloatArray = np.concatenate([one.step for one in (self.accelerometer, self.gyroscope) if one is not None])
         return out
+
+    def moved(self, to: IntArray) -> RecordingFacts:
+        """The facts of a log into which samples were put (:meth:`ChannelFacts.moved`)."""
+        return RecordingFacts(*(one and one.moved(to) for one in (self.accelerometer, self.gyroscope)))
 
     def of(self, sensor: str) -> ChannelFacts:
         """The facts of one sensor.

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.printable import one_line
-from trihedron.records.channel_facts import RecordingFacts
+from trihedron.records.channel_facts import Limit, RecordingFacts
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
 from trihedron.records.finding import Finding
 from trihedron.records.frozen import freeze
@@ -211,6 +211,15 @@ class Recording(Presented):
         from trihedron.channel_facts import facts_of
 
         return facts_of(self.accelerometer, self.gyroscope, self.rate_hz)
+
+    @cached_property
+    def possible_limits(self) -> dict[str, tuple[Limit, ...]]:
+        """Limits by sensor that noise covers, on sides where no code is one (``facts``): found when asked, and
+        not more than possible: steady turns share a level too."""
+        from trihedron.channel_facts.possible_limits import find_possible_limits
+
+        named = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}
+        return find_possible_limits({name: one for name, one in named.items() if one is not None}, self.facts)
 
     @property
     def n_samples(self) -> int:

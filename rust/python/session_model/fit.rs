@@ -112,7 +112,7 @@ impl SessionFit {
 
     #[getter]
     fn stopped_because(&self) -> &'static str {
-        self.fit.stop.in_words()
+        self.fit.stop.name()
     }
 
     #[getter]

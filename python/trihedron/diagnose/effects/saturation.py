@@ -10,10 +10,11 @@ import numpy as np
 from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.possible_limits import BAND_SIGMA, MIN_PLATEAUS
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence, without_moves
-from trihedron.diagnose.effects.plateaus import BAND_SIGMA, MIN_PLATEAUS, Plateau, plateaus_of, shared_levels
+from trihedron.diagnose.effects.plateaus import Plateau, plateaus_of
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES
 from trihedron.records.diagnosis import EffectParameter
@@ -112,7 +113,8 @@ class _Saturation(DirectEffect):
         raw = obs.raw_rate if is_gyro else obs.raw_force
         assert raw is not None
         scale, zero = self._scale_and_zero(context)
-        limit = min(abs(run.level * scale[run.axis] + zero[run.axis]) for run in runs)
+        origin = obs.rate_origin if is_gyro else obs.force_origin
+        limit = min(abs((run.limit.value - origin[run.axis]) * scale[run.axis] + zero[run.axis]) for run in runs)
         close = {m for m, (a, b) in enumerate(obs.move_ranges)
                  if (np.abs(raw[a:b] * scale + zero).max(axis=0) > NEAR_LIMIT * limit).any()}  # fmt: skip
         # An accelerometer that ends at little more than 1 g comes close in every pose: then only plateaus count.
@@ -125,14 +127,13 @@ class _Saturation(DirectEffect):
         is_gyro = self.sensor == "gyro"
         origin = obs.rate_origin if is_gyro else obs.force_origin
         out = []
-        for (axis, sign), (level, is_exact) in sorted(
-            shared_levels(runs, origin, sigma).items(), key=lambda item: (item[0][0], -item[0][1])
-        ):
-            name = f"limit_{AXES[axis]}{'+' if sign > 0 else '-'}"
-            value = float((level - origin[axis]) * scale[axis] + zero[axis])
+        limits = {(run.axis, -run.sign): run.limit for run in runs}
+        for (axis, _), limit in sorted(limits.items()):
+            name = f"limit_{AXES[axis]}{'+' if limit.is_high else '-'}"
+            value = float((limit.value - origin[axis]) * scale[axis] + zero[axis])
             out.append(EffectParameter(name, value, float(sigma[axis] * scale[axis]), "rad/s" if is_gyro else "m/s^2"))
-            if is_exact:  # every sample is the same number: it is exact, whatever the scale factor
-                out.append(EffectParameter(f"raw_{name}", round(level, 9), 0.0, "raw"))
+            if limit.sigma == 0.0:  # every sample is the same number: it is exact, whatever the scale factor
+                out.append(EffectParameter(f"raw_{name}", round(limit.value, 9), 0.0, "raw"))
         out.append(EffectParameter("samples", float(sum(run.stop - run.start for run in runs)), 0.0, "1"))
         return tuple(out)
 

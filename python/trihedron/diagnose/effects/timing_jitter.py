@@ -73,7 +73,7 @@ class TimingJitter(DirectEffect):
         def reweigh(obs: Observations) -> Observations:
             if len(even) != len(obs.time_s):
                 return obs  # samples were put in since
-            again = observe(replace(obs.recording, time_s=even), obs.segments)
+            again = observe(obs.recording.with_same_readings(time_s=even), obs.segments)
             return replace(
                 again,
                 move_ranges=obs.move_ranges,

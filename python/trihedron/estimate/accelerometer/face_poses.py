@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.records.words import Words, words
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 LARGEST_TILT_DEG = 20.0
@@ -16,9 +17,9 @@ FACES: tuple[int, ...] = (1, -1, 2, -2, 3, -3)
 """``+i``: axis i up, ``f = +|g| e_i``. (The manual numbers poses by the face that is *down*: its pose i is -i here.)"""
 
 
-def face_in_words(face: int) -> str:
+def face_in_words(face: int) -> Words:
     """``axis 2 down`` for -2."""
-    return f"axis {abs(face)} {'up' if face > 0 else 'down'}"
+    return words("face", axis=abs(face), is_up=face > 0)
 
 
 def direction_of(faces: IntArray) -> FloatArray:

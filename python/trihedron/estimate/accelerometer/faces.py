@@ -16,6 +16,7 @@ from trihedron.estimate.accelerometer.face_placements import placements
 from trihedron.estimate.accelerometer.norm import norm_residual
 from trihedron.records.calibration import FitQuality, Frame, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
+from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian, reframing
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
@@ -265,7 +266,7 @@ def _quality(
         held_out=apart[:, 0],
         held_out_sigma=apart[:, 1],
         held_out_rms=float(np.sqrt(np.mean(apart[seen, 0] ** 2))) if seen.any() else None,
-        stopped_because="closed form" if closed else "linear least squares",
+        stopped_because=words("closed-form" if closed else "linear-least-squares"),
     )
     return quality, apart
 
@@ -340,6 +341,6 @@ def _observability(noise: FloatArray, faces: IntArray, estimate: _Estimate, g: f
         n_parameters=12,
         condition=float(s[0] / s[-1]),
         singular_values=s,
-        weakest="all faces present" if not missing else f"scale and zero are told apart without {', '.join(missing)}",
+        weakest=words("faces-missing", faces=missing) if missing else words("faces-all"),
         advice=missing,
     )

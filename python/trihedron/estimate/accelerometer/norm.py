@@ -13,6 +13,7 @@ from trihedron.estimate.accelerometer import inputs, verdict
 from trihedron.estimate.accelerometer.poses import ENTRIES, PoseDesign
 from trihedron.records.calibration import FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding
+from trihedron.records.words import words
 from trihedron.sensor_model import reframing
 from trihedron.units import AccelerationUnit
 
@@ -246,11 +247,11 @@ def _assemble(
         held_out_rms=float(np.sqrt(np.mean(unseen[predicted] ** 2))) if predicted.any() else None,
         weights=fit.weights if len(fit.weights) == len(values) else None,
         n_iterations=fit.n_iterations,
-        stopped_because=fit.stopped_because,
+        stopped_because=words(fit.stopped_because),
         covariance_scale=scale,
     )
     findings = [
-        *verdict.convergence_findings(fit.is_converged, fit.stopped_because),
+        *verdict.convergence_findings(fit.is_converged, words(fit.stopped_because)),
         *verdict.observability_findings(
             design, relative_sigma, observability.advice, is_anchored=fit.is_anchored, anchor=_core.ANCHOR
         ),

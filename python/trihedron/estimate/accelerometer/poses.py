@@ -8,24 +8,31 @@ depend on nothing but u, so that the sufficiency of a set of poses can be told b
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.calibration import Observability
+from trihedron.records.words import Words, words
 
 ENTRIES = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))
 """Rows and columns of M's six entries."""
 
-NAMES: tuple[str, ...] = tuple(
-    f"scale of axis {j + 1}" if j == k else f"angle between axes {k + 1} and {j + 1}" for j, k in ENTRIES
-) + tuple(f"zero of axis {j + 1}" for j in range(3))
-"""The nine parameters as a user would name them."""
-
 RANK_TOLERANCE = 1e-6
 """Singular value, relative to the largest, below which a direction counts as unseen: only the same pose repeats to a
 part in a million."""
+
+
+@cache
+def parameter_names() -> tuple[Words, ...]:
+    """The nine parameters as a user would name them."""
+    entries = [
+        words("scale-of-axis", axis=j + 1) if j == k else words("angle-between-axes", one=k + 1, other=j + 1)
+        for j, k in ENTRIES
+    ]
+    return (*entries, *(words("zero-of-axis", axis=j + 1) for j in range(3)))
 
 
 def _unit(directions: FloatArray) -> FloatArray:
@@ -43,7 +50,7 @@ def design_rows(directions: FloatArray) -> FloatArray:
     return np.column_stack([u[:, j] * u[:, k] for j, k in ENTRIES] + [u[:, j] for j in range(3)])
 
 
-def pose_in_words(direction: FloatArray) -> str:
+def pose_in_words(direction: FloatArray) -> Words:
     """How to hold the sensor so that a unit vector (3,) of it points up.
 
     Examples
@@ -54,13 +61,13 @@ def pose_in_words(direction: FloatArray) -> str:
     u = np.asarray(direction, dtype=np.float64)
     order = np.argsort(-np.abs(u), kind="stable")
     first = order[0]
-    text = f"axis {first + 1} {'up' if u[first] > 0 else 'down'}"
+    face = {"axis": first + 1, "is_up": u[first] > 0}
     others = [j for j in order[1:] if abs(u[j]) > 0.2]
     if not others:
-        return text
+        return words("face", **face)
     tilt = np.degrees(np.arccos(min(abs(u[first]) / np.linalg.norm(u), 1.0)))
-    toward = " and ".join(f"axis {j + 1} points half {'up' if u[j] > 0 else 'down'}" for j in others)
-    return f"{text}, then tilted {tilt:.0f}° so that {toward}"
+    towards = [(j + 1, "up" if u[j] > 0 else "down") for j in others]
+    return words("pose", **face, tilt_deg=tilt, towards=towards)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,16 +99,15 @@ class PoseDesign:
         half = (vt[:rank].T / s[:rank]) / scale[:, None]
         return cls(rows, rows.T @ rows, half @ half.T, rank, s, scale, vt)
 
-    def weakest(self) -> str:
+    def weakest(self) -> Words:
         """The worst determined combination, in words."""
         direction = self.directions[-1] / self.scale
         share = np.abs(direction) / np.abs(direction).max()
         # Zero and scale are compared in the effect each has on a reading near |g|, which both rows already are in.
-        names = [NAMES[k] for k in np.argsort(-share, kind="stable") if share[k] > 0.5]
-        joined = names[0] if len(names) == 1 else " together with ".join([", ".join(names[:-1]), names[-1]])
+        names = [parameter_names()[k] for k in np.argsort(-share, kind="stable") if share[k] > 0.5]
         if self.rank < 9:
-            return f"{joined}: not seen at all ({self.rank} of 9 parameters are determined)"
-        return f"{joined}: seen {self.singular_values[0] / self.singular_values[-1]:.3g} times worse than the best"
+            return words("poses-unseen", names=names, rank=self.rank)
+        return words("poses-weakest", names=names, times=self.singular_values[0] / self.singular_values[-1])
 
     def worst_prediction(self) -> float:
         """Largest standard error, over the candidate directions, of the norm that the model predicts, in |g|."""
@@ -110,13 +116,13 @@ class PoseDesign:
         rows = design_rows(CANDIDATES)
         return float(np.sqrt(np.einsum("ij,jk,ik->i", rows, self.covariance, rows).max()))
 
-    def advice(self, relative_sigma: float, n_poses: int) -> tuple[str, ...]:
+    def advice(self, relative_sigma: float, n_poses: int) -> tuple[Words, ...]:
         """The poses that most reduce the largest variance among the nine parameters, one after another (greedy)."""
         information = self.information.copy()
         # A prior of one (100 % of scale, |g| of zero) makes the unseen comparable with the badly seen.
         information += np.eye(9)
         rows = design_rows(CANDIDATES) / relative_sigma
-        words = []
+        advised = []
         for _ in range(n_poses):
             covariance = np.linalg.inv(information)
             seen = rows @ covariance
@@ -125,9 +131,9 @@ class PoseDesign:
             # The worst first; among equals the smaller sum, so that a pose also helps the second worst.
             score = left.max(axis=1) + 1e-3 * left.sum(axis=1)
             best = int(np.argmin(score))
-            words.append(pose_in_words(CANDIDATES[best]))
+            advised.append(pose_in_words(CANDIDATES[best]))
             information += np.outer(rows[best], rows[best])
-        return tuple(words)
+        return tuple(advised)
 
     def correlated(self) -> tuple[tuple[str, str, float], ...]:
         """Pairs of parameters with |correlation| > 0.9, strongest first."""
@@ -136,7 +142,7 @@ class PoseDesign:
         sigma = np.sqrt(np.diag(self.covariance))
         correlation = self.covariance / np.outer(sigma, sigma)
         pairs = [
-            (NAMES[j], NAMES[k], float(correlation[j, k]))
+            (parameter_names()[j], parameter_names()[k], float(correlation[j, k]))
             for j in range(9)
             for k in range(j + 1, 9)
             if abs(correlation[j, k]) > 0.9

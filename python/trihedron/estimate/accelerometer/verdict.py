@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import FloatArray
-from trihedron.estimate.accelerometer.poses import NAMES, PoseDesign
+from trihedron.estimate.accelerometer.poses import PoseDesign, parameter_names
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
@@ -93,7 +93,7 @@ def observability_findings(
 def _unseen(design: PoseDesign) -> list[str]:
     null = design.directions[design.rank :] / design.scale
     share = np.sqrt((null**2).sum(axis=0))
-    return [NAMES[k] for k in np.argsort(-share, kind="stable") if share[k] > 0.3 * share.max()]
+    return [parameter_names()[k] for k in np.argsort(-share, kind="stable") if share[k] > 0.3 * share.max()]
 
 
 def held_out_findings(held_out: FloatArray, sigma: FloatArray, chi2_per_dof: FloatArray, dof: int) -> list[Finding]:

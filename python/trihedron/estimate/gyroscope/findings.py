@@ -11,6 +11,7 @@ from trihedron.estimate.gyroscope.observability import describe, observability_f
 from trihedron.estimate.gyroscope.verification import Prediction
 from trihedron.probability import chdtrc
 from trihedron.records.finding import Finding, FindingCode, Severity
+from trihedron.records.words import words
 from trihedron.units import STANDARD_GRAVITY_M_S2, RateUnit, rate_to_si
 
 MAX_SCALE_RATIO = 1.5
@@ -26,7 +27,7 @@ def findings_of(aligned: Aligned, measured: MoveMeasurements, held: Prediction |
     found += handedness(S, np.asarray(fit.accelerometer_scale))
     found += observability_findings(describe(fit, covariance, S, aligned.n_gyroscope), covariance, S)
     if not fit.is_converged:
-        found.append(Finding.of(FindingCode.NOT_CONVERGED, "gyro", stopped_because=fit.stopped_because))
+        found.append(Finding.of(FindingCode.NOT_CONVERGED, "gyro", stopped_because=words(fit.stopped_because)))
     found += _outlier_findings(aligned, measured)
     if aligned.inflation > 1.0:
         found.append(Finding.of(FindingCode.RESIDUAL_ABOVE_NOISE, "moves", chi2_per_dof=aligned.inflation, dof=fit.dof))

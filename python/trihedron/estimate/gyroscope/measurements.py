@@ -144,7 +144,7 @@ def measure_moves(
         zero = np.ascontiguousarray(zero - force @ attitude.A.T)
     else:
         attitude, rate = None, gyroscope
-    clipped = bridge_clipping(recording.time_s, gyroscope, quantum)
+    clipped = bridge_clipping(recording)
     extra = rounding_variance(gyroscope, quantum, np.median(gyroscope_mean, axis=0), undithered)
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope)

@@ -8,6 +8,7 @@ from trihedron._core import AlignmentFit
 from trihedron.arrays import FloatArray
 from trihedron.records.calibration import PARAMETER_NAMES, Observability
 from trihedron.records.finding import Finding, FindingCode
+from trihedron.records.words import Words, words
 
 WEAK = 0.03
 """Relative standard error of a direction in ``S_ω`` above which it is called weak: data sheets promise this much."""
@@ -27,11 +28,10 @@ def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_gyrosco
     relative = float(np.sqrt(max(values[-1], 0.0))) / size if size > 0 else float("inf")
     rate, axis = (int(k) for k in np.unravel_index(np.argmax(np.abs(worst)), (3, 3)))
     if rate == axis:
-        weakest = f"scale of gyro axis {axis + 1} (S{axis + 1}{axis + 1})"
+        weakest = words("gyro-scale", axis=axis + 1, share=relative)
     else:
-        weakest = f"the share of gyro axis {axis + 1} in the rate about axis {rate + 1} (S{rate + 1}{axis + 1})"
-    weakest += f", known to {100.0 * relative:.2g} % of the scale"
-    advice: tuple[str, ...] = ()
+        weakest = words("gyro-share", axis=axis + 1, rate=rate + 1, share=relative)
+    advice: tuple[Words, ...] = ()
     if fit.rank < len(fit.singular_values) or relative > WEAK:
         advice = tuple(_advice(fit, covariance, size))
     sigma = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
@@ -51,34 +51,32 @@ def describe(fit: AlignmentFit, covariance: FloatArray, S: FloatArray, n_gyrosco
     return Observability(n_gyroscope - n_unseen, n_gyroscope, condition, singular, weakest, advice, pairs)
 
 
-def _advice(fit: AlignmentFit, covariance: FloatArray, size: float) -> list[str]:
+def _advice(fit: AlignmentFit, covariance: FloatArray, size: float) -> list[Words]:
     lines = []
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3) / size
     for axis in range(3):
         weak = [rate for rate in range(3) if sigma[rate, axis] > WEAK]
         if not weak:
             continue
-        if len(weak) == 3:
-            starts = "twice, starting with each of the two other axes upright once"
-        elif weak == [axis]:
-            starts = "and back"
-        else:
-            across = next(rate for rate in weak if rate != axis)
-            # The element S_ij is seen while axis i is level: start with the third axis upright.
-            third = 3 - axis - across
-            starts = f"starting with body axis {third + 1} upright"
+        # The element S_ij is seen while axis i is level: start with the third axis upright.
+        across = next((rate for rate in weak if rate != axis), axis)
         lines.append(
-            f"lay body axis {axis + 1} level and turn the sensor about it by 90 to 120 degrees, {starts}, with a still "
-            "pose before and after"
+            words(
+                "turn-about",
+                axis=axis + 1,
+                start=len(weak) < 3 and across != axis,
+                upright=3 - axis - across + 1,
+                is_twice=len(weak) == 3,
+            )
         )
     if not lines and fit.rank < len(fit.singular_values):
-        lines.append("add moves about all three body axes held level, each with a still pose before and after")
+        lines.append(words("moves-about-all"))
     return lines
 
 
 def observability_findings(observability: Observability, covariance: FloatArray, S: FloatArray) -> list[Finding]:
     """NOT_OBSERVABLE or WEAKLY_OBSERVABLE with the moves to add, or nothing."""
-    advice = [f"{line[0].upper()}{line[1:]}." for line in observability.advice]
+    advice = observability.advice
     missing = observability.n_parameters - observability.rank
     if missing > 0:
         return [

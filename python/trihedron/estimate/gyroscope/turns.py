@@ -36,6 +36,7 @@ from trihedron.records.calibration import FitQuality, Observability, SensorCalib
 from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.records.words import words
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import rate_to_si
 
@@ -206,7 +207,7 @@ def _quality(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solution, S: 
         held_out_rms=float(np.sqrt(np.mean(held[is_held] ** 2))) if np.any(is_held) else None,
         weights=np.where(used, 1.0, 0.0),
         n_iterations=1,
-        stopped_because="closed form",
+        stopped_because=words("closed-form"),
     )
 
 
@@ -215,5 +216,5 @@ def _observability(system: TurnSystem, used: npt.NDArray[np.bool_], fit: Solutio
     singular = np.linalg.svd(matrix / np.linalg.norm(matrix, axis=0), compute_uv=False)
     sigma = np.sqrt(np.diag(fit.covariance)[:9]).reshape(3, 3) / np.linalg.norm(fit.S_w, 2)
     i, j = (int(v) for v in np.unravel_index(int(np.argmax(sigma)), (3, 3)))
-    weakest = f"answer of gyro axis {i + 1} to turns about case axis {j + 1}, known to {100 * sigma[i, j]:.2g} %"
+    weakest = words("gyro-answer", axis=i + 1, about=j + 1, share=sigma[i, j])
     return Observability(12, 12, float(singular[0] / singular[-1]), singular, weakest)

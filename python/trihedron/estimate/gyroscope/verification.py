@@ -11,6 +11,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align, assemble
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.calibration import FitQuality
+from trihedron.records.words import words
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,5 +132,5 @@ def quality_of(
         held_out_angle_deg=None if held is None else held.angle_deg,
         weights=weights,
         n_iterations=fit.iterations,
-        stopped_because=fit.stopped_because,
+        stopped_because=words(fit.stopped_because),
     )

@@ -15,6 +15,7 @@ from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack, KalmanCalibration, PoseTable
+from trihedron.records.words import words
 
 DIFFUSE = 1e8
 """Width of a diffuse start in standard deviations of one reading: its information is 1e-16 of one pose's."""
@@ -259,10 +260,9 @@ def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
     values, directions = singular[1], singular[2]
     condition = float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
     weakest = int(np.argmax(np.abs(directions[-1])))
-    name = ("sensitivity to x", "sensitivity to y", "sensitivity to z", "zero reading")[weakest]
-    advice = (
-        "turn the zero reading's axis both ways up" if weakest == 3 else f"tilt {'xyz'[weakest]} towards the vertical"
-    )
+    axis = "" if weakest == 3 else "xyz"[weakest]
+    name = words("sensitivity-to", axis=axis) if axis else words("zero-reading")
+    advice = words("tilt-towards-vertical", axis=axis) if axis else words("zero-both-ways")
     rank = int(np.sum(values > 1e-9 * values[0]))
     observability = Observability(rank, 4, condition, values, weakest=name, advice=(advice,))
     findings: list[Finding] = []
@@ -270,8 +270,8 @@ def _observability(f: FloatArray) -> tuple[Observability, list[Finding]]:
         findings.append(
             Finding.of(
                 FindingCode.WEAKLY_OBSERVABLE,
-                "kalman-zero" if weakest == 3 else "kalman-sensitivity",
-                axis="" if weakest == 3 else "xyz"[weakest],
+                "kalman-sensitivity" if axis else "kalman-zero",
+                axis=axis,
                 condition=condition,
             )
         )

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import chdtri
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.hold_statistics import as_measured, root_of
 from trihedron.records.hold_noise import HoldLine
@@ -59,9 +60,9 @@ def without_lines(parts: Sequence[FloatArray], lines: Sequence[HoldLine], rate_h
         pieces = [piece for part in out for piece in _pieces(part)]
         width = rate_hz / (2.0 * float(np.median([len(piece) for piece in pieces])))
         tried = line.frequency_hz + width * np.arange(-FINER, FINER + 1) / FINER
-        tried = tried[(tried > 0.0) & (tried < 0.5 * rate_hz)]
-        power = np.sum([_periodogram(piece, tried / rate_hz) for piece in pieces], axis=0)
-        frequency = float(tried[int(np.argmax(power))]) / rate_hz
+        tried = tried[(tried > 0.0) & (tried < 0.5 * rate_hz)] / rate_hz
+        power = np.sum([_explained(piece, tried) for piece in pieces], axis=0)
+        frequency = float(tried[int(np.argmax(power))])
         out = [np.concatenate([_less(piece, frequency) for piece in _pieces(part)]) for part in out]
     return out
 
@@ -71,10 +72,16 @@ def _pieces(part: FloatArray) -> list[FloatArray]:
     return np.array_split(part, -(-len(part) // LONGEST_PIECE))
 
 
-def _periodogram(part: FloatArray, per_sample: FloatArray) -> FloatArray:
-    """Power at frequencies (k,) in periods a sample, the part's mean taken off."""
-    wave = np.exp(-2j * np.pi * np.multiply.outer(per_sample, np.arange(len(part))))
-    return np.asarray(np.abs(wave @ (part - part.mean())) ** 2 / len(part))
+def _explained(part: FloatArray, per_sample: FloatArray) -> FloatArray:
+    """Sum of squares (k,) that a sinusoid explains, at evenly spaced frequencies in periods a sample."""
+    step = float(per_sample[1] - per_sample[0]) if len(per_sample) > 1 else 0.0
+    return _core.sinusoid_power(
+        np.arange(len(part), dtype=np.float64),
+        part - part.mean(),
+        start_hz=float(per_sample[0]),
+        step_hz=step,
+        count=len(per_sample),
+    )
 
 
 def _less(part: FloatArray, per_sample: float) -> FloatArray:

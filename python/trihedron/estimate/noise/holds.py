@@ -90,8 +90,11 @@ def _axis(x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name:
     keep = robust_holds(power.variance, power.dof)
     parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
     # A line is stated as one; it is neither white noise nor a filter's corner.
-    lines = lines_of_holds(*_segments(parts, rate_hz), rate_hz)
-    parts = without_lines(parts, lines, rate_hz)
+    spectrum = _segments(parts, rate_hz)
+    lines = lines_of_holds(*spectrum, rate_hz)
+    if lines:
+        parts = without_lines(parts, lines, rate_hz)
+        spectrum = _segments(parts, rate_hz)
     # Correlation and tails are those of what is kept: a knock would lend its own to all.
     power = _Power.of(parts)
     rounding = step**2 / 12.0
@@ -104,7 +107,6 @@ def _axis(x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name:
         sensor = as_measured(total - rounding, share * pooled.sigma, pooled.dof)
         white = root_of(sensor, 1.0 / rate_hz)
     octaves = _octaves(parts, rate_hz)
-    spectrum = _segments(parts, rate_hz)
     corner, above = filter_corner(*spectrum, rate_hz, rounding / total if total > 0.0 else 1.0, pooled.scatter)
     return HoldNoise(
         name=name,

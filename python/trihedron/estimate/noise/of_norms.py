@@ -41,6 +41,8 @@ ABSENT = 0.1
 SHOWN = 0.1
 """A strength is there where its absence has lost nine tenths of its odds (Jeffreys' strong evidence)."""
 AXES = 3
+INTERVAL = np.array([0.025, 0.5, 0.975])
+"""Ends of a 95 % interval and the median between."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,17 +145,16 @@ class _Drawn:
         )
 
 
-def _quantiles(values: FloatArray, weight: FloatArray) -> tuple[float, float, float]:
+def _quantiles(values: FloatArray, weight: FloatArray, places: FloatArray) -> FloatArray:
+    """Values (k,) below which shares ``places`` (k,) of the weight lie."""
     order = np.argsort(values)
-    reached = np.cumsum(weight[order]) / weight.sum()
-    low, middle, high = (
-        float(values[order[min(int(np.searchsorted(reached, p)), len(order) - 1)]]) for p in (0.025, 0.5, 0.975)
-    )
-    return low, middle, high
+    reached = np.cumsum(weight[order]) / max(float(weight.sum()), 1e-300)
+    out: FloatArray = values[order[np.minimum(np.searchsorted(reached, places), len(order) - 1)]]
+    return out
 
 
 def _measured(values: FloatArray, weight: FloatArray) -> Measured:
-    low, middle, high = _quantiles(values, weight)
+    low, middle, high = _quantiles(values, weight, INTERVAL).tolist()
     of_absent = float(weight[values == 0.0].sum())
     is_there = of_absent / max(1.0 - of_absent, 1e-300) < SHOWN * ABSENT / (1.0 - ABSENT)
     sigma = math.log(high / max(low, LOWEST * high)) / 3.92 if high > 0.0 else 0.0
@@ -169,10 +170,7 @@ def _ratios(first: _Drawn, second: _Drawn, axis: int) -> dict[str, Ratio]:
         for one in (first, second):
             values = getattr(one, name)[:, axis]
             there = values > 0.0
-            order = np.argsort(values[there])
-            reached = np.cumsum(one.weight[there][order]) / max(float(one.weight[there].sum()), 1e-300)
-            index = np.minimum(np.searchsorted(reached, places), len(order) - 1)
-            logs.append(np.log(values[there][order][index]))
-        low, middle, high = np.exp(np.quantile(np.subtract.outer(*logs), (0.025, 0.5, 0.975)))
+            logs.append(np.log(_quantiles(values[there], one.weight[there], places)))
+        low, middle, high = np.exp(np.quantile(np.subtract.outer(*logs), INTERVAL))
         out[name] = Ratio(float(middle), float(low), float(high), 1.0)
     return out

@@ -15,6 +15,7 @@ from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.limits import share_at_limits
 from trihedron.channel_facts.step import converter_step
 
 FALSE_ALARM = 1e-4
@@ -116,7 +117,7 @@ def _limit(n_looks: int, n_independent: float) -> float:
 @dataclass(frozen=True)
 class Readout:
     """How the readings were written: ``resolution`` the smallest change, ``sigma`` the noise of one reading above it,
-    shares of readings that repeat the one before, and that lie on an extreme value that repeats."""
+    shares of readings that repeat the one before, and that lie at a limit."""
 
     resolution: float
     sigma: float
@@ -142,21 +143,8 @@ def readout(x: FloatArray) -> Readout:
     change = np.abs(np.concatenate([np.diff(part) for part in parts]))
     resolution = converter_step(values)
     sigma = float(np.sqrt(0.5 * np.mean(np.square(change))))
-    low, high = float(values.min()), float(values.max())
-    return Readout(resolution, sigma, float(np.mean(change == 0.0)), _clipped(values, low, high, resolution))
-
-
-def _clipped(values: FloatArray, low: float, high: float, resolution: float) -> float:
-    """Share of readings on an extreme value, if that is a wall: a tail thins out towards its end, a wall does not."""
-    if high - low < 8.0 * resolution or high == low:
-        return 0.0
-    shares = []
-    for edge in (low, high):
-        at_edge = np.count_nonzero(values == edge) / len(values)
-        near = np.count_nonzero(np.abs(values - edge) <= 1.5 * resolution) / len(values)
-        if at_edge > 1e-3 and at_edge > 0.6 * near and at_edge * len(values) > 10:
-            shares.append(at_edge)
-    return float(sum(shares))
+    clipped = share_at_limits(values, sigma, resolution)
+    return Readout(resolution, sigma, float(np.mean(change == 0.0)), clipped)
 
 
 def repeated_rows(x: npt.NDArray[np.float64]) -> float:

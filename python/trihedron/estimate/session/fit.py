@@ -10,6 +10,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.session.observed import Observed
 from trihedron.probability import fdtrc
+from trihedron.records.words import words
 from trihedron.session.noise import START_STRENGTHS
 
 FALSE_ALARM = 1e-3
@@ -85,7 +86,7 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
         gyro_zero_rms=float(np.sqrt(np.mean(away[1] ** 2))),
         is_walk_at_edge=core.is_walk_at_edge,
         is_converged=core.is_converged,
-        stopped_because=core.stopped_because,
+        stopped_because=words(core.stopped_because),
         iterations=core.iterations,
         core=core,
     )

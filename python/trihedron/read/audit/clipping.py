@@ -20,14 +20,14 @@ def audit_clipping(sensor: str, walls: tuple[Limit, ...], place: Place) -> list[
     """One finding per sensor that names every wall."""
     if not walls:
         return []
-    first = min(w.sample for w in walls)
+    first = min(int(w.runs[0, 0]) for w in walls)
     numbers = {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_count": float(w.count) for w in walls}
     numbers |= {f"{AXES[w.axis]}_{'high' if w.is_high else 'low'}_value": w.value for w in walls}
     return [
         Finding.of(
             FindingCode.CLIPPING,
             sensor=short(sensor),
-            walls=[(AXES[w.axis], w.value, w.count, w.stretches) for w in walls],
+            walls=[(AXES[w.axis], w.value, w.count, len(w.runs)) for w in walls],
             where=place(first),
             count=sum(w.count for w in walls),
             sample=first,

@@ -11,6 +11,7 @@ from trihedron.arrays import FloatArray
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
+from trihedron.records.words import Words
 
 MAX_DISPLACEMENT = 64
 """Rows a packet may arrive late. Anything further is another recording, not another order."""
@@ -19,7 +20,7 @@ PART = 1 << 20
 _MODULI = (2.0**16, 2.0**24, 2.0**32)
 
 
-def _place(table: Table, rows: npt.NDArray[np.signedinteger] | None, sample: int) -> str:
+def _place(table: Table, rows: npt.NDArray[np.signedinteger] | None, sample: int) -> Words:
     return table.place(int(rows[sample]) if rows is not None else sample)
 
 

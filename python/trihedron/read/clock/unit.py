@@ -13,6 +13,7 @@ from trihedron.read.clock.rate import usual_step
 from trihedron.read.clock.steps import steps_of
 from trihedron.read.errors import ReadError
 from trihedron.records import Finding, FindingCode
+from trihedron.records.words import words
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "100us": 1e-4}
 _CANDIDATES = ("s", "ms", "us", "ns")
@@ -138,7 +139,7 @@ def _quickest_warming(temperature: FloatArray | None) -> float | None:
 
 def _statement(usual: float, choice: str, sure: bool, possible: list[str]) -> Finding:
     rate = 1.0 / (usual * SECONDS[choice])
-    others = [f"{u} ({1.0 / (usual * SECONDS[u]):.4g} Hz)" for u in possible if u != choice]
+    others = [words("unit-with-rate", unit=u, rate_hz=1.0 / (usual * SECONDS[u])) for u in possible if u != choice]
     return Finding.of(
         FindingCode.TIME_UNIT_DETECTED,
         "" if sure else "unsure",

@@ -128,7 +128,7 @@ _MOVES = (
         SERIOUS,
         "the moves determine {rank} of {n_parameters} gyro parameters; least known: {weakest}.",
         _SAME_GRAVITY,
-        "{advice:& }",
+        "{advice:sentences}",
     ),
     Entry(
         Code.NOT_OBSERVABLE,
@@ -136,7 +136,7 @@ _MOVES = (
         SERIOUS,
         "the moves hardly show {weakest}.",
         _SAME_GRAVITY,
-        "{advice:& }",
+        "{advice:sentences}",
     ),
     Entry(
         Code.WEAKLY_OBSERVABLE,
@@ -144,7 +144,7 @@ _MOVES = (
         WARNING,
         "the moves hardly show {weakest}.",
         _SAME_GRAVITY,
-        "{advice:& }",
+        "{advice:sentences}",
     ),
     Entry(
         Code.SAMPLES_LOST,

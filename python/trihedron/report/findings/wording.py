@@ -8,6 +8,9 @@ A place is a name and, after the colon, how its value becomes words:
 ``?drifts|drift``        the first words where the value is 1 or true, else the second; they may hold places
 ``<below|above``         the first words where the value is negative, else the second; they may hold places
 ``&, the ``              several words, joined by what stands after the ``&``; ``and``: ``x, y and z``
+``together``             ``x, y together with z``
+``sentences``            ``X. Y.``
+``clause``               a sentence without its stop
 ``first 8``              ``3, 5, 6``, with ``...`` behind the eighth
 ``numbered``             several words as ``(1) ...; (2) ...``
 ``each`` · ``each; ``    several groups of values, each by the entry's line of that name, joined by comma or ``; ``
@@ -85,6 +88,12 @@ def _in_words(value: Any, how: str, line: str) -> str:
         return (how[4:] or ", ").join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
     if how == "and":
         return listed([str(word) for word in value])
+    if how == "together":
+        return " together with ".join([", ".join(value[:-1]), value[-1]] if len(value) > 1 else value)
+    if how == "sentences":
+        return " ".join(f"{word[:1].upper()}{word[1:]}." for word in value)
+    if how == "clause":
+        return str(value).rstrip(".")
     if how == "numbered":
         return "; ".join(f"({i + 1}) {word}" for i, word in enumerate(value))
     if how.startswith("&"):

@@ -1,0 +1,93 @@
+"""Parts of sentences that stages choose by id: what is least known, what to add, why a fit ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from trihedron.report.findings.wording import filled
+
+LINES: Mapping[str, str] = MappingProxyType(
+    {
+        "towards": "axis {v0} points half {v1}",
+        "devices": "{v0} ({v1} rows)",
+        "words": "{v0} ({v1})",
+        "streams": "{v0} ({v1} messages)",
+    }
+)
+"""What is said of each of several."""
+
+PHRASES: Mapping[str, str] = MappingProxyType(
+    {
+        # parameters of a triad
+        "scale-of-axis": "scale of axis {axis}",
+        "angle-between-axes": "angle between axes {one} and {other}",
+        "zero-of-axis": "zero of axis {axis}",
+        # poses
+        "face": "axis {axis} {is_up:?up|down}",
+        "pose": "axis {axis} {is_up:?up|down}, then tilted {tilt_deg:.0f}° so that {towards:each and }",
+        "poses-unseen": "{names:together}: not seen at all ({rank} of 9 parameters are determined)",
+        "poses-weakest": "{names:together}: seen {times:.3g} times worse than the best",
+        "faces-all": "all faces present",
+        "faces-missing": "scale and zero are told apart without {faces:&, }",
+        # moves and turns of a gyro
+        "gyro-scale": "scale of gyro axis {axis} (S{axis}{axis}), known to {share:.2g %} of the scale",
+        "gyro-share": "the share of gyro axis {axis} in the rate about axis {rate} (S{rate}{axis}), known to "
+        "{share:.2g %} of the scale",
+        "gyro-answer": "answer of gyro axis {axis} to turns about case axis {about}, known to {share:.2g %}",
+        "turn-about": "lay body axis {axis} level and turn the sensor about it by 90 to 120 degrees, "
+        "{start:?starting with body axis {upright} upright|{is_twice:?twice, starting with each of the two other axes "
+        "upright once|and back}}, with a still pose before and after",
+        "moves-about-all": "add moves about all three body axes held level, each with a still pose before and after",
+        # known attitudes
+        "sensitivity-to": "sensitivity to {axis}",
+        "zero-reading": "zero reading",
+        "tilt-towards-vertical": "tilt {axis} towards the vertical",
+        "zero-both-ways": "turn the zero reading's axis both ways up",
+        # why a fit ended
+        "small-step": "converged: the Gauss-Newton step no longer moves the parameters",
+        "small-gradient": "converged: the residual is orthogonal to every parameter",
+        "zero-residual": "converged: the residual vanishes to rounding",
+        "no-descent": "stopped: no step lowers the cost any further",
+        "too-many-iterations": "stopped: iteration limit reached before convergence",
+        "closed-form": "closed form",
+        "linear-least-squares": "linear least squares",
+        # places in a file, amounts
+        "line": "line {line}",
+        "row": "row {row}",
+        "sample": "sample {sample}, {row}, {time_s:.3f} s",
+        "column": "column {column}",
+        "devices": "{devices:each}",
+        "counted": "{words:each}",
+        "both": "{one} and {other}",
+        "streams": "{streams:each}{has_more:? ...|}",
+        "this-container": "This {kind}",
+        "unit-with-rate": "{unit} ({rate_hz:.4g} Hz)",
+        "amount-of-scatter": "{value:.3g} {unit} in {name}",
+        "amount-of-change": "{value:+.3g} ± {std:.2g} {unit} in {name}",
+        # what an exception said, or a finding, or an effect: a sentence becomes a clause of another
+        "because": "{sentence:clause}",
+        "quoted": "{sentence}",
+        # why an effect was not taken off
+        "effect-unknown": "this version does not know it",
+        "effect-of-session": "it belongs to that session, not to the sensor",
+        # why a recording does not go with the others
+        "not-trusted": "its own calibration is not to be trusted: {seen}",
+        "sensor-not-calibrated": "its {sensor} was not calibrated",
+        "first-lacks-sensor": "the first recording has no {sensor}",
+        "another-unit": "its {sensor} is in {unit}, that of the first recording in {first_unit}",
+        "another-gravity": "it was calibrated with another gravity",
+    }
+)
+
+
+def phrase(name: str, values: Mapping[str, Any]) -> str:
+    """The words of a phrase.
+
+    Raises
+    ------
+    KeyError
+        When there is no such phrase, or a place of it has no value.
+    """
+    return filled(PHRASES[name], values, LINES)

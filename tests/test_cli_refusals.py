@@ -1,0 +1,152 @@
+"""One sentence for every question that the command line cannot answer, and nothing written."""
+
+import gzip
+import json
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trihedron.cli import main
+from trihedron.records import Recording
+from trihedron.simulate import Hold, Motion, MoveTo
+from written_session import G, log_text, recording, refused, refused_only, session, simulated
+
+__all__ = ["recording", "session"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["calibrat", "x.csv"], "Did you mean 'calibrate'"),
+        (["calibrate", "--gravty", "9.8", "x.csv"], "--gravity"),
+        (["calibrate"], "no log was named"),
+        (["calibrate", "x.csv", "--method", "magic"], "joint, separate, faces"),
+        (["calibrate", "x.csv", "--frame", "upper"], "lower, symmetric, case"),
+        (["calibrate", "x.csv", "--gravity", "heavy"], "number"),
+        (["calibrate", "x.csv", "--faces", "1,two"], "--faces"),
+        (["calibrate", "x.csv", "--axis-signs", "++"], "three signs"),
+        (["calibrate", "x.csv", "--report", "r.docx"], ".html, .txt or .json"),
+        (["export", "x.json"], "--to"),
+    ],
+)
+def test_a_slip_of_the_pen_is_answered_with_what_there_is(capsys, arguments, said):
+    assert said in refused(capsys, *arguments)
+
+
+def bad_log(name, recording):
+    """Content of a log that cannot be calibrated."""
+    text = log_text(recording)
+    lines = text.splitlines()
+    header = lines[0]
+    body = {
+        "empty": b"",
+        "one row": "\n".join(lines[:2]),
+        "header only": header,
+        "text in numbers": "\n".join([*lines[:500], "12.0,oops,oops,oops,1,2,3", *lines[500:]]),
+        "constant column": "\n".join(
+            [header, *(",".join([*r.split(",")[:3], "7", *r.split(",")[4:]]) for r in lines[1:])]
+        ),
+        "all not a number": "\n".join([header, *(f"{k / 100},nan,nan,nan,nan,nan,nan" for k in range(500))]),
+        "truncated gzip": gzip.compress(text.encode())[:-2000],
+        "a picture": b"\x89PNG\r\n\x1a\n" + b"\x00" * 100,
+        "words": "dear diary\n" * 50,
+        "reversed time": "\n".join([header, *lines[:0:-1]]),
+    }[name]
+    return body if isinstance(body, bytes) else body.encode()
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["empty", "one row", "header only", "constant column", "all not a number", "truncated gzip", "a picture", "words"],
+)
+def test_a_log_that_is_none_is_refused_by_name_and_nothing_is_written(recording, tmp_path, capsys, name):
+    log = tmp_path / "bad.csv"
+    log.write_bytes(bad_log(name, recording))
+    for command in ("segment", "check", "calibrate"):
+        said = refused_only(capsys, command, log, *(["-o", tmp_path / "c.json"] if command == "calibrate" else []))
+        assert "bad.csv" in said
+    assert [p.name for p in tmp_path.iterdir()] == ["bad.csv"]
+
+
+@pytest.mark.parametrize("name", ["text in numbers", "reversed time"])
+def test_a_damaged_log_is_refused_or_calibrated_with_a_finding_but_never_in_silence(recording, tmp_path, capsys, name):
+    log = tmp_path / "bad.csv"
+    log.write_bytes(bad_log(name, recording))
+    status = main(["calibrate", str(log), "--gravity", G])
+    out, err = capsys.readouterr()
+    assert "Traceback" not in err
+    if status == 1:
+        assert "bad.csv" in err
+    else:
+        assert "warning" in out or "serious" in out
+
+
+def test_a_directory_and_a_file_without_permission_are_told_apart(tmp_path, capsys):
+    assert "directory" in refused(capsys, "calibrate", tmp_path)
+    closed = tmp_path / "closed.csv"
+    closed.write_text("t,ax,ay,az\n")
+    closed.chmod(0)
+    if os.access(closed, os.R_OK):
+        pytest.skip("this user may read everything")
+    assert "permission" in refused(capsys, "calibrate", closed)
+
+
+def test_an_output_that_exists_is_refused_before_the_work_and_left_as_it_was(session, tmp_path, capsys):
+    kept = tmp_path / "kept.json"
+    kept.write_text("precious")
+    for option in ("-o", "--json", "--report"):
+        assert "left alone" in refused(capsys, "calibrate", session / "log.csv", option, kept)
+        assert kept.read_text() == "precious"
+    assert main(["calibrate", str(session / "log.csv"), "--gravity", G, "-o", str(kept), "--force"]) == 0
+    assert json.loads(kept.read_text())["format_version"] == 1
+
+
+def test_the_log_itself_is_never_overwritten_by_a_forgotten_argument(session, capsys):
+    before = (session / "log.csv").read_bytes()
+    main(["calibrate", "--json", str(session / "log.csv")])
+    assert (session / "log.csv").read_bytes() == before
+    capsys.readouterr()
+
+
+def test_an_output_folder_that_is_missing_is_named(session, tmp_path, capsys):
+    assert "there is no folder" in refused(capsys, "calibrate", session / "log.csv", "-o", tmp_path / "no" / "c.json")
+
+
+def test_two_outputs_of_one_name_are_refused(session, tmp_path, capsys):
+    path = tmp_path / "x.json"
+    assert "two outputs" in refused(capsys, "calibrate", session / "log.csv", "-o", path, "--json", path)
+
+
+def test_units_that_a_calibration_does_not_map_are_refused(session, recording, tmp_path, capsys):
+    other = tmp_path / "si.csv"
+    in_si = replace(recording, accelerometer=recording.accelerometer * 6e-4, gyroscope=recording.gyroscope * 1.3e-4)
+    other.write_text(log_text(in_si))
+    for command in ("apply", "verify"):
+        assert "maps counts" in refused(capsys, command, session / "c.json", other)
+
+
+def test_gravity_said_twice_or_by_height_alone_is_refused(session, capsys):
+    log = session / "log.csv"
+    assert "given twice" in refused(capsys, "calibrate", log, "--gravity", G, "--latitude", "50")
+    assert "--latitude" in refused(capsys, "calibrate", log, "--height", "100")
+    assert "latitude" in refused(capsys, "calibrate", log, "--latitude", "95")
+    assert "m/s²" in refused(capsys, "calibrate", log, "--gravity", "980")
+
+
+def test_too_few_poses_and_a_log_that_never_rests_are_refused_with_the_remedy(tmp_path, capsys):
+    two = tmp_path / "two.csv"
+    two.write_text(log_text(simulated(Motion((Hold(5.0), MoveTo((1.0, 0.0, 0.0), 2.0), Hold(5.0))))))
+    said = refused(capsys, "calibrate", two)
+    assert "two.csv" in said
+    assert "poses" in said
+    rng = np.random.default_rng(1)
+    time_s = np.arange(3000) / 100.0
+    swing = 9.8 * np.sin(np.outer(time_s, [2.1, 3.3, 4.7])) + rng.normal(size=(3000, 3))
+    moving = Recording(time_s, swing, 2.0 * np.cos(np.outer(time_s, [2.1, 3.3, 4.7])), 100.0)
+    shaken = tmp_path / "shaken.csv"
+    shaken.write_text(log_text(moving))
+    assert "still" in refused(capsys, "calibrate", shaken)
+    assert main(["check", str(shaken)]) == 2
+    assert "NOT FIT" in capsys.readouterr().out

@@ -1,0 +1,54 @@
+"""A session as people write it to a file, its calibration, and the one sentence with which a command refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trihedron.cli import main
+from trihedron.records import Recording
+from trihedron.simulate import hand_session, scenario_by_name, simulate
+
+G = "9.80665"
+
+
+def log_text(recording: Recording, *, columns="time_s,ax,ay,az,gx,gy,gz", scale=1.0):
+    rows = np.column_stack([recording.time_s * scale, recording.accelerometer, recording.gyroscope])
+    return columns + "\n" + "\n".join(",".join(f"{v:.10g}" for v in row) for row in rows) + "\n"
+
+
+def simulated(motion, seed=3):
+    return simulate(replace(scenario_by_name("hand-session"), motion=motion), seed)[0]
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return simulated(hand_session(n_poses=16, hold_s=3.0, move_s=1.5, first_hold_s=5.0))
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory, recording):
+    """A folder with a good log and its calibration."""
+    folder = tmp_path_factory.mktemp("session")
+    (folder / "log.csv").write_text(log_text(recording))
+    assert main(["calibrate", str(folder / "log.csv"), "--gravity", G, "-o", str(folder / "c.json")]) == 0
+    return folder
+
+
+def refused(capsys, *arguments):
+    """The one sentence with which a command refuses."""
+    status = main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    assert status == 1, (status, err)
+    assert out == ""
+    lines = err.strip().splitlines()
+    assert len(lines) == 1, err
+    assert lines[0].startswith("trihedron: ")
+    assert "Traceback" not in err
+    assert len(lines[0]) < 400
+    return lines[0]
+
+
+def refused_only(capsys, *arguments):
+    capsys.readouterr()
+    return refused(capsys, *arguments)
