@@ -1,7 +1,5 @@
 //! Means and noise of readings over ranges of rows: what a log of still poses is asked for again and again.
 
-use crate::stamps::median;
-
 type Row = [f64; 3];
 
 fn is_number(row: &Row) -> bool {
@@ -78,24 +76,9 @@ pub fn block_differences(
     (sum, n)
 }
 
-/// Largest, smallest and middle finite value of a channel, and the middle size of its steps from finite value to finite
-/// value; NaN where there is none.
-#[must_use]
-pub fn extent(rows: &[Row], channel: usize) -> [f64; 4] {
-    let mut values: Vec<f64> = rows
-        .iter()
-        .map(|row| row[channel])
-        .filter(|value| value.is_finite())
-        .collect();
-    let mut steps: Vec<f64> = values.windows(2).map(|p| (p[1] - p[0]).abs()).collect();
-    let largest = values.iter().copied().fold(f64::NAN, f64::max);
-    let smallest = values.iter().copied().fold(f64::NAN, f64::min);
-    [largest, smallest, median(&mut values), median(&mut steps)]
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{block_differences, extent, means_by_owner};
+    use super::{block_differences, means_by_owner};
 
     #[test]
     fn rows_with_a_missing_reading_belong_to_no_mean() {
@@ -120,13 +103,5 @@ mod tests {
             block_differences(&rows, &[[0, 3], [3, 6]], &[0, 1], 2),
             ([0.0; 3], 0)
         );
-    }
-
-    #[test]
-    fn a_channel_reaches_as_far_as_its_finite_values() {
-        let rows = [[2.0; 3], [f64::NAN; 3], [-1.0; 3], [5.0; 3], [4.0; 3]];
-        let bits = |all: [f64; 4]| all.map(f64::to_bits);
-        assert_eq!(bits(extent(&rows, 1)), bits([5.0, -1.0, 3.0, 3.0]));
-        assert!(extent(&[], 0).iter().all(|value| value.is_nan()));
     }
 }

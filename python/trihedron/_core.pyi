@@ -222,7 +222,6 @@ def means_by_owner(
 def block_differences(
     readings: FloatArray, ranges: npt.NDArray[np.int64], owner: npt.NDArray[np.int64], length: int
 ) -> tuple[list[float], int]: ...
-def channel_extents(readings: FloatArray) -> FloatArray: ...
 
 # joints of a motion, and the law of its noise
 def motion_joints(

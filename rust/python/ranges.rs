@@ -11,8 +11,7 @@ use crate::ranges;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(means_by_owner, module)?)?;
-    module.add_function(wrap_pyfunction!(block_differences, module)?)?;
-    module.add_function(wrap_pyfunction!(channel_extents, module)?)
+    module.add_function(wrap_pyfunction!(block_differences, module)?)
 }
 
 /// Ranges `(k, 2)` of `n` rows.
@@ -105,17 +104,4 @@ fn block_differences(
         let rows = as_rows(&readings);
         Ok(ranges::block_differences(rows, &ranges, &owner, length))
     })
-}
-
-/// `(3, 4)` largest, smallest and middle value of every channel, and the middle size of its steps.
-#[pyfunction]
-fn channel_extents<'py>(
-    py: Python<'py>,
-    readings: PyReadonlyArray2<'py, f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let readings = flat3("readings", &readings)?;
-    let all = super::run(py, || {
-        Ok([0, 1, 2].map(|c| ranges::extent(as_rows(&readings), c)))
-    })?;
-    PyArray1::from_slice(py, all.as_flattened()).reshape([3, 4])
 }
