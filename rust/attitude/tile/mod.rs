@@ -147,23 +147,6 @@ impl Tile {
 
     fn gather(&mut self, samples: &Samples<'_>, first: usize, stop: usize) {
         let (time_s, rate) = (samples.time_s, samples.rate);
-        if first + Self::STEPS <= stop
-            && let Some(time_s) = time_s[first..].first_chunk::<{ Self::STEPS + 1 }>()
-            && let Some(rate) = rate[first..].first_chunk::<{ Self::STEPS + 1 }>()
-        {
-            // Rows are written whole: sixteen stretches are read side by side.
-            for m in 0..=ROWS {
-                for l in 0..LANES {
-                    self.time[m][l] = time_s[l * ROWS + m];
-                }
-                for c in 0..3 {
-                    for l in 0..LANES {
-                        self.rate[m][c][l] = rate[l * ROWS + m][c];
-                    }
-                }
-            }
-            return;
-        }
         for l in 0..LANES {
             let at = first + l * ROWS;
             if at + ROWS <= stop {
