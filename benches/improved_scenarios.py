@@ -2,20 +2,28 @@
 
     python benches/improved_scenarios.py ../shared/data [set ...]
 
-For each set an ideal scenario is held against the recording (``diagnose --against``), improved, and held against it
-again. Poses and moves: rms of what the model leaves, stage by stage; then that of the improved simulation, moved as the
-recording was and diagnosed by itself, over the recording's. Noise: simulation over recording by octaves, all axes of
-a sensor (lowest and highest of the octaves' geometric means).
+For each set an ideal scenario is held against the recording (``diagnose --against``), improved with the recording's
+numbers, then noise, then effects and scatter, and every one of them is moved as the recording was. A line a stage:
+simulation over recording, rms of four simulations, of what poses miss in the length of gravity and moves in its
+direction, the worst of either side spared, and of the noise per octave (geometric mean of all octaves and axes, lowest
+and highest octave). As given, both are read with the scenario's numbers; from the stage of the numbers on each is read
+with its own calibration. The last column is the verdict of ``diagnose --against`` the improved scenario.
 """
 
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 import trihedron
+from trihedron.diagnose.against.fitted import model_of_calibration
 from trihedron.pipeline import driven, improve
+from trihedron.pipeline.carried_misses import carried_misses
+from trihedron.pipeline.comparing_noise import sampled
+from trihedron.segment import resegment
+from trihedron.sensor_model import correct
 from trihedron.simulate import read_scenario
 
 IDEAL = 'name = "ideal"\nprofile = "ideal"\n\n[session]\nkind = "hand"\n'
@@ -35,9 +43,11 @@ SETS = {
         for k in (2, 3, 4)
     },
     **{f"mpu9150 {k}": ({"path": f"mpu9150/imu{k}.log", "rate_hz": 100.0}, 9.81) for k in (0, 1, 2)},
+    "kim 1": ({"path": "kim/kim_imu_good1.txt"}, 9.79871),
     "kim 2": ({"path": "kim/kim_imu_good2.txt"}, 9.79871),
     "kim 3": ({"path": "kim/kim_imu_good3.txt"}, 9.79871),
-    "openaxes bmi160": ({"path": "openaxes/bmi160.csv"}, 9.8127),
+    **{f"mimu4444 {k}": ({"path": f"mimu4444/exp_{k}.npz", "device": 1}, 9.8184) for k in (3, 5)},
+    **{f"openaxes {part}": ({"path": f"openaxes/{part}.csv"}, 9.8127) for part in ("bmi160", "adxl355")},
 }
 
 
@@ -49,57 +59,99 @@ def logs(folder, chosen):
         yield name, paths, gravity
 
 
-DOMAINS = ("static-accel", "moves")
+SEEDS = {"as-given": (300,), "numbers": (300,), "noise": (300, 301), "effects": (300, 301, 302, 303)}
+"""Of the simulations of each stage, none of those that the improvement itself makes."""
 
 
-def rms(diagnosis, domain):
-    return next((d.rms for d in diagnosis.remaining if d.domain == domain), float("nan"))
+def of_poses(log, segments, calibration):
+    """Mean square of what the length of gravity misses in the poses [(m/s²)²], the worst spared."""
+    a = calibration.accelerometer
+    length = [np.linalg.norm(correct(log.accelerometer[h.samples()].mean(axis=0), a.S, a.b)) for h in segments.holds]
+    return spared(np.array(length) - calibration.gravity_m_s2)
 
 
-def octaves(diagnosis, sensor):
-    by = {}
-    for n in diagnosis.noise_compared:
-        if n.term == "octave" and n.sensor == sensor and n.ratio:
-            by.setdefault(n.band_hz, []).append(np.log(n.ratio))
-    means = [float(np.exp(np.mean(v))) for v in by.values()]
-    return f"{min(means):.2f} to {max(means):.2f}" if means else "–"
+def of_moves(log, segments, calibration):
+    """Mean square of the angle by which carried gravity misses the next pose [rad²], the worst spared."""
+    return spared(carried_misses(calibration, log, segments).angle_rad)
+
+
+def spared(misses):
+    return float(np.mean(np.sort(misses**2)[:-1]))
+
+
+def octaves(simulated, recording):
+    """Logarithms of the ratio of densities of noise, {(sensor, low_hz): [axes]}."""
+    out = {}
+    for sensor, axes in recording.noise.items():
+        for m, r in zip(simulated.noise.get(sensor, ()), axes, strict=False):
+            made = {o.low_hz: o.density.value for o in m.octaves}
+            for o in r.octaves:
+                if made.get(o.low_hz, 0.0) > 0.0:
+                    out.setdefault((sensor, o.low_hz), []).append(0.5 * np.log(made[o.low_hz] / o.density.value))
+    return out
 
 
 def one(name, paths, gravity, work):
     recording = trihedron.read(**paths)
-    given, better = work / "ideal.toml", work / "better.toml"
+    given = work / "ideal.toml"
     given.write_text(IDEAL)
     found = trihedron.diagnose(recording, against=given, gravity_m_s2=gravity)
-    better.write_text(improve(given, found).text)
-    again = trihedron.diagnose(recording, against=better, gravity_m_s2=gravity)
     own = trihedron.calibrate(recording, gravity_m_s2=gravity)
-    moved = driven(read_scenario(better), recording, own.segments, own.calibration)
-    simulated = trihedron.diagnose(moved, gravity_m_s2=gravity)
-    stages = "; ".join(f"{stage.stage}: " + ", ".join(shown(stage)) for stage in found.stages)
-    ratios = ", ".join(f"{rms(simulated, d) / rms(again, d):.2f}" for d in DOMAINS)
-    cells = (
-        name,
-        f"{found.verdict}: {named(found)}",
-        stages,
-        f"{again.verdict}: {named(again)}",
-        ratios,
-        octaves(again, "accelerometer"),
-        octaves(again, "gyroscope"),
+    poses = resegment(recording, own.segments)
+    seen = sampled(recording, own.segments.holds, model_of_calibration(own.calibration))
+    files = {"as-given": given}
+    for stage in ("numbers", "noise", "effects"):
+        files[stage] = work / f"{stage}.toml"
+        files[stage].write_text(improve(given, found, stage=stage).text)
+    again = trihedron.diagnose(recording, against=files["effects"], gravity_m_s2=gravity)
+    said = {"as-given": f"{found.verdict}: {named(found)}", "effects": f"{again.verdict}: {named(again)}"}
+    for stage, path in files.items():
+        scenario = read_scenario(path)
+        made, ratios = [], {}
+        for seed in SEEDS[stage]:
+            log = driven(scenario, recording, own.segments, own.calibration, seed)
+            its = trihedron.calibrate(log, gravity_m_s2=gravity)
+            reads = with_numbers(its.calibration, scenario) if stage == "as-given" else its.calibration
+            cut = resegment(log, its.segments)
+            made.append((of_poses(log, cut, reads), of_moves(log, cut, reads)))
+            for key, values in octaves(
+                sampled(log, its.segments.holds, model_of_calibration(its.calibration)), seen
+            ).items():
+                ratios.setdefault(key, []).extend(values)
+        reads = with_numbers(own.calibration, scenario) if stage == "as-given" else own.calibration
+        beside = np.mean(made, axis=0) / (of_poses(recording, poses, reads), of_moves(recording, poses, reads))
+        cells = [name if stage == "as-given" else "", stage, *(f"{v:.2f}" for v in np.sqrt(beside))]
+        cells += [in_short(ratios, sensor) for sensor in ("accelerometer", "gyroscope")]
+        print(f"| {' | '.join([*cells, said.get(stage, '')])} |", flush=True)
+
+
+def with_numbers(calibration, scenario):
+    """The calibration with S and b of a scenario."""
+    a, g = scenario.accelerometer, scenario.gyroscope
+    return replace(
+        calibration,
+        accelerometer=replace(calibration.accelerometer, S=np.array(a.S), b=np.array(a.b)),
+        gyroscope=replace(calibration.gyroscope, S=np.array(g.S), b=np.array(g.b)),
     )
-    print(f"| {' | '.join(cells)} |", flush=True)
+
+
+def in_short(ratios, sensor):
+    means = [float(np.mean(values)) for (of, _), values in ratios.items() if of == sensor]
+    if not means:
+        return "–"
+    return f"{np.exp(np.mean(means)):.2f} ({np.exp(min(means)):.2f} to {np.exp(max(means)):.2f})"
 
 
 def named(diagnosis):
-    return ", ".join(effect.id for effect in diagnosis.effects) or "no effect"
-
-
-def shown(stage):
-    return [f"{d.domain} {d.rms:.3g} {d.unit}" for d in stage.domains if d.domain in DOMAINS]
+    return (
+        ", ".join(f"{effect.id}{' of the model' if effect.side == 'model' else ''}" for effect in diagnosis.effects)
+        or "no effect"
+    )
 
 
 def main():
     folder, chosen = Path(sys.argv[1]), sys.argv[2:]
-    head = ("set", "ideal", "stages, held out", "improved", "poses, moves", "accelerometer's octaves", "gyro's")
+    head = ("set", "stage", "poses", "moves", "accelerometer's octaves", "gyro's", "verdict against it")
     print(f"| {' | '.join(head)} |")
     print("|" + "---|" * len(head))
     for name, paths, gravity in logs(folder, chosen):

@@ -190,6 +190,13 @@ def test_the_noise_stage_falls_to_what_the_recordings_own_halves_differ_by():
     # What is not said to differ is not replaced.
     kept = with_noise_stage(stages, given, quiet, segments, fit, [replace(differs, significant=False)])
     assert len({d.rms for s in kept for d in s.domains if d.domain == "noise"}) == 1
+    # Without any noise in the model there is no ratio, and with three holds no half: the stage is there all the same.
+    silent = replace(quiet, accelerometer=np.ones((4000, 3)), gyroscope=np.zeros((4000, 3)))
+    out = with_noise_stage(stages, sampled(silent, holds, fit), quiet, segments, fit, [differs])
+    assert [[d.domain for d in s.domains] for s in out] == [[], ["moves"], ["moves", "noise"], ["noise"]]
+    few = Segments(holds=holds[:3], **still(3))
+    out = with_noise_stage(stages, given, quiet, few, fit, [differs])
+    assert [s.stage for s in out] == ["as-given", "numbers", "noise", "effects"]
 
 
 def test_stamps_that_reading_made_even_still_count_as_scattered():

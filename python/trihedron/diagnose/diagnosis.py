@@ -170,14 +170,15 @@ def _with_late(
     if len(late.accepted) == len(model.accepted):
         return late, candidates  # the same model, which remembers what was looked for in vain
     # What was needless, or too little, in the noise of a model without them may stand beside them.
-    late = replace(late, refused=frozenset(one for one in late.refused if _is_direct(one)))
+    late = replace(late, refused=frozenset(one for one in late.refused if not _competes(one)))
     scored, _ = scores(late, exclude=late.refused)
     return judged_again(_grown(late, scored, alpha, lambda _part: None)), candidates
 
 
-def _is_direct(effect_id: str) -> bool:
-    """Whether an effect brings evidence of its own: refused, it is not looked for again."""
-    return any(one.id == effect_id and isinstance(one, DirectEffect) for one in catalogue())
+def _competes(effect_id: str) -> bool:
+    """Whether an effect has columns that compete; one with nothing but evidence of its own is not looked for again."""
+    effect = next((one for one in catalogue() if one.id == effect_id), None)
+    return not isinstance(effect, DirectEffect) or type(effect).variants is not DirectEffect.variants
 
 
 def _grown(model: StepwiseModel, scored: list[Scored], alpha: float, tell: Callable[[float], None]) -> StepwiseModel:

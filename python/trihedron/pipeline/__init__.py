@@ -15,11 +15,12 @@ if TYPE_CHECKING:
     from trihedron.pipeline.converting import convert
     from trihedron.pipeline.demonstrating import demo
     from trihedron.pipeline.diagnosing import diagnose
+    from trihedron.pipeline.driving import driven
     from trihedron.pipeline.exporting import export
     from trihedron.pipeline.extending import extend
     from trihedron.pipeline.filtering import KalmanResult, kalman
     from trihedron.pipeline.identifying import noise, noise_of_curve, noise_of_file, recording_lengths
-    from trihedron.pipeline.improving import driven, improve
+    from trihedron.pipeline.improving import improve
     from trihedron.pipeline.planning import plan
     from trihedron.pipeline.presenting import plot, report
     from trihedron.pipeline.reading import read, segment
@@ -96,7 +97,7 @@ _HOME = {
     "noise_of_curve": "trihedron.pipeline.identifying",
     "noise_of_file": "trihedron.pipeline.identifying",
     "recording_lengths": "trihedron.pipeline.identifying",
-    "driven": "trihedron.pipeline.improving",
+    "driven": "trihedron.pipeline.driving",
     "improve": "trihedron.pipeline.improving",
     "read": "trihedron.pipeline.reading",
     "segment": "trihedron.pipeline.reading",

@@ -47,7 +47,10 @@ def compared(
     model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated[0])
     given_effects = () if simulated is None else _without_walk(simulated[0].effects, noise)
     unexplained = {test.domain for test in found.remaining if test.disagrees}
-    effects = compare_effects(given_effects, found.effects, found.candidates, alpha=alpha, unexplained=unexplained)
+    effects = compare_effects(
+        given_effects, found.effects, found.candidates, alpha=alpha, unexplained=unexplained,
+        misses={test.domain: test.rms for test in found.domains},
+    )  # fmt: skip
     numbers = compare_numbers(
         model,
         model_of_diagnosis(found),
@@ -71,7 +74,7 @@ def compared(
         verdict=verdict,
         # Effects that the model has too are no disagreement with it.
         domains=(*(found.domains if effects.missing else found.remaining), _numbers_test(parameters)),
-        effects=(*effects.missing, *effects.surplus),
+        effects=effects.in_order,
         parameters=parameters,
         noise_compared=noise,
         stages=(_as_given(given, recording, segments), *found.stages),

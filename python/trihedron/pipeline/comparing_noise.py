@@ -29,8 +29,9 @@ LEAST_STEP_RATIO = math.sqrt(2.0)
 """Ranges of a converter come in powers of two: halfway between two of them."""
 DIGITS = 0.1
 """Steps of a tenth of the noise add a thousandth to its variance: whether they are a converter's changes nothing."""
-LEAST_SEEN_STEP = 1e-3
-"""Of the noise: no converter has a thousand codes to a standard deviation; resampled readings come that near."""
+LEAST_SEEN_STEP = 1e-2
+"""Of the noise: hardly a converter has a hundred codes to a standard deviation; sums of readings and what was taken off
+them come that near to a grid, and steps as fine cannot be told from the digits of a file."""
 LEAST_CORNER_RATIO = 1.2
 """Filters are chosen from lists whose neighbours differ by 1.5 to 2; within a fifth they are the same entry."""
 LEAST_RATE_RATIO = 1.02

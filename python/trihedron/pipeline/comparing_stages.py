@@ -30,15 +30,14 @@ def with_noise_stage(
 
     Every second hold is predicted: by the given model until its noise is replaced, from then on by the recording's
     other holds. A model whose noise differs nowhere in ``compared`` keeps it: half the holds know it less well. The
-    misfit is the rms over sensors, axes and octaves of 20 log10 of the ratio of densities [dB].
+    misfit is the rms over sensors, axes and octaves of 20 log10 of the ratio of densities [dB]; a stage has none where
+    that is no number, as of a model without any noise.
     """
-    if segments.n_holds < FEWEST_HOLDS:
-        return tuple(stages)
-    taught, seen = (sampled(recording, segments.holds[first::2], fit) for first in (0, 1))
-    given, own = _misfit(model, seen), _misfit(taught, seen)
-    if given is None or own is None:
-        return tuple(stages)
-    if not any(one.significant and one.term in NOISE_IN_HOLDS for one in compared):
+    given = own = None
+    if segments.n_holds >= FEWEST_HOLDS:
+        taught, seen = (sampled(recording, segments.holds[first::2], fit) for first in (0, 1))
+        given, own = _misfit(model, seen), _misfit(taught, seen)
+    if given is not None and not any(one.significant and one.term in NOISE_IN_HOLDS for one in compared):
         own = given
     out: list[Stage] = []
     for stage in stages:
@@ -49,7 +48,9 @@ def with_noise_stage(
     return tuple(out)
 
 
-def _with(stage: Stage, misfit: float) -> Stage:
+def _with(stage: Stage, misfit: float | None) -> Stage:
+    if misfit is None:
+        return stage
     return Stage(stage.stage, (*stage.domains, StageDomain("noise", misfit, None, "dB")))
 
 

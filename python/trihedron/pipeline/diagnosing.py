@@ -23,7 +23,7 @@ from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
 from trihedron.pipeline.comparing_slow import slow_noise
 from trihedron.pipeline.comparing_stages import with_noise_stage
 from trihedron.pipeline.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
-from trihedron.pipeline.improving import driven
+from trihedron.pipeline.driving import driven
 from trihedron.pipeline.reading import AnyRecording, read, recording_of, segment, segments_of
 from trihedron.pipeline.referring import AnyReference
 from trihedron.pipeline.results import DiagnosisResult

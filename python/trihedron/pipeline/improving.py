@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import tomllib
-from scipy.stats import chi2
-from scipy.stats import f as f_distribution
 
 from trihedron.diagnose.against import model_of_diagnosis
-from trihedron.files.log import write_recording
 from trihedron.files.scenario import improved_scenario
-from trihedron.pipeline.calibrating import calibrate
-from trihedron.pipeline.carried_misses import carried_misses
 from trihedron.pipeline.comparing_noise import sampled
-from trihedron.pipeline.reading import read
+from trihedron.pipeline.driving import zero_in_moves, zero_of_poses
 from trihedron.pipeline.results import DiagnosisResult
-from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.hold_noise import HoldNoise
-from trihedron.segment import resegment
 from trihedron.simulate import (
     NoiseTerms,
     Scenario,
@@ -34,47 +26,9 @@ from trihedron.simulate import (
     noise_of_octaves,
     read_scenario,
     scenario_from_table,
-    simulate,
-    twin_scenario,
 )
 
 FEWEST_OCTAVES = 4
-FEWEST_MOVES = 6
-FEWEST_POSES = 8
-OF_MEDIANS = 0.37
-"""A median of squares knows a variance as well as the mean of that share of them."""
-BY_CHANCE = 0.01
-"""Two sessions of one unit miss so unlike in one of a hundred."""
-SEED = 20
-"""Of the simulation that is held against the recording: any, but always the same one."""
-
-
-def driven(
-    scenario: Scenario, recording: Recording, segments: Segments, own: Calibration, seed: int = SEED
-) -> Recording:
-    """The scenario's instrument moved as the recording was: its poses and moves, the scenario's own clock.
-
-    ``own`` is the recording's own calibration, by which its motion is told from its readings.
-
-    Raises
-    ------
-    ValueError
-        When the recording lacks a sensor or was never still.
-    """
-    # A pose that was pushed is pushed again: what happened to the recording is no property of an instrument.
-    motion = twin_scenario(recording, resegment(recording, segments), own).motion
-    simulated, _ = simulate(replace(scenario, motion=motion), seed)
-    if scenario.clock.stamp_jitter_s > 0.0 or scenario.clock.jitter_s > 0.0:
-        simulated = _as_read(simulated)
-    return replace(simulated, source=f"{scenario.name}, moved as {recording.source}")
-
-
-def _as_read(simulated: Recording) -> Recording:
-    """A simulated log through a file: what its stamps are worth is settled as that of the recording was."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "simulated.csv"
-        write_recording(simulated, path)
-        return read(path)
 
 
 @dataclass(frozen=True)
@@ -85,10 +39,13 @@ class Improvement:
     left_out: Mapping[str, str]
 
 
-def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
+def improve(
+    scenario: str | Path, found: DiagnosisResult, *, stage: Literal["numbers", "noise", "effects"] = "effects"
+) -> Improvement:
     """The user's scenario file with numbers, noise, sampling and physics of the recording.
 
     Only what differs is replaced; comments, order and all else stay. Effects that only the scenario has are taken out.
+    ``stage`` stops after the numbers, or after noise and sampling.
 
     Raises
     ------
@@ -99,7 +56,11 @@ def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
     tables: dict[str, dict[str, Any]] = {"accelerometer": {}, "gyroscope": {}, "clock": {}, "environment": {}}
     _numbers(tables, given, found)
     _gravity(tables, given, found)
+    if stage == "numbers":
+        return Improvement(improved_scenario(scenario, tables, [], []), {})
     _noise(tables, given, found)
+    if stage == "noise":
+        return Improvement(improved_scenario(scenario, tables, [], []), {})
     physics = [effect for effect in found.effects if effect.side == "recording"]
     shared = {p.id for p in found.parameters if p.significant}
     sizes, left_out = diagnosed_sizes([e.to_dict() for e in (*physics, *_shared(found, shared))])
@@ -116,72 +77,6 @@ def improve(scenario: str | Path, found: DiagnosisResult) -> Improvement:
                 tables[sensor]["electronics"] = {key: strays}
                 text = improved_scenario(scenario, tables, sizes, surplus)
     return Improvement(text, left_out)
-
-
-def zero_of_poses(
-    better: Scenario, recording: Recording, segments: Segments, own: Calibration
-) -> tuple[float, float, float] | None:
-    """By how much the accelerometer's zero must be another in every pose [m/s²] for lengths of gravity to miss alike.
-
-    Medians, so that a pose that was pushed makes no scatter for all of them. ``None`` where both miss alike within
-    chance.
-    """
-    simulated = driven(better, recording, segments, own)
-    try:
-        of_it = calibrate(simulated, gravity_m_s2=better.environment.gravity)
-    except ValueError:
-        return None
-    ours, theirs = _scale_of_poses(own), _scale_of_poses(of_it.calibration)
-    if ours is None or theirs is None:
-        return None
-    (seen, dof), (made, dof_made) = ours, theirs
-    ratio = max(seen / made, made / seen) if made > 0.0 else np.inf
-    if f_distribution.sf(ratio, OF_MEDIANS * dof, OF_MEDIANS * dof_made) > BY_CHANCE:
-        return None
-    before = np.array(better.accelerometer.electronics.zero_scatter)
-    wanted = float(np.mean(before**2)) + seen - made
-    if wanted <= 0.0:
-        return (0.0, 0.0, 0.0) if np.any(before) else None
-    return (float(np.sqrt(wanted)),) * 3
-
-
-def _scale_of_poses(calibration: Calibration) -> tuple[float, int] | None:
-    """Variance of a pose's length of gravity [(m/s²)²] by the median, and its degrees of freedom."""
-    quality = calibration.accelerometer.quality
-    if quality is None or quality.dof < FEWEST_POSES:
-        return None
-    share = quality.dof / len(quality.residual)
-    return float(np.median(quality.residual**2)) / float(chi2.ppf(0.5, 1)) / share, quality.dof
-
-
-def zero_in_moves(
-    better: Scenario, recording: Recording, segments: Segments, own: Calibration
-) -> tuple[float, float, float] | None:
-    """By how much the gyro's zero must stray in moves [rad/s] for an improved scenario to miss as the recording does.
-
-    Gravity carried through the moves of the recording and of the scenario moved alike: what the recording misses more
-    is put on the zero, the same on all axes. ``None`` where both miss alike within chance.
-    """
-    simulated = driven(better, recording, segments, own)
-    try:
-        of_it = calibrate(simulated, gravity_m_s2=better.environment.gravity)
-    except ValueError:
-        return None
-    ours = carried_misses(own, recording, resegment(recording, segments))
-    theirs = carried_misses(of_it.calibration, simulated, resegment(simulated, of_it.segments))
-    if len(ours.angle_rad) < FEWEST_MOVES or len(theirs.angle_rad) < FEWEST_MOVES:
-        return None
-    seen, made = (float(np.mean(one.angle_rad**2)) for one in (ours, theirs))
-    ratio = max(seen / made, made / seen) if made > 0.0 else np.inf
-    # An angle has two components across the vertical.
-    if f_distribution.sf(ratio, 2 * len(ours.angle_rad), 2 * len(theirs.angle_rad)) > BY_CHANCE:
-        return None
-    before = np.array(better.gyroscope.electronics.zero_in_moves)
-    # Straying σ at both ends and straight between turns by σT/√2 an axis, two axes of three of it across the vertical.
-    wanted = float(np.mean(before**2)) + (seen - made) / float(np.mean(ours.duration_s**2))
-    if wanted <= 0.0:
-        return (0.0, 0.0, 0.0) if np.any(before) else None
-    return (float(np.sqrt(wanted)),) * 3
 
 
 def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import norm
 
 from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.selection.accepted import HEADLINE
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.records.domains import Domain
 from trihedron.units import STANDARD_GRAVITY_M_S2
@@ -80,6 +81,11 @@ class ComparedEffects:
     surplus: tuple[AcceptedEffect, ...]
     parameters: tuple[ParameterDifference, ...]
 
+    @property
+    def in_order(self) -> tuple[AcceptedEffect, ...]:
+        """Missing before surplus; behind both what is no mechanism of an instrument, as a scatter or a pushed pose."""
+        return tuple(sorted((*self.missing, *self.surplus), key=_is_beside))
+
 
 def compare_effects(
     model: Sequence[AcceptedEffect],
@@ -88,18 +94,29 @@ def compare_effects(
     *,
     alpha: float,
     unexplained: Collection[Domain] = (),
+    misses: Mapping[Domain, float] = MappingProxyType({}),
 ) -> ComparedEffects:
     """Pair the effects of both sides by name, or by what neither recording could tell apart.
 
     Effects of one session (a pushed pose, a table that was not level) belong to that session: they are never surplus.
     Nor is an effect that would show in a domain of which the recording leaves more ``unexplained`` than its noise:
-    it may be there, and hidden.
+    it may be there, and hidden. ``misses``: rms of the recording's residuals in each domain before any effect; an
+    effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than that.
     """
-    of_session = {effect.id for effect in catalogue() if effect.is_of_session}
+    by_id = {effect.id: effect for effect in catalogue()}
+    of_session = {effect.id for effect in by_id.values() if effect.is_of_session}
     # What the recording's own test calls likely, the search paid for, is not lacking, even where it did not earn its
     # place there.
     tried = [c for c in candidates if c.applicable]
     excluded = {c.id for c in tried if c.p_value is None or len(tried) * c.p_value > alpha}
+    drifting = {effect.id for effect in recording}
+    excluded |= {
+        effect.id
+        for effect in model
+        if any(c.id == effect.id and not c.applicable for c in candidates)
+        and by_id[effect.id].drifts_as in excluded - drifting
+        and _would_show(effect, misses)
+    }
     pairs: list[tuple[AcceptedEffect, AcceptedEffect]] = []
     missing: list[AcceptedEffect] = []
     left = list(model)
@@ -111,17 +128,38 @@ def compare_effects(
             left.remove(partner)
             pairs.append((partner, effect))
     surplus = [
-        replace(effect, side="model", share=None, statement=f"Only the model has it: {effect.statement}")
+        replace(effect, side="model", share=None, statement=_only_there(effect, candidates))
         for effect in left
         if effect.id not in of_session
         and effect.id in excluded
         and not {seen.domain for seen in effect.held_out[:1]} & set(unexplained)
+        and (_would_show(effect, misses) or not by_id[effect.id].is_spread)
     ]
     alike = [
         (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
     ]
     parameters = [p for m, r in alike for p in _parameters(m, r, alpha)]
     return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))
+
+
+def _is_beside(effect: AcceptedEffect) -> bool:
+    """Whether it follows behind mechanisms: a scatter, or what states that it carries little (a faint line)."""
+    is_spread = {one.id: one.is_spread for one in catalogue()}[effect.id]
+    is_stated = effect.side == "recording" and not effect.model.get("variant")
+    return is_spread or (is_stated and (effect.share or 0.0) < HEADLINE)
+
+
+def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:
+    """Whether an effect of this size made some domain's residuals larger than all that the recording's are."""
+    return any(
+        seen.rms_before**2 - seen.rms_after**2 > misses.get(seen.domain, 0.0) ** 2 for seen in effect.held_out[:1]
+    )
+
+
+def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
+    said = f"Only the model has it: {effect.statement}"
+    reasons = [c.reason for c in candidates if c.id == effect.id and not c.applicable]
+    return f"{said} Of the recording {reasons[0]}, and nothing in it drifts by as much." if reasons else said
 
 
 def _is_free(effect: AcceptedEffect) -> bool:

@@ -14,6 +14,7 @@ class AccelThermalBias(Effect):
 
     id = "accel-thermal-bias"
     leaves_open = ("accel-zero",)
+    drifts_as = "accel-hidden-drift"
     mechanism = "accelerometer bias follows the temperature"
     experiment = (
         "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"

@@ -13,6 +13,7 @@ class AccelThermalScale(Effect):
 
     id = "accel-thermal-scale"
     leaves_open = ("accel-zero", "accel-scale")
+    drifts_as = "accel-hidden-drift"
     mechanism = "accelerometer scale follows the temperature"
     experiment = "repeat the same faces and turns at two temperatures"
     applies_elsewhere = True

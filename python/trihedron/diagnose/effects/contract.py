@@ -66,6 +66,8 @@ class Effect(ABC):
     leaves_open: ClassVar[tuple[str, ...]] = ()
     """Numbers (ids) whose level depends on where the effect is counted from: a zero at the session's mean temperature
     is no other zero than one at 25 °C."""
+    drifts_as: ClassVar[str] = ""
+    """The effect (id) that it is in a log without its channel: what follows a temperature that nobody logged drifts."""
     is_local: ClassVar[bool] = False
     """Whether it concerns one pose or move only: its gain may then come from one block of held-out data."""
 

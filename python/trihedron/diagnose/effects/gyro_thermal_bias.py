@@ -15,6 +15,7 @@ class GyroThermalBias(Effect):
 
     id = "gyro-thermal-bias"
     leaves_open = ("gyro-zero",)
+    drifts_as = "gyro-hidden-drift"
     mechanism = "gyro bias follows the temperature"
     experiment = (
         "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"

@@ -13,6 +13,7 @@ class GyroThermalScale(Effect):
 
     id = "gyro-thermal-scale"
     leaves_open = ("gyro-zero", "gyro-scale")
+    drifts_as = "gyro-hidden-drift"
     mechanism = "gyro scale follows the temperature"
     experiment = "repeat the same faces and turns at two temperatures"
     applies_elsewhere = True

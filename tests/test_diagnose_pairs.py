@@ -1,0 +1,94 @@
+"""What blind pairs with nuisances showed (benches/blind_pairs.py), one small case for each cause that was mended."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+import trihedron
+from trihedron.diagnose.against import compare_effects
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter
+from trihedron.records.domains import HeldOut
+from trihedron.simulate import Scenario, hand_session, simulate
+from trihedron.simulate.effects import with_effect
+from trihedron.simulate.profiles import profile_by_name
+
+WITHOUT = "the log has no temperature"
+
+
+def effect(effect_id, before=0.014, after=0.002, *, domain="static-accel", share=0.9, variant="linear"):
+    parameter = EffectParameter("bias_per_kelvin_x", 0.01, 3e-4, "m/s^2/K")
+    held = (HeldOut(domain, 50.0, 1.0, before, after, "m/s^2"),)
+    return AcceptedEffect(effect_id, "Said.", (parameter,), 0.0, 99.0, held, model={"variant": variant}, share=share)
+
+
+def candidates(drift_p, thermal_reason=WITHOUT):
+    return [
+        Candidate("accel-thermal-bias", None, False, thermal_reason),
+        Candidate("accel-hidden-drift", drift_p, True),
+        *(Candidate(f"other-{k}", 0.5, True) for k in range(20)),
+    ]
+
+
+def surplus(drift_p, misses, own=(), unexplained=()):
+    said = compare_effects(
+        [effect("accel-thermal-bias")], own, candidates(drift_p), alpha=0.01, unexplained=unexplained,
+        misses={"static-accel": misses},
+    )  # fmt: skip
+    return [(one.id, one.side) for one in said.surplus]
+
+
+def test_an_effect_of_temperature_is_surplus_where_the_recording_without_a_thermometer_shows_nothing_of_its_size():
+    found = [("accel-thermal-bias", "model")]
+    assert surplus(0.4, 0.002) == found
+    # It could hide below what the recording misses anyway, in a drift that it has, or in what is left unexplained.
+    assert surplus(0.4, 0.02) == []
+    assert surplus(1e-8, 0.002) == []
+    assert surplus(0.4, 0.002, own=[effect("accel-hidden-drift", variant="warm-up")]) == []
+    assert surplus(0.4, 0.002, unexplained=("static-accel",)) == []
+
+
+def test_mechanisms_of_either_side_are_named_before_scatter_and_faint_lines():
+    own = [
+        effect("gyro-g-sensitivity"),
+        effect("gyro-zero-scatter", variant=""),
+        effect("periodic-interference", share=0.1, variant=""),
+    ]
+    tried = [Candidate("accel-cubic", 0.5, True)]
+    said = compare_effects([effect("accel-cubic")], own, tried, alpha=0.01)
+    assert [one.id for one in said.in_order] == [
+        "gyro-g-sensitivity", "accel-cubic", "gyro-zero-scatter", "periodic-interference",
+    ]  # fmt: skip
+
+
+def test_scatter_of_the_model_is_surplus_only_beyond_what_the_recording_misses_anyway():
+    tried = [Candidate("accel-zero-scatter", 0.4, True)]
+    model = [effect("accel-zero-scatter", 1.5e-3, 1.0e-3, variant="")]
+    assert not compare_effects(model, [], tried, alpha=0.01, misses={"static-accel": 1.4e-3}).surplus
+    assert compare_effects(model, [], tried, alpha=0.01, misses={"static-accel": 0.8e-3}).surplus
+
+
+def scattered(recording, sigma, seed):
+    """Zeros of the gyro that are others in every pose, by ``sigma`` of its raw unit."""
+    rng = np.random.default_rng(seed)
+    gyro = np.array(recording.gyroscope)
+    holds = trihedron.segment(recording).holds
+    edges = [0, *[(a.stop + b.start) // 2 for a, b in pairwise(holds)], len(gyro)]
+    for first, last in pairwise(edges):
+        gyro[first:last] += sigma * rng.standard_normal(3)
+    return replace(recording, gyroscope=gyro)
+
+
+def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
+    profile = profile_by_name("mpu")
+    accel, gyro = profile.unit(7)
+    gyro = replace(gyro, S=tuple(tuple(2.0 * v for v in row) for row in gyro.S))
+    motion = hand_session(26, hold_s=4.0, layout=5)
+    plain = Scenario(motion, "unit", accel, gyro, profile.clock)
+    # Half of what the zeros do is the scatter: without it in the noise, a drift does not remove half of their misfit.
+    size = np.radians(0.1)
+    flawed = with_effect(plain, "gyro-hidden-drift", amplitude=(size, -size, size), tau_s=80.0)
+    recording = scattered(simulate(flawed, 11)[0], 0.03 * 65.5, 3)
+    found = trihedron.diagnose(recording, gravity_m_s2=9.80665)
+    assert [one.id for one in found.effects] == ["gyro-hidden-drift", "gyro-zero-scatter"]
+    assert found.verdict == "missing-physics"
