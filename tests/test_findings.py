@@ -142,6 +142,11 @@ def test_a_finding_carries_its_numbers_for_machines():
     assert dict(found.numbers) == {"holds": 1.0, "duration_s": 12.5, "needed": 9.0}
 
 
+def test_what_is_not_a_number_is_no_figure_that_a_file_would_choke_on():
+    found = Finding.of(FindingCode.FEW_POSES, holds=np.inf, duration_s=np.nan, needed=9, numbers={"of_x": -np.inf})
+    assert dict(found.numbers) == {"needed": 9.0}
+
+
 def test_a_value_that_is_missing_or_a_case_that_is_not_there_is_refused():
     with pytest.raises(KeyError):
         Finding.of(FindingCode.FEW_POSES, holds=1)

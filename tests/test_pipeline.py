@@ -8,7 +8,9 @@ import pytest
 from scipy import stats
 
 import trihedron
+from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.demonstrating import compare_with_truth, truth_of_the_day
+from trihedron.refused import RefusedError
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
@@ -166,3 +168,23 @@ def test_a_check_predicts_the_error_bars_that_the_calibration_has(recording, res
     assert checked.is_fit
     np.testing.assert_allclose(checked.calibration.accelerometer.sigma_b, result.accelerometer.sigma_b, rtol=0.05)
     assert "Error bars to expect" in str(checked)
+
+
+@pytest.mark.parametrize("fit", ["calibrate_joint", "calibrate_moves"])
+def test_a_defect_inside_a_fit_is_an_error_and_a_refusal_leaves_the_gyro_out(fit, recording, monkeypatch):
+    calibrating = importlib.import_module("trihedron.pipeline.calibrating")
+    method = "joint" if fit == "calibrate_joint" else "separate"
+
+    def ends(error):
+        def raising(*_, **__):
+            raise error
+
+        monkeypatch.setattr(calibrating, fit, raising)
+        return calibrate(recording, method=method, gravity_m_s2=9.81)
+
+    with pytest.raises(ValueError, match="broadcast"):
+        ends(ValueError("operands could not be broadcast together with shapes (3,) (4,)"))
+    for refusal in (RefusedError("the moves do not tell."), np.linalg.LinAlgError("Singular matrix")):
+        result = ends(refusal)
+        assert result.calibration.gyroscope is None
+        assert any(str(refusal).rstrip(".") in finding.seen for finding in result.findings)

@@ -116,3 +116,17 @@ def test_a_counter_settles_what_late_stamps_leave_open(tmp_path):
 def test_a_counter_of_inner_ticks_does_not_count_samples():
     assert sample_numbers(np.cumsum(np.tile([3.0, 4.0], 50))) is None
     np.testing.assert_array_equal(sample_numbers(np.array([254.0, 255.0, 0.0, 2.0, *range(3, 40)]))[:4], [0, 1, 2, 4])
+
+
+@pytest.mark.parametrize("lost", [0, 9])
+@pytest.mark.parametrize("ppm", [30, 400, 700, 1500, 3000, -400])
+@pytest.mark.parametrize("rate_hz", [50.0, 100.0, 125.0, 200.0, 250.0])
+def test_a_sensor_a_little_fast_of_whole_milliseconds_loses_nothing_to_its_stamps(rate_hz, ppm, lost):
+    # One stamp in some hundreds is a millisecond early: the pattern of a clock of another period with losses.
+    period = 1.0 / (rate_hz * (1.0 + 1e-6 * ppm))
+    tick, behind = numbers(ppm % 7, lost)
+    clock = find_even_clock(np.round(0.0021 + period * tick, 3))
+    # Rounding to 1 ms tells the slope of 6000 rows to a part in a million; an alias is off by hundreds and more.
+    assert clock.period_s == pytest.approx(period, rel=1e-4)
+    assert clock.kind is not StampKind.IRREGULAR
+    np.testing.assert_array_equal(np.flatnonzero(clock.lost_behind), behind)

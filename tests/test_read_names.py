@@ -117,3 +117,43 @@ def test_what_is_neither_sensor_nor_time_is_not_taken_for_one(name):
 def test_raw_readings_rank_above_corrected_ones():
     assert parse_name("gx_measured").rank > parse_name("gx").rank > parse_name("gx_output").rank
     assert parse_name("motionUserAccelerationX(G)").rank < parse_name("accelerometerAccelerationX(G)").rank
+
+
+@pytest.mark.parametrize(
+    ("name", "role", "axis", "unit"),
+    [
+        ("время", "time", "", ""),
+        ("время, мс", "time", "", "ms"),
+        ("уск_x", "accelerometer", "x", ""),
+        ("Уск_Х", "accelerometer", "x", ""),  # a Cyrillic letter that looks like x
+        ("гироскоп_Y (град/с)", "gyroscope", "y", "deg/s"),
+        ("угл_скорость_z", "gyroscope", "z", ""),
+        ("угловое_ускорение_x", "", "x", ""),
+        ("маг_x", "", "", ""),
+        ("Beschl. X [g]", "accelerometer", "x", "g"),
+        ("Drehrate Z [°/s]", "gyroscope", "z", "deg/s"),
+        ("Winkelbeschleunigung x", "", "x", ""),
+        ("Tempo (ms)", "time", "", "ms"),
+        ("temps", "time", "", ""),
+        ("Acel X (m/s²)", "accelerometer", "x", "m/s^2"),
+        ("Giro Z (rad/s)", "gyroscope", "z", "rad/s"),
+        ("girox", "gyroscope", "x", ""),
+        ("accélération_x", "accelerometer", "x", ""),
+        ("vitesse_angulaire_y", "gyroscope", "y", ""),
+        ("prędkość kątowa Y", "gyroscope", "y", ""),
+        ("加速度X(g)", "accelerometer", "x", "g"),
+        ("X轴加速度（g）", "accelerometer", "x", "g"),
+        ("角速度Z(°/s)", "gyroscope", "z", "deg/s"),
+        ("角度X(°)", "", "x", ""),
+        ("温度(℃)", "temperature", "", ""),
+        ("时间", "time", "", ""),
+        ("ωx", "gyroscope", "x", ""),
+        ("t [µs]", "time", "", "us"),  # the micro sign
+        ("t [\u03bcs]", "time", "", "us"),  # the Greek letter
+        ("скачок_x", "", "x", ""),  # unknown: no bare x
+        ("\ufffd\ufffd\ufffd_x", "", "x", ""),  # letters lost in another encoding: no bare x
+    ],
+)
+def test_names_in_other_languages_mean_the_same_and_unknown_words_are_kept(name, role, axis, unit):
+    parsed = parse_name(name)
+    assert (parsed.role, parsed.axis, parsed.unit or parsed.time_unit) == (role, axis, unit)

@@ -8,6 +8,8 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 
+class RefusedError(ValueError): ...
+
 # accelerometer
 ANCHOR: float
 

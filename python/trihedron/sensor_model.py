@@ -19,6 +19,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.calibration import Calibration, Frame, SensorCalibration
+from trihedron.refused import RefusedError
 
 
 def correct(readings: FloatArray, S: FloatArray, b: FloatArray) -> FloatArray:
@@ -41,7 +42,7 @@ def other_form(S: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     S = np.asarray(S, dtype=np.float64)
     if np.linalg.cond(S) > 1e12:
-        raise ValueError("S is singular: two sensor axes are parallel, or one has no scale")
+        raise RefusedError("S is singular: two sensor axes are parallel, or one has no scale")
     inverse = np.asarray(np.linalg.inv(S), dtype=np.float64)
     return inverse, -inverse @ b
 
@@ -108,7 +109,7 @@ def reframing(S: FloatArray, b: FloatArray, frame: Frame) -> Reframing:
         u, _, vt = np.linalg.svd(S)
         q = u @ vt
     else:
-        raise ValueError(f"frame must be 'lower', 'symmetric' or 'case', got {frame!r}")
+        raise RefusedError(f"frame must be 'lower', 'symmetric' or 'case', got {frame!r}")
     signs = _nearest_proper(q)
     rotation: FloatArray = (q * signs).T
     new = rotation @ S
@@ -163,7 +164,7 @@ def in_frame(calibration: Calibration, frame: Frame) -> Calibration:
     if frame == calibration.frame:
         return calibration
     if frame == "case":
-        raise ValueError("the case frame is only known from method 1 (six faces of the case)")
+        raise RefusedError("the case frame is only known from method 1 (six faces of the case)")
     accelerometer = calibration.accelerometer
     change = reframing(accelerometer.S, accelerometer.b, frame)
     n = len(calibration.covariance)

@@ -102,6 +102,13 @@ fn forget(payload: Box<dyn Any + Send>) {
     std::mem::forget(payload);
 }
 
+pyo3::create_exception!(
+    trihedron._core,
+    RefusedError,
+    PyValueError,
+    "A question that its readings or numbers do not answer, refused in one sentence; never a defect of the program."
+);
+
 fn finish<T>(out: Guarded<T>, requests_before: usize) -> PyResult<T> {
     if interrupt::requests() != requests_before {
         return Err(PyKeyboardInterrupt::new_err(
@@ -109,7 +116,7 @@ fn finish<T>(out: Guarded<T>, requests_before: usize) -> PyResult<T> {
         ));
     }
     match out {
-        Ok(answer) => answer.map_err(|error| PyValueError::new_err(error.to_string())),
+        Ok(answer) => answer.map_err(|error| RefusedError::new_err(error.to_string())),
         Err(Failure::Threads(why)) => Err(no_threads(&why)),
         Err(Failure::Panic) => Err(PyRuntimeError::new_err(format!(
             "the numerical core failed on this input ({}); this is a defect of trihedron, please report it",

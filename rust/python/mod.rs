@@ -40,6 +40,10 @@ pub(crate) use doorway::{run, run_long};
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     doorway::keep_panics_quiet();
+    module.add(
+        "RefusedError",
+        module.py().get_type::<doorway::RefusedError>(),
+    )?;
     allan::register(module)?;
     attitude::register(module)?;
     audit::register(module)?;

@@ -7,7 +7,6 @@ called once per hold. Whoever composes it gives the real one (``trihedron.pipeli
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -22,7 +21,6 @@ FIRST_HOLD_S = 6.0
 """The first hold also measures the noise."""
 
 SAME_POSE_DEG = 15.0
-REACHED_DEG = 20.0
 N_CHECKS = 3
 MOST_POSES = 60
 RETRY_HOLD_S = 2.0
@@ -224,8 +222,3 @@ class Guide:
         if known is None:
             return "Turn the board to another side.", ""
         return f"Turn: {known.next_words}.", known.why
-
-
-def with_remark(view: GuideView, remark: str) -> GuideView:
-    """The same view with one more warning in front."""
-    return replace(view, warnings=(remark, *view.warnings))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import pdtrc
 
 from trihedron.channel_facts.ends import End
+from trihedron.probability import chdtrc
 
 STEEP = 5.0
 """The wall is reached by steps this many times the noise: a quiet sensor resting on its largest count is no wall."""
@@ -116,4 +116,5 @@ def _chance(ends: list[End]) -> float:
     expected = sum(
         max(max(end.near((reach + 0.5) * end.step)[0], 1) / reach for reach in (NEAR, NEIGHBOURS)) for end in told
     )
-    return float(pdtrc(spare - 1, expected))
+    # At least so many of a Poisson law: a chi-square of twice as many degrees below twice its mean.
+    return 1.0 - chdtrc(2.0 * spare, 2.0 * expected)

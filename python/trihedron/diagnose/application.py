@@ -22,6 +22,7 @@ from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records import Recording
 from trihedron.records.words import words
+from trihedron.refused import RefusedError
 
 N_ITERATIONS = 2
 """Effects are per mille of the motion: the second pass of the fixed point leaves their square."""
@@ -161,7 +162,7 @@ def _variant(
     effect_id = str(entry.get("id", ""))
     model = entry.get("model")
     if not isinstance(model, Mapping) or "values" not in model or "variant" not in model:
-        raise ValueError(f"effect {effect_id!r} has no model with its variant and values")
+        raise RefusedError(f"effect {effect_id!r} has no model with its variant and values")
     effect = known.get(effect_id)
     if effect is None:
         left_out[effect_id] = words("effect-unknown")
@@ -172,7 +173,7 @@ def _variant(
             for variant in effect.variants(context):
                 if variant.label == model["variant"] and variant.distortion.n_parameters == len(model["values"]):
                     return variant
-            raise ValueError(
+            raise RefusedError(
                 f"effect {effect_id!r} has no variant {model['variant']!r} of {len(model['values'])} values"
             )
         except SignalMissing as missing:

@@ -33,6 +33,7 @@ from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Candidate, Diagnosis
 from trihedron.records.domains import DomainTest
 from trihedron.records.progress import Progress
+from trihedron.refused import RefusedError
 
 LARGEST_ALPHA = 0.5
 """A false-alarm rate of a half or more is a coin, not a test."""
@@ -68,7 +69,7 @@ def diagnose_recording(
     """
     tell = progress or (lambda _fraction, _text: None)
     if not 0.0 < alpha < LARGEST_ALPHA:
-        raise ValueError(f"alpha is a small probability such as 0.01, got {alpha}")
+        raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
     obs = observe(recording, segments)
     start = start_twin(obs, calibration)
     prior = prior_of(obs, calibration) if calibration_is_given else None

@@ -19,7 +19,7 @@ from trihedron.records import (
     Severity,
     Verification,
 )
-from trihedron.units import degrees_from_radians
+from trihedron.refused import RefusedError
 
 FALSE_ALARM = 1e-3
 """Chance that a calibration that holds is said to be exceeded."""
@@ -44,9 +44,9 @@ def verify_calibration(
         When the recording has no accelerometer or no still pose.
     """
     if recording.accelerometer is None or segments.accelerometer_mean is None:
-        raise ValueError("verification needs the accelerometer: gravity is what a calibration is tested against")
+        raise RefusedError("verification needs the accelerometer: gravity is what a calibration is tested against")
     if segments.n_holds == 0:
-        raise ValueError("verification needs still poses, and none was found: hold the sensor still for some seconds")
+        raise RefusedError("verification needs still poses, and none was found: hold the sensor still for some seconds")
     accelerometer = calibration.accelerometer
     noise = _variance(segments.accelerometer_sigma_mean, segments.n_holds)
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
@@ -153,10 +153,3 @@ def _angle_findings(angle_deg: FloatArray, sigma_deg: FloatArray) -> list[Findin
             times_expected=times,
         )
     ]
-
-
-def zero_shift_deg_s(verification: Verification) -> float:
-    """Largest mean rate at rest [deg/s]: how far the zero has moved since the calibration."""
-    if not len(verification.rest_rate):
-        return float("nan")
-    return degrees_from_radians(float(np.abs(np.mean(verification.rest_rate, axis=0)).max()))

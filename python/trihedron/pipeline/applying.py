@@ -17,6 +17,7 @@ from trihedron.pipeline.results import CheckResult
 from trihedron.pipeline.temperature import check_range, thermally_corrected
 from trihedron.records import Calibration, Finding, FindingCode, Recording, SensorCalibration, Severity
 from trihedron.records.words import words
+from trihedron.refused import RefusedError
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -89,7 +90,7 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
         gyroscope = None
         findings = (*findings, _left_out())
     if accelerometer is None and gyroscope is None:
-        raise ValueError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
+        raise RefusedError(f"{recording.source}: only a gyro was logged, and this calibration has none.")
     followed = thermally_corrected(known, recording)
     if followed is None:
         followed = _corrected(accelerometer, known.accelerometer), _corrected(gyroscope, known.gyroscope)
@@ -120,7 +121,9 @@ def without_effects(calibration: Calibration, recording: Recording) -> tuple[Rec
 
     references = calibration.extensions.get("references", {})
     if not isinstance(effects, list | tuple) or not isinstance(references, dict | MappingProxyType):
-        raise ValueError("the calibration's extensions are not those of a diagnosis: calibrate with --extended again.")
+        raise RefusedError(
+            "the calibration's extensions are not those of a diagnosis: calibrate with --extended again."
+        )
     gyroscope = calibration.gyroscope
     done = take_off(
         recording,
@@ -147,7 +150,7 @@ def check_units(calibration: Calibration, recording: Recording) -> None:
     )
     for name, readings, unit, sensor in pairs:
         if readings is not None and sensor is not None and unit != sensor.raw_unit:
-            raise ValueError(
+            raise RefusedError(
                 f"{recording.source}: its {name} is in {unit}, and this calibration maps {sensor.raw_unit}: "
                 f"apply it to a log in {sensor.raw_unit}, or state the log's unit if it was detected wrongly."
             )

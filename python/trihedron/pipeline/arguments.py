@@ -9,6 +9,7 @@ from numbers import Integral, Real
 from typing import Any
 
 from trihedron.records.checked import WrongTypeError, number_of, numbers_of, said
+from trihedron.refused import RefusedError
 
 MOST_WHOLE = 2**63 - 1
 """What the core takes as a whole number."""
@@ -108,7 +109,7 @@ def _whole(where: str, name: str, value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise WrongTypeError(f"{where} is a whole number, not {said(value)}.")
     if not -MOST_WHOLE <= int(value) <= MOST_WHOLE:
-        raise ValueError(f"{where} is a whole number of at most 19 digits, not {said(value)}.")
+        raise RefusedError(f"{where} is a whole number of at most 19 digits, not {said(value)}.")
     _check_range(where, name, int(value))
     return int(value)
 
@@ -117,22 +118,22 @@ def _check_range(where: str, name: str, number: float) -> None:
     low, high, what = RANGES.get(name, (-math.inf, math.inf, ""))
     if not low <= number <= high:
         bound = f"at least {low:g}" if number < low else f"at most {high:g}"
-        raise ValueError(f"{where} is {what}, {bound}, and cannot be {number:g}.")
+        raise RefusedError(f"{where} is {what}, {bound}, and cannot be {number:g}.")
 
 
 def _text(where: str, _name: str, value: Any) -> str:
     if not isinstance(value, str):
         raise WrongTypeError(f"{where} is a text, not {said(value)}.")
     if len(value) > LONGEST_NAME:
-        raise ValueError(f"{where} is a text of at most {LONGEST_NAME} characters, not of {len(value)}.")
+        raise RefusedError(f"{where} is a text of at most {LONGEST_NAME} characters, not of {len(value)}.")
     if "\0" in value:
-        raise ValueError(f"{where} is a text without a zero byte, not {said(value)}.")
+        raise RefusedError(f"{where} is a text without a zero byte, not {said(value)}.")
     return value
 
 
 def _word(where: str, name: str, value: Any) -> str:
     if not _text(where, name, value):
-        raise ValueError(f"{where} is a word of a list, and empty.")
+        raise RefusedError(f"{where} is a word of a list, and empty.")
     return str(value)
 
 
@@ -156,7 +157,7 @@ def _path(where: str, value: Any) -> Any:
     if not isinstance(text, str):
         raise WrongTypeError(f"{where} is the name of a file, not {said(value)}.")
     if not text or "\0" in text or len(text) > LONGEST_NAME:
-        raise ValueError(f"{where} is the name of a file, and {said(text)} cannot be one.")
+        raise RefusedError(f"{where} is the name of a file, and {said(text)} cannot be one.")
     return value
 
 

@@ -24,6 +24,7 @@ from trihedron.read.reference import of_recording
 from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.reference import AgainstReference
 from trihedron.records.words import words
+from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit, rate_to_si
 
@@ -57,9 +58,9 @@ def beside(
     segments = segment(recording)
     try:
         if segments.n_holds < FEWEST_POSES:
-            raise ValueError(f"{segments.n_holds} still poses are too few for a model of their own")
+            raise RefusedError(f"{segments.n_holds} still poses are too few for a model of their own")
         result = ordinary()
-    except ValueError as error:
+    except REFUSALS as error:
         if found.kind == ANOTHER_UNIT:
             # What two gyros tell apart may be either's: with no poses nobody says whose.
             found = replace(found, findings=(*found.findings, _shared(found)))
@@ -103,7 +104,7 @@ def in_si(log: Recording, gravity: float | None) -> Recording:
         return log
     own = calibrate(log, gravity_m_s2=gravity).calibration
     if own.gyroscope is None or log.gyroscope is None or log.accelerometer is None:
-        raise ValueError(f"{log.source}: counts whose scale nothing tells.")
+        raise RefusedError(f"{log.source}: counts whose scale nothing tells.")
     return replace(
         log,
         gyroscope=correct(log.gyroscope, own.gyroscope.S, own.gyroscope.b),
@@ -128,7 +129,7 @@ def shared_log(recording: Recording, other: Any, gravity: float | None) -> Recor
     try:
         known = in_si(other, gravity)
         moves_along(recording, of_recording(known))
-    except ValueError:
+    except REFUSALS:
         return None
     return known
 

@@ -31,6 +31,7 @@ from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.progress import Progress
 from trihedron.records.words import words
+from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import in_frame
 from trihedron.units import rate_to_si
 
@@ -108,7 +109,7 @@ def calibrate(
         When the question cannot be answered; one sentence says why and what to do.
     """
     if method not in METHODS:
-        raise ValueError(f"there is no method {method!r}; choose one of {', '.join(METHODS)}.")
+        raise RefusedError(f"there is no method {method!r}; choose one of {', '.join(METHODS)}.")
     gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
     recording = recording_of(recording)
     segments = segments_of(segments, recording, progress)
@@ -124,15 +125,14 @@ def calibrate(
         wanted: Frame = frame or "case"
     else:
         if faces is not None:
-            raise ValueError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
+            raise RefusedError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
         wanted = frame or "lower"
         options = MoveOptions(nominal_scale=gyroscope_nominal)
         calibration = _by_poses(
             recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
         )
     calibration = in_frame(calibration, wanted)
-    of_fit = _of_fit(calibration, recording, segments)
-    findings = (*said, *recording.findings, *_as_they_weigh(segments), *of_fit)
+    findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))
     return CalibrationResult(replace(calibration, findings=findings), segments, recording)
 
 
@@ -158,7 +158,7 @@ def _as_they_weigh(segments: Segments) -> Found:
 
 def _require_poses(recording: Recording, segments: Segments) -> None:
     if recording.accelerometer is None:
-        raise ValueError(
+        raise RefusedError(
             f"{recording.source}: a gyro alone cannot be calibrated by gravity; log the accelerometer as well, "
             "or name its columns with --columns."
         )
@@ -168,7 +168,7 @@ def _require_poses(recording: Recording, segments: Segments) -> None:
         )
         grave = [finding.seen for finding in segments.findings if finding.severity is not Severity.NOTE]
         why = grave[0] + " " if grave else ""
-        raise ValueError(
+        raise RefusedError(
             f"{recording.source}: {found}. {why}Hold the sensor still for 3 to 5 seconds in each of 18 or more "
             "different poses (docs/procedure.md); `trihedron segment LOG` shows what was seen."
         )
@@ -213,7 +213,7 @@ def _by_poses(
                 return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
             alone = replace(alone, findings=(*found, _joint_fit_left(pull)))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
-    except ValueError as error:
+    except REFUSALS as error:
         return _without_gyroscope(alone, str(error))
     return _together(alone, gyroscope, more)
 
@@ -275,7 +275,7 @@ def _by_faces(
         gyroscope, more = calibrate_turns(
             recording, turns, _zero_turns(segments), nominal_scale=scale, nominal_tolerance=tolerance
         )
-    except ValueError as error:
+    except REFUSALS as error:
         if turns_deg is not None:
             raise
         return _without_gyroscope(alone, str(error))
@@ -298,7 +298,7 @@ def _turns_on_faces(
     if turns_deg is None:
         return [Turn(move.start, move.stop) for move in moves]
     if len(turns_deg) != len(moves):
-        raise ValueError(
+        raise RefusedError(
             f"{len(turns_deg)} turns were given and {len(moves)} were found between poses on the same face: "
             "give one angle in degrees for each, 0 to leave it out."
         )

@@ -35,6 +35,7 @@ from trihedron.read.columns import Columns, find_columns
 from trihedron.read.table import Table
 from trihedron.records import Recording
 from trihedron.records.frame_declaration import FrameDeclaration
+from trihedron.refused import RefusedError
 
 Cells = npt.NDArray[np.float64]
 
@@ -117,7 +118,7 @@ def capture(
         (a ``ValueError``) when the board is silent or not understood, or the disk is full; it says what was saved.
     """
     if seconds is not None and not seconds > 0.0:
-        raise ValueError(f"seconds is how long to record, not {seconds:g}")
+        raise RefusedError(f"seconds is how long to record, not {seconds:g}")
     check_free([Path(output)], overwrite=overwrite)
     source, found = open_device(port, protocol=protocol, baud=baud, columns=columns, time_unit=time_unit)
     recorder = Recorder(
@@ -192,7 +193,7 @@ def sensor_columns(columns: tuple[str, ...]) -> list[int]:
     empty = tuple(np.zeros(1) for _ in columns)
     found = find_columns(Table(Path("the stream"), columns, empty), None, None)
     if found.accelerometer is None:
-        raise ValueError("the board sends no accelerometer that is recognised; name its columns with --columns.")
+        raise RefusedError("the board sends no accelerometer that is recognised; name its columns with --columns.")
     return [*found.accelerometer, *(found.gyroscope or ())]
 
 

@@ -8,6 +8,7 @@ from trihedron.pipeline.results import CheckResult
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 from trihedron.records.words import Words, words
+from trihedron.refused import REFUSALS
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
@@ -22,7 +23,7 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
     # A standard value: here only the size of the error bars is wanted, to which an error of 0.4 % means nothing.
     try:
         result = calibrate(recording, segments=segments, gravity_m_s2=STANDARD_GRAVITY_M_S2)
-    except ValueError as error:
+    except REFUSALS as error:
         why = words("because", sentence=error)
         return CheckResult(
             recording,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from trihedron.gravity import normal_gravity
 from trihedron.records import Finding, FindingCode
+from trihedron.refused import RefusedError
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 
@@ -19,16 +20,18 @@ def settle_gravity(
     """
     if gravity_m_s2 is not None:
         if latitude_deg is not None or height_m is not None:
-            raise ValueError("gravity is given twice, as a value and by a place: give either --gravity or --latitude.")
+            raise RefusedError(
+                "gravity is given twice, as a value and by a place: give either --gravity or --latitude."
+            )
         if not 1.0 < gravity_m_s2 < 100.0:
-            raise ValueError(f"gravity is given in m/s², about 9.8 on Earth, and cannot be {gravity_m_s2:g}.")
+            raise RefusedError(f"gravity is given in m/s², about 9.8 on Earth, and cannot be {gravity_m_s2:g}.")
         return float(gravity_m_s2), "given", ()
     if latitude_deg is not None:
         height = 0.0 if height_m is None else height_m
         value = normal_gravity(latitude_deg, height)
         return value, f"WGS 84 normal gravity at latitude {latitude_deg:g}°, height {height:g} m", ()
     if height_m is not None:
-        raise ValueError("a height alone does not tell gravity: give --latitude with --height, or --gravity.")
+        raise RefusedError("a height alone does not tell gravity: give --latitude with --height, or --gravity.")
     return STANDARD_GRAVITY_M_S2, "not given, standard value", (_defaulted(),)
 
 

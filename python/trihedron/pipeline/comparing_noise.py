@@ -17,6 +17,7 @@ from trihedron.records import Hold, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.hold_noise import HoldNoise, Measured
 from trihedron.records.sampling import StampKind
+from trihedron.refused import REFUSALS
 
 Sensor = Literal["accelerometer", "gyroscope"]
 
@@ -86,7 +87,7 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
         si = readings / np.linalg.norm(np.linalg.inv(S), axis=1)
         try:
             noise[sensor] = noise_of_holds(si, recording.rate_hz, holds)
-        except ValueError:
+        except REFUSALS:
             continue  # no hold is long enough: nothing to compare
         differences = np.concatenate([np.diff(si[a:b], axis=0) for a, b in holds if b - a > 2])
         differences = differences[np.isfinite(differences).all(axis=1)]

@@ -8,6 +8,7 @@ from typing import Any
 from trihedron.files.log import write_recording
 from trihedron.pipeline.reading import read, recording_of
 from trihedron.records import Recording
+from trihedron.refused import RefusedError
 
 
 def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False, **options: Any) -> Recording:
@@ -22,7 +23,7 @@ def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False
         When the log cannot be read, or the file cannot be written.
     """
     if options and (isinstance(log, Recording) or hasattr(log, "recording")):
-        raise ValueError(f"{', '.join(options)}: how a log is read cannot be said of one that was read already.")
+        raise RefusedError(f"{', '.join(options)}: how a log is read cannot be said of one that was read already.")
     recording = read(log, **options) if options else recording_of(log)
     write_recording(recording, output, overwrite=overwrite)
     return recording

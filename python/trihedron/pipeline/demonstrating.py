@@ -20,6 +20,7 @@ from trihedron.pipeline.reading import read, segment
 from trihedron.pipeline.results import CalibrationResult, VerificationResult
 from trihedron.pipeline.verifying import verify
 from trihedron.records import PARAMETER_NAMES, Calibration, Comparison, Recording, Segments, Truth
+from trihedron.refused import RefusedError
 from trihedron.report import calibration_report, demonstration_report, verification_report
 from trihedron.report.document import Document
 from trihedron.report.page import to_html
@@ -64,7 +65,7 @@ def demo(
     """
     target = Path(folder)
     if target.exists() and not overwrite:
-        raise ValueError(f"{target}: this exists and was left alone; choose another name or say overwrite=True.")
+        raise RefusedError(f"{target}: this exists and was left alone; choose another name or say overwrite=True.")
     from trihedron.pipeline.disagreeing import disagree
 
     first = demonstrate(target, overwrite=overwrite)

@@ -30,6 +30,7 @@ from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
 from trihedron.records.progress import Progress
+from trihedron.refused import REFUSALS, RefusedError
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, read_scenario
 
@@ -78,9 +79,9 @@ def diagnose(
         When there is nothing to hold a model against, units differ, or two models are given.
     """
     if calibration is not None and against is not None:
-        raise ValueError("two models were given: a calibration or a simulated recording to compare with, not both.")
+        raise RefusedError("two models were given: a calibration or a simulated recording to compare with, not both.")
     if not 0.0 < alpha < 0.5:
-        raise ValueError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
+        raise RefusedError(f"--alpha is a small probability such as 0.01, not {alpha:g}.")
     tell = progress or (lambda _fraction, _text: None)
     recording = recording_of(recording)
     ordinary = partial(
@@ -105,13 +106,11 @@ def _of_poses(
     tell: Progress,
 ) -> DiagnosisResult:
     """What still poses and the moves between them say."""
-    gravity_m_s2, latitude_deg, height_m = place
     known = None if calibration is None else calibration_of(calibration)
-    said: tuple[Finding, ...] = ()
-    if known is not None and gravity_m_s2 is None and latitude_deg is None and height_m is None:
-        gravity, source = known.gravity_m_s2, "that of the calibration"
+    if known is None or place != (None, None, None):
+        gravity, source, said = settle_gravity(*place)
     else:
-        gravity, source, said = settle_gravity(gravity_m_s2, latitude_deg, height_m)
+        gravity, source, said = known.gravity_m_s2, "that of the calibration", ()
     findings = [*said, *recording.findings]
     if known is not None:
         check_units(known, recording)
@@ -199,7 +198,7 @@ def _start(calibrated: Calibrated, gravity: float, known: Calibration | None) ->
         return calibrated(), True
     try:
         own = calibrated()
-    except ValueError:
+    except REFUSALS:
         return replace(known, gravity_m_s2=gravity), False
     is_poor = is_open(own) or (known.gyroscope is not None and own.gyroscope is None)
     return (replace(known, gravity_m_s2=gravity), False) if is_poor else (own, True)
@@ -225,8 +224,8 @@ def _simulation(recording: Recording, gravity: float, alpha: float, tell: Progre
         recording = replace(recording, gyroscope=None)
     try:
         result = calibrate(recording, gravity_m_s2=gravity)
-    except ValueError as error:
-        raise ValueError(f"the simulated recording cannot be calibrated: {error}") from None
+    except REFUSALS as error:
+        raise RefusedError(f"the simulated recording cannot be calibrated: {error}") from None
     diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=tell)
     noise = sampled(recording, result.segments.holds, model_of_diagnosis(diagnosis))
     frames = () if of_world is None else (of_world,)

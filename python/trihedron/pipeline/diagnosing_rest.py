@@ -20,6 +20,7 @@ from trihedron.diagnose.session.starting_point import (
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments
 from trihedron.records.diagnosis import Diagnosis, LinearModel
+from trihedron.refused import REFUSALS
 from trihedron.units import acceleration_to_si, rate_to_si
 
 Calibrated = Callable[[], Calibration]
@@ -66,7 +67,7 @@ def _is_rest(recording: Recording, segments: Segments, calibrated: Calibrated) -
         return False
     try:
         own = calibrated()
-    except ValueError:
+    except REFUSALS:
         return True
     return is_open(own)
 

@@ -17,6 +17,7 @@ from trihedron.pipeline.carried_misses import carried_misses
 from trihedron.pipeline.reading import read
 from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Recording, Segments
+from trihedron.refused import REFUSALS
 from trihedron.segment import resegment
 from trihedron.simulate import Scenario, simulate, twin_scenario
 
@@ -128,7 +129,7 @@ class _Moved:
             log = _sensed(replace(scenario, motion=self._motion), seed)
             try:
                 yield calibrate(log, gravity_m_s2=self._gravity), log
-            except ValueError:
+            except REFUSALS:
                 continue
 
 

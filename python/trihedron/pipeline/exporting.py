@@ -11,6 +11,7 @@ from trihedron.files.noise import noise_figures, read_noise
 from trihedron.files.output import check_free, write_whole
 from trihedron.pipeline.applying import AnyCalibration, calibration_of
 from trihedron.records import Noise
+from trihedron.refused import RefusedError
 from trihedron.report.noise_files import noise_record
 
 
@@ -52,7 +53,7 @@ def export(
         When the target is unknown or its convention cannot hold the calibration.
     """
     if rate_hz is not None and not rate_hz > 0.0:
-        raise ValueError(f"rate_hz is the number of samples per second, not {rate_hz}")
+        raise RefusedError(f"rate_hz is the number of samples per second, not {rate_hz}")
     options = ExportOptions(rate_hz=rate_hz, topic=topic, accel_lsb=accelerometer_lsb, gyro_lsb=gyroscope_lsb)
     if noise is not None:
         figures, rest_rate = noise_figures(noise_record(noise)) if isinstance(noise, Noise) else read_noise(noise)

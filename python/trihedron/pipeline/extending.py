@@ -17,6 +17,7 @@ from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain
 from trihedron.records.progress import Progress
 from trihedron.records.words import words
+from trihedron.refused import RefusedError
 
 
 def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress | None = None) -> CalibrationResult:
@@ -33,7 +34,7 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
         raise WrongTypeError(f"trihedron.extend takes what trihedron.calibrate gave, not {type(result).__name__}.")
     base = result.calibration
     if base.frame != "lower":
-        raise ValueError(
+        raise RefusedError(
             f"an extended calibration is made in frame lower, not {base.frame}: "
             "use method joint or separate and leave the frame out."
         )

@@ -34,6 +34,7 @@ from trihedron.records import (
 from trihedron.records.noise import Noise
 from trihedron.records.presented import Presented
 from trihedron.records.progress import Progress
+from trihedron.refused import RefusedError
 
 NoiseSource = AxisNoise | Sequence[AxisNoise] | Noise | str | os.PathLike[str]
 
@@ -168,7 +169,7 @@ def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments:
 
 def _identify(rest: Recording) -> Noise:
     if rest.accelerometer is None:
-        raise ValueError(f"{rest.source}: there is no accelerometer whose noise could be identified in this log")
+        raise RefusedError(f"{rest.source}: there is no accelerometer whose noise could be identified in this log")
     unit = rest.accelerometer_unit.value
     names = ("accelerometer x", "accelerometer y", "accelerometer z")
     return identify_noise(rest.accelerometer, rest.rate_hz, names=names, units=(unit, unit, unit), source=rest.source)

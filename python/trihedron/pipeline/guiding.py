@@ -26,6 +26,7 @@ from trihedron.pipeline.results import CalibrationResult, VerificationResult
 from trihedron.pipeline.verifying import verify
 from trihedron.records import Calibration, FindingCode, Recording, Segments, Severity
 from trihedron.records.guiding import LEAST_POSES, Accuracy, Examination, Uncertain
+from trihedron.refused import REFUSALS
 from trihedron.sensor_model import in_frame
 from trihedron.units import (
     STANDARD_GRAVITY_M_S2,
@@ -142,7 +143,7 @@ def conclude(
     kept = tuple(finding for finding in segments.findings if finding.code is not FindingCode.FEW_POSES)
     try:
         return result, verify(result.calibration, held_back, segments=replace(segments, findings=kept))
-    except ValueError:
+    except REFUSALS:
         return result, None
 
 
@@ -155,7 +156,7 @@ def _calibration(recording: Recording, segments: Segments, gravity: float) -> Ca
         return None
     try:
         made = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
-    except ValueError:
+    except REFUSALS:
         return None
     return in_frame(made, "lower")
 

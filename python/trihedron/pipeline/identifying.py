@@ -21,6 +21,7 @@ from trihedron.read.allan_table import read_allan_table
 from trihedron.read.chunks import open_chunks
 from trihedron.read.errors import ReadError
 from trihedron.records import Noise, TermName
+from trihedron.refused import RefusedError
 from trihedron.units import (
     AccelerationUnit,
     RateUnit,
@@ -132,7 +133,7 @@ def noise_of_file(
             source=str(path),
         )
     if exclude_s:
-        raise ValueError(f"{path}: nothing can be left out of a log that is read in one pass; cut the file instead.")
+        raise RefusedError(f"{path}: nothing can be left out of a log that is read in one pass; cut the file instead.")
 
     kept = None
     if checkpoint is not None:

@@ -15,6 +15,7 @@ from trihedron.estimate.gyroscope.turn_design import (
     design_zero_first,
 )
 from trihedron.records.plan import ExperimentPlan, MovePlan, PosePlan, PoseWorth, TurnPlan
+from trihedron.refused import RefusedError
 from trihedron.units import STANDARD_GRAVITY_M_S2, m_s2_from_micro_g, radians_from_degrees
 
 POSE_SETS = ("6 faces", "9 poses", "12 edges", "18 poses: faces and edges", "26 poses: faces, edges and corners")
@@ -50,7 +51,7 @@ def plan(
     """
     for name, value in (("turn time", turn_s), ("hold", hold_s), ("accelerometer noise", accelerometer_density)):
         if not value > 0.0:
-            raise ValueError(f"the {name} must be a positive number, got {value:g}")
+            raise RefusedError(f"the {name} must be a positive number, got {value:g}")
     angles = [radians_from_degrees(angle) for angle in turns_deg if angle != 0.0] * 3
     axes = [axis for axis in range(3) for angle in turns_deg if angle != 0.0]
     arguments = (axes, angles, [turn_s] * len(angles), hold_s, gyroscope_density, sigma_turn_rad)

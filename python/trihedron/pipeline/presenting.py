@@ -14,6 +14,7 @@ from trihedron.pipeline.results import CalibrationResult, CheckResult, Diagnosis
 from trihedron.pipeline.sessions import SessionsResult
 from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segments, Verification
 from trihedron.records.plan import ExperimentPlan
+from trihedron.refused import RefusedError
 from trihedron.report import document, frames, machine, summaries
 from trihedron.report.calibration import calibration_report
 from trihedron.report.check import check_report
@@ -128,7 +129,7 @@ def plot(result: object, name: str | None = None) -> ShownFigure:
     chosen = next(iter(there), None) if name is None else name
     if chosen is None or chosen not in there:
         listed = ", ".join(repr(key) for key in there) or "none"
-        raise ValueError(f"there is no figure {chosen!r} of this {type(result).__name__}; there are: {listed}.")
+        raise RefusedError(f"there is no figure {chosen!r} of this {type(result).__name__}; there are: {listed}.")
     draw = there[chosen].draw
     assert draw is not None
     return draw()

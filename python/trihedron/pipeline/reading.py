@@ -12,6 +12,7 @@ from trihedron.read import ReadError, read_recording
 from trihedron.records import Recording, Segments
 from trihedron.records.checked import WrongTypeError, number_of
 from trihedron.records.progress import Progress
+from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, RateUnit
 
 AnyRecording = object
@@ -158,7 +159,7 @@ def segments_of(given: Segments | None, recording: Recording, progress: Progress
     if given is None:
         return segment(recording, progress=progress)
     if not isinstance(given, Segments):
-        raise ValueError(f"segments are what trihedron.segment(recording) gives, not {type(given).__name__}.")
+        raise RefusedError(f"segments are what trihedron.segment(recording) gives, not {type(given).__name__}.")
     return given
 
 

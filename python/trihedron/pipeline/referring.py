@@ -28,6 +28,7 @@ from trihedron.records.diagnosis import (
 )
 from trihedron.records.domains import DomainTest, HeldOut
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceMotion
+from trihedron.refused import RefusedError
 from trihedron.sensor_model import in_frame
 from trihedron.units import acceleration_to_si
 
@@ -103,7 +104,7 @@ def calibration_by(
         When the log has no accelerometer: a calibration file holds both.
     """
     if recording.accelerometer is None:
-        raise ValueError(
+        raise RefusedError(
             f"{recording.source}: a calibration holds an accelerometer too, and this log has none; "
             "`trihedron diagnose LOG --reference MOTION --json FILE` writes the gyro's numbers."
         )

@@ -16,6 +16,7 @@ from trihedron.pipeline.reading import AnyRecording, recording_of
 from trihedron.pipeline.results import CalibrationResult, VerificationResult
 from trihedron.records import Recording
 from trihedron.records.guiding import Accuracy, GuideView
+from trihedron.refused import RefusedError
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 STEP_S = 0.25
@@ -102,6 +103,6 @@ def steps(time_s: npt.NDArray[np.float64]) -> Iterable[tuple[int, int]]:
 def readings_of(recording: Recording) -> npt.NDArray[np.float64]:
     """(n, 3) or (n, 6), the accelerometer first."""
     if recording.accelerometer is None:
-        raise ValueError(f"{recording.source}: a guide needs the accelerometer; this log has a gyro alone.")
+        raise RefusedError(f"{recording.source}: a guide needs the accelerometer; this log has a gyro alone.")
     parts = [part for part in (recording.accelerometer, recording.gyroscope) if part is not None]
     return np.hstack(parts)

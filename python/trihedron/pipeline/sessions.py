@@ -22,6 +22,7 @@ from trihedron.records.presented import Presented
 from trihedron.records.progress import Progress
 from trihedron.records.sessions import By, Session, SessionsModel
 from trihedron.records.words import Words, words
+from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import in_frame
 
 BYS: tuple[By, ...] = get_args(By)
@@ -94,9 +95,9 @@ def calibrate_sessions(
         When fewer than two recordings can be calibrated, or what they are grouped by is not known.
     """
     if by not in BYS:
-        raise ValueError(f"recordings are not grouped by {by!r}; choose one of {', '.join(BYS)}.")
+        raise RefusedError(f"recordings are not grouped by {by!r}; choose one of {', '.join(BYS)}.")
     if labels is not None and len(labels) != len(recordings):
-        raise ValueError(f"{len(labels)} labels were given for {len(recordings)} recordings; give one for each.")
+        raise RefusedError(f"{len(labels)} labels were given for {len(recordings)} recordings; give one for each.")
     tell = progress or (lambda _fraction, _text: None)
     results: list[CalibrationResult] = []
     groups: list[str] = []
@@ -111,7 +112,7 @@ def calibrate_sessions(
             else:
                 place = {"gravity_m_s2": gravity_m_s2, "latitude_deg": latitude_deg, "height_m": height_m}
                 result = calibrate(recording, **place)  # type: ignore[arg-type]
-        except ValueError as error:
+        except REFUSALS as error:
             left_out.append((recording.source, str(error)))
             continue
         why = _unfit(result, results)
@@ -122,7 +123,7 @@ def calibrate_sessions(
         groups.append(label)
     if len(results) < 2:
         reasons = "; ".join(f"{Path(name).name}: {reason}" for name, reason in left_out) or "one recording was given"
-        raise ValueError(f"two recordings at least are needed to see what repeats ({reasons}).")
+        raise RefusedError(f"two recordings at least are needed to see what repeats ({reasons}).")
     sessions = sessions_of(results, groups)
     model = combine(sessions, by, results[0].calibration, frame=frame, alpha=alpha, left_out=tuple(left_out))
     return SessionsResult(model, tuple(results))
@@ -149,7 +150,7 @@ def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Wo
 def _label(recording: Recording, by: By) -> str:
     if by == "date":
         if recording.start_epoch_s <= 0.0:
-            raise ValueError(
+            raise RefusedError(
                 f"{recording.source}: the log does not say on which day it was recorded; give --labels DAY,DAY,..., "
                 "one word for each recording."
             )

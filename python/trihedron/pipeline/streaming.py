@@ -23,6 +23,7 @@ from trihedron.pipeline.results import CalibrationResult
 from trihedron.read import ChunkedLog, open_chunks
 from trihedron.records import Hold, Move, Recording, Segments
 from trihedron.records.progress import Progress
+from trihedron.refused import RefusedError
 from trihedron.segment import BlockSums, segment_blocks
 from trihedron.sensor_model import correct
 from trihedron.units import AccelerationUnit, RateUnit
@@ -110,7 +111,7 @@ def log_on_disk(
         When the file is neither, columns do not fit, or a sensor has not all its axes in the order x y z.
     """
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
-        raise ValueError(f"--rate is a positive number of samples per second, not {rate_hz}.")
+        raise RefusedError(f"--rate is a positive number of samples per second, not {rate_hz}.")
     log = open_chunks(Path(path), columns)
     triads: dict[str, Triad | None] = {"a": None, "g": None}
     for sensor in triads:
@@ -118,7 +119,7 @@ def log_on_disk(
             wanted = (f"{sensor}x", f"{sensor}y", f"{sensor}z")
             first = log.roles.index(wanted[0]) if wanted[0] in log.roles else 0
             if log.roles[first : first + 3] != wanted:
-                raise ValueError(f"{path}: --columns must name {' '.join(wanted)}, one after the other.")
+                raise RefusedError(f"{path}: --columns must name {' '.join(wanted)}, one after the other.")
             triads[sensor] = Triad(log, first)
     return LogOnDisk(
         EvenTime(log.n_rows, rate_hz),
@@ -277,16 +278,16 @@ def apply_file(
     target = Path(output)
     known = calibration_of(calibration)
     if target.suffix.lower() != ".npy":
-        raise ValueError(f"{target}: a log that is corrected in pieces is written as .npy; give this ending.")
+        raise RefusedError(f"{target}: a log that is corrected in pieces is written as .npy; give this ending.")
     if target.exists() and not overwrite:
-        raise ValueError(f"{target}: this exists and was left alone; choose another name or add --force.")
+        raise RefusedError(f"{target}: this exists and was left alone; choose another name or add --force.")
     if known.extensions.get("effects") or known.extensions.get("thermal"):
-        raise ValueError("this calibration follows temperature or takes effects off: apply it to the log as a whole.")
+        raise RefusedError("this calibration follows temperature or takes effects off: apply it to the log as a whole.")
     check_units(known, cast("Recording", log))
     sensors = [(log.accelerometer, known.accelerometer), (log.gyroscope, known.gyroscope)]
     used = [(triad, sensor) for triad, sensor in sensors if triad is not None and sensor is not None]
     if not used:
-        raise ValueError(f"{log.source}: the calibration holds none of its sensors.")
+        raise RefusedError(f"{log.source}: the calibration holds none of its sensors.")
     shape = (log.n_samples, 1 + 3 * len(used))
     part, note, next_note = (Path(f"{target}{ending}") for ending in (".part", ".part.json", ".part.json.new"))
     of = made_of(log.log.path, log.rate_hz, log.log.roles, shape, calibration_text(known))

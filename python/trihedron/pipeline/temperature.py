@@ -11,6 +11,7 @@ from trihedron.arrays import FloatArray
 from trihedron.invariants import Anchor, model_vector, numbers_of
 from trihedron.records import Calibration, Finding, FindingCode, Recording
 from trihedron.records.sessions import PARAMETERS
+from trihedron.refused import RefusedError
 from trihedron.sensor_model import in_frame, reframing
 
 KNOTS = 257
@@ -35,7 +36,7 @@ def check_range(calibration: Calibration, recording: Recording) -> tuple[Finding
     try:
         low, high = (float(value) for value in stated["temperature_degc"])
     except (TypeError, ValueError):
-        raise ValueError("the calibration's valid_range is not two temperatures: calibrate again.") from None
+        raise RefusedError("the calibration's valid_range is not two temperatures: calibrate again.") from None
     T = recording.temperature_degc
     if T is None or not np.isfinite(T).any():
         return (_missing(low, high),) if "thermal" in calibration.extensions else ()

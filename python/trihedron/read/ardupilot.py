@@ -18,7 +18,6 @@ from trihedron.read.table import StatedClock, Table, file_sha256
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.records import Finding, FindingCode
 
-MAGIC = b"\xa3\x95"
 _TYPES = ["IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
 _STAMPS = (("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS", "ms"))
 _FIELDS = {

@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+import numpy as np
+
 from trihedron.read.errors import ReadError
 from trihedron.read.names import ColumnName, parse_name
 from trihedron.read.table import Table
@@ -21,6 +23,8 @@ _ALIASES = {
     **{"temp": "temperature", "temperature": "temperature", "supply": "supply", "voltage": "supply", "v": "supply"},
 }
 _SKIP = {"-", "_", "skip", ""}
+_BY_PLACE = (3, 4, 6, 7)
+"""Numbers of columns whose order is known without names."""
 
 
 @dataclass(frozen=True)
@@ -183,6 +187,9 @@ def _column_number(table: Table, text: str, role: str) -> int:
 def _positional(table: Table, sensor: Sensor | None) -> Columns:
     """No names: the usual orders by number of columns."""
     filled = [i for i, column in enumerate(table.columns) if len(column) and not (table.names and table.names[i])]
+    # Cells behind the last reading that never held a value.
+    while filled and len(filled) not in _BY_PLACE and not np.isfinite(table.columns[filled[-1]]).any():
+        filled.pop()
     n = len(filled)
     if n in (3, 4):
         time = filled[0] if n == 4 else None
@@ -217,7 +224,7 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
             triads["accelerometer"] = tilt[0]
     own_time: int | None = None
     unnamed = sum(1 for i, name in enumerate(table.names) if not name and len(table.columns[i]))
-    if triads["accelerometer"] is None and triads["gyroscope"] is None and unnamed in (3, 4, 6, 7):
+    if triads["accelerometer"] is None and triads["gyroscope"] is None and unnamed in _BY_PLACE:
         by_place = _positional(table, sensor)
         triads = {"accelerometer": by_place.accelerometer, "gyroscope": by_place.gyroscope}
         own_time = by_place.time

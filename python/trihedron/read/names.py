@@ -6,6 +6,9 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 
+from trihedron.read.languages import english, plain
+
+_WORD = re.compile(r"(?:[^\W_²³¹]|°)+")
 _NOT_A_SENSOR = frozenset(
     {"cov", "covariance", "std", "stddev", "sigma", "var", "bias", "offset", "integral", "dt", "euler", "orientation"}
     | {"quaternion", "quat", "mag", "magnetometer", "magnetic", "gravity", "clipping", "clip", "samples", "sat", "flag"}
@@ -33,6 +36,7 @@ _TIME_WORDS = {
     "elapsed",
     "epoch",
     "clock",
+    "when",
     "datetime",
     # The clock of GNSS receivers; time in the languages of loggers that translate their names.
     "tow",
@@ -44,7 +48,6 @@ _TIME_WORDS = {
     "tempo",
 }
 _TIME_WORDS |= {"millis", "micros", "seconds", "secs", "ticks", "unix"}
-_TIME_ANYWHERE = {"time", "timestamp", "timestamps", "stamp", "datetime", "tow", "itow"}
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
 _TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
 _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
@@ -109,7 +112,7 @@ def _unit(sensor: str, words: list[str]) -> str:
 @lru_cache(maxsize=4096)
 def parse_name(name: str) -> ColumnName:
     """What a column called ``name`` holds."""
-    text = name.strip().strip('"').strip().replace("m/(s^2)", "m/s^2").replace("m/(sec^2)", "m/s^2")
+    text = plain(name.strip().strip('"').strip()).replace("m/(s^2)", "m/s^2").replace("m/(sec^2)", "m/s^2")
     if re.fullmatch(r"gF[xyz]", text):
         # Physics Toolbox: force in g along an axis, not a gyro's x.
         return ColumnName("accelerometer", text[-1], "gf", "g", rank=1)
@@ -133,10 +136,8 @@ def parse_name(name: str) -> ColumnName:
     if inner:
         index, text = inner.group(1), text[: inner.start()]
     text = text.replace("m/s^2", "m_s2").replace("m/s²", "m_s2")
-    words = [w for w in re.split(r"[^a-z0-9µ°]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", text).lower()) if w]
-    unit_words = [
-        w for w in re.split(r"[^a-z0-9µ°]+", bracket.replace("²", "2").replace("-1", "").replace("-2", "2")) if w
-    ]
+    words = english(_WORD.findall(re.sub(r"([a-z])([A-Z])", r"\1 \2", text).lower()))
+    unit_words = english(_WORD.findall(bracket.replace("²", "2").replace("-1", "").replace("-2", "2")))
     return _classify(words, unit_words, index)
 
 
@@ -215,7 +216,9 @@ def _sensor(words: list[str]) -> str:
 
 def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
     joined = "".join(words)
-    if words[0] in {"temp", "temperature", "tempc"} or any(_TEMPERATURE.fullmatch(w) for w in words):
+    if words[0] in {"temp", "temperature", "tempc"} or any(
+        _TEMPERATURE.fullmatch(w) and w not in _TIME_WORDS for w in words
+    ):
         return ColumnName("temperature", words=tuple(words))
     if words == ["t"] and set(unit_words) & {"°", "c", "°c", "degc", "k"}:
         return ColumnName("temperature", words=tuple(words))

@@ -162,8 +162,7 @@ def audited(
     sensors = settled(sensors)
     findings = list(sensors.findings)
     _accounted(sensors, findings)
-    time_s, table = sensors.time_s, sensors.table
-    n = len(time_s)
+    time_s, table, n = sensors.time_s, sensors.table, len(sensors.time_s)
     rate = _rate_hz(sensors)
     present = {
         name: triad

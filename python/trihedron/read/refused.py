@@ -25,7 +25,6 @@ _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
     (b"ply\n", "a point cloud", "name the log of the IMU"),
     (b"bplist00", "a property list", "export the log as CSV"),
 )
-_ROW_MARKS = b"0123456789+-."
 
 
 def refuse_foreign(path: Path, magic: bytes) -> None:

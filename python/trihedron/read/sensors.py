@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -14,13 +13,14 @@ from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz, sett
 from trihedron.read.clock.order import in_order
 from trihedron.read.clock.steps import steps_of
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
+from trihedron.read.constant import refuse_constant
 from trihedron.read.copies import copied_rows
 from trihedron.read.devices import Choice, one_device
 from trihedron.read.errors import ReadError
-from trihedron.read.names import parse_name
 from trihedron.read.sensing import order_of_triads
 from trihedron.read.table import Table
 from trihedron.read.text.store import side_by_side
+from trihedron.read.unread_time import refuse_unread_time
 from trihedron.records import Finding, FindingCode, Sampling
 from trihedron.records.progress import Progress
 from trihedron.records.sampling import UNJUDGED
@@ -121,7 +121,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
     findings = [*table.findings, *chosen.findings, *_words_left_out(table)]
     if chosen.time is None:
-        _refuse_unread_time(table, options)
+        refuse_unread_time(table, chosen, options.columns, options.rate_hz or _stated_rate(table))
     clock, rate = _time_base(table, chosen, options, findings)
     clock = _without_copies(table, chosen, clock, findings)
     accelerometer = _triad(table, chosen.accelerometer, clock.rows)
@@ -143,7 +143,7 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
         ("gyroscope", gyroscope, chosen.gyroscope),
     ):
         if triad is not None and where is not None:
-            _refuse_constant(table, name, triad, where)
+            refuse_constant(table, name, triad, where)
     return Sensors(
         clock.time_s,
         clock.start_s,
@@ -176,24 +176,6 @@ def _words_left_out(table: Table) -> list[Finding]:
     ]
 
 
-_CLOCK = re.compile(r"\d[:.h]\d\d[:.m]\d\d")
-"""Hours, minutes and seconds in some order of marks."""
-
-
-def _refuse_unread_time(table: Table, options: Options) -> None:
-    """A time that cannot be understood must not become 100 Hz."""
-    if table.names is None or (options.columns is not None and re.search(r"(?:t|time)\s*=", options.columns)):
-        return
-    has_time = any(parse_name(name).role == "time" for i, name in enumerate(table.names) if i not in table.words)
-    for i, example in table.words.items():
-        is_clock = not has_time and _CLOCK.search(example) is not None
-        if is_clock or parse_name(table.names[i]).role == "time":
-            raise ReadError(
-                f"{table.path}: column {table.label(i)} holds {example[:40]!r}, which is no time known here; write it "
-                "in seconds or as 2024-03-01 12:00:00.000, or read with --columns time=none --rate HZ."
-            )
-
-
 def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[Finding]) -> Clock:
     """Rows written twice (same stamp, same readings) once; they are no samples."""
     if chosen.time is None or not steps_of(clock.time_s).same:
@@ -214,21 +196,6 @@ def _without_copies(table: Table, chosen: Columns, clock: Clock, findings: list[
         )
     )
     return Clock(np.delete(clock.time_s, drop), clock.start_s, np.delete(rows, drop), clock.findings)
-
-
-def _refuse_constant(table: Table, name: str, triad: FloatArray, where: tuple[int, int, int]) -> None:
-    for k, column in enumerate(where):
-        head = triad[:1000, k]
-        if np.isfinite(head[0]) and np.any(np.isfinite(head) & (head != head[0])):
-            continue  # it changes: no need to go through millions of rows
-        finite = triad[np.isfinite(triad[:, k]), k]
-        if len(finite) == 0:
-            raise ReadError(f"{table.path}: column {table.label(column)} of the {name} holds no finite number.")
-        if finite[0] == finite[-1] and np.all(finite == finite[0]):
-            raise ReadError(
-                f"{table.path}: column {table.label(column)} of the {name} is {finite[0]:.6g} in all {len(finite)} "
-                f"rows from {table.place(0)} on: a dead channel, or the wrong column; name the columns with --columns."
-            )
 
 
 def _is_gyro_first(first: FloatArray, second: FloatArray, rate_hz: float, findings: list[Finding]) -> bool:

@@ -12,7 +12,6 @@ from trihedron.records import Finding
 from trihedron.records.words import Words, words
 
 SECONDS = StatedClock(unit="s")
-MICROSECONDS = StatedClock(unit="us")
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -67,6 +68,7 @@ class FindingCode(str, Enum):
     HOLD_CREEPS = "hold-creeps"
     HOLD_BUMPED = "hold-bumped"
     HOLD_UNSTEADY = "hold-unsteady"
+    HOLD_AT_LIMIT = "hold-at-limit"
     SLOW_TURN = "slow-turn"
     FEW_POSES = "few-poses"
     NOT_STATIC = "not-static"
@@ -186,7 +188,9 @@ class Finding(Frozen, Plain):
         catalogue = import_module("trihedron.report.findings.catalogue")
         severity, seen, cause, action = catalogue.words_of(code, case, severity, values)
         told = {name: float(v) for name, v in values.items() if isinstance(v, Real) and not isinstance(v, bool)}
-        return cls(code, severity, seen, cause, action, MappingProxyType(told | dict(numbers or {})))
+        # What could not be estimated is infinite or none: no figure, and no file could hold it.
+        figures = {name: v for name, v in (told | dict(numbers or {})).items() if math.isfinite(v)}
+        return cls(code, severity, seen, cause, action, MappingProxyType(figures))
 
     def __str__(self) -> str:
         return f"{self.severity.value}: {self.seen}" + (f" {self.action}" if self.action else "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
+from trihedron.segment.range_ends import RangeEnd, inside_the_range
 
 SEED_FRACTION = 0.02
 SEED_S = 1.0
@@ -18,6 +20,8 @@ ROUNDING = 1e-7
 FALSE_ALARM = 1e-4
 """Chance that a still window is called moving: once in minutes of windows, and so short a gap is closed again."""
 _MAX_ROUNDS = 60
+USUALLY_STILL = 0.1
+"""Quantile of a log's windows that stands for stillness before it is found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +56,13 @@ class Activity:
         return bool(np.median(ratio) > 0.5 * WINDOW_BLOCKS * channels.length)
 
 
-def measure_activity(channels: Channels) -> Activity:
+def measure_activity(channels: Channels, ends: Sequence[RangeEnd] = ()) -> Activity:
     """Noise floor by growing the quietest windows until they hold every window that the same noise explains.
 
     The floor of a channel is the median over the quiet windows, so neither axes of different noise nor a few
     disturbed windows matter; the limit lies at the false-alarm quantile of a log-normal whose width is that of the
     chi-square law, or the width of the quiet windows' lower half where that is larger (coloured noise, rounding).
+    A channel at one of the ``ends`` of its range has no vote there.
     """
     width = min(WINDOW_BLOCKS, channels.n_blocks)
     n_channels = channels.mean.shape[1]
@@ -76,7 +81,10 @@ def measure_activity(channels: Channels) -> Activity:
     # Running sums round at 1e-8 of the signal: a simulation without noise must not take that for its noise.
     tiny = np.maximum(1e-12 * np.median(inside[whole], axis=0), ROUNDING**2 * np.mean(mean**2, axis=0))[alive]
     inside_alive, between_alive = inside[:, alive] + tiny, between[:, alive] + tiny / channels.length
-    total = np.log(inside_alive + between_alive).mean(axis=1)
+    tells = inside_the_range(channels, ends)[:, alive]
+    total = _mean_of(
+        np.log(inside_alive + between_alive) - _usual(inside_alive + between_alive, tells & whole[:, None]), tells
+    )
     total[~whole] = np.inf
     n_seed = min(max(int(SEED_FRACTION * whole.sum()), channels.blocks(SEED_S)), int(whole.sum()))
     quiet = total <= np.partition(total, n_seed - 1)[n_seed - 1]
@@ -85,8 +93,9 @@ def measure_activity(channels: Channels) -> Activity:
     fast = slow = total
     limits = [0.0, 0.0]
     for _ in range(_MAX_ROUNDS):
-        fast = np.log((inside_alive / np.median(inside_alive[quiet], axis=0)).mean(axis=1))
-        slow = np.log((between_alive / np.median(between_alive[quiet], axis=0)).mean(axis=1))
+        inside_floor, between_floor = (_median_of(a, tells, quiet) for a in (inside_alive, between_alive))
+        fast = np.log(_mean_of(inside_alive / inside_floor, tells))
+        slow = np.log(_mean_of(between_alive / between_floor, tells))
         limits = [_limit(a[quiet], nu) for a, nu in zip((fast, slow), freedom, strict=True)]
         grown = whole & (fast <= limits[0]) & (slow <= limits[1])
         if not grown.any() or np.array_equal(grown, quiet):
@@ -94,9 +103,32 @@ def measure_activity(channels: Channels) -> Activity:
         quiet = grown
     white, wander = np.maximum(rounding, 0.0), rounding / channels.length
     white = white.copy()
-    white[alive] = np.median(inside_alive[quiet], axis=0)
-    wander[alive] = np.median(between_alive[quiet], axis=0) / _chi2_median_ratio(max(width - 1, 1))
+    white[alive] = _median_of(inside_alive, tells, quiet)
+    wander[alive] = _median_of(between_alive, tells, quiet) / _chi2_median_ratio(max(width - 1, 1))
     return Activity(fast, slow, limits[0], limits[1], quiet, white, wander + np.zeros(n_channels))
+
+
+def _usual(power: FloatArray, tells: BoolArray) -> FloatArray:
+    """(c,) logarithm of a channel's power when still, roughly: channels of different units are then averaged alike."""
+    return np.log([np.quantile(power[mask, c], USUALLY_STILL) for c, mask in enumerate(tells.T)])
+
+
+def _mean_of(values: FloatArray, tells: BoolArray) -> FloatArray:
+    """(m,) mean over the channels that tell; infinite where none does."""
+    if tells.all():
+        mean: FloatArray = values.mean(axis=1)
+        return mean
+    count = tells.sum(axis=1)
+    return np.where(count > 0, np.where(tells, values, 0.0).sum(axis=1) / np.maximum(count, 1), np.inf)
+
+
+def _median_of(values: FloatArray, tells: BoolArray, quiet: BoolArray) -> FloatArray:
+    """(c,) median over quiet windows in which a channel tells; over all in which it does where no quiet one is."""
+    if tells.all():
+        median: FloatArray = np.median(values[quiet], axis=0)
+        return median
+    chosen = [quiet & one if (quiet & one).any() else one for one in tells.T]
+    return np.array([np.median(values[mask, c]) for c, mask in enumerate(chosen)])
 
 
 def _limit(activity: FloatArray, freedom: int) -> float:

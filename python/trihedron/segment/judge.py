@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from trihedron import probability
@@ -10,6 +12,7 @@ from trihedron.ranges import ranges_of
 from trihedron.records import Finding, FindingCode, Hold, Recording
 from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise
+from trihedron.segment.range_ends import RangeEnd, is_cut
 from trihedron.segment.runs import MIN_HOLD_S, Run
 
 CREEP_CHANCE = 1e-3
@@ -86,6 +89,20 @@ def _creep_size(channels: Channels, run: Run, noise: MeanNoise, chance: float) -
     statistic = float(np.sum(difference[live] ** 2 / variance[live]))
     freedom = int(live.sum())
     return float(np.sqrt(statistic)) if freedom and statistic > float(probability.chdtri(freedom, chance)) else 0.0
+
+
+def without_cut(
+    recording: Recording, channels: Channels, runs: list[Run], ends: Sequence[RangeEnd]
+) -> tuple[list[Run], list[Finding]]:
+    """Stretches of stillness whose accelerometer was inside its range, and what is said of the others."""
+    cut = [is_cut(recording, channels, (run.first, run.last), ends) for run in runs]
+    kept = [run for run, end in zip(runs, cut, strict=True) if end is None]
+    first = next(((run, end) for run, end in zip(runs, cut, strict=True) if end is not None), None)
+    if first is None:
+        return runs, []
+    start_s = float(recording.time_s[first[0].first * channels.length])
+    said = Finding.of(FindingCode.HOLD_AT_LIMIT, holds=len(runs) - len(kept), first_s=start_s, reading=first[1].reading)
+    return kept, [said]
 
 
 def judge_log(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,12 +11,14 @@ import numpy as np
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.ranges import ranges_of
 from trihedron.records import Finding, Hold, Move, Recording, Segments
+from trihedron.records.channel_facts import Limit
 from trihedron.records.progress import Progress
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, split_into_blocks
 from trihedron.segment.floor import Activity, measure_activity
-from trihedron.segment.judge import judge_log, judge_runs
+from trihedron.segment.judge import judge_log, judge_runs, without_cut
 from trihedron.segment.means import average_holds
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
+from trihedron.segment.range_ends import range_ends
 from trihedron.segment.runs import (
     MIN_HOLD_S,
     SWAY_RAD,
@@ -56,15 +60,30 @@ def segment_recording(recording: Recording, *, progress: Progress | None = None)
     """
     report = progress or (lambda _done, _text: None)
     report(0.0, "noise of short blocks")
-    return segment_blocks(recording, split_into_blocks(recording), progress=progress)
+    channels = split_into_blocks(recording)
+    return segment_blocks(recording, channels, limits=_limits(recording), progress=progress)
 
 
-def segment_blocks(recording: Recording, channels: Channels, *, progress: Progress | None = None) -> Segments:
-    """The same from blocks that were made already; of the recording itself only rows of holds are read."""
+def _limits(recording: Recording) -> list[tuple[int, Limit]]:
+    """Limits of all channels, counted as blocks count them."""
+    sensors = [one for one in (recording.facts.accelerometer, recording.facts.gyroscope) if one is not None]
+    return [(3 * k + limit.axis, limit) for k, facts in enumerate(sensors) for limit in facts.limits]
+
+
+def segment_blocks(
+    recording: Recording,
+    channels: Channels,
+    *,
+    limits: Sequence[tuple[int, Limit]] = (),
+    progress: Progress | None = None,
+) -> Segments:
+    """The same from blocks that were made already, with the (channel, limit) that readings were seen to end at; of the
+    recording itself only rows of holds are read."""
     report = progress or (lambda _done, _text: None)
     if channels.is_valid.sum() < WINDOW_BLOCKS:
         return _nothing_found(recording, channels)
-    activity = measure_activity(channels)
+    ends = range_ends(channels, limits)
+    activity = measure_activity(channels, ends)
     if activity.is_wandering(channels):
         return _nothing_found(recording, channels)
     report(0.4, "still stretches")
@@ -84,9 +103,11 @@ def segment_blocks(recording: Recording, channels: Channels, *, progress: Progre
             channels, quiet, ranges_of(quiet), drifting, SWAY_RAD * gravity, channels.blocks(MIN_HOLD_S)
         )
     loose = loose_blocks(activity, channels.is_valid) & ~turning
-    runs = _find_runs(recording, channels, quiet, loose)
+    found = _find_runs(recording, channels, quiet, loose)
+    runs, said = without_cut(recording, channels, found, ends)
     report(0.7, "means and their errors")
-    return _describe(recording, channels, activity, runs, turning)
+    segments = _describe(recording, channels, activity, runs, turning)
+    return replace(segments, findings=(*said, *segments.findings)) if said else segments
 
 
 def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose: BoolArray) -> list[Run]:

@@ -10,6 +10,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.refused import RefusedError
 from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.coloured_noise import coloured_variance
 
@@ -50,7 +51,7 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         or segments.accelerometer_sigma_mean is None
         or segments.accelerometer_mean is None
     ):
-        raise ValueError("the segments do not say how certain their hold means are")
+        raise RefusedError("the segments do not say how certain their hold means are")
     step_s = 1.0 / recording.rate_hz
     floor = LEAST_SHARE * max(float(np.abs(segments.accelerometer_mean).max()), 1e-300)
     has_rate = recording.gyroscope is not None and segments.gyroscope_sigma is not None

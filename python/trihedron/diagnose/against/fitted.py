@@ -10,6 +10,7 @@ from trihedron.arrays import FloatArray
 from trihedron.records import Calibration
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import Domain, DomainTest
+from trihedron.refused import RefusedError
 
 PUBLISHED_DIGITS = 1e-6
 """A calibration without error bars is taken at its last printed digits: this share of each number."""
@@ -67,7 +68,7 @@ def model_of_diagnosis(diagnosis: Diagnosis, *, with_effects: bool = True) -> Fi
     fit = diagnosis.extended if with_effects else diagnosis.baseline
     tests = diagnosis.remaining if with_effects else diagnosis.domains
     if fit.covariance is None:
-        raise ValueError("a diagnosis is compared by its covariance, and this one carries none")
+        raise RefusedError("a diagnosis is compared by its covariance, and this one carries none")
     accel, gyro = fit.accelerometer, fit.gyroscope
     covariance = np.array(fit.covariance)
     widened = np.ones(len(covariance))

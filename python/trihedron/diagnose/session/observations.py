@@ -12,6 +12,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.records import Recording, Segments
+from trihedron.refused import RefusedError
 from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.noise import measure_noise
 
@@ -157,9 +158,9 @@ def observe(recording: Recording, segments: Segments) -> Observations:
     recording = recording.with_distinct_stamps()
     segments, swing = means_beside_lines(recording, segments)
     if recording.accelerometer is None or segments.accelerometer_mean is None:
-        raise ValueError("a diagnosis needs accelerometer readings: this recording has none")
+        raise RefusedError("a diagnosis needs accelerometer readings: this recording has none")
     if segments.n_holds < 2:
-        raise ValueError(
+        raise RefusedError(
             f"a diagnosis needs still poses to hold the model against: {segments.n_holds} found, at least 2 are needed"
         )
     t = recording.time_s

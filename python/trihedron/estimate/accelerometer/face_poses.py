@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.records.words import Words, words
+from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 LARGEST_TILT_DEG = 20.0
@@ -49,7 +50,7 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
     elif acceleration_to_si(raw_unit) is not None:
         centred = means
     else:
-        raise ValueError(
+        raise RefusedError(
             f"{len(means)} still poses in counts are too few to tell faces apart: record all six faces, or say which "
             "face is up in each pose"
         )
@@ -71,7 +72,7 @@ def given(up: Sequence[int], n: int) -> IntArray:
     """
     faces = np.asarray(up)
     if faces.shape != (n,) or not np.all(np.isin(faces, (0, *FACES))):
-        raise ValueError(
+        raise RefusedError(
             f"faces must be {n} numbers, each ±1, ±2 or ±3 (axis up or down) or 0 (left out), got {list(up)}"
         )
     return faces.astype(np.int64)
@@ -89,11 +90,11 @@ def check_sufficient(faces: IntArray, *, all_six: bool) -> None:
     missing = [face for face in FACES if face not in present]
     axes = {abs(face) for face in present}
     if all_six and missing:
-        raise ValueError(
+        raise RefusedError(
             f"the closed form needs all six faces; missing: {', '.join(face_in_words(face) for face in missing)}"
         )
     if len(axes) < 3 or len(present) < 4:
-        raise ValueError(
+        raise RefusedError(
             "these faces do not determine the accelerometer's twelve parameters; missing: "
             + ", ".join(face_in_words(face) for face in missing)
         )

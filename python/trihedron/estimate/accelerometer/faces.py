@@ -17,6 +17,7 @@ from trihedron.estimate.accelerometer.norm import norm_residual
 from trihedron.records.calibration import FitQuality, Frame, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.words import words
+from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import other_form, other_form_jacobian, reframing
 from trihedron.units import AccelerationUnit, degrees_from_radians
 
@@ -82,9 +83,9 @@ def calibrate_faces(
     g = inputs.gravity(gravity_m_s2)
     unit = AccelerationUnit(raw_unit)
     if method not in ("least-squares", "closed-form"):
-        raise ValueError(f"method must be 'least-squares' or 'closed-form', got {method!r}")
+        raise RefusedError(f"method must be 'least-squares' or 'closed-form', got {method!r}")
     if len(values) == 0:
-        raise ValueError("there are no still poses: hold each of the six faces still for some seconds")
+        raise RefusedError("there are no still poses: hold each of the six faces still for some seconds")
     faces = face_poses.identify(values, unit) if up is None else face_poses.given(up, len(values))
     used = np.flatnonzero(faces)
     closed = method == "closed-form"
@@ -248,7 +249,7 @@ def _quality(
         others = used[used != pose]
         try:
             face_poses.check_sufficient(faces[others], all_six=closed)
-        except ValueError:
+        except REFUSALS:
             continue
         apart[pose] = _left_out_pose(values, noise, faces, g, pose, others, estimate.tilt_rad, closed=closed)
     seen = np.isfinite(apart[:, 0])

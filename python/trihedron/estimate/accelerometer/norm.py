@@ -14,6 +14,7 @@ from trihedron.estimate.accelerometer.poses import ENTRIES, PoseDesign
 from trihedron.records.calibration import FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding
 from trihedron.records.words import words
+from trihedron.refused import RefusedError
 from trihedron.sensor_model import reframing
 from trihedron.units import AccelerationUnit
 
@@ -130,12 +131,12 @@ def calibrate_norm_samples(
     raw = np.ascontiguousarray(samples, dtype=np.float64)
     pose = np.asarray(pose_of_sample)
     if raw.ndim != 2 or raw.shape[1] != 3 or pose.shape != (len(raw),) or len(raw) == 0:
-        raise ValueError(f"samples must have shape (n, 3) with one pose index each, got {raw.shape} and {pose.shape}")
+        raise RefusedError(f"samples must have shape (n, 3) with one pose index each, got {raw.shape} and {pose.shape}")
     if not np.issubdtype(pose.dtype, np.integer) or pose.min() < 0:
-        raise ValueError("pose indices must be non-negative integers")
+        raise RefusedError("pose indices must be non-negative integers")
     count = np.bincount(pose)
     if np.any(count == 0):
-        raise ValueError(f"pose {int(np.flatnonzero(count == 0)[0])} has no samples")
+        raise RefusedError(f"pose {int(np.flatnonzero(count == 0)[0])} has no samples")
     sums = np.column_stack([np.bincount(pose, weights=raw[:, j]) for j in range(3)])
     values, noise = inputs.pose_means(sums / count[:, None], sigma_means)
     g = inputs.gravity(gravity_m_s2)
@@ -154,14 +155,14 @@ def calibrate_norm_samples(
 
 def _settings(g: float, frame: str, loss: str, loss_scale: float | None, objective: str) -> _core.NormSettings:
     if frame not in ("lower", "symmetric"):
-        raise ValueError(
+        raise RefusedError(
             f"still poses of any orientation give the frame 'lower' or 'symmetric', not {frame!r}: "
             "they do not know the case"
         )
     if loss not in _LOSSES:
-        raise ValueError(f"loss must be one of {', '.join(_LOSSES)}, got {loss!r}")
+        raise RefusedError(f"loss must be one of {', '.join(_LOSSES)}, got {loss!r}")
     if objective not in ("norm", "squared"):
-        raise ValueError(f"objective must be 'norm' or 'squared', got {objective!r}")
+        raise RefusedError(f"objective must be 'norm' or 'squared', got {objective!r}")
     number, default = _LOSSES[loss]
     return _core.NormSettings(
         g,
@@ -174,7 +175,7 @@ def _settings(g: float, frame: str, loss: str, loss_scale: float | None, objecti
 
 def _enough(values: FloatArray) -> None:
     if len(values) < 3:
-        raise ValueError(
+        raise RefusedError(
             f"{len(values)} still poses are too few for an accelerometer: record at least nine different orientations, "
             "better eighteen (six faces and twelve edges of a cube)"
         )
@@ -187,7 +188,7 @@ def _positive_start(
         return None
     S, b = (np.ascontiguousarray(part, dtype=np.float64) for part in start)
     if S.shape != (3, 3) or b.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(b))):
-        raise ValueError("a start is S of shape (3, 3) and b of shape (3,), finite")
+        raise RefusedError("a start is S of shape (3, 3) and b of shape (3,), finite")
     return np.ascontiguousarray(S * signs), b
 
 

@@ -13,6 +13,7 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.probability import chdtrc, chdtri
 from trihedron.records.calibration import SensorCalibration
+from trihedron.refused import RefusedError
 
 RateDegree = Literal[0, 1, 3]
 """Degree of the rate polynomial over a sample: 0 constant, 1 linear, 3 coning-corrected."""
@@ -55,7 +56,7 @@ class MoveOptions:
         if value.ndim == 0:
             return float(value) * np.eye(3)
         if value.shape != (3, 3):
-            raise ValueError(f"nominal_scale must be a number or (3, 3), got shape {value.shape}")
+            raise RefusedError(f"nominal_scale must be a number or (3, 3), got shape {value.shape}")
         return value
 
 
@@ -138,7 +139,7 @@ def align_screened(
     """
     used = ~measured.is_lost
     if not np.any(used):
-        raise ValueError("the gyro met its limit in every move: turn more slowly or set a wider range")
+        raise RefusedError("the gyro met its limit in every move: turn more slowly or set a wider range")
     outliers: tuple[int, ...] = ()
     is_near = False
     n_parameters = 9 + (3 if options.is_offset_free else 0)

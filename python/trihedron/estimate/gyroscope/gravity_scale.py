@@ -12,6 +12,7 @@ from trihedron.estimate.gyroscope.moves import calibrate_moves
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.refused import REFUSALS
 
 LARGEST_DOUBT = 0.1
 """Relative standard error above which a scale by gravity is not used: three of them still exclude half and twice."""
@@ -39,7 +40,7 @@ def scale_by_gravity(
         return None
     try:
         gyroscope, _ = calibrate_moves(recording, segments, accelerometer, gravity_m_s2, MoveOptions(n_folds=0))
-    except ValueError:
+    except REFUSALS:
         return None
     quality, seen = gyroscope.quality, gyroscope.observability
     if quality is None or seen is None or seen.rank < seen.n_parameters or quality.angle_deg is None:

@@ -24,6 +24,7 @@ from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
+from trihedron.refused import RefusedError
 
 GAP_STEPS = 5.0
 """A step of time so much longer than the usual one is a gap: the rate in it is unknown."""
@@ -105,7 +106,7 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
     elif count:
         variance = sums / count
     else:
-        raise ValueError("the holds are too short to tell the gyro's noise: hold each pose for at least a second")
+        raise RefusedError("the holds are too short to tell the gyro's noise: hold each pose for at least a second")
     converter = recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s
     density: FloatArray = np.sqrt(np.maximum(variance, converter))
     return density
@@ -150,7 +151,6 @@ def measure_moves(
         rate, extra = _bridged(rate, extra, clipped, gyroscope)
     mid_s = np.ascontiguousarray(segments.time_mid_s[links])
     prepared = Moves(recording.time_s, rate, edges, mid_s, links, rate_degree, extra)
-
     var_reading = _mean_variance(segments.accelerometer_sigma_mean)
     zero_read, var_zero_read = zero, var_zero
     walk = excess_variance(zero[links[:, 1]] - zero[links[:, 0]], var_zero[links[:, 1]] + var_zero[links[:, 0]])
@@ -196,12 +196,12 @@ def measure_moves(
 def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
     moves = [move for move in segments.moves if move.stop - move.start >= 2]
     if not moves:
-        raise ValueError(
+        raise RefusedError(
             "no move between two still poses was found: turn the sensor by hand between poses and hold each for some "
             "seconds"
         )
     if moves[-1].stop > recording.n_samples or segments.holds[-1].stop > recording.n_samples:
-        raise ValueError("the segments reach beyond the recording: they belong to another log")
+        raise RefusedError("the segments reach beyond the recording: they belong to another log")
     return moves
 
 
@@ -292,7 +292,7 @@ def _undithered(quantum: FloatArray, sigma: FloatArray | None) -> BoolArray:
 
 def _both_means(segments: Segments) -> tuple[FloatArray, FloatArray]:
     if segments.accelerometer_mean is None or segments.gyroscope_mean is None:
-        raise ValueError("method 2 needs the hold means of both sensors: segment a recording that has both")
+        raise RefusedError("method 2 needs the hold means of both sensors: segment a recording that has both")
     return segments.accelerometer_mean, segments.gyroscope_mean
 
 
@@ -303,14 +303,14 @@ def _gapped(steps: FloatArray, nominal: float, edges: IntArray) -> BoolArray:
 
 def _required(readings: FloatArray | None, name: str) -> FloatArray:
     if readings is None:
-        raise ValueError(f"the recording has no {name}: method 2 needs both sensors")
+        raise RefusedError(f"the recording has no {name}: method 2 needs both sensors")
     return readings
 
 
 def _mean_variance(sigma_mean: FloatArray | None) -> FloatArray:
     """Variance of the hold means, (n, 3); what rounding leaves in them is in it (docs/segmentation.md)."""
     if sigma_mean is None:
-        raise ValueError("the segments do not say how certain their hold means are")
+        raise RefusedError("the segments do not say how certain their hold means are")
     return np.ascontiguousarray(np.asarray(sigma_mean, dtype=np.float64) ** 2)
 
 

@@ -8,6 +8,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
+from trihedron.refused import RefusedError
 from trihedron.units import rate_to_si
 
 
@@ -70,7 +71,7 @@ def starts(
     if unit is not None and nominal is None:
         found.append(unit * np.eye(3))
     if not found:
-        raise ValueError(
+        raise RefusedError(
             "the moves do not determine a first guess of the gyro scale and its readings are counts: "
             "give nominal_scale (3, 3) in rad/s per count, or add moves about all three axes"
         )

@@ -13,6 +13,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
 from trihedron.estimate.gyroscope.zeros import pool_zeros
 from trihedron.records.recording import Recording
+from trihedron.refused import RefusedError
 from trihedron.units import rate_to_si
 
 QUARTER = math.pi / 2.0
@@ -45,13 +46,13 @@ class Turn:
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop - 1:
-            raise ValueError(f"a turn must hold at least two samples, got {self.start}..{self.stop}")
+            raise RefusedError(f"a turn must hold at least two samples, got {self.start}..{self.stop}")
         if self.axis is not None and self.axis not in (0, 1, 2):
-            raise ValueError(f"the axis of a turn is 0, 1 or 2, got {self.axis}")
+            raise RefusedError(f"the axis of a turn is 0, 1 or 2, got {self.axis}")
         if self.angle_rad is not None and not math.isfinite(self.angle_rad):
-            raise ValueError("the angle of a turn must be finite")
+            raise RefusedError("the angle of a turn must be finite")
         if self.direction is not None and not 0.99 < math.hypot(*self.direction) < 1.01:
-            raise ValueError("the direction of a turn must be a unit vector")
+            raise RefusedError("the direction of a turn must be a unit vector")
 
     @property
     def stated(self) -> FloatArray | None:
@@ -120,11 +121,11 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
         When there is no gyro, no turn, or no zero turn of a second or more to learn the noise from.
     """
     if recording.gyroscope is None:
-        raise ValueError("the recording has no gyroscope")
+        raise RefusedError("the recording has no gyroscope")
     if not turns:
-        raise ValueError("method 1 needs turns: none were given and none were found")
+        raise RefusedError("method 1 needs turns: none were given and none were found")
     if not zeros:
-        raise ValueError(
+        raise RefusedError(
             "method 1 needs a stretch without rotation (a zero turn): hold the sensor still for some seconds"
         )
     gyroscope = recording.gyroscope
@@ -144,7 +145,7 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
         sums += 0.5 * np.sum(np.diff(means, axis=0) ** 2, axis=0) * length * step_s
         count += len(means) - 1
     if count < 4:
-        raise ValueError("the zero turns are too short to tell the gyro's noise: hold still for some seconds")
+        raise RefusedError("the zero turns are too short to tell the gyro's noise: hold still for some seconds")
     var_rate = np.maximum(sums / count, recording.facts.of("gyroscope").step ** 2 / 12.0 * step_s)
     zero_s = np.array(zero_duration)
     rates = zero_angle / zero_s[:, None]
@@ -180,12 +181,12 @@ def nominal_matrix(
     if nominal_scale is not None:
         value = np.asarray(nominal_scale, dtype=np.float64)
         if value.shape not in ((), (3, 3)) or not np.all(np.isfinite(value)):
-            raise ValueError("nominal_scale must be a finite number or a (3, 3) matrix, rad/s per raw unit")
+            raise RefusedError("nominal_scale must be a finite number or a (3, 3) matrix, rad/s per raw unit")
         return value * np.eye(3) if value.ndim == 0 else value
     unit = rate_to_si(recording.gyroscope_unit)
     if unit is not None:
         return unit * np.eye(3)
-    raise ValueError(AMBIGUOUS)
+    raise RefusedError(AMBIGUOUS)
 
 
 def scale_of_stated(measured: MeasuredTurns, turns: Sequence[Turn]) -> FloatArray | None:

@@ -13,6 +13,7 @@ from trihedron.estimate.gyroscope.turn_angles import Turn
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
+from trihedron.refused import RefusedError
 
 SAME_POSE_RAD = math.radians(5.0)
 """A turn on a table leaves gravity where it was, but for twice the table's tilt: a table leans two degrees at most."""
@@ -60,7 +61,7 @@ def stated_turns(
     if len(angles_deg) != len(moves):
         times = ", ".join(f"{recording.time_s[move.start]:.0f}" for move in moves[:12])
         where = f" (at {times}{' ...' if len(moves) > 12 else ''} s)" if moves else ""
-        raise ValueError(
+        raise RefusedError(
             f"{len(angles_deg)} turns were stated and {len(moves)} were found between poses of the same tilt{where}: "
             "give one angle in degrees for each, 0 to leave it out."
         )

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +40,11 @@ def design_least_squares(
         When the turns do not determine an axis, or nothing tells the zero.
     """
     if not 1e-30 < noise_density < 1e30:
-        raise ValueError(f"a noise density of {noise_density:g} is that of no gyro")
+        raise RefusedError(f"a noise density of {noise_density:g} is that of no gyro")
     q, p, t = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
     information = t + zero_s / noise_density**2 - float(np.sum(p**2 / q))
     if not information > 1e-12 * (t + zero_s / noise_density**2):
-        raise ValueError("nothing tells the zero: turn there and back, or hold still for some seconds")
+        raise RefusedError("nothing tells the zero: turn there and back, or hold still for some seconds")
     var_zero = 1.0 / information
     return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_zero), math.sqrt(var_zero))
 
@@ -67,7 +68,7 @@ def design_zero_first(
     """
     q, p, _ = _sums(axes, angles_rad, durations_s, noise_density, sigma_turn_rad)
     if not zero_s > 0.0:
-        raise ValueError("this route needs a zero turn: hold still for some seconds")
+        raise RefusedError("this route needs a zero turn: hold still for some seconds")
     var_zero = noise_density**2 / zero_s
     return TurnDesign(np.sqrt(1.0 / q + (p / q) ** 2 * var_zero), math.sqrt(var_zero))
 
@@ -80,14 +81,14 @@ def _sums(
     sigma_turn_rad: float,
 ) -> tuple[FloatArray, FloatArray, float]:
     if not noise_density > 0.0 or sigma_turn_rad < 0.0 or min(durations_s, default=0.0) <= 0.0:
-        raise ValueError("noise and durations must be positive")
+        raise RefusedError("noise and durations must be positive")
     which, angle, time = np.asarray(axes), np.asarray(angles_rad), np.asarray(durations_s)
     weight = 1.0 / (noise_density**2 * time + sigma_turn_rad**2)
     q = np.array([float(np.sum((weight * angle**2)[which == axis])) for axis in range(3)])
     p = np.array([float(np.sum((weight * angle * time)[which == axis])) for axis in range(3)])
     if np.any(q <= 0.0):
         missing = " and ".join(str(axis + 1) for axis in np.flatnonzero(q <= 0.0))
-        raise ValueError(f"no turn about axis {missing}: each axis needs one of its own")
+        raise RefusedError(f"no turn about axis {missing}: each axis needs one of its own")
     return q, p, float(np.sum(weight * time**2))
 
 

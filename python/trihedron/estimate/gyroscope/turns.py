@@ -37,6 +37,7 @@ from trihedron.records.finding import Finding
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.records.words import words
+from trihedron.refused import RefusedError
 from trihedron.sensor_model import other_form, other_form_jacobian
 from trihedron.units import rate_to_si
 
@@ -166,17 +167,17 @@ def _require_every_axis(known: Sequence[KnownTurn], used: npt.NDArray[np.bool_],
         vectors = np.array([turn.vector for turn in known])[used]
         directions = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
         if len(vectors) < 3 or np.linalg.svd(directions, compute_uv=False)[-1] < MIN_SPREAD:
-            raise ValueError(
+            raise RefusedError(
                 f"the {len(vectors)} usable turns are about fewer than three directions that are not parallel: turn "
                 "the sensor on a table by known angles on three of its sides"
             )
         return
     missing = [axis for axis in range(3) if not any(t.axis == axis and u for t, u in zip(known, used, strict=True))]
     if missing and recording_is_counts and any(turn.is_ambiguous for turn in known):
-        raise ValueError(AMBIGUOUS)
+        raise RefusedError(AMBIGUOUS)
     if missing:
         names = " and ".join(str(axis + 1) for axis in missing)
-        raise ValueError(
+        raise RefusedError(
             f"no usable turn about body axis {names} was found among {len(known)}: turn the sensor about it by a known "
             "angle, there and back, or give the angle of each turn"
         )

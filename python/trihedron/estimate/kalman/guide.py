@@ -9,6 +9,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.refused import RefusedError
 
 State = TypeVar("State")
 
@@ -22,7 +23,7 @@ class Goal:
 
     def __post_init__(self) -> None:
         if not (self.sensitivity > 0 and self.zero_m_s2 > 0):
-            raise ValueError(f"a goal must be positive, got {self.sensitivity} and {self.zero_m_s2} m/s²")
+            raise RefusedError(f"a goal must be positive, got {self.sensitivity} and {self.zero_m_s2} m/s²")
 
     def shortfall(self, relative_sigma: FloatArray) -> float:
         """Largest standard error (3, 4) over its limit: 1 or less is good enough."""

@@ -8,6 +8,7 @@ from typing import Protocol
 
 from trihedron.records.hold_noise import OctaveNoise
 from trihedron.records.kalman import AxisNoise
+from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, acceleration_to_si
 
 MOST_ABOVE = 2.0
@@ -73,7 +74,7 @@ def noise_from_identified(
     chosen = [axis for axis in axes if axis.unit in units] or list(axes[:3])
     if len(chosen) != 3:
         names = ", ".join(axis.name for axis in axes)
-        raise ValueError(f"noise of three accelerometer axes is needed, and was identified for {names}")
+        raise RefusedError(f"noise of three accelerometer axes is needed, and was identified for {names}")
     out = [_one(axis, AccelerationUnit(raw_unit)) for axis in chosen]
     return out[0], out[1], out[2]
 
@@ -88,7 +89,7 @@ def _one(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> AxisNoise:
         )
         wanted = acceleration_to_si(raw_unit)
         if has is None or wanted is None:
-            raise ValueError(
+            raise RefusedError(
                 f"the noise of {axis.name} is in {axis.unit or 'an unknown unit'} and the log in {raw_unit.value}: "
                 "identify the noise from a log in the same unit"
             )
@@ -129,7 +130,7 @@ def check_same_converter(
     for axis, noise, step, seen in zip("xyz", given, steps, octaves, strict=True):
         fast = noise.sample_sigma
         if step > COARSER * noise.resolution and step > fast > 0.0:
-            raise ValueError(
+            raise RefusedError(
                 f"the log of rest is of another converter than {source}: accelerometer {axis} has steps of {step:.3g} "
                 f"there, and the noise of the rest, {fast:.3g} a sample in steps of {noise.resolution:.3g}, would have "
                 f"shown them; {remedy}"
@@ -146,7 +147,7 @@ def check_same_converter(
         if lowest > MOST_ABOVE**2 or highest < 1.0 / MOST_BELOW**2:
             middle = math.sqrt(sorted(r[2] for r in ratios)[len(ratios) // 2])
             words = f"{middle:.2g} times that" if middle > 1.0 else f"1/{1.0 / middle:.2g} of that"
-            raise ValueError(
+            raise RefusedError(
                 f"the noise of accelerometer {axis} inside the still poses of {source} is {words} of the log of rest, "
                 f"at every frequency: another converter, range or unit; {remedy}"
             )

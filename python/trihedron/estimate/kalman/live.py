@@ -13,6 +13,7 @@ from trihedron.estimate.kalman.guide import Goal, Guide
 from trihedron.estimate.kalman.per_axis import Prior, noise_per_axis
 from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.kalman import AxisNoise, LiveEstimate
+from trihedron.refused import RefusedError
 
 
 class LiveCalibration:
@@ -98,9 +99,9 @@ class LiveCalibration:
         """
         z, f = np.asarray(reading, dtype=np.float64), np.asarray(reference, dtype=np.float64)
         if z.shape != (3,) or f.shape != (3,):
-            raise ValueError(f"a pose needs three readings and three references, got shapes {z.shape} and {f.shape}")
+            raise RefusedError(f"a pose needs three readings and three references, got shapes {z.shape} and {f.shape}")
         if not np.all(np.isfinite(z)):
-            raise ValueError(f"pose {self.n_poses + 1}: the reading is not finite")
+            raise RefusedError(f"pose {self.n_poses + 1}: the reading is not finite")
         nis = np.empty(3)
         vector = [float(v) for v in f]
         for axis, one in enumerate(self._filters):

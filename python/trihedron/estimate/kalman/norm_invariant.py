@@ -18,6 +18,7 @@ from trihedron.estimate.kalman.shaping import ShapingOptions, shaping_model
 from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisNoise, LiveEstimate, NormKalmanCalibration
+from trihedron.refused import RefusedError
 
 NormFrame = Literal["lower", "symmetric"]
 
@@ -98,7 +99,7 @@ class LiveNormCalibration:
         """
         a = np.asarray(reading, dtype=np.float64)
         if a.shape != (3,):
-            raise ValueError(f"a pose needs three readings, got shape {a.shape}")
+            raise RefusedError(f"a pose needs three readings, got shape {a.shape}")
         extra = [float(v) for v in np.broadcast_to(np.asarray(extra_variance, dtype=np.float64), (3,))]
         innovation, variance = self._filter.add([float(v) for v in a - self._zero], start_s, hold_s, extra)
         if relinearise:
@@ -273,12 +274,12 @@ def calibrate_without_references(
 def _mean_readings(readings: npt.ArrayLike) -> FloatArray:
     a = np.array(readings, dtype=np.float64)
     if a.ndim != 2 or a.shape[1] != 3:
-        raise ValueError(f"readings must have shape (n, 3), got {a.shape}")
+        raise RefusedError(f"readings must have shape (n, 3), got {a.shape}")
     n = len(a)
     if n < N_PARAMETERS:
-        raise ValueError(f"{n} poses give {n} equations for nine unknowns: hold at least nine, better eighteen")
+        raise RefusedError(f"{n} poses give {n} equations for nine unknowns: hold at least nine, better eighteen")
     if not np.all(np.isfinite(a)):
-        raise ValueError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
+        raise RefusedError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
     return a
 
 

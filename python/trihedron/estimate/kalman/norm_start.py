@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,13 +27,13 @@ class NormStart:
     def __post_init__(self) -> None:
         S, zero = np.array(self.S, dtype=np.float64), np.array(self.zero, dtype=np.float64)
         if S.shape != (3, 3) or zero.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(zero))):
-            raise ValueError(f"a start needs finite S (3, 3) and zero (3,), got shapes {S.shape} and {zero.shape}")
+            raise RefusedError(f"a start needs finite S (3, 3) and zero (3,), got shapes {S.shape} and {zero.shape}")
         if np.linalg.matrix_rank(S) < 3:
-            raise ValueError(
+            raise RefusedError(
                 "a start needs three independent axes: S = 0 is no calibration, but the filter would stay there"
             )
         if not (self.sigma_relative > 0 and self.sigma_zero_m_s2 > 0):
-            raise ValueError("the uncertainty of a start must be positive")
+            raise RefusedError("the uncertainty of a start must be positive")
         object.__setattr__(self, "S", S)
         object.__setattr__(self, "zero", zero)
 
@@ -53,6 +54,8 @@ class NormStart:
         a = np.asarray(readings, dtype=np.float64)
         half = (a.max(axis=0) - a.min(axis=0)) / 2.0
         if np.any(half <= 0):
-            raise ValueError(f"axis {'xyz'[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
+            raise RefusedError(
+                f"axis {'xyz'[int(np.argmin(half))]} never changed: turn it both ways up, or give a start"
+            )
         zero = (a.max(axis=0) + a.min(axis=0)) / 2.0
         return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_zero_m_s2=3.0)

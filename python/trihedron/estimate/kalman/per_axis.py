@@ -16,6 +16,7 @@ from trihedron.records.calibration import Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.kalman import AxisKalmanResult, AxisNoise, ConstantsTrack, KalmanCalibration, PoseTable
 from trihedron.records.words import words
+from trihedron.refused import REFUSALS, RefusedError
 
 DIFFUSE = 1e8
 """Width of a diffuse start in standard deviations of one reading: its information is 1e-16 of one pose's."""
@@ -42,7 +43,7 @@ class Prior:
         for name in ("mean", "sigma", "walk"):
             array = np.array(getattr(self, name), dtype=np.float64)
             if array.shape != (3, 4) or not np.all(np.isfinite(array)):
-                raise ValueError(f"prior {name} must be finite with shape (3, 4), got {array.shape}")
+                raise RefusedError(f"prior {name} must be finite with shape (3, 4), got {array.shape}")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
@@ -52,7 +53,7 @@ def noise_per_axis(noise: AxisNoise | Sequence[AxisNoise]) -> tuple[AxisNoise, A
     if isinstance(noise, AxisNoise):
         return noise, noise, noise
     if len(noise) != 3:
-        raise ValueError(f"noise must describe one axis or three, got {len(noise)}")
+        raise RefusedError(f"noise must describe one axis or three, got {len(noise)}")
     return noise[0], noise[1], noise[2]
 
 
@@ -98,7 +99,9 @@ def calibrate_with_references(
     f = table.specific_force
     z = np.array(readings, dtype=np.float64)
     if z.shape != f.shape:
-        raise ValueError(f"there are {len(f)} reference poses, but the readings have shape {z.shape}: one row per pose")
+        raise RefusedError(
+            f"there are {len(f)} reference poses, but the readings have shape {z.shape}: one row per pose"
+        )
     start, hold, extra = pose_arrays(len(f), start_s, hold_s, extra_variance)
     noises = noise_per_axis(noise)
     options = options or ShapingOptions()
@@ -145,9 +148,9 @@ def pose_arrays(
     start = np.array(start_s, dtype=np.float64)
     hold = np.array(np.broadcast_to(np.asarray(hold_s, dtype=np.float64), (n,)))
     if start.shape != (n,):
-        raise ValueError(f"start_s must have one entry per pose ({n}), got shape {start.shape}")
+        raise RefusedError(f"start_s must have one entry per pose ({n}), got shape {start.shape}")
     if not (np.all(np.isfinite(hold)) and np.all(hold > 0)):
-        raise ValueError("hold_s must be finite and positive: every pose needs a positive length")
+        raise RefusedError("hold_s must be finite and positive: every pose needs a positive length")
     extra = np.asarray(extra_variance, dtype=np.float64)
     return start, hold, np.array(np.broadcast_to(extra[:, None] if extra.ndim == 1 else extra, (n, 3)))
 
@@ -187,7 +190,7 @@ def _one_axis(
         tracks.append(ConstantsTrack("recursive least squares", *recursive))
         try:
             ols, ols_cov, gls, gls_cov, *track = _core.kalman_generalised_least_squares(model, begin, poses)
-        except ValueError:
+        except REFUSALS:
             if must_determine:
                 raise
         else:
@@ -229,7 +232,7 @@ def direct_form(
     inverse_b = np.array([a.constants[3] for a in axes])
     scale = np.linalg.norm(inverse_S, axis=1)
     if np.any(scale == 0) or np.linalg.cond(inverse_S / scale[:, None]) > 1e6:
-        raise ValueError("the three axes read the same component of gravity: the triad cannot be inverted")
+        raise RefusedError("the three axes read the same component of gravity: the triad cannot be inverted")
     S = np.linalg.inv(inverse_S)
     b = -S @ inverse_b
     # dS = −S dS_a S and db = −S (dS_a b + db_a): row i of S_a and b_a[i] move together, other rows independently.

@@ -22,6 +22,7 @@ from trihedron.records import (
     Recording,
     Segments,
 )
+from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +48,12 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
     """
     a = recording.accelerometer
     if a is None:
-        raise ValueError(f"{recording.source}: there is no accelerometer to calibrate in this log")
+        raise RefusedError(f"{recording.source}: there is no accelerometer to calibrate in this log")
     if table is not None and table.start_s is not None and table.stop_s is not None:
         return _timed_means(recording, segments, a, table.start_s, table.stop_s)
     mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma_mean
     if mean is None or sigma is None or segments.n_holds == 0:
-        raise ValueError(f"{recording.source}: no still pose was found, so there is nothing to calibrate from")
+        raise RefusedError(f"{recording.source}: no still pose was found, so there is nothing to calibrate from")
     step = 1.0 / recording.rate_hz
     start = np.array([recording.time_s[hold.start] for hold in segments.holds])
     length = np.array([recording.time_s[hold.stop - 1] + step for hold in segments.holds]) - start
@@ -61,13 +62,13 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
         chosen = np.asarray(table.hold, dtype=np.intp)
         if np.any(chosen >= segments.n_holds):
             worst = int(np.max(chosen)) + 1
-            raise ValueError(
+            raise RefusedError(
                 f"{table.source}: pose {worst} is asked for, but {recording.source} has {segments.n_holds} still poses"
             )
         if np.any(np.diff(chosen) <= 0):
-            raise ValueError(f"{table.source}: give the poses in the order in which they were held, each once")
+            raise RefusedError(f"{table.source}: give the poses in the order in which they were held, each once")
     elif table is not None and len(table) != segments.n_holds:
-        raise ValueError(
+        raise RefusedError(
             f"{table.source} lists {len(table)} poses, but {recording.source} has {segments.n_holds} still poses: add "
             "a column 'hold' with the number of the still pose (`trihedron segment` lists them), or 'start' and 'stop'"
         )
@@ -85,7 +86,7 @@ def _timed_means(
         rows = a[first:last]
         rows = rows[np.isfinite(rows).all(axis=1)]
         if len(rows) < 2:
-            raise ValueError(f"pose {i + 1}: the log has {len(rows)} readings from {start:g} s to {stop:g} s")
+            raise RefusedError(f"pose {i + 1}: the log has {len(rows)} readings from {start:g} s to {stop:g} s")
         mean[i] = rows.mean(axis=0)
         scatter = rows.std(axis=0, ddof=1) if noise is None else noise
         sigma[i] = scatter / np.sqrt(len(rows))
@@ -102,7 +103,7 @@ def noise_from_holds(recording: Recording, segments: Segments) -> tuple[AxisNois
     """
     a = recording.accelerometer
     if a is None:
-        raise ValueError(f"{recording.source}: there is no accelerometer to calibrate in this log")
+        raise RefusedError(f"{recording.source}: there is no accelerometer to calibrate in this log")
     sigma = segments.accelerometer_sigma
     sigma = np.zeros(3) if sigma is None else sigma
     noises, steps = [], recording.facts.of("accelerometer").step

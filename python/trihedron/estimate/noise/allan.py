@@ -14,6 +14,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.degrees import KINDS, bias_along, edf_along
 from trihedron.estimate.noise.gaps import true_share
 from trihedron.records.noise import AllanCurve, AllanKind
+from trihedron.refused import RefusedError
 
 _LONGEST = {"overlapping": 2, "non-overlapping": 2, "modified": 3, "hadamard": 3, "total": 2}
 
@@ -68,12 +69,12 @@ def allan_deviation(
     ((2,), [1.0, 0.1])
     """
     if isinstance(names, str) or isinstance(units, str):
-        raise ValueError("names and units are lists, one text for each channel.")
+        raise RefusedError("names and units are lists, one text for each channel.")
     readings = as_readings(x)
     n = len(readings)
     check_question(rate_hz, kind, confidence)
     if n < _LONGEST[kind]:
-        raise ValueError(f"an Allan deviation needs at least {_LONGEST[kind]} readings, got {n}")
+        raise RefusedError(f"an Allan deviation needs at least {_LONGEST[kind]} readings, got {n}")
     sizes = default_clusters(n, kind) if clusters is None else checked_clusters(clusters)
     variance, terms, weight = _core.allan_variance(readings, sizes, KINDS[kind])
     for c in range(len(variance)):
@@ -137,7 +138,7 @@ def stream_allan_deviation(
             )
         stream.extend(readings)
     if stream is None:
-        raise ValueError("the log holds no chunk of readings")
+        raise RefusedError("the log holds no chunk of readings")
     return streamed_curve(stream, rate_hz, confidence, tuple(names), tuple(units))
 
 
@@ -163,10 +164,10 @@ def as_readings(x: npt.ArrayLike) -> npt.NDArray[np.float64]:
     if array.ndim == 1:
         array = array[:, np.newaxis]
     if array.ndim != 2 or array.shape[1] == 0:
-        raise ValueError(f"readings must have shape (n,) or (n, channels), got {np.shape(x)}")
+        raise RefusedError(f"readings must have shape (n,) or (n, channels), got {np.shape(x)}")
     if array.dtype not in (np.float64, np.float32, np.int16, np.int32):
         if array.dtype.kind not in "iufb":
-            raise ValueError(f"readings must be real numbers, got the type {array.dtype}")
+            raise RefusedError(f"readings must be real numbers, got the type {array.dtype}")
         array = array.astype(np.float64)
     # The kernel reads all four types; float64 stands for any of them in the signatures.
     return np.ascontiguousarray(array)
@@ -181,11 +182,11 @@ def check_question(rate_hz: float, kind: str, confidence: float) -> None:
         Naming the argument.
     """
     if not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise ValueError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
+        raise RefusedError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
     if kind not in KINDS:
-        raise ValueError(f"kind must be one of {', '.join(KINDS)}; got {kind!r}")
+        raise RefusedError(f"kind must be one of {', '.join(KINDS)}; got {kind!r}")
     if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence must lie between 0 and 1, got {confidence}")
+        raise RefusedError(f"confidence must lie between 0 and 1, got {confidence}")
 
 
 def checked_clusters(clusters: Sequence[int] | npt.NDArray[np.int64]) -> list[int]:
@@ -198,10 +199,10 @@ def checked_clusters(clusters: Sequence[int] | npt.NDArray[np.int64]) -> list[in
     """
     sizes = np.atleast_1d(np.asarray(clusters))
     if sizes.ndim != 1 or sizes.size == 0:
-        raise ValueError("clusters must be a list of cluster sizes in readings")
+        raise RefusedError("clusters must be a list of cluster sizes in readings")
     whole = np.asarray(sizes, dtype=np.float64)
     if not np.all(np.isfinite(whole)) or np.any(whole != np.round(whole)) or np.any(whole < 1):
-        raise ValueError("clusters are counted in readings: whole numbers of at least 1 (averaging time times rate)")
+        raise RefusedError("clusters are counted in readings: whole numbers of at least 1 (averaging time times rate)")
     return [int(m) for m in whole]
 
 

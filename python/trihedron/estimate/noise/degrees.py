@@ -9,6 +9,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.isotonic import never_falling
 from trihedron.records.noise import AllanKind
+from trihedron.refused import RefusedError
 
 KINDS = {
     "overlapping": _core.AllanKind.Overlapping,
@@ -39,9 +40,9 @@ def degrees_of_freedom(n: int, m: int, alpha: int, kind: AllanKind = "overlappin
         When ``n`` readings hold no pair of clusters of ``m``, or the exponent is none of these.
     """
     if alpha not in TYPES:
-        raise ValueError(f"alpha must be one of 2, 0, -1, -2, got {alpha}")
+        raise RefusedError(f"alpha must be one of 2, 0, -1, -2, got {alpha}")
     if m < 1:
-        raise ValueError(f"a cluster holds at least one reading, got {m}")
+        raise RefusedError(f"a cluster holds at least one reading, got {m}")
     return _core.allan_degrees(n, m, TYPES[alpha], KINDS[kind])
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records import Recording
+from trihedron.refused import RefusedError
 from trihedron.units import acceleration_to_si, rate_to_si
 
 AXES = ("x", "y", "z")
@@ -59,7 +60,7 @@ def _with_gaps(readings: FloatArray, recording: Recording) -> FloatArray:
     lost = np.round(steps[late]).astype(np.int64) - 1
     total = len(readings) + int(lost.sum())
     if total > 4 * len(readings):
-        raise ValueError(
+        raise RefusedError(
             f"{recording.source}: {100 - 100 * len(readings) / total:.0f} % of the time has no reading; "
             "cut the log to the part that was recorded without a break."
         )

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.records.hold_noise import Measured, Ratio
+from trihedron.refused import RefusedError
 
 MOST_LEFT_OUT = 0.25
 """Share of holds that may be left out for noise far above the rest's: a disturbed hold, not another sensor."""
@@ -88,7 +89,7 @@ def ratio_of(one: Measured, other: Measured) -> Ratio:
     from scipy.stats import t
 
     if not (one.value > 0.0 and other.value > 0.0):
-        raise ValueError("only positive figures have a ratio")
+        raise RefusedError("only positive figures have a ratio")
     squares = (one.sigma_log**2, other.sigma_log**2)
     sigma = math.sqrt(sum(squares))
     parts = sum(s**2 / d for s, d in zip(squares, (one.dof, other.dof), strict=True) if math.isfinite(d))

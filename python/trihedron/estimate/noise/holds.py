@@ -22,6 +22,7 @@ from trihedron.estimate.noise.hold_statistics import as_measured, pooled_logarit
 from trihedron.estimate.noise.spectrum import cosine_transform
 from trihedron.ranges import ranges_of
 from trihedron.records.hold_noise import HoldNoise, Measured, OctaveNoise
+from trihedron.refused import RefusedError
 
 SHORTEST = 32
 """Readings of a hold that is used: fewer hold no octave below the uppermost two."""
@@ -71,10 +72,10 @@ def noise_of_holds(
     x = np.asarray(readings, dtype=np.float64)
     x = x[:, np.newaxis] if x.ndim == 1 else x
     if not (math.isfinite(rate_hz) and rate_hz > 0):
-        raise ValueError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
+        raise RefusedError(f"rate_hz must be a positive number of samples per second, got {rate_hz}")
     for start, stop in holds:
         if not 0 <= start < stop <= len(x):
-            raise ValueError(f"a hold runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
+            raise RefusedError(f"a hold runs from an earlier to a later of {len(x)} readings, got {start} to {stop}")
     channels = x.shape[1]
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
     units = tuple(units) or ("",) * channels
@@ -84,7 +85,7 @@ def noise_of_holds(
 def _axis(x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name: str, unit: str) -> HoldNoise:
     parts = [run for start, stop in holds for run in _unbroken(x[start:stop])]
     if not parts:
-        raise ValueError(f"{name}: no hold has {SHORTEST} readings in a row; hold still for longer")
+        raise RefusedError(f"{name}: no hold has {SHORTEST} readings in a row; hold still for longer")
     step = converter_step(np.concatenate(parts))
     power = _Power.of(parts)
     keep = robust_holds(power.variance, power.dof)

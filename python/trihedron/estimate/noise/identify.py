@@ -20,6 +20,7 @@ from trihedron.estimate.noise.screening import Event, readout, repeated_rows, sh
 from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.finding import Finding
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
+from trihedron.refused import RefusedError
 
 MOST_DISTURBED = 0.25
 """Share of an axis that may be left out by itself."""
@@ -71,9 +72,9 @@ def identify_noise(
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
     units = tuple(units) or ("",) * channels
     if len(names) != channels or len(units) != channels:
-        raise ValueError(f"{channels} channels need as many names and units, got {len(names)} and {len(units)}")
+        raise RefusedError(f"{channels} channels need as many names and units, got {len(names)} and {len(units)}")
     if n < SHORTEST:
-        raise ValueError(
+        raise RefusedError(
             f"{n} readings ({n / rate_hz:.3g} s) are too few to tell noise terms apart: at least {SHORTEST} are "
             "needed, an hour or more is useful"
         )
@@ -126,7 +127,7 @@ def _screen(
     for start, stop in excluded:
         column[start:stop] = np.nan
     if not np.any(np.isfinite(column)):
-        raise ValueError(f"{name} holds no finite reading outside the excluded stretches")
+        raise RefusedError(f"{name} holds no finite reading outside the excluded stretches")
     steps: list[Event] = []
     cuts: list[tuple[int, int]] = []
     findings: list[Finding] = []
@@ -175,8 +176,8 @@ def merged(stretches: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
 def _checked_stretch(stretch: tuple[float, float], n: int, rate_hz: float) -> tuple[int, int]:
     start, stop = stretch
     if not (math.isfinite(start) and start < stop):
-        raise ValueError(f"an excluded stretch runs from an earlier to a later second, got {start} to {stop}")
+        raise RefusedError(f"an excluded stretch runs from an earlier to a later second, got {start} to {stop}")
     first, last = max(0, math.floor(start * rate_hz)), min(n, math.ceil(min(stop, n / rate_hz) * rate_hz))
     if first >= n or last <= 0:
-        raise ValueError(f"the excluded stretch {start} s to {stop} s lies outside the log of {n / rate_hz:.6g} s")
+        raise RefusedError(f"the excluded stretch {start} s to {stop} s lies outside the log of {n / rate_hz:.6g} s")
     return first, last

@@ -9,6 +9,7 @@ import numpy as np
 from trihedron.estimate.noise.spectrum import line_coefficients
 from trihedron.estimate.noise.terms import SYMBOLS
 from trihedron.records.noise import NoiseAxis, TermName
+from trihedron.refused import RefusedError
 
 LONGEST_S = 30 * 86400.0
 """Longest recording that is advised: a month."""
@@ -60,9 +61,9 @@ def recording_length_s(axis: NoiseAxis, symbol: TermName | str, relative: float)
     """
     term = TermName(symbol)
     if not axis.terms[term].is_present:
-        raise ValueError(f"{axis.name} shows no {term.value}: there is nothing to know more precisely")
+        raise RefusedError(f"{axis.name} shows no {term.value}: there is nothing to know more precisely")
     if not relative > 0:
-        raise ValueError(f"a relative accuracy is a positive share, got {relative}")
+        raise RefusedError(f"a relative accuracy is a positive share, got {relative}")
     low, high = 10.0 / axis.rate_hz, LONGEST_S
     if relative_sigma(axis, high)[term] > relative:
         return None

@@ -13,6 +13,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.noise.spectrum import Ordinates
 from trihedron.estimate.noise.terms import SYMBOLS, gauss_markov_density
+from trihedron.refused import RefusedError
 
 EVIDENCE = 8.0
 """Drop of the deviance that a term must earn. An absent term earns it by chance with a probability of 0.25 % (half a
@@ -74,7 +75,7 @@ def binned(
         pick = [p & ~m for p, m in zip(pick, masked, strict=True)]
     frequency = np.concatenate([band.frequency_hz[p] for band, p in zip(bands, pick, strict=True)])
     if len(frequency) == 0:
-        raise ValueError(f"no spectral ordinate lies below {highest_hz} Hz")
+        raise RefusedError(f"no spectral ordinate lies below {highest_hz} Hz")
     order = np.argsort(frequency, kind="stable")
 
     def gather(parts: list[FloatArray]) -> FloatArray:

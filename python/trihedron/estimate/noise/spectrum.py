@@ -27,6 +27,7 @@ from trihedron.estimate.noise.gaps import (
     slow_over_fast,
 )
 from trihedron.estimate.noise.leakage import flicker_leakage
+from trihedron.refused import RefusedError
 
 LONGEST_TRANSFORM = 1 << 17
 """Longest transform; a longer stretch is averaged to block means first."""
@@ -118,7 +119,7 @@ def ordinates(x: FloatArray, rate_hz: float, stretches: Sequence[tuple[int, int]
     if block > 1 and used == USED_SHARE:
         bands += _segments(x, rate_hz, stretches, block)
     if not bands:
-        raise ValueError(
+        raise RefusedError(
             f"no stretch of the log is long enough to tell noise terms apart: the longest has "
             f"{max((b - a for a, b in stretches), default=0)} readings; record longer or exclude less"
         )

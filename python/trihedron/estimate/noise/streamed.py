@@ -23,6 +23,7 @@ from trihedron.estimate.noise.axis import blank_axis, identify_axis, stretches_b
 from trihedron.estimate.noise.screening import readout, steps_and_knocks
 from trihedron.estimate.noise.spectrum import LONGEST_TRANSFORM, ordinates_of_means
 from trihedron.records.noise import AllanCurve, Noise, NoiseAxis
+from trihedron.refused import RefusedError
 
 Keep = Callable[[int, Callable[[], Mapping[str, FloatArray]]], None]
 _PARTS = ("numbers", "fine", "window", "sums")
@@ -89,7 +90,7 @@ def stream_noise(
         if keep is not None:
             keep(seen, now)
     if stream is None:
-        raise ValueError("the log holds no chunk of readings")
+        raise RefusedError("the log holds no chunk of readings")
     *_, n, means = stream.finish()
     channels = len(means)
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))

@@ -10,6 +10,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.coloured import Solution, solve
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
+from trihedron.refused import RefusedError
 from trihedron.sensor_model import other_form, other_form_jacobian
 
 TURNS = 4
@@ -189,7 +190,7 @@ def _gravity_seen(readings: FloatArray, back: FloatArray, handedness: float) -> 
 
 def _refuse_mirror(reference: Reference, determinant: float, handedness: float) -> None:
     if determinant * handedness < 0.0:
-        raise ValueError(
+        raise RefusedError(
             f"{reference.motion.source}: the reference is mirrored against the log: its turns and its forces are those "
             "of frames of opposite handedness. Turn the sign of one axis of the reference (position and attitude), or "
             "of one sensor's axis in the log."

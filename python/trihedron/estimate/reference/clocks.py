@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.together import Grid, Reference
+from trihedron.refused import RefusedError
 
 LEAST_CORRELATION = 0.7
 """Below this the two motions are not taken for one: of 7140 pairs of unrelated hand motions of 30 to 60 s one in a
@@ -53,7 +54,7 @@ def align(grid: Grid, reference: Reference, stamped_offset_s: float | None) -> A
     # A clock that jumps spoils the correlation of the whole: stretches are asked first.
     refined = _refined(ours, grid, reference, offset)
     if correlation < LEAST_CORRELATION:
-        raise ValueError(
+        raise RefusedError(
             f"{reference.motion.source}: this reference and the log share no motion (the turning rates agree best "
             f"with a correlation of {correlation:.2f}; shared ones reach 0.93): name the reference of this very log, "
             "or check its rate and angle units."
@@ -172,7 +173,7 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
         before, after = np.median(found[max(0, k - 2) : k + 1]), np.median(found[k + 1 : k + 4])
         steady = np.median(np.abs(np.delete(step, k))) if len(step) > 1 else 0.0
         if abs(after - before) > JUMP_S and abs(step[k]) > 5.0 * steady and min(k + 1, len(found) - k - 1) >= 2:
-            raise ValueError(
+            raise RefusedError(
                 f"{reference.motion.source}: the reference's clock jumps by {after - before:+.3g} s between "
                 f"{at[k]:.0f} and {at[k + 1]:.0f} s of the log: cut the reference there and use the parts one by one."
             )

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.reference.earth import EarthColumns, EarthRate, earth_rate
+from trihedron.refused import RefusedError
 
 Mask = npt.NDArray[np.bool_]
 
@@ -72,7 +73,7 @@ def solve(
     """
     k, _, p = design.shape
     if 3 * k < 2 * p + 30:
-        raise ValueError("too little motion is known beside the log: fewer windows than the parameters need.")
+        raise RefusedError("too little motion is known beside the log: fewer windows than the parameters need.")
     scale = np.sqrt(np.mean(design**2, axis=(0, 1)))
     scale[scale == 0.0] = 1.0
     X = design / scale

@@ -21,6 +21,7 @@ from trihedron.estimate.reference.together import Grid, Reference, grid_of
 from trihedron.estimate.reference.windows import Windows, windows_on
 from trihedron.records import Recording
 from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceMotion, ReplayStage
+from trihedron.refused import REFUSALS, RefusedError
 from trihedron.sensor_model import reframing
 from trihedron.units import rate_to_si
 
@@ -208,7 +209,7 @@ def _earth(gyro: GyroFit) -> Estimate | None:
 def _refuse_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
     left = _share_left(gyro)
     if left > STRANGERS and not motion.is_stepwise:
-        raise ValueError(
+        raise RefusedError(
             f"{motion.source}: this reference and the log share no motion: their turning rates look alike in size, but "
             f"no mounting makes them one ({100 * left:.0f} % of the rate is left); name the reference of this very log."
         )
@@ -230,7 +231,7 @@ def _refuse_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) 
         (60.0, "it is in rpm or per minute"),
     ):
         if abs(scale / factor - 1.0) < 0.2:
-            raise ValueError(
+            raise RefusedError(
                 f"{motion.source}: the reference turns {scale:.3g} times as fast as the gyro says: {words}, or the "
                 "log's unit is misread; name the unit in its columns ('wx [deg/s]', --reference-columns) or with "
                 "--gyro-unit."
@@ -242,7 +243,7 @@ def _refuse_still(gyro: GyroFit, motion: ReferenceMotion) -> None:
     size = np.linalg.norm(gyro.A, axis=0)
     weak = [_AXES[j] for j in range(3) if not np.linalg.norm(sigma[:, j]) < 0.5 * size[j]]
     if weak:
-        raise ValueError(
+        raise RefusedError(
             f"{motion.source}: the log's gyro axis {' and '.join(weak)} hardly turns while the reference is there, and "
             "its scale stays open: turn the unit about every axis (a rate table: one mounting for each)."
         )
@@ -276,7 +277,7 @@ def _effects(
                 extra=signals,
                 settled_noise=gyro.solution.model,
             )
-        except ValueError:
+        except REFUSALS:
             continue
         value, covariance = -fit.solution.theta[12:], fit.solution.covariance[12:, 12:]
         n = len(value)
@@ -311,7 +312,7 @@ def _held_out(
         return ()
     try:
         taught = fit_gyroscope(grid, reference, _windows(grid, reference, first), gyro.offset_s, gyro.rate, clock=1)
-    except ValueError:
+    except REFUSALS:
         return ()
     time = grid.time_s * (1.0 + taught.rate) + taught.offset_s
     stages: list[tuple[str, FloatArray]] = [

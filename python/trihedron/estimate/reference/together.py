@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from trihedron.arrays import FloatArray
 from trihedron.records import Recording
 from trihedron.records.reference import ReferenceMotion
+from trihedron.refused import RefusedError
 
 Mask = npt.NDArray[np.bool_]
 
@@ -39,7 +40,7 @@ def grid_of(recording: Recording) -> Grid:
         When there is no gyro.
     """
     if recording.gyroscope is None:
-        raise ValueError(f"{recording.source}: a reference is held against the gyro, and this log has none.")
+        raise RefusedError(f"{recording.source}: a reference is held against the gyro, and this log has none.")
     recording = recording.with_distinct_stamps()
     gyroscope = recording.gyroscope
     assert gyroscope is not None

@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron.estimate.sessions.spread import common_mean, spread_between, spread_within
 from trihedron.records.sessions import PARAMETERS, Repeated, Session
+from trihedron.refused import RefusedError
 
 
 def repeated_parameters(sessions: Sequence[Session]) -> tuple[Repeated, ...]:
@@ -21,7 +22,7 @@ def repeated_parameters(sessions: Sequence[Session]) -> tuple[Repeated, ...]:
         With fewer than two sessions.
     """
     if len(sessions) < 2:
-        raise ValueError("one recording does not show how far a parameter repeats; give two or more.")
+        raise RefusedError("one recording does not show how far a parameter repeats; give two or more.")
     groups = [session.group for session in sessions]
     if len(set(groups)) == len(groups):
         groups = [""] * len(groups)

@@ -15,6 +15,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.sessions.spread import spread_within
 from trihedron.probability import fdtrc
 from trihedron.records.sessions import PARAMETERS, Session, Spread, ThermalModel, ThermalTerm
+from trihedron.refused import RefusedError
 
 MAX_ORDER = 3
 SPARE = 2
@@ -39,9 +40,9 @@ def thermal_model(sessions: Sequence[Session]) -> ThermalModel:
     T = np.array([session.temperature_degc for session in sessions])
     if not np.all(np.isfinite(T)):
         missing = [session.name for session in sessions if not np.isfinite(session.temperature_degc)]
-        raise ValueError(f"{missing[0]}: no temperature was logged; log it, or leave this recording out.")
+        raise RefusedError(f"{missing[0]}: no temperature was logged; log it, or leave this recording out.")
     if np.ptp(T) < MIN_SPAN_DEGC:
-        raise ValueError(
+        raise RefusedError(
             f"all recordings were made within {np.ptp(T):.1f} °C: they do not show what temperature does; record at "
             "temperatures 10 °C apart or more."
         )

@@ -92,8 +92,10 @@ def _stuck(
     if windows is not None:
         others = [j for j in range(3) if j != k]
         noise = windows.quiet_noise(sensor)
-        stretch = readings[start : start + longest]
-        moving = np.nanstd(stretch[:, others], axis=0) > 5.0 * np.maximum(noise[others], step)
+        stretch = readings[start : start + longest, others]
+        stretch = stretch[np.isfinite(stretch).all(axis=1)]
+        spread = stretch.std(axis=0) if len(stretch) else np.zeros(2)
+        moving = spread > 5.0 * np.maximum(noise[others], step)
         if step > 2.0 * noise[k] and not moving.any():
             return []
     return [

@@ -12,6 +12,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, earliest, lateness, track
 from trihedron.read.clock.period import find_period
+from trihedron.read.clock.rounded import numbers_of_rounded
 from trihedron.records.sampling import StampKind
 
 FEWEST_ROWS = 100
@@ -67,6 +68,11 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
         return None
     found = find_period(time_s)
     period, sees = found.period_s, found.is_seen
+    if counter is None and found.grid_s > 0.0:
+        numbers = numbers_of_rounded(time_s, found.grid_s)
+        numbered = None if numbers is None else find_even_clock(time_s, numbers)
+        if numbered is not None and numbered.kind is not StampKind.IRREGULAR:
+            return numbered
     if counter is not None:
         tick, pauses, width, moved_back = (
             counter,

@@ -46,9 +46,15 @@ def _active(triads: list[FloatArray], n: int) -> list[slice]:
         return parts
     activity = np.zeros(len(parts))
     for x in triads:
-        spread = np.array([float(np.nanstd(x[p][::16], axis=0).sum()) for p in parts])
+        spread = np.array([_spread(x[p][::16]) for p in parts])
         activity += spread / max(float(np.median(spread)), 1e-300)
     return [parts[k] for k in sorted(np.argsort(activity)[::-1][:PARTS])]
+
+
+def _spread(x: FloatArray) -> float:
+    """Standard deviation over the rows (n, 3) without a missing reading, summed over the axes; 0 without such rows."""
+    whole = x[np.isfinite(x).all(axis=1)]
+    return float(whole.std(axis=0).sum()) if len(whole) else 0.0
 
 
 def _sums(late: FloatArray, step_s: float, tick: IntArray, triads: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
@@ -70,8 +76,11 @@ def _sums(late: FloatArray, step_s: float, tick: IntArray, triads: list[FloatArr
         for axis in range(3):
             column = x[:, axis]
             change = np.abs(np.diff(column))
-            noise = float(np.nanmedian(change)) / 0.954  # of one reading: √2 · 0.6745
-            noise = max(noise, float(np.nanmax(change, initial=0.0)) * 1e-6)
+            change = change[np.isfinite(change)]
+            if not len(change):
+                continue
+            noise = float(np.median(change)) / 0.954  # of one reading: √2 · 0.6745
+            noise = max(noise, float(change.max()) * 1e-6)
             if not noise > 0.0:
                 continue
             y = column / noise

@@ -131,9 +131,10 @@ def _quickest_warming(temperature: FloatArray | None) -> float | None:
     if temperature is None or len(temperature) < 500:
         return None
     n = len(temperature) // 50
-    blocks = np.nanmean(temperature[: n * 50].reshape(50, n), axis=1) if np.isfinite(temperature).any() else None
-    if blocks is None or not np.isfinite(blocks).all():
+    parts = temperature[: n * 50].reshape(50, n)
+    if not np.isfinite(parts).any(axis=1).all():
         return None
+    blocks = np.nanmean(parts, axis=1)
     return float(np.abs(np.diff(blocks)).max() / n)
 
 

@@ -93,6 +93,8 @@ def blocks(
         raise from_os_error(path, error) from None
 
 
+_MINUS = "\u2212".encode()
+"""What typesetting programs and some spreadsheets write for ``-``."""
 _SEMICOLON = re.compile(rb"(?m)^;")
 
 
@@ -110,10 +112,11 @@ def with_hash_remarks(data: bytes) -> bytes:
 
 
 def as_utf8(path: Path, data: bytes, first_line: int) -> bytes:
-    """Text with a byte order mark or in UTF-16 as plain UTF-8; junk refused by its first zero byte."""
+    """Text with a byte order mark or in UTF-16 as plain UTF-8, minus signs as ``-``; junk refused by its first zero
+    byte."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16", errors="replace").encode()
-    data = data.removeprefix(b"\xef\xbb\xbf")
+        return data.decode("utf-16", errors="replace").encode().replace(_MINUS, b"-")
+    data = data.removeprefix(b"\xef\xbb\xbf").replace(_MINUS, b"-")
     zero = data.find(b"\x00")
     if zero >= 0:
         line = first_line + data.count(b"\n", 0, zero)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.read.errors import ReadError
+from trihedron.read.names import parse_name
 from trihedron.read.panics import panics_unprinted
 from trihedron.read.text.dates import form_of, seconds
 from trihedron.read.text.layout import MISSING, Layout
@@ -133,6 +134,17 @@ def refuse_words(
         raise ReadError(
             f"{path}: line {lines[row]}, column {name}: {cell[:40]!r} is not a number; mend or delete that line."
         )
+
+
+def sparse_words(cells: pl.Series, name: str, n_before: int) -> TextColumn | None:
+    """Remarks here and there, behind ``n_before`` empty cells, in a column whose name means nothing known here: words,
+    and no damage. None where the cells (n,) are all empty, or stand where numbers are expected."""
+    if not name or parse_name(name).role:
+        return None
+    words = cells.filter(_words(cells, False))
+    if not len(words):
+        return None
+    return TextColumn(words[0], words={"": 0}, codes=[np.zeros(n_before, dtype=np.int64)])
 
 
 def numbers(series: pl.Series, column: TextColumn | None) -> FloatArray:

@@ -116,8 +116,13 @@ def detect(text: str) -> Layout | None:
         return None
     first, rate = _past_start_and_rate(lines, first, separator)
     trailing = separator != " " and n_fields > 1 and all(line.rstrip(" ").endswith(separator) for line in tail)
+    header = _header(lines[:first], separator, n_fields - trailing)
+    if trailing and header.names is None:
+        # Not a mark behind the last cell but a last cell without a value, where it has a name.
+        with_last = _header(lines[:first], separator, n_fields)
+        if with_last.names is not None:
+            header, trailing = with_last, False
     n_kept = n_fields - trailing
-    header = _header(lines[:first], separator, n_kept)
     stray = () if rate else _stray(lines[:first], header, decimal_comma)
     # Remarks count from the names on, fitting or not, or from the first line that may have been a row.
     named = [i for i in range(first) if header.ignored and lines[i].strip() == header.ignored]

@@ -20,7 +20,15 @@ from trihedron.read.room import check_memory
 from trihedron.read.table import Table, file_sha256
 from trihedron.read.text.ahead import Bytes, blocks_ahead
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks, has_semicolon_remarks, with_hash_remarks
-from trihedron.read.text.cells import MAX_WORDS, TextColumn, find_text_columns, numbers, parse, refuse_words
+from trihedron.read.text.cells import (
+    MAX_WORDS,
+    TextColumn,
+    find_text_columns,
+    numbers,
+    parse,
+    refuse_words,
+    sparse_words,
+)
 from trihedron.read.text.dates import past_midnight
 from trihedron.read.text.layout import MAX_STRAY_LINES, MAX_STRAY_ROWS, Layout, detect, is_comment, split
 from trihedron.read.text.lines import Lines, RowLines, data_lines, offset_of_line, regular
@@ -270,6 +278,12 @@ class TextReader:
         suspects = [name for name in frame.columns if schema[name] == pl.Float64 and frame[name].null_count()]
         if suspects:
             as_text = parse(self.path, data, dict.fromkeys(frame.columns, pl.String), layout, int(lines[0]))
+            for i in [int(name) for name in suspects if frame[name].null_count() == frame.height]:
+                column = sparse_words(as_text[str(i)], layout.names[i] if layout.names else "", self.n_rows)
+                if column is not None and (self.n_rows == 0 or self.store.set_aside(i)):
+                    self.text_columns[i] = column
+                    suspects.remove(str(i))
+                    frame = frame.with_columns(as_text[str(i)])
             refuse_words(self.path, frame, as_text.select(suspects), lines, layout)
         columns = [numbers(frame[str(i)], self.text_columns.get(i)) for i in range(layout.n_fields)]
         self._take(columns, lines, len(data), layout)

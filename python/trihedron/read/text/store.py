@@ -52,6 +52,13 @@ class Store:
         self.n_rows += count
         self._is_numeric = [True] * self.n_columns
 
+    def set_aside(self, column: int) -> bool:
+        """A column turns out to hold words: given up where no number was met in it yet."""
+        if np.isfinite(self.columns()[column]).any():
+            return False
+        self._is_numeric[column] = False
+        return True
+
     def _with_room(self, b: int, need: int, expected: int) -> FloatArray:
         """A block with room for ``need`` rows, for the ``expected`` ones if it has to be made anew."""
         array = self._arrays[b]

@@ -38,6 +38,15 @@ ENTRIES = (
         "Their means weigh less, by their own scatter; rest the case on something firm for a better result.",
     ),
     Entry(
+        Code.HOLD_AT_LIMIT,
+        "",
+        WARNING,
+        "{holds:# still pose} {holds:?reads|read} the end of the accelerometer's range (first at {first_s:.1f} s, a "
+        "reading of {reading:.6g}) and {holds:?is|are} left out: only a bound of gravity is known there.",
+        "The range ends below 1 g plus the zero of that axis.",
+        "Set a wider range; the poses that remain calibrate what they show.",
+    ),
+    Entry(
         Code.NOT_STATIC,
         "",
         SERIOUS,

@@ -1,0 +1,63 @@
+"""Words that loggers translate, in English: German, French, Spanish, Portuguese, Italian, Polish, Russian, Chinese,
+Japanese, and the Greek letters of equations. A word not known here stays as it is, and its column unrecognised."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+_MEANINGS = {
+    "angular acceleration": "winkelbeschl\\w* 角加速度",
+    "linear acceleration": "线加速度 线性加速度 線形加速度 線加速度",
+    "gravity": "schwerkraft gravitat\\w* gravite gravedad gravidade гравит\\w* 重力 重力加速度",
+    "magnetometer": "magnetfeld магн\\w* маг 磁场 磁場 磁力计 磁力計 地磁",
+    "acceleration": "beschl\\w* acel\\w* przysp\\w* уск\\w* акс\\w* 加速度 加速度计 加速度計 加速度センサー?",
+    "gyro": "drehrate\\w* drehgeschw\\w* winkelgeschw\\w* kreisel\\w* giro\\w* zyro\\w* гир\\w* ω "
+    "角速度 陀螺[仪儀]? ジャイロ",
+    "angular": "angulaire\\w* angolar\\w* katow\\w* угл\\w*",
+    "velocity": "geschwindigkeit\\w* vitesse velocidad\\w* velocita predkosc скор\\w*",
+    "linear": "linear[ei]\\w* lineal\\w* lineaire\\w* liniow\\w* линейн\\w*",
+    "time": "uhrzeit heure hora czas врем\\w* \\w*[时時][间間刻]\\w*",
+    "temperature": "темп\\w* [温溫]度",
+    "axis": "achse axe eje eixo asse ось оси [轴軸]",
+    **{"s": "с сек sek 秒", "ms": "мс 毫秒", "us": "мкс 微秒", "m": "м", "rad": "рад", "deg": "град"},
+    "x": "х",
+    "y": "у",
+    "": "по 的",
+}
+"""English, and what stands for it as regular expressions of whole words without accents; ``х`` and ``у`` are the
+Cyrillic letters that look like x and y."""
+_ENGLISH = {english: re.compile("|".join(words.split())).fullmatch for english, words in _MEANINGS.items()}
+_SENSORS = (["acceleration"], ["gyro"])
+_OTHER_SCRIPT = "\u0370-\u03bb\u03bd-\u052f\u3040-\u30ff\u3400-\u9fff\uac00-\ud7af"
+"""Greek, Cyrillic, kana, Han and Hangul; not the Greek letter that stands for a millionth."""
+_BETWEEN_SCRIPTS = re.compile(
+    f"(?<=[{_OTHER_SCRIPT}])(?=[A-Za-z])|(?<=[A-Za-z])(?=[{_OTHER_SCRIPT}])|(?=[轴軸])|(?<=[轴軸])"
+)
+_LOST = re.compile("\ufffd{2,}")
+"""Letters of an encoding that is not UTF-8."""
+
+
+def plain(text: str) -> str:
+    """Letters without their accents, ASCII brackets, and a blank where the script changes (``加速度X``)."""
+    if text.isascii():
+        return text
+    bare = "".join(c for c in unicodedata.normalize("NFD", text) if unicodedata.category(c) != "Mn")
+    bare = unicodedata.normalize("NFC", bare).replace("μ", "µ").replace("（", "(").replace("）", ")")
+    # A word, though nobody knows which: "x" behind letters that are lost is no bare x.
+    return _BETWEEN_SCRIPTS.sub(" ", _LOST.sub(" unreadable ", bare))
+
+
+def english(words: list[str]) -> list[str]:
+    """Lower-case words with those of other languages in English; an axis glued to a sensor stands alone."""
+    out: list[str] = []
+    for word in words:
+        known = _translated(word)
+        if known is not None and word[-1] in "xyz" and _translated(word[:-1]) in _SENSORS:
+            known = [*known, word[-1]]
+        out += [word] if known is None else known
+    return out
+
+
+def _translated(word: str) -> list[str] | None:
+    return next((text.split() for text, fits in _ENGLISH.items() if fits(word)), None)

@@ -1,0 +1,108 @@
+"""Ends of a channel's range that a sensor rests at: one code for seconds, which is neither stillness nor a reading."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron.arrays import BoolArray
+from trihedron.ranges import Range
+from trihedron.records import Recording
+from trihedron.records.channel_facts import Limit
+from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
+
+CONSTANT = 0.01
+"""Variance of a block over that of rounding below which its readings are one code."""
+USUALLY_STILL = 0.1
+"""Quantile of a log's windows whose scatter stands for the noise before stillness is found."""
+NEAR = 4.0
+"""Standard deviations of the noise from the end within which readings are cut, and look quieter than they are."""
+MOST_OF_A_LOG = 0.5
+"""A channel that gives one code for longer than this is one whose noise is below its step: nothing is cut."""
+TELLS_CODES_APART = 0.6
+"""Noise over step from which a reading never keeps one code by itself: half a second of it has at least two codes with
+all but one chance in a billion."""
+CUT = 0.01
+"""Share of a pose's readings at the end of the range from which its mean is that of a cut distribution: by less than
+0.4 % of a reading's noise below it, a tenth of the error of a mean of 700 readings."""
+
+
+@dataclass(frozen=True)
+class RangeEnd:
+    """The outermost reading of channel ``channel`` on the side ``side`` (1 or -1), where the log rests at it.
+
+    ``margin`` is how near to it readings are cut (raw units); ``is_certain`` where noise would have told codes apart.
+    """
+
+    channel: int
+    side: int
+    reading: float
+    margin: float
+    is_certain: bool
+
+
+def range_ends(channels: Channels, limits: Sequence[tuple[int, Limit]] = ()) -> tuple[RangeEnd, ...]:
+    """Ends at which windows stand on one code although the channel's noise elsewhere moves the last digit.
+
+    ``limits`` are (channel, limit) of all readings, where they were looked at: poses whose noise is cut in half are
+    told by those alone.
+    """
+    valid = channels.is_valid
+    constant = valid[:, None] & (channels.variance <= CONSTANT * channels.quantisation_variance)
+    known = {(c, 1 if limit.is_high else -1): limit.value for c, limit in limits}
+    resting = constant.sum(axis=0)
+    out: list[RangeEnd] = []
+    for c in range(channels.mean.shape[1]):
+        is_known = any(of == c for of, _ in known)
+        if not (is_known or WINDOW_BLOCKS <= resting[c] <= MOST_OF_A_LOG * valid.sum()):
+            continue
+        noise = _usual_noise(channels, c)
+        if noise == 0.0:
+            continue
+        step, rounding = float(channels.quantum[c]), float(channels.quantisation_variance[c])
+        margin = max(NEAR * float(np.sqrt(noise)), step)
+        is_certain = noise - rounding > (TELLS_CODES_APART * step) ** 2
+        for side in (1, -1):
+            end = known.get((c, side), side * float(np.max(side * channels.mean[valid, c])))
+            at_end = constant[:, c] & (side * (channels.mean[:, c] - end) >= -0.5 * step)
+            if (c, side) in known or at_end.sum() >= WINDOW_BLOCKS:
+                out.append(RangeEnd(c, side, end, margin, is_certain))
+    return tuple(out)
+
+
+def _usual_noise(channels: Channels, channel: int) -> float:
+    """Variance of a reading in calm windows of a channel that show more than its rounding; 0 where none does."""
+    variance = np.where(channels.is_valid, channels.variance[:, channel], 0.0)[:, None]
+    power = rolling_mean(variance, min(WINDOW_BLOCKS, channels.n_blocks))[:, 0]
+    live = power[channels.is_valid & (power > 2.0 * channels.quantisation_variance[channel])]
+    return float(np.quantile(live, USUALLY_STILL)) if len(live) else 0.0
+
+
+def inside_the_range(channels: Channels, ends: Sequence[RangeEnd]) -> BoolArray:
+    """(m, c) windows in which a channel's scatter is the sensor's own.
+
+    A pose whose reading lies beyond the range gives one code for seconds, the quietest stretch of the log by far; taken
+    for its noise, every pose inside the range would seem to shake.
+    """
+    inside = np.ones(channels.mean.shape, dtype=np.bool_)
+    for end in ends:
+        reading = np.where(channels.is_valid, end.side * channels.mean[:, end.channel], -np.inf)
+        near = (reading >= end.side * end.reading - end.margin)[:, None].astype(np.float64)
+        inside[:, end.channel] &= rolling_mean(near, min(WINDOW_BLOCKS, channels.n_blocks))[:, 0] == 0.0
+    return inside
+
+
+def is_cut(recording: Recording, channels: Channels, blocks: Range, ends: Sequence[RangeEnd]) -> RangeEnd | None:
+    """The end of the accelerometer's range that a stretch of stillness stands at: of gravity it tells only a bound."""
+    if recording.accelerometer is None:
+        return None
+    rows = recording.accelerometer[blocks[0] * channels.length : blocks[1] * channels.length]
+    for end in ends:
+        if not end.is_certain or channels.is_gyroscope[end.channel]:
+            continue
+        at_end = end.side * (rows[:, end.channel] - end.reading) >= -0.5 * channels.quantum[end.channel]
+        if float(np.mean(at_end)) > CUT:
+            return end
+    return None

@@ -1,0 +1,67 @@
+"""Poses at the end of the accelerometer's range: neither the noise of a sensor nor a reading of gravity."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from trihedron import calibrate, segment
+from trihedron.records import FindingCode, Recording
+
+G = 9.80665
+RATE = 100.0
+
+
+def posed(n_poses, *, noise, step, limit=np.inf, seed=1, hold_s=4.0, move_s=1.0):
+    """Poses evenly over the sphere with straight moves between them, read with noise, a range and a step (m/s²)."""
+    rng = np.random.default_rng(seed)
+    k = np.arange(n_poses) + 0.5
+    polar, azimuth = np.arccos(1 - 2 * k / n_poses), np.pi * (1 + 5**0.5) * k
+    up = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=1)
+    parts = []
+    for a, b in zip(up, np.roll(up, -1, axis=0), strict=True):
+        s = (1 - np.cos(np.pi * np.arange(move_s * RATE) / (move_s * RATE))) / 2
+        way = np.outer(1 - s, a) + np.outer(s, b)
+        parts += [np.tile(a, (int(hold_s * RATE), 1)), way / np.linalg.norm(way, axis=1, keepdims=True)]
+    force = G * np.vstack(parts)
+    read = force + noise * rng.normal(size=force.shape)
+    read = np.clip(read, -limit, limit)
+    read = np.round(read / step) * step
+    time_s = np.arange(len(read)) / RATE
+    return up, Recording(time_s, read, None, RATE, accelerometer_unit="m/s^2")
+
+
+@pytest.mark.parametrize("limit", [9.3, 9.7])
+def test_poses_inside_a_range_below_gravity_are_found_and_those_beyond_are_left_out(limit):
+    up, recording = posed(24, noise=0.01, step=0.0012, limit=limit)
+    segments = segment(recording)
+    # One reading in a hundred is beyond 2.33 standard deviations.
+    inside = (np.abs(G * up) < limit - 2.33 * 0.01).all(axis=1)
+    assert 12 <= inside.sum() < 24
+    assert len(segments.holds) == inside.sum()
+    np.testing.assert_allclose(segments.accelerometer_mean, G * up[inside], atol=0.01)
+    found = {f.code: f for f in segments.findings}
+    assert found[FindingCode.HOLD_AT_LIMIT].numbers["holds"] == (~inside).sum()
+    assert abs(found[FindingCode.HOLD_AT_LIMIT].numbers["reading"]) == pytest.approx(limit, abs=0.0012)
+    result = calibrate(recording, gravity_m_s2=G)
+    # A pose at the limit reads up to 0.5 m/s² less than gravity; taken for a reading it moves a scale by per cents.
+    np.testing.assert_allclose(
+        np.diag(result.accelerometer.S), 1.0, atol=5 * np.sqrt(np.diag(result.accelerometer.covariance)[:9:4].max())
+    )
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02, 0.1])
+def test_a_converter_too_coarse_to_tell_rest_from_its_end_loses_no_pose(noise):
+    # 8 bit over ±2 g: a pose on the outermost code read keeps it without any range ending there.
+    _, recording = posed(24, noise=noise, step=0.16)
+    segments = segment(recording)
+    assert len(segments.holds) == 24
+    assert FindingCode.HOLD_AT_LIMIT not in {f.code for f in segments.findings}
+
+
+def test_a_range_that_only_moves_reach_loses_no_pose():
+    _, recording = posed(24, noise=0.01, step=0.0012)
+    jolted = recording.accelerometer.copy()
+    jolted[450::500] = 19.6
+    segments = segment(replace(recording, accelerometer=np.clip(jolted, -19.6, 19.6)))
+    assert len(segments.holds) == 24
