@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.diagnose.residuals.creep import settling
+from trihedron.diagnose.residuals.creep import settling, with_settling
+from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
 from trihedron.diagnose.selection.model import begin
-from trihedron.diagnose.session.observations import observe
+from trihedron.diagnose.session.observations import _turned_at_ends, observe
 from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.records import Recording
 from trihedron.segment import resegment, segment_recording
@@ -63,3 +64,31 @@ def test_scatter_under_supports_that_give_is_still_found_and_creep_alone_is_none
     assert gives.creep - gives.scatter > 9.0
     assert not settling(session(seed, 0.0, 1e-3)).is_motion
     assert not settling(session(seed, 0.006, 1e-3)).is_motion
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree(seed):
+    context = session(seed, 0.006, 0.0)
+    found = settling(context)
+    assert found.is_seen
+    # Drawn with 0.006 rad about each axis, gone in 2 s; the fit has a grid of factors of two for that time.
+    assert 0.5 < found.rate_rad_s * found.tau_s / 0.006 < 2.0
+    before, after = (
+        {one.domain: one for one in judge_rows(fitted, 0.01)}
+        for fitted in (context.fitted, begin(with_settling(context, found), context.fitted.twin, None).fitted)
+    )
+    assert before["moves"].disagrees
+    assert not after["moves"].disagrees
+    assert after["static-gyro"].disagrees
+    for lean_rad, scatter in ((0.0, 0.0), (0.0, 1e-3)):
+        assert not settling(session(seed, lean_rad, scatter)).is_seen
+
+
+def test_a_pose_that_was_not_still_is_turned_at_its_ends_and_a_noisy_session_is_not():
+    lasts = np.array([2.0, 8.0, 2.0, 4.0])
+    sigma = 1e-4 / np.sqrt(lasts)[:, None] * np.ones(3)
+    np.testing.assert_array_equal(_turned_at_ends(sigma, lasts), 0.0)
+    sigma[2] = 5e-3
+    turned = _turned_at_ends(sigma, lasts)
+    np.testing.assert_array_equal(turned[[0, 1, 3]], 0.0)
+    np.testing.assert_allclose(turned[2], (5e-3 * 1.0) ** 2, rtol=0.01)  # half of 2 s

@@ -82,15 +82,33 @@ def test_motion_above_half_the_rate_is_counted_and_smooth_motion_is_not() -> Non
     noise = 0.05 * rng.standard_normal((n, 3))
     moves, holds = ((500, 900), (1500, 1900)), [(2000, 2400), (2500, 2900), (3000, 3400)]
     noise[2000:] -= smooth[2000:]
-    quiet = unresolved_variance(smooth + noise, moves, holds, step)
+    quiet = unresolved_variance(smooth + noise, moves, holds, step, np.zeros(3))
     white = 0.05**2 * 400 * step**2
     assert (quiet < 0.2 * white).all()
     struck = smooth + noise
     struck[700] += (8.0, -4.0, 2.0)  # one sample of a jolt
-    found = unresolved_variance(struck, moves, holds, step)
+    found = unresolved_variance(struck, moves, holds, step, np.zeros(3))
     # Its area times the share that a flat spectrum has at the sampling frequency: all of it.
     assert np.sqrt(found[0]) == pytest.approx(np.array([8.0, 4.0, 2.0]) * step, rel=0.2)
     assert (found[1] < 0.2 * white).all()
+
+
+def test_a_rate_that_steps_between_samples_is_charged_with_what_its_integral_misses() -> None:
+    rng = np.random.default_rng(5)
+    step, n, moves = 0.01, 200, 300
+    jumps = rng.normal(size=(moves, 3))
+    at = (100.0 + rng.random(moves)) * step  # where between two samples
+    t = np.arange(n) * step
+    rate = np.where(t[None, :, None] >= at[:, None, None], jumps[:, None, :], 0.0).reshape(-1, 3)
+    # Sum of the samples less the true integral, both up to the last sample.
+    missed = rate.reshape(moves, n, 3).sum(axis=1) * step - jumps * (n * step - at)[:, None]
+    missed += 0.5 * jumps * step  # the first sample after the jump comes half a step late in the mean
+    ranges = tuple((k * n + 50, k * n + 150) for k in range(moves))
+    holds = [(k * n + 5, k * n + 45) for k in range(moves)]
+    charged = unresolved_variance(rate, ranges, holds, step, np.zeros(3))
+    # 900 squares of a jump times a phase have a mean certain to 7 %: two of those, and a tenth for the width of the
+    # band, over which a step's power is above that at its middle.
+    assert np.mean(missed**2) == pytest.approx(np.mean(charged), rel=0.25)
 
 
 def test_two_recordings_of_one_phone_hold_one_g_sensitivity_though_its_walk_takes_it_up(real_data: Path) -> None:

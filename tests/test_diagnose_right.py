@@ -62,8 +62,9 @@ def hand(rng, arm, n_moves=24, rate_hz=100.0):
     return SimpleNamespace(
         moves=tuple(slice(k * len(t), (k + 1) * len(t)) for k in range(n_moves)), time_s=np.arange(n) / rate_hz,
         rate=np.concatenate(rates), force=np.concatenate(forces), gravity_in_moves=np.zeros((n, 3)),
+        fitted=SimpleNamespace(line=SimpleNamespace(path=SimpleNamespace(attitude=np.tile(np.eye(3), (n, 1, 1))))),
         noise_floor=np.full((2, 3), 0.02), obs=SimpleNamespace(
-            recording=SimpleNamespace(rate_hz=rate_hz), n=n,
+            recording=SimpleNamespace(rate_hz=rate_hz), n=n, n_holds=0,
             move_ranges=tuple((k * len(t), (k + 1) * len(t)) for k in range(n_moves)),
         ),
     )  # fmt: skip

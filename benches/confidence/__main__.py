@@ -1,4 +1,4 @@
-"""``python benches/confidence [--sessions N] [NAME ...]``: do 95 % intervals hold, whatever the session?
+"""``python benches/confidence [--sessions N] [--asked] [NAME ...]``: do 95 % intervals hold, whatever the session?
 
 One line per setting: sessions answered and trusted (no serious finding), those refused or marked; over the trusted ones
 the share of parameters within 1.96 σ (accelerometer 9, gyro scale 9, gyro zero 3), rms z, the median and the largest
@@ -16,6 +16,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from confidence.arm import carried
+from confidence.judge import judge
+from confidence.machine import box, robot, swing
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import hand, manual, table
@@ -55,9 +57,33 @@ SETTINGS = {
     "arm, held in the hand": (carried, {"rest": "in hand"}),
     "arm, 50 Hz": (carried, {"rate_hz": 50.0}),
     "arm, 12 bit": (carried, {"gyro_bits": 12, "accel_bits": 12}),
+    **{make.__name__: (make, {}) for make in (box, robot, swing)},
+    **{
+        f"robot, noise {kind}": (robot, {"noise": kind})
+        for kind in ("telegraph", "tails", "spikes", "laplace", "filtered", "mains", "unequal")
+    },
+    "robot, 12 bit": (robot, {"gyro_bits": 12}),
+    "robot, 12 bit, lost 0.3 %, remade": (robot, {"gyro_bits": 12, "lost": 0.003, "is_remade": True}),
+    "robot, 10 bit, poses of 1.5 s, lost 1 %": (
+        robot,
+        {"hold_s": 1.5, "gyro_bits": 10, "accel_bits": 12, "lost": 0.01},
+    ),
+    "swing, 10 bit, poses of 1.5 s, lost 0.5 %, remade": (
+        swing,
+        {"hold_s": 1.5, "gyro_bits": 10, "accel_bits": 12, "lost": 0.005, "is_remade": True},
+    ),
     "manual's session, moves": (manual, {}),
     "manual's session, stated turns": (manual, {"is_stated": True}),
 }
+
+# One factor of a session at a time: length of moves, bits, rate, poses, slow noise, losses. 16 bits, 100 Hz, 18 poses
+# are those of the moves of 2 s.
+ASKED = (
+    *(f"moves of {s:g} s" for s in (0.25, 2.0, 30.0)),
+    *(f"{which} of {b} bit" for which in ("gyro", "both") for b in (8, 10, 12)),
+    *("10 Hz", "1000 Hz", "9 poses", "12 poses", "40 poses", "1/f strong", "1/f weak"),
+    *(f"lost {100 * p:g} %, stamps {stamps}" for p in (0.001, 0.03) for stamps in ("true", "remade")),
+)
 
 
 def answer(make, options, seed):
@@ -90,11 +116,18 @@ def main() -> None:
     parser.add_argument("--sessions", type=int, default=20)
     parser.add_argument("--first", type=int, default=0, help="seed of the first session")
     parser.add_argument("--rows", type=Path, help="file to which every session is written, a line of JSON each")
+    parser.add_argument("--asked", action="store_true", help="the settings of the table of coverage, no others")
+    parser.add_argument("--judge", type=Path, help="print coverage from such a file; run nothing")
     parser.add_argument("names", nargs="*")
     given = parser.parse_args()
+    if given.judge:
+        judge(given.judge)
+        return
     print("setting                        trusted marked none holds  acc in  S_w in  b_w in  rms z   error of S_w, %")
     for name, (make, options) in SETTINGS.items():
         if given.names and not any(word in name for word in given.names):
+            continue
+        if given.asked and name not in ASKED:
             continue
         rows = [session(name, make, options, given.first + k) for k in range(given.sessions)]
         if given.rows:

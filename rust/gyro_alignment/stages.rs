@@ -4,7 +4,7 @@ use super::covariance::{Layout, whole_covariance};
 use super::{Alignment, Evaluated, LastTurns, Model};
 use crate::banded::BandedCholesky;
 use crate::error::{Error, Result};
-use crate::gauss_newton::{self, Certainty, Loss, Options, Solution};
+use crate::gauss_newton::{self, Certainty, Loss, Options, Solution, Stop};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// How to fit.
@@ -68,6 +68,8 @@ pub struct Fit {
 
 /// Angle, rad, beyond which the robust approach stops believing a move.
 const DOUBTFUL_ANGLE: f64 = 0.05;
+/// Standard errors by which the parameters together may still move.
+const SETTLED: f64 = 1e-3;
 
 /// Fits from each start and keeps the best; then weighs by the full covariance.
 ///
@@ -122,7 +124,7 @@ pub fn fit(
         let distance = (&solution.r_factor * &moved).norm();
         base = problem.unpack(&base, &solution.parameters);
         last = Some(solution);
-        if distance < 1e-3 && change_of_weights < 1e-3 {
+        if distance < SETTLED && change_of_weights < 1e-3 {
             settled = true;
             break;
         }
@@ -230,10 +232,13 @@ fn finish(
     let mut columns = jacobian.insert_column(0, 0.0);
     columns.set_column(0, &residual);
     factor.whiten(&mut columns);
-    let chi2 = columns.column(0).norm_squared();
+    let whitened = columns.column(0).into_owned();
+    let chi2 = whitened.norm_squared();
     let jacobian = columns.remove_column(0);
     let certainty = gauss_newton::certainty(&jacobian, 1.0, Options::default().rank_tolerance);
     let covariance = certainty.covariance.clone();
+    // Where rounding of the cost hides the last part of the descent, what is left of it is still known.
+    let left = (&jacobian * (&covariance * (jacobian.transpose() * &whitened))).norm();
     // x̂ = x − K ε with K = P Jᵀ in whitened rows: how anything that entered the rows reaches the solution.
     let gain = &covariance * jacobian.transpose();
     let mut by_accelerometer = layout.wrt_accelerometer(problem, &at);
@@ -274,7 +279,9 @@ fn finish(
             .collect(),
         model: at.model,
         iterations,
-        is_converged: settled && solution.stop.is_converged(),
+        is_converged: settled
+            && (solution.stop.is_converged()
+                || (solution.stop == Stop::NoDescent && left < SETTLED)),
         stopped_because: solution.stop.name(),
     })
 }

@@ -13,6 +13,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect
 from trihedron.diagnose.laws.find import laws_of_rest
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
+from trihedron.diagnose.residuals.creep import settling, with_settling
 from trihedron.diagnose.residuals.goodness_of_fit import hidden_zeros, judge_rows
 from trihedron.diagnose.residuals.timing import judge_timing
 from trihedron.diagnose.residuals.within_holds import judge_within_holds
@@ -133,7 +134,7 @@ class _Run:
 
 def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell: Progress) -> _Run:
     tell(0.05, "fitting the session")
-    bare = begin(obs, start, prior)
+    bare = _with_creep(begin(obs, start, prior))
     tell(0.2, "looking at the samples")
     model, candidates = with_evidence(bare, alpha)
     domains = _all_domains(bare.context, alpha, model.refused)
@@ -157,6 +158,21 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
     sought = {one.id for one in catalogue() if isinstance(one, DirectEffect) and one.is_sought_again}
     remaining = _all_domains(judged.context, alpha, judged.refused | (sought - named))
     return _Run(bare, judged, domains, accounted_for(judged, remaining), candidates)
+
+
+def _with_creep(bare: StepwiseModel) -> StepwiseModel:
+    """The session with rates at rest and moves that allow for poses which turn while they settle, where they do."""
+    rates = [one for one in judge_rows(bare.fitted, CREEP_ALPHA) if one.domain == "static-gyro"]
+    if not any(one.disagrees for one in rates):
+        return bare
+    found = settling(bare.context)
+    if not found.is_seen:
+        return bare
+    return begin(with_settling(bare.context, found), bare.start, bare.prior)
+
+
+CREEP_ALPHA = 0.01
+"""False alarms of the rates at rest above which creep is looked for at all."""
 
 
 def _with_late(

@@ -8,7 +8,8 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.verdict import covariance_scale
-from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align_screened
+from trihedron.estimate.gyroscope.aligned_moves import measured_and_aligned
+from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions
 from trihedron.estimate.gyroscope.findings import findings_of
 from trihedron.estimate.gyroscope.lost_turns import (
     PossibleLosses,
@@ -17,10 +18,9 @@ from trihedron.estimate.gyroscope.lost_turns import (
     of_alignment,
     relative_sigma,
 )
-from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.gyroscope.moves import gyroscope_of
 from trihedron.estimate.gyroscope.observability import describe
-from trihedron.estimate.gyroscope.start import starts
 from trihedron.estimate.gyroscope.verification import held_out
 from trihedron.estimate.session.carried import carried
 from trihedron.estimate.session.figures import held_out as held_out_of_session
@@ -65,12 +65,9 @@ def calibrate_joint(
         As :func:`trihedron.estimate.gyroscope.calibrate_moves`.
     """
     options = options or MoveOptions()
-    measured = measure_moves(recording, segments, accelerometer, options.rate_degree, options.is_attitude_removed)
-    options = options.suited_to(measured)
     basis, frame = free_directions(accelerometer.S)
-    first = starts(recording, measured, accelerometer, options.nominal())
     part = AccelerometerPart(accelerometer, basis, is_given=False)
-    aligned = align_screened(measured, part, gravity_m_s2, first, options)
+    measured, aligned, options = measured_and_aligned(recording, segments, part, gravity_m_s2, options)
     is_determined = aligned.fit.rank == len(aligned.fit.singular_values)
     if frame == "case" or options.is_offset_free or not is_determined:
         # Moves that leave directions open, or a zero hidden inside a step of the converter: the moves alone are judged.

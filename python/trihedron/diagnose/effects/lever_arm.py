@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 from scipy.special import fdtrc
 
 from trihedron.arrays import FloatArray
@@ -18,8 +19,6 @@ from trihedron.records.domains import HeldOut, Where
 MIN_SHARE = 0.1
 """One arm must predict at least this share of the motion of moves it was not fitted to: a hand also just travels, but
 its travel follows no turn, and leaves 5 % at most (21 simulated sessions without an arm)."""
-VISIBLE = 0.04
-"""The same with all moves weighed alike: held-out rms falls by 2 %."""
 MOSTLY = 0.5
 """Share from which an arm is what a session's moves do; below, the hand mostly travels, and the arm is a remark."""
 FEWEST_MOVES = 6
@@ -30,16 +29,33 @@ P_LIMIT = 1e-5
 """False alarms of Hotelling's test on moves whose own travel does not follow the turn."""
 SMOOTHED, SMOOTHED_S = 5, 0.04
 """Samples, and seconds, of the mean that both sides pass: angular acceleration is a difference of noisy rates."""
-N_WEIGHINGS = 4
+N_SHAPES = 24
+"""Polynomials of time in which a move is written. A hand's travel is made of the slow ones: of five simulated hands
+with arms of 2 to 3 cm none stands out at 1e-5 where samples count alike, one with 10 shapes, three with 24."""
+SAMPLES_PER_SHAPE = 3
+"""Readings of a short move (the fifth part is shorter) for each."""
+SHORT = 0.2
+FEWEST_PER_SHAPE = 2
+"""Moves with fewer readings for each shape are left out: their shapes are no longer different curves."""
+SHRUNK = (0.02, 100.0)
+"""Of the mean variance of a shape, added to each: 24 by 24 covariances come from as few as 18 curves. With the second,
+shapes count alike, which a few moves with long arms need; the better of the two answers, paid for twice."""
+N_WEIGHINGS, N_AGAIN = 6, 3
+"""Rounds from nothing known, and from where one move less changes little."""
 QUIETEST = 0.5
 """Of the median: no move counts for more than twice the median one, however little the hand travels in it."""
+N_ARM = 3
+"""Unknowns of an arm; behind them a delay between the sensors, which turned gravity would read as one."""
+ROUNDING = 1e-9
+"""Of an arm's square that of a delay is larger by: a delay of a tenth of a second stays one."""
 
 
 class LeverArm(DirectEffect):
-    """Sample by sample in moves, f - (−g) follows α×r + ω×(ω×r) with one r for all moves.
+    """In moves f - (−g) follows α×r + ω×(ω×r) with one r for all of them.
 
-    A hand's own travel is unknown acceleration of any colour, so the scatter of the arm from move to move, not the
-    sample noise, decides (jackknife over moves, each weighed by what the arm leaves of it), and moves are held out.
+    A hand's own travel is unknown acceleration, much of it slow, so the scatter of the arm from move to move, not the
+    sample noise, decides (jackknife over moves), moves are held out, and what hands do not do weighs most: the
+    covariance of the travel's shapes in time is estimated from all moves, in the frame in which each began.
     """
 
     id = "lever-arm"
@@ -52,59 +68,61 @@ class LeverArm(DirectEffect):
         return "fewer than six moves with a gyro" if len(_true_moves(context)) < FEWEST_MOVES else None
 
     def find(self, context: Context) -> Evidence | None:
-        sums = _sums(context)
-        if np.linalg.cond(sums.normal.sum(axis=0)) > TOO_FLAT:
+        moves = _written(context)
+        flat = np.einsum("mkia,mkib->ab", moves.columns, moves.columns)[:N_ARM, :N_ARM]
+        if len(moves.target) < FEWEST_MOVES or np.linalg.cond(flat) > TOO_FLAT:
             return None
-        found, weight = _fitted(sums)
-        held_out = _unpredicted(sums, found.without_one)
-        share = 1.0 - float(weight @ held_out) / float(weight @ sums.energy)
-        after = float(held_out.sum())
-        whole = float(sums.energy.sum())
-        if share < MIN_SHARE or 1.0 - after / whole < VISIBLE or found.p_value > P_LIMIT:
+        found, by = min((_fitted(moves, one) for one in SHRUNK), key=lambda one: one[0].p_value)
+        before, after = (float(by.weight @ one) for one in _held_out(moves, found, by.shapes))
+        share = 1.0 - after / before
+        if share < MIN_SHARE or len(SHRUNK) * found.p_value > P_LIMIT:
             return None
-        before_rms, after_rms = float(np.sqrt(whole / sums.n)), float(np.sqrt(after / sums.n))
+        # Rms of what hands do little of: every shape and move by its weight, the same before and after.
+        scale = 3.0 * float(np.trace(by.shapes)) * float(by.weight.sum())
+        before_rms, after_rms = float(np.sqrt(before / scale)), float(np.sqrt(after / scale))
         noise = float(np.sqrt((context.noise_floor[0] ** 2).mean()))
         held = HeldOut("dynamics", (before_rms / noise) ** 2, (after_rms / noise) ** 2, before_rms, after_rms, "m/s^2")
         sigma = np.sqrt(np.diag(found.covariance))
         parameters = tuple(
             EffectParameter(f"r_{axis}", float(v), float(s), "m")
-            for axis, v, s in zip(AXES, found.arm, sigma, strict=True)
+            for axis, v, s in zip(AXES, found.value[:N_ARM], sigma, strict=True)
         )
-        length = float(np.linalg.norm(found.arm))
+        length = float(np.linalg.norm(found.value[:N_ARM]))
         # Real motion explains nothing of how gravity and rest disagree: it stands behind what does.
-        strength = float(len(weight) * np.log(whole / after)) if 1.0 - after / whole > MOSTLY else 0.0
+        whole, left = (float(one.sum()) for one in _held_out(moves, found, np.eye(moves.n_shapes)))
+        strength = float(len(by.weight) * np.log(whole / left)) if 1.0 - left / whole > MOSTLY else 0.0
         return Evidence(
-            max(found.p_value, 1e-300), strength, parameters,
+            max(len(SHRUNK) * found.p_value, 1e-300), strength, parameters,
             f"The accelerometers sit {100 * length:.1f} cm from the centre of rotation: one arm predicts "
-            f"{100 * share:.0f} % of the acceleration in moves it was not fitted to.",
+            f"{100 * share:.0f} % of the acceleration in moves it was not fitted to (what hands do most weighs least).",
             "dynamics", Where(("ax", "ay", "az")), (held,),
         )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class _Sums:
-    """Per move: ``normal`` (m, 3, 3), ``side`` (m, 3) and ``energy`` (m,) of the least squares for one arm; how many
-    readings in each (``samples`` (m,)) and in all (``n``)."""
+class _Moves:
+    """Moves in shapes of time, in the frame in which each began: ``target`` (m, shapes, 3) the force beside gravity,
+    ``columns`` (m, shapes, 3, 4) what a metre of arm along each axis and a second of delay would make of it."""
 
-    normal: FloatArray
-    side: FloatArray
-    energy: FloatArray
-    samples: FloatArray
+    target: FloatArray
+    columns: FloatArray
 
     @property
-    def n(self) -> float:
-        """Readings of all channels."""
-        return float(self.samples.sum())
+    def n_shapes(self) -> int:
+        """Number of shapes."""
+        return int(self.target.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
 class _Arm:
-    """``arm`` (3,) m, its jackknife ``covariance``, Hotelling's ``p_value``, the arms ``without_one`` move (m, 3)."""
+    """``value`` (4,) arm [m] and delay [s], the arm's jackknife ``covariance`` (3, 3) and Hotelling's ``p_value``;
+    ``without_one`` (m, 4) the value without each move, ``delay_without_one`` (m,) that of a delay alone."""
 
-    arm: FloatArray
+    value: FloatArray
     covariance: FloatArray
     p_value: float
     without_one: FloatArray
+    delay_without_one: FloatArray
 
 
 def _true_moves(context: Context) -> list[slice]:
@@ -116,50 +134,103 @@ def _true_moves(context: Context) -> list[slice]:
     return [where for where, (a, b) in pairs if not clipped[a:b].any()]
 
 
-def _sums(context: Context) -> _Sums:
-    normal, side, energy, samples = [], [], [], []
+def _written(context: Context) -> _Moves:
+    holds = context.obs.n_holds
+    spans = _true_moves(context)
+    short = float(np.quantile([where.stop - where.start for where in spans], SHORT))
+    n_shapes = int(np.clip(short // SAMPLES_PER_SHAPE, 1, N_SHAPES))
     width = max(SMOOTHED, int(SMOOTHED_S * context.obs.recording.rate_hz)) | 1
-    for where in _true_moves(context):
+    targets, columns = [], []
+    for where in spans:
+        if where.stop - where.start < FEWEST_PER_SHAPE * n_shapes:
+            continue
+        t = context.time_s[where]
         w = _smooth(context.rate[where], width)
-        a = np.gradient(w, context.time_s[where], axis=0)
-        e = _smooth(context.force[where] - context.gravity_in_moves[where], width)
-        # a × r + w × (w × r), as a matrix on r.
-        columns = (_cross(a) + _cross(w) @ _cross(w)).reshape(-1, 3)
-        target = e.reshape(-1)
-        normal.append(columns.T @ columns)
-        side.append(columns.T @ target)
-        energy.append(float(target @ target))
-        samples.append(float(len(target)))
-    return _Sums(np.array(normal), np.array(side), np.array(energy), np.array(samples))
+        a = np.gradient(w, t, axis=0)
+        gravity = _smooth(context.gravity_in_moves[where], width)
+        e = _smooth(context.force[where], width) - gravity
+        # a × r + w × (w × r), as a matrix on r; a delay reads gravity as it turned: d/dt of -g is -w × (-g).
+        made = np.concatenate([_cross(a) + _cross(w) @ _cross(w), -np.cross(w, gravity)[:, :, None]], axis=2)
+        begun = context.fitted.line.path.attitude[where.start - holds : where.stop - holds].transpose(0, 2, 1)
+        shapes = _shapes(t, n_shapes)
+        targets.append(shapes.T @ (begun @ e[:, :, None])[:, :, 0])
+        columns.append(np.tensordot(shapes.T, begun @ made, axes=1))
+    return _Moves(np.array(targets), np.array(columns))
 
 
-def _fitted(sums: _Sums) -> tuple[_Arm, FloatArray]:
-    """The arm and the weights (m,) of the moves, each by what it leaves: hands travel far in some, hardly in others."""
-    left = sums.energy
-    for _ in range(N_WEIGHINGS):
-        variance = left / sums.samples
-        weight = 1.0 / np.maximum(variance, QUIETEST * float(np.median(variance)))
-        found = _jackknife(sums.normal * weight[:, None, None], sums.side * weight[:, None])
-        left = _unpredicted(sums, np.tile(found.arm, (len(weight), 1)))
-    return found, weight
+def _shapes(time_s: FloatArray, count: int) -> FloatArray:
+    """(n, count) Legendre polynomials over the time of a move, of mean square 1, times the weight of each sample."""
+    x = 2.0 * (time_s - time_s[0]) / (time_s[-1] - time_s[0]) - 1.0
+    weight = 0.5 * np.gradient(x)
+    out: FloatArray = legvander(x, count - 1) * np.sqrt(2.0 * np.arange(count) + 1.0) * weight[:, None]
+    return out
 
 
-def _jackknife(normal: FloatArray, side: FloatArray) -> _Arm:
-    """The moves left out one by one tell the error bar: a move that decides alone makes it wide."""
-    m = len(normal)
-    N, b = normal.sum(axis=0), side.sum(axis=0)
-    arm = np.linalg.solve(N, b)
-    without_one = np.linalg.solve(N - normal, (b - side)[:, :, None])[:, :, 0]
-    away = without_one - arm
+@dataclass(frozen=True, eq=False)
+class _Weighed:
+    """One least-squares answer: ``value`` (4,), inverse covariance of the ``shapes``, ``weight`` (m,) of the moves."""
+
+    value: FloatArray
+    shapes: FloatArray
+    weight: FloatArray
+
+
+def _normal(moves: _Moves, by: _Weighed) -> tuple[FloatArray, FloatArray]:
+    """(m, 4, 4) normal matrices and (m, 4) right-hand sides."""
+    weighted = np.einsum("kl,mlib->mkib", by.shapes, moves.columns) * by.weight[:, None, None, None]
+    normal = np.einsum("mkia,mkib->mab", moves.columns, weighted)
+    # Turns about the vertical alone show no delay; it is zero then.
+    normal[:, N_ARM, N_ARM] += ROUNDING * np.trace(normal[:, :N_ARM, :N_ARM], axis1=1, axis2=2)
+    return normal, np.einsum("mkia,mki->ma", weighted, moves.target)
+
+
+def _weighed(moves: _Moves, by: _Weighed, shrunk: float, n: int) -> _Weighed:
+    """The answer again, ``n`` times, in the noise that the last one left."""
+    for _ in range(n):
+        left = moves.target - moves.columns @ by.value
+        covariance = np.einsum("mki,mli->kl", left * by.weight[:, None, None], left) / (3.0 * len(left))
+        mean = float(np.trace(covariance)) / moves.n_shapes
+        shapes = np.linalg.inv(covariance + shrunk * mean * np.eye(moves.n_shapes))
+        squares = _squares(left, shapes)
+        weight = 1.0 / np.maximum(squares, QUIETEST * float(np.median(squares)))
+        by = _Weighed(by.value, shapes, weight / weight.mean())
+        normal, side = (one.sum(axis=0) for one in _normal(moves, by))
+        by = replace(by, value=np.linalg.solve(normal, side))
+    return by
+
+
+def _fitted(moves: _Moves, shrunk: float) -> tuple[_Arm, _Weighed]:
+    """The arm, each move left out in turn for its error bar: covariance and weights are made again without it.
+
+    A move that decides alone, or makes the noise in which it stands out, makes that wide.
+    """
+    m = len(moves.target)
+    start = _Weighed(np.zeros(N_ARM + 1), np.eye(moves.n_shapes), np.ones(m))
+    whole = _weighed(moves, start, shrunk, N_WEIGHINGS)
+    without_one = np.empty((m, N_ARM + 1))
+    for k in range(m):
+        others = np.arange(m) != k
+        few = _Moves(moves.target[others], moves.columns[others])
+        without_one[k] = _weighed(few, replace(whole, weight=whole.weight[others]), shrunk, N_AGAIN).value
+    away = (without_one - whole.value)[:, :N_ARM]
     covariance = away.T @ away * ((m - 1) / (m - 3))
+    arm = whole.value[:N_ARM]
     wald = float(arm @ np.linalg.solve(covariance, arm)) / 3.0 * (m - 3) / (m - 1)
-    return _Arm(arm, covariance, float(fdtrc(3.0, m - 3.0, wald)), without_one)
+    normal, side = _normal(moves, whole)
+    delay = (side.sum(axis=0) - side)[:, N_ARM] / (normal.sum(axis=0) - normal)[:, N_ARM, N_ARM]
+    return _Arm(whole.value, covariance, float(fdtrc(3.0, m - 3.0, wald)), without_one, delay), whole
 
 
-def _unpredicted(sums: _Sums, arms: FloatArray) -> FloatArray:
-    """(m,) squares of what one arm a move (m, 3) leaves of it."""
-    moved = np.einsum("mi,mij,mj->m", arms, sums.normal, arms)
-    return np.asarray(sums.energy - 2.0 * (arms * sums.side).sum(axis=1) + moved)
+def _squares(left: FloatArray, shapes: FloatArray) -> FloatArray:
+    """(m,) sums of squares of curves (m, shapes, 3), their covariance in time divided out."""
+    return np.asarray((left * np.einsum("kl,mli->mki", shapes, left)).sum(axis=(1, 2)))
+
+
+def _held_out(moves: _Moves, found: _Arm, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(m,) squares that a delay alone leaves of each move, and an arm beside it, both fitted without that move."""
+    alone = moves.target - moves.columns[..., N_ARM] * found.delay_without_one[:, None, None]
+    beside = moves.target - np.einsum("mkia,ma->mki", moves.columns, found.without_one)
+    return _squares(alone, shapes), _squares(beside, shapes)
 
 
 def _cross(v: FloatArray) -> FloatArray:

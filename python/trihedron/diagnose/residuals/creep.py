@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.session.observations import Observations
 
 FEWEST_POSES = 6
 """Poses below which their creep has no variance of its own."""
@@ -20,17 +21,25 @@ SIZES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 31)])
 """Scatter and creep tried, in rms of the readings' error: a quarter of a step of the grid is 10 %."""
 LEVEL = 0.5
 """Cosine to the vertical that parts the level axes (0) from it (1)."""
+CERTAIN = 20.0
+"""Twice the log-likelihood that creep wins beside scatter: one in 10⁵ of chi-square with one degree of freedom, with
+four time constants paid for."""
 STILL_SCATTERS = 0.01
 """p-value of a scatter beside creep from which the scatter stands."""
 
 
 @dataclass(frozen=True)
 class Settling:
-    """Rates at rest described by creep alone, by scatter alone, by both: twice the log-likelihood over neither."""
+    """Rates at rest described by creep alone, by scatter alone, by both: twice the log-likelihood over neither.
+
+    ``rate_rad_s`` is the creep's standard deviation on setting down beside scatter, ``tau_s`` how fast it dies away.
+    """
 
     creep: float
     scatter: float
     both: float
+    rate_rad_s: float = 0.0
+    tau_s: float = SETTLES_S[0]
 
     @property
     def is_motion(self) -> bool:
@@ -38,6 +47,11 @@ class Settling:
         beside = max(self.both - self.creep, 0.0)
         p = 0.5 * float(chdtrc(1.0, beside)) if beside > 0.0 else 1.0
         return self.creep > self.scatter and p > STILL_SCATTERS
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether there is creep for certain, with or without scatter beside it."""
+        return self.both - self.scatter > CERTAIN
 
 
 def settling(context: Context) -> Settling:
@@ -54,11 +68,35 @@ def settling(context: Context) -> Settling:
     scatter = float(tables[0].log_likelihood((scale * SIZES) ** 2, np.zeros(len(SIZES))).max())
     a, b = ((scale * g.ravel()) ** 2 for g in np.meshgrid(SIZES, SIZES, indexing="ij"))
     creep, both = [], []
-    for table in tables:
+    for table, tau in zip(tables, SETTLES_S, strict=False):
         values = table.log_likelihood(a, b)
         creep.append(float(values[a == 0.0].max()))
-        both.append(float(values.max()))
-    return Settling(2.0 * (max(creep) - none), 2.0 * (scatter - none), 2.0 * (max(both) - none))
+        best = int(values.argmax())
+        both.append((float(values[best]), float(np.sqrt(b[best])), tau))
+    most, rate, tau = max(both)
+    return Settling(2.0 * (max(creep) - none), 2.0 * (scatter - none), 2.0 * (most - none), rate, tau)
+
+
+def with_settling(context: Context, found: Settling) -> Observations:
+    """Rates at rest as uncertain as poses turn, moves as the verticals at their ends: a pose that settles is not where
+    its mean is (eq. 8.7f). That the rates at rest disagree is still judged by their own noise.
+    """
+    obs = context.obs
+    assert obs.hold_rate_sigma is not None
+    lasts = np.array([hold.stop - hold.start for hold in obs.segments.holds]) / obs.recording.rate_hz
+    fades = np.exp(-lasts / found.tau_s)
+    mean = found.tau_s * (1.0 - fades) / lasts
+    turned = found.rate_rad_s * found.tau_s
+    begins, ends = turned * (1.0 - mean), turned * (mean - fades)
+    si_per_raw = context.si_per_raw("gyroscope")
+    unresolved = dict(obs.unresolved)
+    for before, after in obs.move_holds:
+        key = int(before), int(after)
+        wider = np.zeros((2, 3)) if key not in unresolved else unresolved[key].copy()
+        wider[1] += (ends[before] ** 2 + begins[after] ** 2) / si_per_raw**2
+        unresolved[key] = wider
+    creep = found.rate_rad_s * mean[:, None] / si_per_raw
+    return replace(obs, unresolved=unresolved, hold_rate_sigma=np.hypot(obs.hold_rate_sigma, creep), hold_creep=creep)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +134,8 @@ class _Table:
 
 def _table(context: Context, tau: float) -> _Table | None:
     obs, twin = context.obs, context.fitted.twin
-    if obs.raw_rate is None or obs.hold_rate_sigma is None:
+    noise = obs.hold_rate_noise
+    if obs.raw_rate is None or noise is None:
         return None
     contrasts = np.linalg.qr(np.column_stack([np.ones(N_BLOCKS), np.eye(N_BLOCKS)[:, 1:]]))[0][:, 1:].T
     sums, axes, errors = [], [], []
@@ -116,7 +155,7 @@ def _table(context: Context, tau: float) -> _Table | None:
         turned = contrasts @ (tau * (1.0 - fades))
         for axis in np.linalg.svd(up[None])[2]:
             is_level = abs(float(axis @ up)) < LEVEL
-            own = float(np.sqrt(((axis @ twin.gyro_S) ** 2 * obs.hold_rate_sigma[i] ** 2).sum() * N_BLOCKS))
+            own = float(np.sqrt(((axis @ twin.gyro_S) ** 2 * noise[i] ** 2).sum() * N_BLOCKS))
             y, a, b = rate @ axis / own, np.ones(N_BLOCKS) / own, fades / own
             if is_level:
                 # Turned force reads along the other level axis; its white noise is that of the quiet floor.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.special import fdtrc
 
 from trihedron.arrays import FloatArray
@@ -53,7 +54,7 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
             continue
         # A widened domain is judged by the noise it was predicted to have.
         widened = {MOVES: fitted.line.obs.moves_inflation, DYNAMICS: fitted.line.obs.dynamics_inflation}.get(label, 1.0)
-        chi2 = float((fitted.system.residual[rows] ** 2).sum()) * widened**2
+        chi2 = float(((fitted.system.residual[rows] * _unsettled(fitted, label, rows)) ** 2).sum()) * widened**2
         per_dof = chi2 / dof
         p = float(fdtrc(dof, NOISE_DOF, per_dof))
         disagrees = p < alpha / N_DOMAINS_TESTED
@@ -69,6 +70,20 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
             DomainTest(name, per_dof, dof, p, disagrees, where, physical.get(label, 0.0), rms_unit.get(label, ""))
         )
     return tuple(tests)
+
+
+def _unsettled(fitted: Fit, label: int, rows: npt.NDArray[np.bool_]) -> FloatArray:
+    """(rows,) what makes residuals of rates at rest those over their own noise again, where creep was added to it."""
+    obs, system = fitted.line.obs, fitted.system
+    noise, spread = obs.hold_rate_noise, obs.hold_rate_spread
+    out = np.ones(int(np.count_nonzero(rows)))
+    if label != STATIC_GYRO or obs.hold_creep is None or noise is None or spread is None:
+        return out
+    direct = system.walk[rows] == 0
+    own = noise if obs.zero_scatter is None else np.hypot(noise, obs.zero_scatter[1])
+    ratio = spread / own
+    out[direct] = ratio[system.segment[rows][direct], system.channel[rows][direct]]
+    return out
 
 
 def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:

@@ -44,7 +44,7 @@ def final_numbers(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> Fi
     if _scatters(gyro):
         assert gyro is not None
         obs = with_gyro_scatter(obs, gyro.evidence.scatter, context.si_per_raw("gyroscope"))
-    elif "static-gyro" in left and obs.hold_rate_sigma is not None:
+    elif "static-gyro" in left and obs.hold_rate_sigma is not None and obs.hold_creep is None:
         wider: FloatArray = obs.hold_rate_sigma * np.sqrt(max(left["static-gyro"], 1.0))
         obs = replace(obs, hold_rate_sigma=wider)
     obs = replace(

@@ -16,6 +16,9 @@ from trihedron.refused import RefusedError
 from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.noise import measure_noise
 
+UNSTEADY = 2.0
+"""Error of a pose's mean over that of the session's usual pose, from which the pose itself was not still: errors of
+means are known to a fifth."""
 LONGEST_MOVE_S = 180.0
 """A hand move takes seconds, a careful change of fixture minutes; over longer the bias decides what is integrated."""
 
@@ -35,7 +38,8 @@ class Observations:
     ``unresolved`` maps a move's two holds to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
     by motion faster than the samples, by noise slower than a move and by shaking that stands in a pose's end.
     ``zero_scatter`` (2, 3), once a diagnosis has found it: how far zeros scatter from hold to hold beside their walk,
-    accelerometer and gyro, raw units.
+    accelerometer and gyro, raw units. ``hold_creep`` (h, 3), once it was seen: by how much (one sigma,
+    raw units) poses turn that settle; it is in ``hold_rate_sigma``.
     The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
     """
 
@@ -62,6 +66,7 @@ class Observations:
     moves_inflation: float = 1.0
     dynamics_inflation: float = 1.0
     zero_scatter: FloatArray | None = None
+    hold_creep: FloatArray | None = None
 
     @property
     def n_holds(self) -> int:
@@ -72,6 +77,14 @@ class Observations:
     def n_moves(self) -> int:
         """Number of moves between neighbouring poses."""
         return len(self.move_ranges)
+
+    @property
+    def hold_rate_noise(self) -> FloatArray | None:
+        """(h, 3) standard errors of the gyro's means without the creep of poses."""
+        if self.hold_rate_sigma is None or self.hold_creep is None:
+            return self.hold_rate_sigma
+        out: FloatArray = np.sqrt(self.hold_rate_sigma**2 - self.hold_creep**2)
+        return out
 
     @property
     def hold_force_spread(self) -> FloatArray:
@@ -184,6 +197,9 @@ def observe(recording: Recording, segments: Segments) -> Observations:
             ranges.append((start, stop))
             holds.append((move.hold_before, move.hold_after))
     noise = measure_noise(recording, segments, ranges)
+    if noise.rate_sigma is not None:
+        lasts = np.array([t[hold.stop - 1] - t[hold.start] for hold in segments.holds])
+        swing = swing + np.stack([np.zeros_like(noise.rate_sigma), _turned_at_ends(noise.rate_sigma, lasts)], axis=1)
     unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(noise.unresolved, holds, strict=True)]
     return Observations(
         recording=recording,
@@ -206,3 +222,14 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         bumped_s=bumped,
         unresolved=dict(zip(holds, unresolved, strict=True)),
     )
+
+
+def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:
+    """(holds, 3) variance, (raw unit · s)², of the angle between a pose's mean and its end where it was not still.
+
+    A rate that changes inside a pose (the tail of a move, a push) makes its mean uncertain, and turns its ends away
+    from its middle by as much, times half of the pose. Poses with the session's usual noise have none.
+    """
+    usual = np.median(rate_sigma**2 * lasts_s[:, None], axis=0) / lasts_s[:, None]
+    out: FloatArray = np.maximum(rate_sigma**2 - UNSTEADY**2 * usual, 0.0) * (0.5 * lasts_s[:, None]) ** 2
+    return out

@@ -92,9 +92,12 @@ class Fit:
         Error bars allow for zeros that scatter, as those of a calibration do (eq. 11.12b).
         """
         obs, core = self.line.obs, self.line.core
-        if obs.zero_scatter is None:
+        if obs.zero_scatter is None or not obs.zero_scatter[0].any():
+            # A gyro whose zeros scatter says nothing of the accelerometer's.
+            gyro = START_STRENGTHS[1][1] if obs.zero_scatter is None else 1.0
+            between = START_STRENGTHS[2] if obs.zero_scatter is None else core.strengths[2]
             core = core_model(obs, self.twin.gravity, self.line.prior, is_scatter_free=True).fit(
-                state=core_state(self.twin), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
+                state=core_state(self.twin), strengths=(core.strengths[0], (START_STRENGTHS[1][0], gyro), between),
                 force_effect=contiguous(self.line.distortion.force), rate_effect=contiguous(self.line.distortion.rate),
                 is_tuned=False,
             )  # fmt: skip

@@ -192,7 +192,8 @@ def contiguous(values: FloatArray | None) -> FloatArray | None:
 def core_model(
     obs: Observations, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False
 ) -> _core.SessionModel:
-    """The Rust model of some observations; with ``is_scatter_free`` zeros may scatter though no diagnosis says so."""
+    """The Rust model of some observations; with ``is_scatter_free`` zeros may scatter though no diagnosis says so
+    (a gyro's named scatter is its unit then)."""
     has_rate = obs.hold_rate is not None and obs.hold_rate_sigma is not None and obs.rate_density is not None
     poses = _core.SessionPoses(
         time_s=np.ascontiguousarray(obs.hold_time_s, dtype=np.float64),
@@ -207,7 +208,9 @@ def core_model(
     if is_scatter_free or obs.zero_scatter is not None:
         unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma)
         scatter = (unit, False)
-        if obs.zero_scatter is not None:
+        if obs.zero_scatter is not None and is_scatter_free:
+            unit[1] = np.maximum(obs.zero_scatter[1], START_STRENGTHS[1][0] * unit[1])
+        elif obs.zero_scatter is not None:
             # A sensor that does not scatter has a scatter that counts as none.
             scatter = (np.maximum(obs.zero_scatter, START_STRENGTHS[1][0] * unit), True)
     return _core.SessionModel(

@@ -24,6 +24,9 @@ CAUCHY_SCALE = 3.0
 FALSE_ALARM = 1e-3
 """Chance that a sound recording raises a statistical finding of one kind."""
 
+AT_LEAST = 0.84
+"""One standard error: as much of the rounding charged as misses with this chance would be larger than those seen."""
+
 
 @dataclass(frozen=True)
 class MoveOptions:
@@ -211,6 +214,9 @@ def assemble(
     k = accelerometer.basis.shape[1]
     p = fit.covariance.shape[0]
     inner = inflation * (np.asarray(fit.covariance) + _unseen(fit, S, k))
+    narrower = np.ones(p)
+    narrower[k : k + 9] = _narrowing(fit, measured)
+    inner = inner * np.outer(narrower, narrower)
     cov_accelerometer = accelerometer.model.covariance if accelerometer.is_given else np.zeros((12, 12))
     response = np.asarray(fit.wrt_accelerometer)
     # y = (fit parameters, z̄, given accelerometer).
@@ -245,6 +251,17 @@ def assemble(
         inflation=inflation,
         n_gyroscope=p - k,
     )
+
+
+def _narrowing(fit: AlignmentFit, measured: MoveMeasurements) -> float:
+    """Factor, at most one, on the scale's standard errors where readings are coarser than their noise.
+
+    What rounding may hide is charged for the usual hand; what it did hide shows in the misses, up to their own chance.
+    The offset, which all moves share, does not show in them, and keeps the whole charge.
+    """
+    if fit.dof < 1 or not np.any(measured.is_undithered):
+        return 1.0
+    return min(1.0, float(np.sqrt(fit.chi2 / chdtri(fit.dof, AT_LEAST))))
 
 
 def _unseen(fit: AlignmentFit, S: FloatArray, k: int) -> FloatArray:

@@ -118,8 +118,10 @@ def measure_moves(
     accelerometer: SensorCalibration,
     rate_degree: int,
     is_attitude_removed: bool | None = None,
+    *,
+    is_bridged: bool = True,
 ) -> MoveMeasurements:
-    """Collect hold means, moves and noise.
+    """Collect hold means, moves and noise; readings that look like the gyro's limit are bridged if ``is_bridged``.
 
     With ``is_attitude_removed`` (``None``: where the holds show it beyond chance) a zero reading that follows specific
     force is subtracted sample by sample: interpolating it between two attitudes would be wrong in the middle of a move.
@@ -132,8 +134,7 @@ def measure_moves(
     gyroscope = _required(recording.gyroscope, "gyroscope")
     raw_force = _required(recording.accelerometer, "accelerometer")
     accelerometer_mean, gyroscope_mean = _both_means(segments)
-    moves = _moves_of(recording, segments)
-    edges, links = _edges_and_links(moves)
+    edges, links = _edges_and_links(_moves_of(recording, segments))
     reading, zero = (np.ascontiguousarray(mean, dtype=np.float64) for mean in (accelerometer_mean, gyroscope_mean))
     quantum = recording.facts.of("gyroscope").step
     var_zero = _mean_variance(segments.gyroscope_sigma_mean)
@@ -145,7 +146,7 @@ def measure_moves(
         zero = np.ascontiguousarray(zero - force @ attitude.A.T)
     else:
         attitude, rate = None, gyroscope
-    clipped = bridge_clipping(recording)
+    clipped = bridge_clipping(recording) if is_bridged else None
     extra = rounding_variance(gyroscope, quantum, np.median(gyroscope_mean, axis=0), undithered)
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope)
@@ -161,8 +162,7 @@ def measure_moves(
         weights, mean, var_mean = _pooled_hidden(zero, var_zero, undithered, (weights, mean, var_mean))
     seen = rate_noise_density(recording, segments)
     density = density_without_rounding(seen, quantum, 1.0 / recording.rate_hz, undithered)
-    if attitude is not None:
-        var_mean = np.maximum(var_mean, attitude.var_zero)
+    var_mean = var_mean if attitude is None else np.maximum(var_mean, attitude.var_zero)
     steps, nominal, jitter = _steps_of(recording)
     return MoveMeasurements(
         moves=prepared,

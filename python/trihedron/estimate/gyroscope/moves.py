@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.estimate.gyroscope.alignment import Aligned, MoveOptions, align_screened, given_accelerometer
+from trihedron.estimate.gyroscope.aligned_moves import measured_and_aligned
+from trihedron.estimate.gyroscope.alignment import Aligned, MoveOptions, given_accelerometer
 from trihedron.estimate.gyroscope.findings import findings_of
 from trihedron.estimate.gyroscope.lost_turns import of_alignment
-from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.estimate.gyroscope.observability import describe
-from trihedron.estimate.gyroscope.start import starts
 from trihedron.estimate.gyroscope.verification import Prediction, held_out, quality_of
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding
@@ -50,11 +50,8 @@ def calibrate_moves(
         When a sensor or every move is missing, or nothing tells the scale to start from.
     """
     options = options or MoveOptions()
-    measured = measure_moves(recording, segments, accelerometer, options.rate_degree, options.is_attitude_removed)
-    options = options.suited_to(measured)
-    first = starts(recording, measured, accelerometer, options.nominal())
     part = given_accelerometer(accelerometer)
-    aligned = align_screened(measured, part, gravity_m_s2, first, options)
+    measured, aligned, options = measured_and_aligned(recording, segments, part, gravity_m_s2, options)
     held = held_out(aligned, measured, part, gravity_m_s2, options)
     aligned, of_losses = of_alignment(recording.time_s, measured, aligned, gravity_m_s2)
     found = (*findings_of(aligned, measured, held), *of_losses)

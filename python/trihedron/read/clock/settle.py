@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.read.clock.even import EvenClock, find_even_clock
+from trihedron.read.clock.even import EXACT, EvenClock, find_even_clock
 from trihedron.read.clock.followed import followed
 from trihedron.read.clock.steps import steps_of
 from trihedron.records import Finding, FindingCode
@@ -60,7 +60,7 @@ def settle_clock(
     share, sigma = 0.0, float("inf")
     shared = steps_of(time_s).same / (len(time_s) - 1)
     is_even = False
-    if clock.stamp_error_s > WORTH * clock.period_s:
+    if clock.stamp_error_s > _worth(clock.kind) * clock.period_s:
         share, sigma = followed(time_s, clock.even_s, clock.tick, triads)
         follows = share - STANDARD_ERRORS * sigma > SYSTEMATIC
         ignores = share + STANDARD_ERRORS * sigma < 1.0 - SYSTEMATIC
@@ -80,6 +80,11 @@ def settle_clock(
     del clock
     # In its own place: a long log has no room for a second.
     return Settled(np.maximum.accumulate(even, out=even), start_s + start, sampling, told, findings)
+
+
+def _worth(kind: StampKind) -> float:
+    # Rounding is the file's, not the sensor's, however small: left in the stamps it would be found as jitter.
+    return EXACT if kind is StampKind.ROUNDED else WORTH
 
 
 def sample_numbers(counter: FloatArray) -> IntArray | None:
@@ -102,7 +107,7 @@ def sample_numbers(counter: FloatArray) -> IntArray | None:
 
 
 def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Finding, ...]:
-    if sampling.stamp_error_s <= WORTH * sampling.period_s:
+    if sampling.stamp_error_s <= _worth(sampling.kind) * sampling.period_s:
         return ()
     follows = sampling.followed - STANDARD_ERRORS * sampling.sigma_followed > SYSTEMATIC
     follows_wholly = follows and sampling.followed + STANDARD_ERRORS * sampling.sigma_followed > 1.0 - SYSTEMATIC

@@ -1,0 +1,63 @@
+"""Moves measured and aligned, with a gyro's apparent limit believed only where gravity does not deny it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.channel_facts.limits import is_end_of_word
+from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align_screened
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
+from trihedron.estimate.gyroscope.start import starts
+from trihedron.estimate.gyroscope.verification import predict
+from trihedron.records.recording import Recording
+from trihedron.records.segments import Segments
+
+DENIED = 0.1
+"""Part of what peaks that were cut would be short of by which gravity is missed, and they were not."""
+
+
+def measured_and_aligned(
+    recording: Recording, segments: Segments, part: AccelerometerPart, gravity_m_s2: float, options: MoveOptions
+) -> tuple[MoveMeasurements, Aligned, MoveOptions]:
+    """Moves of a session, their alignment, and the options that suit them.
+
+    A machine that always turns at one speed, seen through a converter coarser than its noise, ends at one code, as a
+    gyro at its limit does. Had peaks been cut there, the readings as they are would fall short by what bridges them.
+    Where gravity is carried far better than that, nothing was cut, unless the code is the end of a converter's word.
+    """
+    bridged = _measured(recording, segments, part, options, is_bridged=True)
+    facts = recording.facts.of("gyroscope")
+    is_word = any(is_end_of_word(limit.value, float(facts.step[limit.axis])) for limit in facts.limits)
+    if np.any(bridged.clipped_s > 0.0) and not is_word:
+        measured = _measured(recording, segments, part, options, is_bridged=False)
+        plain = _aligned(recording, measured, part, gravity_m_s2, options)
+        if _denies_cut(plain, bridged, measured):
+            return measured, plain, options.suited_to(measured)
+    aligned = _aligned(recording, bridged, part, gravity_m_s2, options)
+    return bridged, aligned, options.suited_to(bridged)
+
+
+def _denies_cut(plain: Aligned, bridged: MoveMeasurements, measured: MoveMeasurements) -> bool:
+    """Whether gravity is carried through the moves that look cut as only whole turns carry it."""
+    S = np.asarray(plain.fit.gyroscope_scale)
+    added = (bridged.rate - measured.rate) @ S.T * measured.nominal_step_s
+    cut = bridged.clipped_s > 0.0
+    short = np.array([np.linalg.norm(np.nansum(added[a:b], axis=0)) for a, b in measured.edges[cut]])
+    missed = np.radians(predict(plain, measured, is_held_out=False).angle_deg[cut])
+    return bool(np.median(missed) < DENIED * np.median(short))
+
+
+def _measured(
+    recording: Recording, segments: Segments, part: AccelerometerPart, options: MoveOptions, *, is_bridged: bool
+) -> MoveMeasurements:
+    return measure_moves(
+        recording, segments, part.model, options.rate_degree, options.is_attitude_removed, is_bridged=is_bridged
+    )
+
+
+def _aligned(
+    recording: Recording, measured: MoveMeasurements, part: AccelerometerPart, gravity_m_s2: float, options: MoveOptions
+) -> Aligned:
+    options = options.suited_to(measured)
+    first = starts(recording, measured, part.model, options.nominal())
+    return align_screened(measured, part, gravity_m_s2, first, options)
