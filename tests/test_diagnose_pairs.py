@@ -7,8 +7,10 @@ import numpy as np
 
 import trihedron
 from trihedron.diagnose.against import compare_effects
+from trihedron.pipeline.comparing_noise import Sampled, compare_noise
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter
 from trihedron.records.domains import HeldOut
+from trihedron.records.hold_noise import HoldNoise, Measured
 from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.profiles import profile_by_name
@@ -92,3 +94,21 @@ def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
     found = trihedron.diagnose(recording, gravity_m_s2=9.80665)
     assert [one.id for one in found.effects] == ["gyro-hidden-drift", "gyro-zero-scatter"]
     assert found.verdict == "missing-physics"
+
+
+def test_a_step_that_one_axis_alone_seems_to_have_is_no_converters():
+    def axes(*steps):
+        white = Measured(1e-4, 0.98e-4, 1.02e-4, 0.01)
+        return tuple(HoldNoise(axis, "rad/s", 100.0, 20, 9000, white, step, (), (), None, 50.0, 0.0)
+                     for axis, step in zip("xyz", steps, strict=True))  # fmt: skip
+
+    def said(model, recording):
+        sides = [Sampled({"gyroscope": one}, {"gyroscope": np.zeros(3)}, {"gyroscope": 100}, 100.0, 0.0)
+                 for one in (model, recording)]  # fmt: skip
+        rows = compare_noise(*sides, alpha=0.01)
+        return [row.axis for row in rows if row.term == "resolution" and row.significant]
+
+    # Noise of 1e-3 a reading; the simulation's steps are a third of it.
+    converter = axes(3e-4, 3e-4, 3e-4)
+    assert said(converter, axes(1e-9, 0.0, 3e-5)) == []
+    assert said(converter, axes(3e-5, 3e-5, 3e-5)) == ["x", "y", "z"]

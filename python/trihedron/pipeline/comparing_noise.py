@@ -33,6 +33,8 @@ DIGITS = 0.1
 LEAST_SEEN_STEP = 1e-2
 """Of the noise: hardly a converter has a hundred codes to a standard deviation; sums of readings and what was taken off
 them come that near to a grid, and steps as fine cannot be told from the digits of a file."""
+FEWEST_ALIKE = 2
+"""Axes with one step, of which a converter shows."""
 LEAST_CORNER_RATIO = 1.2
 """Filters are chosen from lists whose neighbours differ by 1.5 to 2; within a fifth they are the same entry."""
 LEAST_RATE_RATIO = 1.02
@@ -122,7 +124,7 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
         even = _are_even([m.white for _, m, _ in pairs]) and not _are_even([r.white for _, _, r in pairs])
         out += _resembling(sensor, [w for w in white if w is not None], recording.rate_hz, even)
         for axis, m, r in pairs:
-            out += _step(sensor, axis, m, r)
+            out += _step(sensor, axis, (m, model.noise[sensor]), (r, recording.noise[sensor]))
             out += _corner(sensor, axis, m, r, alpha * SHARE / 6.0)
             out += _octaves(sensor, axis, m, r, alpha * SHARE / max(n_octaves, 1))
         out += _distribution(sensor, model, recording)
@@ -219,10 +221,17 @@ def _are_even(white: Sequence[Measured | None]) -> bool:
     return chance > UNLIKE_BY_CHANCE and float(np.ptp(logs)) < math.log(UNLIKE_AXES)
 
 
-def _step(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise) -> Iterator[NoiseDifference]:
+def _step(
+    sensor: Sensor,
+    axis: str,
+    model: tuple[HoldNoise, Sequence[HoldNoise]],
+    recording: tuple[HoldNoise, Sequence[HoldNoise]],
+) -> Iterator[NoiseDifference]:
+    """One axis of either side, with all axes of its sensor."""
+    m, r = model[0], recording[0]
     unit = "m/s^2" if sensor == "accelerometer" else "rad/s"
     name = "accelerometer" if sensor == "accelerometer" else "gyro"
-    m_shows, r_shows = _shows_steps(m), _shows_steps(r)
+    m_shows, r_shows = _shows_steps(*model), _shows_steps(*recording)
     if not (m_shows or r_shows):
         return
     if not (m_shows and r_shows):
@@ -243,8 +252,14 @@ def _step(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise) -> Iterator[Noi
     yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
 
 
-def _shows_steps(one: HoldNoise) -> bool:
-    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of a converter."""
+def _shows_steps(one: HoldNoise, axes: Sequence[HoldNoise]) -> bool:
+    """Whether readings go in steps: a distance of numbers far below the noise is that of chance, not of a converter.
+
+    Nor is one that no other axis has: the axes of a sensor share a converter.
+    """
+    alike = sum(max(one.step, other.step) < LEAST_STEP_RATIO * min(one.step, other.step) for other in axes)
+    if one.step > 0.0 and alike < min(FEWEST_ALIKE, len(axes)):
+        return False
     level = 0.0 if one.white is None else one.white.value * math.sqrt(one.rate_hz)
     return one.step > LEAST_SEEN_STEP * level
 

@@ -20,6 +20,7 @@ from trihedron.pipeline.comparing import compared
 from trihedron.pipeline.comparing_correlation import correlation_times
 from trihedron.pipeline.comparing_frames import rates_of_world, sign_of_gravity
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
+from trihedron.pipeline.comparing_quantisation import quantisation_noise
 from trihedron.pipeline.comparing_slow import slow_noise
 from trihedron.pipeline.comparing_stages import with_noise_stage
 from trihedron.pipeline.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
@@ -264,6 +265,7 @@ def _noise(
     theirs = (simulated.diagnosis, simulated.recording, simulated.segments)
     return (
         *compare_noise(simulated.sampled, ours, alpha=alpha),
+        *quantisation_noise(simulated.sampled, ours, alpha=alpha),
         *correlation_times(simulated.sampled, ours, alpha=alpha),
         *slow_noise(theirs, (found, recording, segments), alpha=alpha),
     )

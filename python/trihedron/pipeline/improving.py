@@ -13,7 +13,8 @@ import tomllib
 
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.files.scenario import improved_scenario
-from trihedron.pipeline.comparing_noise import sampled
+from trihedron.pipeline.comparing_noise import Sampled, sampled
+from trihedron.pipeline.comparing_quantisation import white_and_quantisation
 from trihedron.pipeline.driving import zero_in_moves, zero_of_poses
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records.diagnosis import AcceptedEffect
@@ -104,6 +105,18 @@ def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
     return out
 
 
+def white_and_quantisation_of(seen: Sampled, name: str) -> dict[str, list[float]]:
+    """N and Q of all axes of a sensor, as its octaves show them together; empty where some axis tells them not."""
+    axes = [white_and_quantisation(axis) for sensor, each in seen.noise.items() if sensor == name for axis in each]
+    known = [one for one in axes if one is not None]
+    if len(known) < len(axes):
+        return {}
+    return {
+        "N": [math.sqrt(one.white) for one in known],
+        "Q": [math.sqrt(one.quantisation) if one.is_shown else 0.0 for one in known],
+    }
+
+
 def _corner(axes: Sequence[HoldNoise]) -> float | None:
     """Corner [Hz] of the low-pass that most axes show, ``None`` where they show none."""
     seen = [math.log(axis.corner_hz.value) for axis in axes if axis.corner_hz is not None]
@@ -158,6 +171,13 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
                 tables[name]["noise_filter"] = {"corner_hz": low_pass.corner_hz, "order": low_pass.order}
             if "B" not in terms and any(noise.B):
                 terms["B"] = list(noise.B)
+        if "Q" in terms:
+            # What rises with frequency is in the white noise of neighbours: both from one fit, and no low-pass.
+            seen = sampled(found.recording, found.segments.holds, model_of_diagnosis(found))
+            both = white_and_quantisation_of(seen, name)
+            if both:
+                terms |= both
+                tables[name].pop("noise_filter", None)
         if terms:
             tables[name]["noise"] = terms
     for n in found.noise_compared:
