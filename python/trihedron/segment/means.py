@@ -62,8 +62,8 @@ def average_holds(
 def _sample_means(triads: list[FloatArray], holds: tuple[Hold, ...]) -> tuple[FloatArray, IntArray]:
     """(h, c) means over the samples of each hold, and (h,) how many of them are finite in every sensor."""
     parts = [(k, a, b) for k, hold in enumerate(holds) for a, b in hold.undisturbed()]
-    owner, first, last = np.array(parts, dtype=np.int64).reshape(-1, 3).T.copy()
-    spans = np.column_stack([first, last])
+    owner, begins, ends = np.array(parts, dtype=np.int64).reshape(-1, 3).T.copy()
+    spans = np.column_stack([begins, ends])
     n_rows = np.bincount(owner, spans[:, 1] - spans[:, 0], len(holds)).astype(np.int64)
     if all(a.flags.c_contiguous and a.dtype == np.float64 for a in triads):
         found = [_core.means_by_owner(a, spans, owner, len(holds)) for a in triads]
