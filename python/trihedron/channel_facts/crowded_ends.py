@@ -73,7 +73,10 @@ def is_repeated(end: End, *, is_known: bool) -> bool:
     if equal**repeats > BY_CHANCE:
         return False
     # Where rows are written again, neighbours are equal everywhere.
-    return max(equal, float(np.mean(np.diff(end.column) == 0.0))) ** repeats < BY_CHANCE
+    return (
+        max(equal, float(np.mean(np.concatenate([np.diff(part) for part in end.stretches]) == 0.0))) ** repeats
+        < BY_CHANCE
+    )
 
 
 def is_cut_noise(end: End) -> bool:

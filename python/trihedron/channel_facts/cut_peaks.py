@@ -30,12 +30,12 @@ def is_cut(end: End, *, is_known: bool) -> bool:
     otherwise, or two peaks end at it.
     """
     column = end.column
-    if not end.lasts or abs(end.value - float(np.nanmedian(column))) <= FAR * end.span:
+    if not end.lasts or abs(end.value - end.middle) <= FAR * end.span:
         return False
     runs = end.runs if is_known else end.moving_runs
     runs = runs[np.diff(runs, axis=1)[:, 0] > 1]
-    finite = column[np.isfinite(column)]
-    noise = TO_SIGMA * float(np.median(np.abs(np.diff(finite)))) / np.sqrt(2.0)
+    steps = np.abs(np.concatenate([np.diff(part[np.isfinite(part)]) for part in end.stretches]))
+    noise = TO_SIGMA * float(np.median(steps)) / np.sqrt(2.0) if len(steps) else 0.0
     pairs = 0
     for first, stop in runs[:: max(1, -(-len(runs) // MOST_RUNS))].tolist():
         if _falls_on_both_sides(column, first, stop, end.step, noise):

@@ -20,7 +20,7 @@ ORDER, GAIN = 4, np.sqrt(70.0)
 WHITE = 0.2
 """Part of the noise at rest that they must show: filters leave as much; of a log that never rests it is the motion."""
 PROBED = 1 << 14
-"""Readings, in so many stretches evenly spread over the log, from which they are taken."""
+"""Readings, in so many stretches evenly spread over the log, from which its scatter and its middle are taken."""
 STRETCHES = 16
 TO_SIGMA = 1.4826
 """Standard deviation of a Gaussian over the median of its size."""
@@ -66,13 +66,25 @@ class End:
         return np.stack([np.concatenate([at[:1], at[breaks + 1]]), np.concatenate([at[breaks], at[-1:]]) + 1], axis=1)
 
     @cached_property
+    def stretches(self) -> list[FloatArray]:
+        """Parts of the column, evenly spread over a long log, that stand for it."""
+        column, length = self.column, PROBED // STRETCHES
+        if len(column) <= PROBED:
+            return [column]
+        starts = np.linspace(0, len(column) - length, STRETCHES).astype(int)
+        return [column[first : first + length] for first in starts]
+
+    @property
+    def middle(self) -> float:
+        """Where the axis mostly is."""
+        seen = np.concatenate(self.stretches)
+        seen = seen[np.isfinite(seen)]
+        return float(np.median(seen) if len(seen) else np.nanmedian(self.column))
+
+    @cached_property
     def dither(self) -> float:
         """Noise of one sample that carries readings from code to code, 0 where what looks like noise may be motion."""
-        length = PROBED // STRETCHES
-        column = self.column
-        starts = np.linspace(0, len(column) - length, STRETCHES).astype(int)
-        parts = [column[s : s + length] for s in starts] if len(column) > PROBED else [column]
-        rough = np.abs(np.concatenate([np.diff(part, ORDER) for part in parts]))
+        rough = np.abs(np.concatenate([np.diff(part, ORDER) for part in self.stretches]))
         rough = rough[np.isfinite(rough)]
         seen = TO_SIGMA * float(np.median(rough)) / GAIN if len(rough) else 0.0
         return min(seen, self.noise) if seen > WHITE * self.noise else 0.0
