@@ -1,10 +1,15 @@
 """Mistakes that simulators have made in noise and sampling, each told by its numbers."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from trihedron.diagnose.against import FittedModel, compare_numbers
+from trihedron.diagnose.against.mechanisms import ComparedEffects
+from trihedron.estimate.noise.low_pass import LowPass
 from trihedron.pipeline.comparing_correlation import correlation_times
 from trihedron.pipeline.comparing_noise import compare_noise, sampled
 from trihedron.records import Hold, Recording
@@ -24,13 +29,14 @@ def numbers(accel_zero=(0.0, 0.0, 0.0), gyro_zero=(0.0, 0.0, 0.0)):
     )  # fmt: skip
 
 
-def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_s=None, jitter_s=0.0):
+def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_s=None, jitter_s=0.0, one=False):
     """Readings at rest; ``tau_s``: a Gauss-Markov process of twice the noise's size beside it, per sensor."""
     rng = np.random.default_rng(seed)
     n = EVERY * N_HOLDS
     readings = {}
     for sensor, noise in SENSORS.items():
         x = rng.uniform(-np.sqrt(3.0), np.sqrt(3.0), (n, 3)) if uniform else rng.standard_normal((n, 3))
+        x = x[:, :1] if one else x
         x = size * noise * x * np.array(axes)
         if tau_s:
             keep = np.exp(-1.0 / (RATE_HZ * tau_s[sensor]))
@@ -46,7 +52,8 @@ def log(seed, *, axes=(1.0, 1.1, 1.25), uniform=False, size=1.0, step=STEP, tau_
 def _without_corners():
     """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_holds.py has them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("trihedron.estimate.noise.holds.filter_corner", lambda *_: (None, RATE_HZ))
+        patch.setattr("trihedron.estimate.noise.holds.low_passes", lambda s, _: [LowPass(None, RATE_HZ)] * len(s))
+        patch.setattr("trihedron.estimate.noise.holds.undisturbed", lambda spectrum, _: spectrum)
         yield
 
 
@@ -89,6 +96,41 @@ def test_the_same_noise_on_all_axes_is_named_where_the_recordings_axes_differ(re
     assert "the same on all axes of the model" in found["gyroscope", "N"]
     even = log(6, axes=(1.1, 1.1, 1.1))
     assert not any("same on all axes" in words for words in said(log(5, axes=(1.3, 1.3, 1.3)), even).values())
+
+
+@pytest.mark.parametrize("step", [STEP, 1.5e-3])
+def test_one_draw_for_all_three_axes_is_named(step):
+    own, one = log(21, step=step), log(22, step=step, one=True)
+    assert "drawn once instead of three times" in said(one, own)["gyroscope", "distribution"]
+    # Noise that the recording's axes share (a supply, a table) refutes nothing.
+    assert ("gyroscope", "distribution") not in said(one, one)
+    assert ("gyroscope", "distribution") not in said(own, one)
+
+
+def test_the_root_of_the_rate_is_that_of_the_model(real):
+    at_400_hz = replace(log(23, size=20.0), rate_hz=4.0 * RATE_HZ)
+    assert "√400" in said(at_400_hz, real)["gyroscope", "N"]
+
+
+def test_scales_of_counts_and_of_si_are_compared_up_to_their_common_part_and_that_is_said():
+    si = numbers()
+    k = 820.0 * np.array([1.01, 0.99, 1.0])
+    sigma = np.r_[np.full(9, 1e-8), np.full(3, 1e-3), np.full(9, 1e-5), np.full(3, 1e-5)]
+    counts = replace(si, accel_S=np.diag(1.0 / k), accel_unit="counts", covariance=np.diag(sigma**2))
+    rows = [p for p in compare_numbers(si, counts, alpha=0.01).parameters if p.id == "accel-scale"]
+    relative = np.log(k) - np.log(k).mean()
+    assert [p.difference for p in rows] == pytest.approx(relative.tolist(), abs=1e-9)
+    assert all("relative to the mean of its three axes" in p.remark and "per g" in p.remark for p in rows)
+    assert not any(p.remark for p in compare_numbers(si, si, alpha=0.01).parameters)
+
+
+def test_an_arm_of_the_motion_is_no_difference_of_instruments_unless_a_misfit_asks_for_it():
+    def missing(id, share):
+        return ComparedEffects((SimpleNamespace(id=id, share=share),), (), ()).differ
+
+    assert not missing("lever-arm", 0.0)
+    assert missing("lever-arm", 0.4)
+    assert missing("sensor-lag", 0.0)
 
 
 def test_readings_without_steps_are_named_where_the_recordings_steps_matter():
@@ -151,8 +193,6 @@ def test_a_step_of_a_quarter_of_the_noise_is_another_converter_and_digits_of_a_f
 
 def test_a_distance_of_readings_far_below_the_noise_is_no_converter_of_theirs(real):
     # Resampled readings: what two of them happen to differ by. The other log has steps of half its noise.
-    from dataclasses import replace
-
     def with_steps(log, step):
         noise = {s: tuple(replace(one, step=step * SENSORS[s]) for one in axes) for s, axes in log.noise.items()}
         return replace(log, noise=noise)

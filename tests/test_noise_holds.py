@@ -46,15 +46,19 @@ def test_octaves_hold_the_density_and_tell_where_two_spectra_differ():
 
 def test_a_filter_shows_its_corner_and_white_noise_none():
     rng = np.random.default_rng(73)
-    inside = 0
+    inside = dense = 0
     for _ in range(10):
         axis = of(rng, corner=15.0)
+        # The density is that below the corner: half of the mean squared difference is a quarter of it.
+        dense += axis.white.lower <= 1e-2 <= axis.white.upper < 1.2e-2
         inside += axis.corner_hz is not None and axis.corner_hz.lower <= 15.0 <= axis.corner_hz.upper
         plain = of(rng)
         assert plain.corner_hz is None
         # Nothing below Nyquist, to what twenty holds tell.
         assert plain.corner_above_hz > 35.0
     assert inside >= 8
+    # Of 10 at 95 %: 7 or more with probability 0.999.
+    assert dense >= 7
 
 
 def test_a_line_common_to_the_holds_is_found_with_its_amplitude():

@@ -140,3 +140,104 @@ def test_readings_missing_in_any_pattern_never_make_python_warn():
         n_read += 1
         assert accounts(recording)
     assert n_read > 30
+
+
+def in_turn(tmp_path, every: int, extra: str = ""):
+    """A log of one sensor in each row, the gyro's stamps 2 ms behind; or of the gyro in every ``every``-th row."""
+    table = readings(ROWS)
+    rows = []
+    for i, (t, *values) in enumerate(table.tolist()):
+        acc, gyr = (",".join(map(repr, values[k : k + 3])) for k in (0, 3))
+        if every == 1:
+            rows += [f"{t:.6f},{acc},,,{extra}", f"{t + 0.002:.6f},,,,{gyr}{extra}"]
+        else:
+            rows.append(f"{t:.6f},{acc},{gyr if i % every == 0 else ',,'}{extra}")
+    path = tmp_path / "log.csv"
+    path.write_text(HEADER + "\n".join(rows) + "\n")
+    return path, table
+
+
+def test_rows_of_two_sensors_in_turn_are_two_logs_joined_on_their_stamps(tmp_path):
+    path, table = in_turn(tmp_path, 1)
+    recording = read_recording(path)
+    assert recording.rows_in_file == 2 * ROWS
+    assert accounts(recording)
+    # The first acceleration lies before the first rate.
+    np.testing.assert_array_equal(recording.accelerometer, table[1:, 1:4])
+    # The gyro 8 ms before and 2 ms behind: linear interpolation, to the rounding of stamps in a settled clock.
+    expected = 0.2 * table[:-1, 4:] + 0.8 * table[1:, 4:]
+    np.testing.assert_allclose(recording.gyroscope, expected, rtol=0, atol=1e-9)
+    only = read_recording(gyroscope_path=path)
+    assert only.accelerometer is None
+    np.testing.assert_array_equal(only.gyroscope, table[:, 4:])
+
+
+@pytest.mark.parametrize("every", [2, 5])
+def test_a_slower_sensor_in_every_other_row_is_no_loss(tmp_path, every):
+    path, table = in_turn(tmp_path, every)
+    recording = read_recording(path)
+    assert accounts(recording)
+    n = len(recording.time_s)
+    np.testing.assert_array_equal(recording.accelerometer, table[:n, 1:4])
+    np.testing.assert_allclose(recording.gyroscope[::every], table[:n:every, 4:], rtol=0, atol=1e-9)
+    assert np.isfinite(recording.gyroscope).all()
+
+
+def test_rows_in_turn_without_a_time_are_refused_and_lost_readings_stay_lost(tmp_path):
+    path, table = in_turn(tmp_path, 1)
+    with pytest.raises(ReadError, match="in turn, and no column holds the time"):
+        read_recording(path, columns="time=none", rate_hz=100.0)
+    lost = table.copy()
+    lost[np.random.default_rng(3).random(ROWS) < 0.3, 4:] = np.nan
+    recording = read_recording(write(tmp_path / "lost.csv", lost))
+    np.testing.assert_array_equal(recording.gyroscope, lost[:, 4:])
+
+
+def test_a_counter_of_all_rows_does_not_count_the_other_sensor_as_lost(tmp_path):
+    path, _ = in_turn(tmp_path, 1)
+    lines = path.read_text().splitlines()
+    rows = [f"{i},{line}" for i, line in enumerate(lines[1:])]
+    path.write_text("\n".join(["counter," + lines[0], *rows]) + "\n")
+    assert FindingCode.SAMPLES_LOST not in codes(read_recording(path))
+
+
+def turning_body(seed: int, rate_hz: float = 50.0, seconds: float = 60.0):
+    """Time (n,), accelerometer (n, 3) [m/s^2] and rates (n, 3) [rad/s] of a body turned to and fro by a hand."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(int(rate_hz * seconds)) / rate_hz
+    rates = np.zeros((len(t), 3))
+    for start in np.arange(3.0, seconds - 3.0, 5.0):
+        inside = (t >= start) & (t < start + 2.0)
+        rates[inside] += rng.uniform(-1, 1, 3) * (1.0 - np.cos(np.pi * (t[inside, None] - start)))
+    down = np.empty((len(t), 3))
+    down[0] = [0.1, 0.3, 1.0] / np.linalg.norm([0.1, 0.3, 1.0])
+    for i in range(1, len(t)):
+        half = down[i - 1] - np.cross(rates[i], down[i - 1]) / rate_hz
+        down[i] = half / np.linalg.norm(half)
+    # A hand accelerates what it turns by some tenths of m/s^2.
+    shake = np.abs(rates) * rng.normal(0.0, 0.3, rates.shape)
+    return t, 9.81 * down + shake + rng.normal(0, 0.01, rates.shape), rates + rng.normal(0, 0.002, rates.shape)
+
+
+@pytest.mark.parametrize("names", ["rx,ry,rz", "p,q,r", "вращ_x,вращ_y,вращ_z"])
+@pytest.mark.parametrize("scale", [1.0, 180.0 / np.pi])
+def test_columns_that_turn_as_gravity_does_are_named_and_others_are_not(tmp_path, names, scale):
+    for seed in range(4):
+        t, acc, rates = turning_body(seed)
+        rng = np.random.default_rng(100 + seed)
+        others = {
+            "gyro": scale * rates,
+            "angles": scale * np.cumsum(rates, axis=0) / 50.0,
+            "field": 4.0 * acc + 0.3 * rng.standard_normal(acc.shape),
+            "noise": scale * rng.standard_normal(acc.shape),
+            "velocity": np.cumsum(acc - acc.mean(axis=0), axis=0) / 50.0,
+        }
+        for kind, values in others.items():
+            path = write(tmp_path / "log.csv", np.column_stack([t, acc, values]), header=f"t,ax,ay,az,{names}\n")
+            recording = read_recording(path)
+            assert recording.gyroscope is None
+            said = [f.action for f in recording.findings if "turn as gravity turns" in f.seen]
+            assert len(said) == (kind == "gyro"), (seed, kind)
+            if said:
+                mapping = said[0].split("--columns ")[1].rstrip(".")
+                np.testing.assert_allclose(read_recording(path, columns=mapping).gyroscope, values)

@@ -65,7 +65,7 @@ def compared(
     verdict: Verdict = found.verdict
     if found.verdict not in ("unexplained", "not-testable"):
         verdict = "parameters-differ" if differ else "consistent"
-        if effects.missing or effects.surplus:
+        if effects.differ:
             verdict = "missing-physics"
     elif found.verdict == "unexplained" and effects.surplus:
         verdict = "missing-physics"

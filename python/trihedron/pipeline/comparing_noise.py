@@ -13,6 +13,7 @@ from scipy.stats import chi2
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.against import FittedModel
 from trihedron.estimate.noise import noise_of_holds, ratio_of
+from trihedron.pipeline.comparing_draws import one_draw_for_all, uniform_for_normal
 from trihedron.records import Hold, Recording
 from trihedron.records.diagnosis import NoiseDifference, NoiseTerm
 from trihedron.records.hold_noise import HoldNoise, Measured
@@ -55,20 +56,21 @@ RESEMBLES = 1.06
 """A ratio this near to √rate, or to its inverse, is taken for it."""
 SHOWS = 0.5
 """Noise of half a converter step moves its last digit in every third reading: it cannot be overlooked."""
-NORMAL_EXCESS, UNIFORM_EXCESS = 0.0, -0.6
-"""Excess kurtosis of differences of two normal and of two uniform numbers."""
-
 _AXES = ("x", "y", "z")
 _SCATTERED = (StampKind.LATE, StampKind.SCATTERED)
 
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Noise of both sensors in SI along their own axes, and the clock."""
+    """Noise of both sensors in SI along their own axes, and the clock.
+
+    ``likeness`` is the smallest correlation, in size, of the noise of any two axes.
+    """
 
     noise: dict[Sensor, tuple[HoldNoise, ...]]
     excess: dict[Sensor, FloatArray]
     n_differences: dict[Sensor, int]
+    likeness: dict[Sensor, float]
     rate_hz: float
     jitter_steps: float
 
@@ -79,6 +81,7 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
     noise: dict[Sensor, tuple[HoldNoise, ...]] = {}
     excess: dict[Sensor, FloatArray] = {}
     count: dict[Sensor, int] = {}
+    likeness: dict[Sensor, float] = {}
     both: tuple[tuple[Sensor, FloatArray | None, FloatArray | None], ...] = (
         ("accelerometer", recording.accelerometer, model.accel_S),
         ("gyroscope", recording.gyroscope, model.gyro_S),
@@ -97,6 +100,8 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
         power = np.maximum((centred**2).mean(axis=0), 1e-150)
         excess[sensor] = (centred**4).mean(axis=0) / power**2 - 3.0
         count[sensor] = len(differences)
+        products = np.abs(centred.T @ centred / len(centred)) / np.sqrt(np.outer(power, power))
+        likeness[sensor] = float(products.min())
     steps = np.diff(recording.time_s)
     nominal = 1.0 / recording.rate_hz
     away = steps[np.abs(steps - nominal) < 0.9 * nominal] / nominal - 1.0
@@ -105,7 +110,7 @@ def sampled(recording: Recording, poses: Sequence[Hold], model: FittedModel) -> 
     if clock.is_even and clock.kind in _SCATTERED:
         # Reading put the samples on the even clock behind their stamps: what these scattered by is in its report.
         jitter = max(jitter, clock.stamp_error_s * recording.rate_hz)
-    return Sampled(noise, excess, count, recording.rate_hz, jitter)
+    return Sampled(noise, excess, count, likeness, recording.rate_hz, jitter)
 
 
 def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[NoiseDifference, ...]:
@@ -122,12 +127,20 @@ def compare_noise(model: Sampled, recording: Sampled, *, alpha: float) -> tuple[
         n_octaves = 2 * sum(len(r.octaves) for _, _, r in pairs)
         white = [_white(sensor, axis, m, r, alpha * SHARE / 6.0) for axis, m, r in pairs]
         even = _are_even([m.white for _, m, _ in pairs]) and not _are_even([r.white for _, _, r in pairs])
-        out += _resembling(sensor, [w for w in white if w is not None], recording.rate_hz, even)
+        out += _resembling(sensor, [w for w in white if w is not None], model.rate_hz, even)
+        is_one_part = all(
+            len({one.corner_hz for one in side}) == 1 for side in (model.noise[sensor], recording.noise[sensor])
+        )
         for axis, m, r in pairs:
             out += _step(sensor, axis, (m, model.noise[sensor]), (r, recording.noise[sensor]))
-            out += _corner(sensor, axis, m, r, alpha * SHARE / 6.0)
+            # Axes that share a filter have one corner, measured on all of them: one question.
+            corners = [] if is_one_part and axis != _AXES[0] else [*_corner(sensor, axis, m, r, alpha * SHARE / 6.0)]
+            out += [replace(row, axis="") if is_one_part else row for row in corners]
             out += _octaves(sensor, axis, m, r, alpha * SHARE / max(n_octaves, 1))
-        out += _distribution(sensor, model, recording)
+        n = min(model.n_differences[sensor], recording.n_differences[sensor])
+        noise = (*model.noise[sensor], *recording.noise[sensor])
+        out += uniform_for_normal(sensor, model.excess[sensor], recording.excess[sensor], n, noise)
+        out += one_draw_for_all(sensor, model.likeness[sensor], recording.likeness[sensor], n)
     out += _sampling(model, recording)
     return tuple(out)
 
@@ -161,7 +174,7 @@ def _hidden(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, unit: str) ->
     quiet, loud = (m, r) if m.white is None or not m.white.value > 0.0 else (r, m)
     side, other = ("model", "recording") if quiet is m else ("recording", "model")
     assert loud.white is not None
-    would_show = loud.white.value * math.sqrt(loud.rate_hz) > SHOWS * quiet.step
+    would_show = loud.reading_sigma > SHOWS * quiet.step
     name = "accelerometer" if sensor == "accelerometer" else "gyro"
     remark = f"The converter of the {side} hides the noise of its {name}."
     if would_show:
@@ -236,15 +249,14 @@ def _step(
         return
     if not (m_shows and r_shows):
         # Readings finer than their noise shows: only a step that matters beside the noise is missed.
-        step, noise = (m.step, m.white) if m_shows else (r.step, r.white)
-        floor = None if noise is None else noise.value * math.sqrt(r.rate_hz)
-        matters = floor is None or step > floor
+        coarse = m if m_shows else r
+        matters = coarse.step > coarse.reading_sigma
         side = "recording" if m_shows else "model"
         remark = f"The {side} has no converter steps on the {name}." if matters else ""
         yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, None, None, unit, None, matters, remark)
         return
     ratio = m.step / r.step
-    levels = [one.white.value * math.sqrt(one.rate_hz) for one in (m, r) if one.white is not None]
+    levels = [one.reading_sigma for one in (m, r) if one.reading_sigma > 0.0]
     # Steps far below the noise are as likely the digits of a file as a converter's.
     is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
     is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
@@ -260,8 +272,7 @@ def _shows_steps(one: HoldNoise, axes: Sequence[HoldNoise]) -> bool:
     alike = sum(max(one.step, other.step) < LEAST_STEP_RATIO * min(one.step, other.step) for other in axes)
     if one.step > 0.0 and alike < min(FEWEST_ALIKE, len(axes)):
         return False
-    level = 0.0 if one.white is None else one.white.value * math.sqrt(one.rate_hz)
-    return one.step > LEAST_SEEN_STEP * level
+    return one.step > LEAST_SEEN_STEP * one.reading_sigma
 
 
 def _corner(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> Iterator[NoiseDifference]:
@@ -282,10 +293,12 @@ def _corner(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float)
 
 
 def _octaves(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float) -> Iterator[NoiseDifference]:
-    """Octave by octave; significant where it differs otherwise than the white noise does."""
+    """Octave by octave; significant where it differs otherwise than white noise and filter do."""
     if m.white is None or r.white is None:
         return
     white = ratio_of(m.white, r.white)
+    filters_differ = any(row.significant for row in _corner(sensor, axis, m, r, alpha))
+    corners = [one.corner_hz.lower for one in (m, r) if one.corner_hz is not None]
     there = {o.low_hz: o for o in m.octaves}
     for octave in r.octaves:
         twin = there.get(octave.low_hz)
@@ -295,6 +308,8 @@ def _octaves(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float
         beyond = ratio.value / white.value**2
         is_far = max(beyond, 1.0 / beyond) > LEAST_OCTAVE_RATIO**2
         is_off = ratio.p_value < alpha and not ratio.lower < white.value**2 < ratio.upper
+        # Above the corner it is the filter that differs, and that is said.
+        is_off = is_off and not (filters_differ and octave.high_hz > min(corners))
         band = f"{octave.low_hz:g} to {octave.high_hz:g} Hz"
         name = "accelerometer" if sensor == "accelerometer" else "gyro"
         remark = f"Noise of the {name} {axis} at {band} is {math.sqrt(ratio.value):.3g} times the recording's."
@@ -304,25 +319,6 @@ def _octaves(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, alpha: float
             f"{'m/s^2' if sensor == 'accelerometer' else 'rad/s'}/sqrt(Hz)", ratio.p_value,
             bool(is_far and is_off), remark if is_far and is_off else "", (octave.low_hz, octave.high_hz),
         )  # fmt: skip
-
-
-def _distribution(sensor: Sensor, model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
-    """Uniform noise for normal: the fourth moment of differences tells, where the converter's steps are finer."""
-    n = min(model.n_differences[sensor], recording.n_differences[sensor])
-    middle = 0.5 * (NORMAL_EXCESS + UNIFORM_EXCESS)
-    is_fine = all(
-        axis.white is not None and axis.step < axis.white.value * math.sqrt(axis.rate_hz)
-        for side in (model, recording)
-        for axis in side.noise[sensor]
-    )
-    # Four standard errors of a kurtosis of n correlated differences must fit between the two.
-    if not is_fine or 4.0 * math.sqrt(48.0 / max(n, 1)) > -middle:
-        return
-    m, r = float(model.excess[sensor].mean()), float(recording.excess[sensor].mean())
-    if m < middle < r:
-        name = "accelerometer" if sensor == "accelerometer" else "gyro"
-        remark = f"The noise of the model's {name} is uniformly distributed; the recording's is normal."
-        yield NoiseDifference(sensor, "", "distribution", m, r, None, None, "excess kurtosis", None, True, remark)
 
 
 def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:

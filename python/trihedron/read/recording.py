@@ -19,12 +19,14 @@ from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.errors import ReadError, from_os_error
+from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
 from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
 from trihedron.read.two_files import merge_sensors
+from trihedron.read.unnamed_gyro import unnamed_gyro
 from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
@@ -127,6 +129,8 @@ def _of_file(path: Path, sensor: Sensor | None, options: Options) -> Sensors:
 def of_tables(tables: tuple[Table, ...], sensor: Sensor | None, options: Options) -> Sensors:
     """The sensors of one table, of two (accelerometer, gyro) merged, or of the one of two that is wanted."""
     if len(tables) == 1:
+        tables = by_rows(tables[0], options.columns, sensor)
+    if len(tables) == 1:
         return sensors_of(tables[0], sensor, options)
     if sensor is not None:
         return sensors_of(next(table for table in tables if table.sensor == sensor), sensor, options)
@@ -179,7 +183,7 @@ def audited(
             sensors.accelerometer, windows, sensors.columns.accelerometer_unit, accelerometer_unit
         )
         acc_unit = AccelerationUnit(judged.unit)
-        findings += judged.findings
+        findings += [*judged.findings, *unnamed_gyro(sensors, rate)]
     if sensors.gyroscope is not None:
         judged = judge_gyroscope(
             sensors.gyroscope,

@@ -25,7 +25,7 @@ _SLOPE_LOW, _SLOPE_HIGH = 0.4, 1.6
 _MIN_CORRELATION = 0.25
 _BLOCK_S = 0.1
 _MAX_BLOCKS = 20_000
-_CANDIDATES = (RateUnit.RAD_S, RateUnit.DEG_S, RateUnit.MRAD_S, RateUnit.MDEG_S)
+CANDIDATES = (RateUnit.RAD_S, RateUnit.DEG_S, RateUnit.MRAD_S, RateUnit.MDEG_S)
 
 
 @dataclass(frozen=True)
@@ -46,13 +46,13 @@ def unit_by_turning(
     """The one unit in which the gyro agrees with gravity, and the evidence; None where the log cannot tell."""
     ratio, n_turns = turn_ratio(gyroscope, time_s, windows)
     if n_turns >= 2 and math.isfinite(ratio):
-        for unit in _CANDIDATES:
+        for unit in CANDIDATES:
             scale = rate_to_si(unit) or 0.0
             if _RATIO_LOW * scale <= ratio <= _RATIO_HIGH * scale:
                 return Turning(unit, by_path=True, n_turns=n_turns)
     agreeing = [
         (unit, slope, correlation)
-        for unit in _CANDIDATES
+        for unit in CANDIDATES
         for slope, correlation, n in [turn_slope(accelerometer, gyroscope, rate_hz, rate_to_si(unit) or 0.0)]
         # Five deviations of a correlation of n independent pairs, and a share of the motion worth calling rotation.
         if _SLOPE_LOW <= slope <= _SLOPE_HIGH and correlation > max(_MIN_CORRELATION, 5.0 / math.sqrt(max(n, 1)))

@@ -43,8 +43,10 @@ class HoldLine:
 class HoldNoise:
     """Noise of one axis inside the holds of a session; u is the unit of the raw readings.
 
-    ``white`` is the density N [u/√Hz] from reading to reading, freed of the rounding of the converter, ``None`` where
-    the converter hides it; ``step`` [u] the resolution, zero where the readings are finer than their noise shows.
+    ``white`` is the density N [u/√Hz] of the white noise ahead of the sensor's filter, freed of the rounding of the
+    converter, ``None`` where the converter hides it; ``reading_sigma`` [u] the noise from reading to reading (that of
+    their differences over √2, rounding taken off; zero where it is hidden), which is N times the root of the rate
+    where there is no filter. ``step`` [u] is the resolution, zero where the readings are finer than their noise shows.
     ``corner_hz`` is the corner of a low-pass filter where one shows, ``corner_above_hz`` what it lies above where none
     does. ``scatter`` is by how much the noise differs from hold to hold beyond chance (standard deviation of the
     logarithm of its power).
@@ -56,6 +58,7 @@ class HoldNoise:
     n_holds: int
     n_readings: int
     white: Measured | None
+    reading_sigma: float
     step: float
     octaves: tuple[OctaveNoise, ...]
     lines: tuple[HoldLine, ...]

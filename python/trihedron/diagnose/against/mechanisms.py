@@ -82,6 +82,12 @@ class ComparedEffects:
     parameters: tuple[ParameterDifference, ...]
 
     @property
+    def differ(self) -> bool:
+        """Whether instruments do: an arm of the motion that no domain of misfit asks for is none of the model's."""
+        of_motion = {effect.id for effect in catalogue() if effect.is_of_motion}
+        return bool(self.surplus) or any(e.share or e.id not in of_motion for e in self.missing)
+
+    @property
     def in_order(self) -> tuple[AcceptedEffect, ...]:
         """Missing before surplus; behind both what is no mechanism of an instrument, as a scatter or a pushed pose."""
         return tuple(sorted((*self.missing, *self.surplus), key=_is_beside))
@@ -98,13 +104,14 @@ def compare_effects(
 ) -> ComparedEffects:
     """Pair the effects of both sides by name, or by what neither recording could tell apart.
 
-    Effects of one session (a pushed pose, a table that was not level) belong to that session: they are never surplus.
+    Effects of one session (a pushed pose, a table that was not level, the arm that it was turned on) belong to that
+    session: they are never surplus.
     Nor is an effect that would show in a domain of which the recording leaves more ``unexplained`` than its noise:
     it may be there, and hidden. ``misses``: rms of the recording's residuals in each domain before any effect; an
     effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than that.
     """
     by_id = {effect.id: effect for effect in catalogue()}
-    of_session = {effect.id for effect in by_id.values() if effect.is_of_session}
+    of_session = {effect.id for effect in by_id.values() if effect.is_of_session or effect.is_of_motion}
     # What the recording's own test calls likely, the search paid for, is not lacking, even where it did not earn its
     # place there.
     tried = [c for c in candidates if c.applicable]

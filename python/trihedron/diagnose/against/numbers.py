@@ -75,6 +75,7 @@ class _Group:
     unit: str
     dof: float = SPREAD_DOF
     remark: str = ""
+    is_relative: bool = False
 
     @property
     def p_value(self) -> float:
@@ -158,7 +159,7 @@ def compare_numbers(
                 named.unit,
                 float(p_value),
                 bool(is_significant),
-                named.remark if is_significant else "",
+                named.remark if is_significant or named.is_relative else "",
             )
             for k in range(len(named.names))
         ]
@@ -241,7 +242,8 @@ def _sensor(
         _Group(f"{prefix}-zero", sensor, _AXES, a.zero, r.zero, r.zero - a.zero, covariance[:3, :3], unit, WANDER_DOF,
                _never_added(prefix, a.zero, r.zero, J_m @ covariances[0] @ J_m.T, wander_model)),
         _Group(
-            f"{prefix}-scale", sensor, _AXES, np.exp(log_m), np.exp(log_r), change, scale_covariance, "1"
+            f"{prefix}-scale", sensor, _AXES, np.exp(log_m), np.exp(log_r), change, scale_covariance, "1",
+            remark=_relative_to(prefix, a, r, units) if is_relative else "", is_relative=is_relative,
         ),
         _Group(
             f"{prefix}-misalignment", sensor, names, a.angle, r.angle, r.angle - a.angle, covariance[6:, 6:], "rad"
@@ -261,6 +263,19 @@ def _never_added(
         return ""
     name = "accelerometer" if prefix == "accel" else "gyro"
     return f"All zeros of the model's {name} are none: a bias was drawn and never added, or there is none."
+
+
+def _relative_to(prefix: str, a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> str:
+    """That scales of counts and of SI have no common part to compare, and how large a count is."""
+    counts, side = (r, "recording") if units[1] is None else (a, "model")
+    per_si = math.exp(float(counts.log_scale.mean()))
+    name, per = ("accelerometer", f"{per_si * STANDARD_GRAVITY_M_S2:.5g} per g")
+    if prefix == "gyro":
+        name, per = "gyro", f"{per_si * math.radians(1.0):.4g} per °/s"
+    return (
+        f"Scales of the {name} are relative to the mean of its three axes: the {side} is in counts ({per}), whose "
+        "nominal size is not known."
+    )
 
 
 def _sizes_in_si(a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> tuple[float, float] | None:

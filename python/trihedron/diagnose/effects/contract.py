@@ -63,6 +63,8 @@ class Effect(ABC):
     """Whether it only says how far something scatters, not why: mechanisms are named before it."""
     is_of_session: ClassVar[bool] = False
     """Whether it belongs to one experiment (a pushed pose, a tilted table) and to no instrument."""
+    is_of_motion: ClassVar[bool] = False
+    """Whether it belongs to how the sensor was moved (the arm it was turned on): another session has another."""
     leaves_open: ClassVar[tuple[str, ...]] = ()
     """Numbers (ids) whose level depends on where the effect is counted from: a zero at the session's mean temperature
     is no other zero than one at 25 °C."""

@@ -59,6 +59,7 @@ class LeverArm(DirectEffect):
     """
 
     id = "lever-arm"
+    is_of_motion = True
     mechanism = "the accelerometers sit away from the centre of rotation"
     experiment = (
         "turn about another point: an arm follows the centre of rotation, a displacement inside the case does not"

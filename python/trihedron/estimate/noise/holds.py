@@ -16,12 +16,12 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.step import converter_step
-from trihedron.estimate.noise.corner import filter_corner
 from trihedron.estimate.noise.hold_lines import lines_of_holds, without_lines
-from trihedron.estimate.noise.hold_statistics import as_measured, pooled_logarithm, robust_holds, root_of
+from trihedron.estimate.noise.hold_statistics import Pooled, as_measured, pooled_logarithm, robust_holds, root_of
+from trihedron.estimate.noise.low_pass import LowPass, Spectrum, densities_below, low_passes, undisturbed
 from trihedron.estimate.noise.spectrum import cosine_transform
 from trihedron.ranges import ranges_of
-from trihedron.records.hold_noise import HoldNoise, Measured, OctaveNoise
+from trihedron.records.hold_noise import HoldLine, HoldNoise, Measured, OctaveNoise
 from trihedron.refused import RefusedError
 
 SHORTEST = 32
@@ -31,6 +31,8 @@ LEAST_DITHER = 0.4
 LAGS = 8
 """Lags over which squared differences are correlated: filters of a sensor remember no more readings."""
 LONGEST_SEGMENT = 4096
+FEWER = 4.0 / 3.0
+"""So many more readings are worth half the resolution at low frequencies."""
 FEWEST_HOLDS = 3
 """Holds that must show an octave, where there are as many: the scatter of one is not known."""
 
@@ -44,6 +46,8 @@ def noise_of_holds(
     units: Sequence[str] = (),
 ) -> tuple[HoldNoise, ...]:
     """Noise of every axis inside the holds of a session, each figure with its interval.
+
+    The channels are those of one sensor: they share a low-pass unless their spectra deny it.
 
     Parameters
     ----------
@@ -79,50 +83,109 @@ def noise_of_holds(
     channels = x.shape[1]
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
     units = tuple(units) or ("",) * channels
-    return tuple(_axis(x[:, c], rate_hz, holds, names[c], units[c]) for c in range(channels))
-
-
-def _axis(x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name: str, unit: str) -> HoldNoise:
-    parts = [run for start, stop in holds for run in _unbroken(x[start:stop])]
-    if not parts:
-        raise RefusedError(f"{name}: no hold has {SHORTEST} readings in a row; hold still for longer")
-    step = converter_step(np.concatenate(parts))
-    power = _Power.of(parts)
-    keep = robust_holds(power.variance, power.dof)
-    parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
-    # A line is stated as one; it is neither white noise nor a filter's corner.
-    spectrum = _segments(parts, rate_hz)
-    lines = lines_of_holds(*spectrum, rate_hz)
-    if lines:
-        parts = without_lines(parts, lines, rate_hz)
-        spectrum = _segments(parts, rate_hz)
-    # Correlation and tails are those of what is kept: a knock would lend its own to all.
-    power = _Power.of(parts)
-    rounding = step**2 / 12.0
-    pooled = pooled_logarithm(power.variance, power.dof)
-    total = math.exp(pooled.mean)
-    white: Measured | None = None
-    if total > 0.0 and (step == 0.0 or total - rounding > (LEAST_DITHER * step) ** 2):
-        # The rounding is known: what is left carries the whole error.
-        share = total / (total - rounding)
-        sensor = as_measured(total - rounding, share * pooled.sigma, pooled.dof)
-        white = root_of(sensor, 1.0 / rate_hz)
-    octaves = _octaves(parts, rate_hz)
-    corner, above = filter_corner(*spectrum, rate_hz, rounding / total if total > 0.0 else 1.0, pooled.scatter)
-    return HoldNoise(
-        name=name,
-        unit=unit,
-        rate_hz=rate_hz,
-        n_holds=len(parts),
-        n_readings=sum(len(part) for part in parts),
-        white=white,
-        step=step,
-        octaves=octaves,
-        lines=lines,
-        corner_hz=corner,
-        corner_above_hz=above,
-        scatter=pooled.scatter,
+    axes = [_Axis.of(x[:, c], rate_hz, holds, names[c]) for c in range(channels)]
+    filters = low_passes([axis.spectrum for axis in axes], rate_hz)
+    white = _white(axes, filters, rate_hz)
+    return tuple(
+        HoldNoise(
+            name=name,
+            unit=unit,
+            rate_hz=rate_hz,
+            n_holds=len(axis.parts),
+            n_readings=sum(len(part) for part in axis.parts),
+            white=density,
+            reading_sigma=math.sqrt(max(axis.total - axis.rounding, 0.0)) if axis.is_dithered else 0.0,
+            step=axis.step,
+            octaves=_octaves(axis.parts, rate_hz),
+            lines=axis.lines,
+            corner_hz=one.corner_hz,
+            corner_above_hz=one.above_hz,
+            scatter=axis.pooled.scatter,
+        )
+        for axis, one, density, name, unit in zip(axes, filters, white, names, units, strict=True)
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Axis:
+    """Holds of one axis without disturbed ones and lines, and what is pooled over them."""
+
+    parts: list[FloatArray]
+    step: float
+    lines: tuple[HoldLine, ...]
+    pooled: Pooled
+    spectrum: Spectrum
+
+    @classmethod
+    def of(cls, x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name: str) -> _Axis:
+        parts = [run for start, stop in holds for run in _unbroken(x[start:stop])]
+        if not parts:
+            raise RefusedError(f"{name}: no hold has {SHORTEST} readings in a row; hold still for longer")
+        step = converter_step(np.concatenate(parts))
+        power = _Power.of(parts)
+        keep = robust_holds(power.variance, power.dof)
+        parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
+        # A line is stated as one; it is neither white noise nor a filter's corner.
+        spectrum = _segments(parts, rate_hz)
+        lines = lines_of_holds(*spectrum, rate_hz)
+        if lines:
+            parts = without_lines(parts, lines, rate_hz)
+            spectrum = _segments(parts, rate_hz)
+        # Correlation and tails are those of what is kept: a knock would lend its own to all.
+        power = _Power.of(parts)
+        pooled = pooled_logarithm(power.variance, power.dof)
+        whole = Spectrum(*_segments(parts, rate_hz, most=True), step**2 / 12.0 / rate_hz, pooled.scatter)
+        return cls(parts, step, lines, pooled, undisturbed(whole, rate_hz))
+
+    @property
+    def rounding(self) -> float:
+        return self.step**2 / 12.0
+
+    @property
+    def total(self) -> float:
+        """Half the mean squared difference of a typical hold."""
+        return math.exp(self.pooled.mean)
+
+    @property
+    def is_dithered(self) -> bool:
+        """Whether differences of readings are more than rounding."""
+        return self.total > 0.0 and self._dithers(self.total - self.rounding)
+
+    def _dithers(self, variance: float) -> bool:
+        return self.step == 0.0 or variance > (LEAST_DITHER * self.step) ** 2
+
+    def of_differences(self, rate_hz: float) -> Measured | None:
+        """White density where the spectrum is flat: half the mean squared difference less rounding."""
+        if not self.is_dithered:
+            return None
+        # The rounding is known: what is left carries the whole error.
+        share = self.total / (self.total - self.rounding)
+        sensor = as_measured(self.total - self.rounding, share * self.pooled.sigma, self.pooled.dof)
+        return root_of(sensor, 1.0 / rate_hz)
+
+    def of_level(self, density: float, sigma_log: float, corner_hz: float) -> Measured | None:
+        """White density below a filter's corner, of a typical hold: levels of holds differ as their differences do."""
+        if not (density > 0.0 and self._dithers(2.0 * corner_hz * density)):
+            return None
+        holds, scatter = len(self.parts), self.pooled.scatter
+        own = scatter**2 / max(holds, 1)
+        sigma = math.sqrt(sigma_log**2 + own)
+        share = own / sigma**2
+        dof = max(holds - 1, 1) / share**2 if share > 0.0 else math.inf
+        return root_of(as_measured(density * math.exp(-0.5 * scatter**2), sigma, dof), 1.0)
+
+
+def _white(axes: Sequence[_Axis], filters: Sequence[LowPass], rate_hz: float) -> list[Measured | None]:
+    """Densities of white noise: below the corner where a filter shows, of all frequencies where none does."""
+    out = [axis.of_differences(rate_hz) for axis in axes]
+    for one in dict.fromkeys(filters):
+        if one.corner_hz is None:
+            continue
+        sharing = [k for k, f in enumerate(filters) if f == one]
+        levels = densities_below([axes[k].spectrum for k in sharing], one, rate_hz)
+        for k, level in zip(sharing, levels, strict=True):
+            out[k] = axes[k].of_level(*level, one.corner_hz.value)
+    return out
 
 
 def _unbroken(part: FloatArray) -> list[FloatArray]:
@@ -184,9 +247,18 @@ def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, 
     return tuple(out)
 
 
-def _segments(parts: Sequence[FloatArray], rate_hz: float) -> tuple[FloatArray, FloatArray, int]:
-    """Frequencies (k,), mean power (k,) and number of segments of one length that most holds have."""
+def _segments(parts: Sequence[FloatArray], rate_hz: float, *, most: bool = False) -> tuple[FloatArray, FloatArray, int]:
+    """Frequencies (k,), mean power (k,) and number of segments of one length that most holds have.
+
+    With ``most``, of half that length where more readings are in such segments by a third.
+    """
     length = 1 << int(math.log2(max(SHORTEST, min(LONGEST_SEGMENT, float(np.median([len(p) for p in parts]))))))
+
+    def used(n: int) -> int:
+        return sum(len(part) // n * n for part in parts)
+
+    if most and length > SHORTEST and used(length // 2) > used(length) * FEWER:
+        length //= 2
     rows = [part[s : s + length] for part in parts for s in range(0, len(part) - length + 1, length)]
     stack = np.stack(rows)
     stack = stack - stack.mean(axis=1, keepdims=True)

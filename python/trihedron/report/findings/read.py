@@ -154,6 +154,14 @@ _COLUMNS = (
     ),
     Entry(
         Code.COLUMNS_ASSUMED,
+        "unnamed-gyro",
+        WARNING,
+        "No gyro was recognised, but columns {taken} turn as gravity turns in the accelerometer's axes.",
+        "A gyro under a name that does not say so.",
+        "If it is one, read with --columns {mapping}.",
+    ),
+    Entry(
+        Code.COLUMNS_ASSUMED,
         "header-ignored",
         WARNING,
         "The line '{line}' above the numbers does not name their {n_columns} columns, so it was passed over.",
@@ -309,6 +317,14 @@ _DEVICES = (
         "Each line names its record: {kinds:each}; those of the accelerometer and the gyro were read.",
         numbers=("rows_left_out",),
         lines=MappingProxyType({"kinds": "{v0} ({v1})"}),
+    ),
+    Entry(
+        Code.DEVICE_CHOSEN,
+        "in-turn",
+        NOTE,
+        "{accelerometer_rows} rows hold the accelerometer and {gyroscope_rows} the gyro, with the other's cells empty: "
+        "they were read as two logs and joined on their stamps.",
+        numbers=("rows_left_out",),
     ),
 )
 

@@ -1,0 +1,294 @@
+"""The low-pass of a sensor in the spectra of its axes at rest: its corner, and the density below it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from trihedron import _core
+from trihedron.arrays import FloatArray
+from trihedron.records.hold_noise import Measured
+from trihedron.refused import RefusedError
+
+EARNED = 16.0
+"""Drop of the deviance that a corner must earn: it is searched over a grid and five shapes."""
+RISE = 4.6
+"""Rise at the ends of its 95 % interval, other terms on the edge of what can be (docs/noise.md, 3)."""
+TOLERANCE = 0.03
+"""No band of the spectrum is believed to better: no nearer is real noise flat, or a filter one of the shapes."""
+ORDERS = (1, 2, 3, 4)
+"""Of Butterworth filters; beside them a Gaussian, which cascades of running means (CIC) come to."""
+FLICKER_AND_WALK = (1, 2)
+LEAKAGE = (4, 8)
+"""Above a ringing that is cut off: its resonance falls with the fourth power of frequency, steeper next to it."""
+FINE = 16
+"""Lowest ordinates that stay single; above, neighbours within ``WIDTH`` of their frequency are taken together."""
+WIDTH = 0.04
+SHAPE_TERMS = 2
+"""Even powers of frequency by which the shape below the corner may differ from the best of the list: of running means,
+Butterworth filters to order 4 and their squares the density is off by 1.3 % at most then (2.6 % with one)."""
+SHAPE_ERROR = 0.01
+"""What is left of that, of the density's power."""
+LEAST_GAIN = 1e-9
+"""A Gaussian far above its corner is nothing that numbers hold."""
+SCORING_STEPS = 30
+HIGHEST_FLOOR = 0.125
+"""Of the rate: a quarter of the spectrum below Nyquist may be taken for disturbance, no more."""
+MODEL_PARAMETERS = 5
+MISFIT = 3.0
+"""Standard deviations of the deviance beyond which a spectrum is more than filtered noise, flicker and walk."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Mean power (k,) at frequencies (k,) of ``count`` segments of one axis, two-sided densities.
+
+    ``rounding`` is the density that the converter's steps add, ``scatter`` by how much the holds' power differs;
+    ``slow`` are the powers of 1/f that lie beneath: flicker and walk, or what leaks from below where that was cut off.
+    """
+
+    frequency_hz: FloatArray
+    power: FloatArray
+    count: int
+    rounding: float
+    scatter: float
+    slow: tuple[int, ...] = FLICKER_AND_WALK
+
+    @cached_property
+    def bins(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Frequency, mean power and number of ordinates, times segments, of each bin."""
+        n = len(self.power)
+        edges = [*range(min(FINE, n))]
+        while edges[-1] < n:
+            edges.append(edges[-1] + max(1, int(WIDTH * edges[-1])))
+        starts = np.array([e for e in edges if e < n])
+        size = np.diff([*starts.tolist(), n]).astype(np.float64)
+        frequency = np.add.reduceat(self.frequency_hz, starts) / size
+        return frequency, np.add.reduceat(self.power, starts) / size, size * self.count
+
+    def above(self, lowest_hz: float) -> Spectrum:
+        """What lies at and above a frequency; the whole for zero."""
+        if lowest_hz == 0.0:
+            return self
+        high = self.frequency_hz >= lowest_hz
+        return replace(self, frequency_hz=self.frequency_hz[high], power=self.power[high], slow=LEAKAGE)
+
+    def beneath(self, frequency_hz: FloatArray) -> FloatArray:
+        """(k, m) shapes of slow noise, one at the lowest frequency."""
+        return np.stack([(self.frequency_hz[0] / frequency_hz) ** power for power in self.slow], axis=1)
+
+    def weights(self, axes: int) -> FloatArray:
+        """Ordinates of each bin, but for what is believed of a model's shape; its error is that of all ``axes``."""
+        _, _, count = self.bins
+        # Bands of an eighth of the spectrum weigh no more than the tolerance and the scatter of holds allow.
+        error = TOLERANCE**2 * axes + self.scatter**2 / max(self.count, 1)
+        cap = 2.0 / error / (len(self.power) / 8.0)
+        return np.minimum(count, cap * count / self.count)
+
+    @property
+    def rounding_share(self) -> float:
+        """Of the level of the lower quarter of the spectrum."""
+        frequency, power, _ = self.bins
+        low = power[frequency <= 0.25 * frequency[-1]]
+        level = float(np.median(low)) if len(low) else 0.0
+        return min(self.rounding / level, 1.0) if level > 0.0 else 1.0
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """``corner_hz`` where one shows, what it lies ``above_hz`` where none does; ``shape``: its order, 0 a Gaussian."""
+
+    corner_hz: Measured | None
+    above_hz: float
+    shape: int = 0
+
+
+def low_passes(spectra: Sequence[Spectrum], rate_hz: float) -> list[LowPass]:
+    """The filter of each axis of a sensor: one for all where no axis speaks against it.
+
+    The spectrum of an axis is a filtered white one over flicker and walk, rounding unfiltered beneath, from the lowest
+    frequency on above which that accounts for it: a stand that rings after every turn is no filter.
+    """
+    grid = corners_tried(spectra, rate_hz)
+    tables = [_deviances(s, grid, rate_hz, len(spectra)) for s in spectra]
+    together = np.sum([table for table, _ in tables], axis=0)
+    flat = sum(flat for _, flat in tables)
+    place = np.unravel_index(int(np.argmin(together)), together.shape)
+    if flat - together[place] > EARNED:
+        against = max(min(float(table[place]), own_flat) - float(table.min()) for table, own_flat in tables)
+    else:
+        against = max(own_flat - float(table.min()) for table, own_flat in tables)
+    if against <= EARNED:
+        return [_settled(together, flat, grid)] * len(spectra)
+    return [_settled(table, own_flat, grid) for table, own_flat in tables]
+
+
+def corners_tried(spectra: Sequence[Spectrum], rate_hz: float) -> FloatArray:
+    """Corners [Hz] from four periods a segment, or a 64th of Nyquist, to four times Nyquist."""
+    floor = max((4.0 * float(s.frequency_hz[0]) for s in spectra), default=0.0)
+    return np.geomspace(max(rate_hz / 128.0, floor), 2.0 * rate_hz, 49)
+
+
+def undisturbed(spectrum: Spectrum, rate_hz: float) -> Spectrum:
+    """The spectrum from the lowest octave on above which a filter, flicker and walk account for it; all, if none does.
+
+    Knocks that ring, a swaying stand and a trembling hand fill the lowest octaves of many holds, and only those.
+    """
+    grid = corners_tried([spectrum], rate_hz)[::2]
+    lowest = 0.0
+    while lowest < HIGHEST_FLOOR * rate_hz:
+        above = spectrum.above(lowest)
+        _, power, _ = above.bins
+        weight = above.weights(1)
+        if not np.all(power > 0.0) or len(power) < FINE:
+            return spectrum
+        table, flat = _deviances(above, grid, rate_hz, 1)
+        misfit = min(float(table.min()), flat) - float(weight @ (np.log(power) + 1.0))
+        free = len(power) - MODEL_PARAMETERS
+        if misfit < free + MISFIT * math.sqrt(2.0 * free):
+            return above
+        lowest = 2.0 * lowest if lowest > 0.0 else 2.0 * float(spectrum.frequency_hz[0])
+    return spectrum
+
+
+def _deviances(spectrum: Spectrum, grid: FloatArray, rate_hz: float, axes: int) -> tuple[FloatArray, float]:
+    """Deviance of every shape and corner (shapes, corners), and without a filter."""
+    frequency, power, _ = spectrum.bins
+    weight = spectrum.weights(axes)
+    zero = np.zeros(len(power))
+    share = spectrum.rounding_share
+    slow = spectrum.beneath(frequency).T
+    terms = list(range(1 + len(slow)))
+
+    def deviance(gain: FloatArray) -> float:
+        basis = np.vstack([(1.0 - share) * gain + share, slow])
+        return float(_core.SpectralBins(weight, power, zero, zero, basis).fit(terms, False).deviance)
+
+    if not np.any(power > 0.0):
+        return np.zeros((len(ORDERS) + 1, len(grid))), 0.0
+    table = [[deviance(gain_of(frequency, float(c), shape, rate_hz)) for c in grid] for shape in (0, *ORDERS)]
+    return np.array(table), deviance(np.ones(len(power)))
+
+
+def _settled(table: FloatArray, flat: float, grid: FloatArray) -> LowPass:
+    best = table.min(axis=0)
+    inside = grid[best <= min(float(best.min()), flat) + RISE]
+    place = int(np.argmin(best))
+    if flat - best[place] < EARNED:
+        return LowPass(None, float(inside[0]) if len(inside) else float(grid[-1]))
+    ratio = float(grid[1] / grid[0])
+    lower, upper = float(inside[0]) / math.sqrt(ratio), float(inside[-1]) * math.sqrt(ratio)
+    sigma = math.log(upper / lower) / (2.0 * math.sqrt(RISE))
+    shape = (0, *ORDERS)[int(np.argmin(table[:, place]))]
+    return LowPass(Measured(float(grid[place]), lower, upper, sigma), lower, shape)
+
+
+def gain_of(frequency_hz: FloatArray, corner_hz: float, shape: int, rate_hz: float) -> FloatArray:
+    """Power gain of a filter ahead of the sampling, what lies above Nyquist folded back; 1 at zero.
+
+    Butterworth of order ``shape``, Gaussian for 0; half the power at ``corner_hz``.
+    """
+    fold: FloatArray = rate_hz * np.arange(-8.0, 9.0)
+
+    def unfolded(f: FloatArray) -> FloatArray:
+        square = (f / corner_hz) ** 2
+        return np.asarray(np.exp(-math.log(2.0) * square) if shape == 0 else 1.0 / (1.0 + square**shape))
+
+    gain = np.sum(unfolded(np.asarray(frequency_hz[:, np.newaxis] + fold)), axis=1) / np.sum(unfolded(fold))
+    return np.asarray(np.maximum(gain, LEAST_GAIN))
+
+
+@dataclass(frozen=True, eq=False)
+class _Below:
+    """Bins (k,) of one axis below the corner: ``shape`` (k, m) even powers of frequency, ``slow`` (k, j)."""
+
+    gain: FloatArray
+    shape: FloatArray
+    slow: FloatArray
+    power: FloatArray
+    count: FloatArray
+    rounding: float
+
+
+def _bounded_step(J: FloatArray, r: FloatArray, lowest: FloatArray, n_levels: int) -> tuple[FloatArray, FloatArray]:
+    """Inverse information and a Gauss-Newton step whose first parts stay above ``lowest``: those at it do not move."""
+    held = np.zeros(J.shape[1], dtype=bool)
+    step = np.zeros(J.shape[1])
+    inverse = np.zeros((J.shape[1], J.shape[1]))
+    while True:
+        free = np.flatnonzero(~held)
+        part = np.linalg.pinv(J[:, free].T @ J[:, free], rcond=1e-12)
+        step[:] = 0.0
+        bounded = np.flatnonzero(held)
+        step[bounded] = lowest[bounded]
+        step[free] = part @ (J[:, free].T @ (r - J[:, bounded] @ step[bounded]))
+        below = np.zeros_like(held)
+        below[n_levels : len(lowest)] = step[n_levels : len(lowest)] < lowest[n_levels:]
+        below &= ~held
+        if not below.any():
+            break
+        held |= below
+    inverse[np.ix_(free, free)] = part
+    step[:n_levels] = np.clip(step[:n_levels], -1.0, 1.0)
+    return inverse, step
+
+
+def densities_below(spectra: Sequence[Spectrum], low_pass: LowPass, rate_hz: float) -> list[tuple[float, float]]:
+    """White density [u²/Hz] of each axis below a corner they share, and the standard error of its logarithm.
+
+    Whittle likelihood of the ordinates below the corner: density times the gain of ``low_pass`` times exp of an even
+    polynomial of frequency common to the axes, over each one's flicker and rounding. The level at zero is the density:
+    the shape of the filter is paid for, not believed.
+
+    Raises
+    ------
+    ValueError
+        When ``low_pass`` has no corner.
+    """
+    if low_pass.corner_hz is None:
+        raise RefusedError("no corner shows: the density is that of all readings")
+    corner = low_pass.corner_hz.value
+    axes = []
+    for spectrum in spectra:
+        frequency, power, count = spectrum.bins
+        below = frequency <= corner
+        f = frequency[below]
+        shape = np.stack([(f / corner) ** (2 * k) for k in range(1, SHAPE_TERMS + 1)], axis=1)
+        gain = gain_of(f, corner, low_pass.shape, rate_hz)
+        axes.append(_Below(gain, shape, spectrum.beneath(f), power[below], count[below], spectrum.rounding))
+    n = len(axes)
+    first = np.cumsum([n, *(a.slow.shape[1] for a in axes)])
+    level = np.array([math.log(max(float(np.median(a.power / a.gain)), 1e-300)) for a in axes])
+    beneath = [np.zeros(a.slow.shape[1]) for a in axes]
+    bend = np.zeros(SHAPE_TERMS)
+    covariance = np.eye(n)
+    for _ in range(SCORING_STEPS):
+        blocks, rests = [], []
+        for k, axis in enumerate(axes):
+            white = np.exp(level[k] + axis.shape @ bend) * axis.gain
+            # Relative to the level; what fell below nothing is none, unless the data lift it again.
+            unit = axis.slow * math.exp(level[k])
+            mean = white + unit @ beneath[k] + axis.rounding
+            design = np.zeros((len(mean), int(first[-1]) + SHAPE_TERMS))
+            design[:, k] = white
+            design[:, first[k] : first[k + 1]] = unit
+            design[:, first[-1] :] = white[:, np.newaxis] * axis.shape
+            root = np.sqrt(axis.count / 2.0) / mean
+            blocks.append(design * root[:, np.newaxis])
+            rests.append((axis.power - mean) * root)
+        J, r = np.vstack(blocks), np.concatenate(rests)
+        inverse, step = _bounded_step(J, r, np.concatenate([np.full(n, -1.0), *(-b for b in beneath)]), n)
+        level = level + step[:n]
+        beneath = [b + step[first[k] : first[k + 1]] for k, b in enumerate(beneath)]
+        bend = bend + step[first[-1] :]
+        covariance = inverse[:n, :n]
+        if float(np.abs(step[:n]).max()) < 1e-6:
+            break
+    # What was cut off may leak as much as the level itself where it ends, and falls with frequency squared at least.
+    leak = np.array([(s.frequency_hz[0] / corner) ** 2 if s.slow == LEAKAGE else 0.0 for s in spectra])
+    sigma = np.sqrt(np.diag(covariance) + SHAPE_ERROR**2 + leak**2)
+    return [(float(np.exp(a)), float(s)) for a, s in zip(level, sigma, strict=True)]

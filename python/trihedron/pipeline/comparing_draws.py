@@ -1,0 +1,52 @@
+"""How a simulation draws the numbers of its noise: from which distribution, and for each axis its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+from trihedron.arrays import FloatArray
+from trihedron.records.diagnosis import NoiseDifference
+from trihedron.records.hold_noise import HoldNoise
+
+Sensor = Literal["accelerometer", "gyroscope"]
+
+NORMAL_EXCESS, UNIFORM_EXCESS = 0.0, -0.6
+"""Excess kurtosis of differences of two normal and of two uniform numbers."""
+ONE_DRAW, OWN_DRAWS = 0.75, 0.5
+"""Correlations from which on three axes have one noise (steps of twice its size leave so much of one draw), and up to
+which they have their own. Independent ones reach neither; of ``FEWEST`` differences they reach 0.2."""
+FEWEST = 256
+_NAMES = {"accelerometer": "accelerometer", "gyroscope": "gyro"}
+
+
+def uniform_for_normal(
+    sensor: Sensor, model: FloatArray, recording: FloatArray, n: int, noise: Sequence[HoldNoise]
+) -> Iterator[NoiseDifference]:
+    """Uniform noise for normal: the excess kurtosis (3,) of ``n`` differences tells, where steps are finer."""
+    middle = 0.5 * (NORMAL_EXCESS + UNIFORM_EXCESS)
+    is_fine = all(axis.reading_sigma > axis.step for axis in noise)
+    # Four standard errors of a kurtosis of n correlated differences must fit between the two.
+    if not is_fine or 4.0 * math.sqrt(48.0 / max(n, 1)) > -middle:
+        return
+    m, r = float(model.mean()), float(recording.mean())
+    if m < middle < r:
+        remark = f"The noise of the model's {_NAMES[sensor]} is uniformly distributed; the recording's is normal."
+        yield NoiseDifference(sensor, "", "distribution", m, r, None, None, "excess kurtosis", None, True, remark)
+
+
+def one_draw_for_all(sensor: Sensor, model: float, recording: float, n: int) -> Iterator[NoiseDifference]:
+    """The same random numbers on all three axes, where the recording's go their own ways.
+
+    ``model`` and ``recording`` are the smallest correlations, in size, of two axes' ``n`` differences at rest.
+    """
+    if n < FEWEST or not (model > ONE_DRAW and recording < OWN_DRAWS):
+        return
+    remark = (
+        f"The noise of the model's {_NAMES[sensor]} is one and the same on all three axes (they correlate by "
+        f"{model:.2f}, the recording's by {recording:.2f}): it was drawn once instead of three times."
+    )
+    yield NoiseDifference(
+        sensor, "", "distribution", model, recording, None, None, "correlation of axes", None, True, remark
+    )

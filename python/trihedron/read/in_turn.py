@@ -1,0 +1,91 @@
+"""One table whose rows hold the accelerometer or the gyro, the other's cells empty: two logs, told by the rows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.read.columns import Sensor, Triad, find_columns
+from trihedron.read.errors import ReadError
+from trihedron.read.table import Table
+from trihedron.records import Finding, FindingCode
+
+_LOOKED_AT = 1000
+_USUALLY_BOTH = 0.9
+"""Share of the first rows with both sensors above which nothing more is asked: missing readings are lost ones."""
+_SELDOM_BOTH = 0.5
+"""Share of a sensor's rows that the other one shares at most; stamps of two clocks coincide now and then."""
+_IN_STEP = 0.9
+"""Share of a slower sensor's rows that follow each other by the same number of rows."""
+
+
+def by_rows(table: Table, mapping: str | None, sensor: Sensor | None) -> tuple[Table, ...]:
+    """The accelerometer's rows and the gyro's where they take turns, or where one fills every second, third ... row
+    only; else the table itself.
+
+    Raises
+    ------
+    ReadError
+        When rows take turns and no column holds their time, or as ``find_columns``.
+    """
+    chosen = find_columns(table, mapping, sensor or table.sensor)
+    if chosen.accelerometer is None or chosen.gyroscope is None:
+        return (table,)
+    triads = (chosen.accelerometer, chosen.gyroscope)
+    acc, gyr = (_has_reading(table, triad, _LOOKED_AT) for triad in triads)
+    if np.mean(acc & gyr) >= _USUALLY_BOTH:
+        return (table,)
+    acc, gyr = (_has_reading(table, triad, None) for triad in triads)
+    rows = [np.flatnonzero(has).astype(np.int64) for has in (acc, gyr)]
+    fewest = min(len(r) for r in rows)
+    take_turns = np.count_nonzero(acc & gyr) <= _SELDOM_BOTH * fewest
+    if fewest < 2 or not (take_turns or any(_is_every_other(r) for r in rows)):
+        return (table,)
+    if chosen.time is None:
+        raise ReadError(
+            f"{table.path}: rows hold the accelerometer ({len(rows[0])}) or the gyro ({len(rows[1])}) in turn, and no "
+            "column holds the time that would join them; log a time in each row, or both sensors in one row."
+        )
+    left = int(np.count_nonzero(~(acc | gyr)))
+    note = Finding.of(
+        FindingCode.DEVICE_CHOSEN,
+        "in-turn",
+        accelerometer_rows=len(rows[0]),
+        gyroscope_rows=len(rows[1]),
+        rows_left_out=left,
+    )
+    table = _without_counter(table, chosen.counter)
+    reported = table.n_in_file - table.n_rows
+    first = _filled(table.take(rows[0], len(rows[0]) + left + reported, note))
+    second = _filled(replace(table.take(rows[1], len(rows[1])), findings=()))
+    return replace(first, sensor="accelerometer"), replace(second, sensor="gyroscope")
+
+
+def _has_reading(table: Table, triad: Triad, most: int | None) -> npt.NDArray[np.bool_]:
+    has = np.zeros(len(table.columns[triad[0]][:most]), dtype=np.bool_)
+    for column in triad:
+        if len(table.columns[column][:most]) == len(has):
+            has |= np.isfinite(table.columns[column][:most])
+    return has
+
+
+def _is_every_other(rows: npt.NDArray[np.int64]) -> bool:
+    step = np.diff(rows)
+    usual = int(np.median(step))
+    return usual > 1 and bool(np.mean(step == usual) >= _IN_STEP)
+
+
+def _without_counter(table: Table, counter: int | None) -> Table:
+    """A counter of all rows would count those of the other sensor as lost."""
+    if counter is None or not len(table.columns[counter]) or np.median(np.diff(table.columns[counter])) != 1.0:
+        return table
+    columns = tuple(np.empty(0) if i == counter else column for i, column in enumerate(table.columns))
+    return replace(table, columns=columns, rows_in_file=table.n_in_file)
+
+
+def _filled(table: Table) -> Table:
+    """Without the columns that hold nothing in these rows."""
+    columns = tuple(c if len(c) and np.isfinite(c).any() else np.empty(0) for c in table.columns)
+    return replace(table, columns=columns)
