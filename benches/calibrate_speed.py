@@ -1,7 +1,10 @@
-"""`calibrate` with reading: warm in one process, and cold as a command; wall and processor time, best and median.
+"""`calibrate` or `diagnose` with reading: warm in one process, and cold as a command; wall and processor time.
 
 python benches/calibrate_speed.py --accel xsens_acc.txt --gyro xsens_gyro.txt --gravity 9.81744 [--rounds 12]
 python benches/calibrate_speed.py LOG --gravity 9.81
+python benches/calibrate_speed.py ... --diagnose        [OPENBLAS_NUM_THREADS=1 as the command sets it]
+
+Prints best and median.
 """
 
 from __future__ import annotations
@@ -17,11 +20,11 @@ import time
 import trihedron
 
 
-def cold(words: list[str]) -> tuple[float, float]:
+def cold(command: str, words: list[str]) -> tuple[float, float]:
     """Wall and processor time of the command in a process of its own."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    command = [sys.executable, "-m", "trihedron", "calibrate", *words]
-    subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+    whole = [sys.executable, "-m", "trihedron", command, *words]
+    subprocess.run(whole, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
     wall, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
     return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
@@ -33,6 +36,7 @@ def main() -> None:
     parser.add_argument("--gyro")
     parser.add_argument("--gravity", type=float, required=True)
     parser.add_argument("--rounds", type=int, default=12)
+    parser.add_argument("--diagnose", action="store_true")
     given = parser.parse_args()
     pair = {"accelerometer_path": given.accel, "gyroscope_path": given.gyro}
     words = ["--accel", given.accel, "--gyro", given.gyro] if given.log is None else [given.log]
@@ -40,11 +44,12 @@ def main() -> None:
     def warm() -> tuple[float, float]:
         began, worked = time.perf_counter(), time.process_time()
         recording = trihedron.read(given.log) if given.log is not None else trihedron.read(**pair)
-        trihedron.calibrate(recording, gravity_m_s2=given.gravity)
+        (trihedron.diagnose if given.diagnose else trihedron.calibrate)(recording, gravity_m_s2=given.gravity)
         return time.perf_counter() - began, time.process_time() - worked
 
+    command = "diagnose" if given.diagnose else "calibrate"
     warm()
-    for name, action in (("warm", warm), ("cold", lambda: cold([*words, "--gravity", str(given.gravity)]))):
+    for name, action in (("warm", warm), ("cold", lambda: cold(command, [*words, "--gravity", str(given.gravity)]))):
         wall, cpu = zip(*(action() for _ in range(given.rounds)), strict=True)
         print(
             f"{name}: wall {min(wall):.3f} s, median {statistics.median(wall):.3f}; processor {min(cpu):.3f} s, "

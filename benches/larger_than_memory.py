@@ -2,14 +2,17 @@
 
     python benches/larger_than_memory.py --rows 20000000                 20 million rows of counts, 240 MB
     python benches/larger_than_memory.py --rows 1000000000 --rate 4000   12 GB of log, 56 GB of corrected readings
+    python benches/larger_than_memory.py --rows 10000000 --csv           a text of 7 columns through the commands
 
 24 poses are held for equal times, with turns of two seconds between them. Peak memory is that of a process that does
-one step and nothing else, beyond what it took to load the program.
+one step and nothing else, beyond what it took to load the program. Of a text the commands `segment` and `allan` are run
+with ``--stream``: processor time and largest resident set of each, the program included.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
@@ -82,10 +85,41 @@ def make_log(path: Path, rows: int, rate_hz: float, poses: int = 24) -> None:
     log.flush()
 
 
+def write_csv(log: Path, text: Path, rate_hz: float) -> None:
+    """The log as time in seconds and six readings in SI units, six decimals each."""
+    counts = np.load(log, mmap_mode="r")
+    per_unit = np.repeat([COUNTS_PER_M_S2, COUNTS_PER_RAD_S], 3)
+    with text.open("w") as stream:
+        stream.write("t,ax,ay,az,gx,gy,gz\n")
+        for start in range(0, len(counts), PIECE):
+            part = counts[start : start + PIECE] / per_unit
+            time_s = (start + np.arange(len(part))) / rate_hz
+            np.savetxt(stream, np.column_stack([time_s, part]), fmt="%.6f", delimiter=",")
+
+
+def of_text(text: Path, rate_hz: float) -> None:
+    """Both commands on a text, each in a process of its own."""
+    said = ["--stream", "--columns", "t,ax,ay,az,gx,gy,gz", "--rate", f"{rate_hz:g}"]
+    said += ["--accel-unit", "m/s^2", "--gyro-unit", "rad/s"]
+    for step in ("segment", "allan"):
+        pid = os.posix_spawn(
+            sys.executable,
+            [sys.executable, "-m", "trihedron", step, str(text), *said],
+            os.environ,
+            file_actions=[(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)],
+        )
+        _, status, used = os.wait4(pid, 0)
+        print(
+            f"{step:10s} {used.ru_utime + used.ru_stime:8.1f} s of processor time  {used.ru_maxrss / 1e6:6.2f} GB  "
+            f"status {os.waitstatus_to_exitcode(status)}"
+        )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", type=int, default=20_000_000)
     parser.add_argument("--rate", type=float, default=1000.0)
+    parser.add_argument("--csv", action="store_true", help="a text through the commands instead")
     parser.add_argument("--folder", default=None, help="where there is room for the log and the corrected readings")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=given.folder) as place:
@@ -96,6 +130,11 @@ def main() -> None:
             f"{given.rows} rows at {given.rate:g} Hz: {hours:.1f} h, {log.stat().st_size / 1e6:.0f} MB on disk, "
             f"{48 * given.rows / 1e6:.0f} MB as a recording in memory"
         )
+        if given.csv:
+            text = Path(place) / "log.csv"
+            write_csv(log, text, given.rate)
+            of_text(text, given.rate)
+            return
         for step in ("segment", "calibrate", "apply"):
             command = [sys.executable, "-c", STEP, str(log), str(Path(place) / "out"), step, str(given.rate)]
             print(subprocess.run(command, capture_output=True, text=True, check=True).stdout, end="")

@@ -23,6 +23,7 @@ pub mod noise_law;
 pub mod norm_invariant;
 pub mod number_text;
 pub mod poisson;
+pub mod ranges;
 pub mod rotation;
 pub mod running;
 pub mod screening;

@@ -118,7 +118,7 @@ def tuned(function, width):
         out = np.empty((n, width)) if width in (4, 9) else np.empty(45)
         between = [c.pointer(MATRIX), c.pointer(ZERO)] if "jac" in function else []
         threads = [1] if function.endswith("simd") and "traj" not in function else []
-        getattr(c.library("poisson_ref"), function)(
+        getattr(c.loaded("poisson_ref"), function)(
             c.pointer(w), c.size_t(n), c.double(STEP_S), *between, c.pointer(out), *threads
         )
         return out

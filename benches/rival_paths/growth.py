@@ -35,7 +35,11 @@ def draw(path: Path) -> None:
             continue
         made = function() if function.__name__ == "numba_chain" else function
         curve(left, steps[:3] if name.startswith("SciPy") else steps, made, attitude)
-    left.legend([name for name, f in attitude.TRAJECTORY.items() if f is not None and not name.startswith("pyins")])
+    # Below right no line goes: the fits begin at what a call costs, and those of SciPy lie above all others.
+    place = {"loc": "lower right", "fontsize": "small"}
+    left.legend(
+        [name for name, f in attitude.TRAJECTORY.items() if f is not None and not name.startswith("pyins")], **place
+    )
     left.set(xlabel="steps", ylabel="seconds", title="attitude at every step", xscale="log", yscale="log")
     poses = [18, 50, 200, 1000, 10_000, 100_000, 1_000_000]
     for name, function in norm.FIT.items():
@@ -43,7 +47,7 @@ def draw(path: Path) -> None:
             continue
         made = function() if function.__name__ == "ours" else function
         curve(right, poses[:5] if name.startswith("SciPy") else poses, made, norm)
-    right.legend([name for name, function in norm.FIT.items() if function is not None])
+    right.legend([name for name, function in norm.FIT.items() if function is not None], **place)
     right.set(xlabel="poses or samples", ylabel="seconds", title="fit of the norm", xscale="log", yscale="log")
     for axes in (left, right):
         axes.grid(which="major", alpha=0.3)

@@ -65,7 +65,7 @@ def numpy_newton(a):
 
 def tuned(a):
     p, cost = START.copy(), ctypes.c_double()
-    c.library("accel_ref").a_fit(c.pointer(a), c.size_t(len(a)), c.double(G), c.pointer(p), ctypes.byref(cost))
+    c.loaded("accel_ref").a_fit(c.pointer(a), c.size_t(len(a)), c.double(G), c.pointer(p), ctypes.byref(cost))
     return p
 
 

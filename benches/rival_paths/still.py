@@ -45,7 +45,7 @@ def bottleneck(a):
 def tuned(kind):
     def call(a):
         out = np.empty(len(a) - WINDOW + 1)
-        c.library("static_ref").sv_run(c.pointer(a), c.size_t(len(a)), WINDOW, c.pointer(out), kind, 1)
+        c.loaded("static_ref").sv_run(c.pointer(a), c.size_t(len(a)), WINDOW, c.pointer(out), kind, 1)
         return out
 
     return call if c.is_here("static_ref") else None

@@ -16,7 +16,7 @@ def is_here(name: str) -> bool:
 
 
 @cache
-def library(name: str) -> ctypes.CDLL:
+def loaded(name: str) -> ctypes.CDLL:
     source = SOURCES / f"{name}.c"
     built = Path(tempfile.gettempdir()) / "trihedron-rivals" / f"{name}-{source.stat().st_mtime_ns}.so"
     if not built.exists():

@@ -6,6 +6,7 @@ use super::shaping::{Layout, Shaping, ShapingModel};
 use super::timeline::{Steps, Timeline};
 use super::ud::{Factors, Transition, UdFilter};
 use crate::error::{Error, Result};
+use crate::simd::{Instructions, for_each_instruction_set};
 
 /// Constants of one axis: sensitivity to each of the three reference components, and zero reading.
 pub const N_CONSTANTS: usize = 4;
@@ -245,21 +246,26 @@ impl AxisFilter {
     /// Standard errors of the constants.
     #[must_use]
     pub fn sigma(&self) -> [f64; N_CONSTANTS] {
-        let k = self.n_noise();
-        std::array::from_fn(|i| self.filter.factors.variance(k + i).sqrt())
+        self.filter.factors.last_variances().map(f64::sqrt)
     }
 
     /// Slow noise at the end of the last hold, and its standard error.
     #[must_use]
     pub fn drift(&self) -> (f64, f64) {
-        let row = &self.slow;
+        let (value, variance) = self.drift_and_variance();
+        (value, variance.sqrt())
+    }
+
+    fn drift_and_variance(&self) -> (f64, f64) {
+        // Behind the noise nothing of the row is left but zeros.
+        let row = &self.slow[..self.n_noise()];
         let value = row.iter().zip(&self.filter.x).map(|(h, x)| h * x).sum();
-        (value, self.filter.factors.variance_along(row).sqrt())
+        (value, self.filter.factors.variance_along(row))
     }
 }
 
 /// Everything one axis' filter said, pose by pose.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct AxisTrack {
     /// Constants after each pose.
     pub constants: Vec<[f64; N_CONSTANTS]>,
@@ -267,10 +273,14 @@ pub struct AxisTrack {
     pub sigma: Vec<[f64; N_CONSTANTS]>,
     /// Covariance of the constants after the last pose.
     pub covariance: DMatrix<f64>,
-    /// Innovations and their variances.
-    pub steps: Vec<AxisStep>,
-    /// Filtered slow noise at the end of each hold, and its standard error.
-    pub drift: Vec<(f64, f64)>,
+    /// Measured minus predicted readings.
+    pub innovation: Vec<f64>,
+    /// Variances that the filter predicted for them.
+    pub innovation_variance: Vec<f64>,
+    /// Filtered slow noise at the end of each hold.
+    pub drift: Vec<f64>,
+    /// Its standard error.
+    pub drift_sigma: Vec<f64>,
 }
 
 /// Run the filter over all poses.
@@ -283,16 +293,41 @@ pub fn track(model: &ShapingModel, prior: &Prior, poses: &[Pose]) -> Result<Axis
     let mut out = AxisTrack {
         constants: Vec::with_capacity(n),
         sigma: Vec::with_capacity(n),
-        covariance: DMatrix::zeros(0, 0),
-        steps: Vec::with_capacity(n),
+        innovation: Vec::with_capacity(n),
+        innovation_variance: Vec::with_capacity(n),
         drift: Vec::with_capacity(n),
+        drift_sigma: Vec::with_capacity(n),
+        ..AxisTrack::default()
     };
     for pose in poses {
-        out.steps.push(filter.add(pose)?);
+        let step = filter.add(pose)?;
+        let (drift, variance) = filter.drift_and_variance();
         out.constants.push(filter.constants());
-        out.sigma.push(filter.sigma());
-        out.drift.push(filter.drift());
+        out.sigma.push(filter.filter.factors.last_variances());
+        out.innovation.push(step.innovation);
+        out.innovation_variance.push(step.innovation_variance);
+        out.drift.push(drift);
+        out.drift_sigma.push(variance);
     }
+    // All roots at once: one after the other they take as long as the update.
+    let instructions = Instructions::detect();
+    take_roots(instructions, out.sigma.as_flattened_mut());
+    take_roots(instructions, &mut out.drift_sigma);
     out.covariance = filter.covariance();
     Ok(out)
+}
+
+for_each_instruction_set! {
+    fn take_roots(values: &mut [f64]) = take_roots_body
+}
+
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "it takes the instructions of its caller"
+)]
+fn take_roots_body<const FUSED: bool>(values: &mut [f64]) {
+    for value in values {
+        *value = value.sqrt();
+    }
 }

@@ -6,6 +6,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+/// Number of states that is not known beforehand.
+const ANY: usize = 0;
+
 /// Unit upper triangular `U` (by columns) and diagonal `D` of a covariance.
 #[derive(Debug, Clone)]
 pub struct Factors {
@@ -77,14 +80,29 @@ impl Factors {
             .sum::<f64>()
     }
 
+    /// Variances of the last `K` states.
+    #[must_use]
+    pub fn last_variances<const K: usize>(&self) -> [f64; K] {
+        let n = self.n;
+        let mut out = [0.0; K];
+        for (c, d) in self.d[n - K..].iter().enumerate() {
+            let column = &self.u[(n - K + c) * n + n - K..][..K];
+            for (out, u) in out.iter_mut().zip(column) {
+                *out += u * u * d;
+            }
+        }
+        out
+    }
+
     /// `hᵀ P h`.
     #[must_use]
     pub fn variance_along(&self, h: &[f64]) -> f64 {
-        let n = self.n;
-        (0..n)
-            .map(|j| {
-                let f: f64 = (0..=j).map(|i| self.u[j * n + i] * h[i]).sum();
-                f * f * self.d[j]
+        self.u
+            .chunks_exact(self.n.max(1))
+            .zip(&self.d)
+            .map(|(column, d)| {
+                let f: f64 = column.iter().zip(h).map(|(u, h)| u * h).sum();
+                f * f * d
             })
             .sum()
     }
@@ -166,15 +184,34 @@ impl UdFilter {
 
     /// The same with the innovation given, as an extended filter computes it from its non-linear prediction.
     pub fn update_with_innovation(&mut self, h: &[f64], innovation: f64, r: f64) -> Innovation {
-        let n = self.x.len();
+        // The constants of an axis behind up to four states of noise: loops of a length that the compiler knows.
+        match self.x.len() {
+            4 => self.update_of::<4>(h, innovation, r),
+            5 => self.update_of::<5>(h, innovation, r),
+            6 => self.update_of::<6>(h, innovation, r),
+            7 => self.update_of::<7>(h, innovation, r),
+            8 => self.update_of::<8>(h, innovation, r),
+            _ => self.update_of::<ANY>(h, innovation, r),
+        }
+    }
+
+    fn update_of<const N: usize>(&mut self, h: &[f64], innovation: f64, r: f64) -> Innovation {
+        let n = if N == ANY { self.x.len() } else { N };
         let Factors { u, d, .. } = &mut self.factors;
+        let (u, d, h, x) = (&mut u[..n * n], &mut d[..n], &h[..n], &mut self.x[..n]);
         let gain = &mut self.work[..n];
         let mut alpha = r;
+        // Of a number too small to have an inverse the quotients are formed themselves.
+        let inverse_of = |alpha: f64| (alpha >= f64::MIN_POSITIVE).then(|| alpha.recip());
+        let over = |value: f64, alpha: f64, inverse: Option<f64>| {
+            inverse.map_or(value / alpha, |one| value * one)
+        };
+        let mut inverse = inverse_of(alpha);
         for j in 0..n {
             let column = &mut u[j * n..j * n + n];
             let f: f64 = column[..j].iter().zip(h).map(|(u, h)| u * h).sum::<f64>() + h[j];
             let v = d[j] * f;
-            let before = alpha;
+            let (before, inverse_before) = (alpha, inverse);
             alpha += f * v;
             gain[j] = v;
             if v == 0.0 {
@@ -182,9 +219,14 @@ impl UdFilter {
                 continue;
             }
             // Without noise so far (`before == 0`) the gain's earlier entries are all zero and λ multiplies nothing.
-            let lambda = if before > 0.0 { -f / before } else { 0.0 };
+            let lambda = if before > 0.0 {
+                -over(f, before, inverse_before)
+            } else {
+                0.0
+            };
+            inverse = inverse_of(alpha);
             if alpha > 0.0 {
-                d[j] *= before / alpha;
+                d[j] *= over(before, alpha, inverse).min(1.0);
             }
             for i in 0..j {
                 let old = column[i];
@@ -193,8 +235,8 @@ impl UdFilter {
             }
         }
         if alpha > 0.0 {
-            for (g, x) in gain.iter_mut().zip(&mut self.x) {
-                *g /= alpha;
+            for (g, x) in gain.iter_mut().zip(x) {
+                *g = over(*g, alpha, inverse);
                 *x += *g * innovation;
             }
         } else {
@@ -214,25 +256,36 @@ impl UdFilter {
 
     /// Move the first `m` states: Thornton's update by modified weighted Gram-Schmidt.
     pub fn predict(&mut self, step: &Transition) {
-        let (n, m) = (self.x.len(), step.m);
+        match step.m {
+            1 => self.predict_of::<1>(step),
+            2 => self.predict_of::<2>(step),
+            3 => self.predict_of::<3>(step),
+            4 => self.predict_of::<4>(step),
+            _ => self.predict_of::<ANY>(step),
+        }
+    }
+
+    fn predict_of<const M: usize>(&mut self, step: &Transition) {
+        let (n, m) = (self.x.len(), if M == ANY { step.m } else { M });
         let Factors { u, d, .. } = &mut self.factors;
         let (rows, rest) = self.work.split_at_mut(2 * m * m);
         let (weights, moved) = rest.split_at_mut(2 * m);
         let width = 2 * m;
         // rows = [Φ U11 | G], weights = [D1 | q]
+        let (phi, noise) = (&step.phi[..m * m], &step.noise);
         for i in 0..m {
-            let phi = &step.phi[i * m..(i + 1) * m];
+            let phi = &phi[i * m..(i + 1) * m];
             for j in 0..m {
                 rows[i * width + j] = (0..=j).map(|k| phi[k] * u[j * n + k]).sum();
-                rows[i * width + m + j] = step.noise.u[j * m + i];
+                rows[i * width + m + j] = noise.u[j * m + i];
             }
             weights[i] = d[i];
-            weights[m + i] = step.noise.d[i];
+            weights[m + i] = noise.d[i];
         }
         // U12 ← Φ U12 and x ← Φ x
         for j in m..n {
             for i in 0..m {
-                let phi = &step.phi[i * m..(i + 1) * m];
+                let phi = &phi[i * m..(i + 1) * m];
                 moved[i] = phi
                     .iter()
                     .zip(&u[j * n..j * n + m])
@@ -242,7 +295,7 @@ impl UdFilter {
             u[j * n..j * n + m].copy_from_slice(&moved[..m]);
         }
         for i in 0..m {
-            let phi = &step.phi[i * m..(i + 1) * m];
+            let phi = &phi[i * m..(i + 1) * m];
             moved[i] = phi.iter().zip(&self.x).map(|(p, x)| p * x).sum();
         }
         self.x[..m].copy_from_slice(&moved[..m]);

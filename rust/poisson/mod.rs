@@ -8,6 +8,7 @@
 //! Equations (5.1)-(5.6) of docs/model-gyroscope.md.
 
 mod lanes;
+mod prepared;
 mod steps;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -15,8 +16,7 @@ use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::rotation::skew;
-use crate::simd::Instructions;
-use lanes::{Rate, Step, Steps};
+pub use prepared::{PreparedMove, prepare};
 pub use steps::{StepWeights, step_weights};
 
 /// 3 × 9 sensitivity of a rotation vector to `S`, column `3 i + j` for `S_ij`.
@@ -74,13 +74,6 @@ pub struct RateNoise {
     pub nominal_step_s: f64,
 }
 
-/// A move prepared for repeated integration: the moments of its raw readings.
-#[derive(Debug, Clone)]
-pub struct PreparedMove {
-    steps: Steps,
-    span_s: f64,
-}
-
 /// The rotation of one move and how it answers to everything it was computed from.
 ///
 /// Sensitivities are rotation vectors `θ` in the frame at the start of the move: `B(p + δp) ≈ B exp(−[θ]×)`, `θ = G δp`.
@@ -105,144 +98,6 @@ impl Turn {
     #[must_use]
     pub fn derivative(&self, theta: &Vector3<f64>) -> Matrix3<f64> {
         -self.rotation * skew(theta)
-    }
-}
-
-/// Reduces the samples of a move to moments; non-finite rows and repeated stamps are bridged.
-///
-/// `var_extra`, as long as `raw` where given, is the variance of single readings beyond the rate noise: readings that
-/// were reconstructed where the gyro met its limit.
-///
-/// # Errors
-/// When the range leaves the record, the anchors coincide or time runs backward.
-pub fn prepare(
-    time_s: &[f64],
-    raw: &[Vector3<f64>],
-    var_extra: Option<&[Vector3<f64>]>,
-    range: &MoveRange,
-    model: RateModel,
-) -> Result<PreparedMove> {
-    if var_extra.is_some_and(|var| var.len() != raw.len()) {
-        return Err(Error::bad_input(
-            "the extra variance must have one row per reading",
-        ));
-    }
-    if range.start >= range.stop || range.stop > time_s.len() || time_s.len() != raw.len() {
-        return Err(Error::bad_input(format!(
-            "a move covers samples {}..{} of {}: it must hold at least one sample and stay inside the record",
-            range.start,
-            range.stop,
-            time_s.len().min(raw.len())
-        )));
-    }
-    let span_s = range.anchor_after_s - range.anchor_before_s;
-    if !(span_s > 0.0 && span_s.is_finite()) {
-        return Err(Error::bad_input(format!(
-            "the still pose after the move at sample {} must be later than the one before it",
-            range.start
-        )));
-    }
-    let mut used: Vec<usize> = Vec::with_capacity(range.stop - range.start);
-    for k in range.start..range.stop {
-        if !(raw[k].iter().all(|x| x.is_finite()) && time_s[k].is_finite()) {
-            continue;
-        }
-        if let Some(&last) = used.last() {
-            if time_s[k] < time_s[last] {
-                return Err(Error::bad_input(format!(
-                    "time runs backward at sample {k}: sort the record first"
-                )));
-            }
-            if time_s[k] <= time_s[last] {
-                continue;
-            }
-        }
-        used.push(k);
-    }
-    let n = used.len();
-    let mut steps = Steps::new(n.saturating_sub(1));
-    for i in 0..n.saturating_sub(1) {
-        let step = StepWeights::at(time_s, |k| used[k], n, i, model);
-        let (moment0, moment1) = step.moments(|k| raw[k]);
-        let (p, q) = (step.from, step.to);
-        steps.set(
-            i,
-            &Step {
-                moment0,
-                moment1,
-                change: raw[q] - raw[p],
-                h: step.h,
-                fraction: (0.5 * (time_s[p] + time_s[q]) - range.anchor_before_s) / span_s,
-                var_extra: var_extra.map_or_else(Vector3::zeros, |var| var[p]),
-            },
-        );
-    }
-    Ok(PreparedMove { steps, span_s })
-}
-
-impl PreparedMove {
-    /// Number of integration steps.
-    #[must_use]
-    pub fn n_steps(&self) -> usize {
-        self.steps.len()
-    }
-
-    /// Time between the anchors, s.
-    #[must_use]
-    pub fn span_s(&self) -> f64 {
-        self.span_s
-    }
-
-    /// `∫ w' dt` over the move, raw unit · s: the turn as the gyro saw it when its axis stays fixed.
-    #[must_use]
-    pub fn raw_angle(&self) -> Vector3<f64> {
-        self.steps.raw_angle()
-    }
-
-    /// Integrated time, s.
-    #[must_use]
-    pub fn duration_s(&self) -> f64 {
-        self.steps.duration_s()
-    }
-
-    /// Rotation and sensitivities for `ω = S w' + b`, `b` from `bias_before` to `bias_after` (rad/s) between the anchors.
-    #[must_use]
-    pub fn integrate(
-        &self,
-        scale: &Matrix3<f64>,
-        bias_before: &Vector3<f64>,
-        bias_after: &Vector3<f64>,
-        noise: &RateNoise,
-    ) -> Turn {
-        self.integrate_with(
-            Instructions::detect(),
-            scale,
-            bias_before,
-            bias_after,
-            noise,
-        )
-    }
-
-    /// As [`integrate`](Self::integrate), by instructions of the caller's choice; the results differ by rounding.
-    #[must_use]
-    pub fn integrate_with(
-        &self,
-        instructions: Instructions,
-        scale: &Matrix3<f64>,
-        bias_before: &Vector3<f64>,
-        bias_after: &Vector3<f64>,
-        noise: &RateNoise,
-    ) -> Turn {
-        let at = Rate {
-            scale: *scale,
-            bias: *bias_before,
-            change: bias_after - bias_before,
-            span_s: self.span_s,
-            variance: noise.density.component_mul(&noise.density),
-            var_time: noise.sigma_time_s * noise.sigma_time_s,
-            gap_s: 1.5 * noise.nominal_step_s,
-        };
-        self.steps.integrate(instructions, &at)
     }
 }
 
@@ -293,8 +148,9 @@ pub fn integrate_once(
         .par_iter()
         .zip(bias_before.par_iter().zip(bias_after))
         .map(|(range, (before, after))| {
-            let prepared = prepare(time_s, raw, None, range, model)?;
-            Ok(prepared.integrate(scale, before, after, noise))
+            prepared::integrate_once(time_s, raw, range, model, |span_s| {
+                noise.beside(scale, before, after, span_s)
+            })
         })
         .collect()
 }

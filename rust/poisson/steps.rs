@@ -121,7 +121,7 @@ impl StepWeights {
 
 /// Neighbouring steps may differ by this factor (jitter, one lost sample) before a cubic through them is worse than a
 /// straight line: across a longer gap it overshoots.
-const UNEVEN_STEPS: f64 = 3.0;
+pub(super) const UNEVEN_STEPS: f64 = 3.0;
 
 /// Integration steps between the samples `used` (ascending, of strictly rising time).
 #[must_use]

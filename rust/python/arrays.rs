@@ -51,19 +51,7 @@ pub(super) fn flat1<'a, T: numpy::Element + Copy>(
 
 /// Owned rows of an `(n, 3)` array of any strides.
 pub(super) fn rows3(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vector3<f64>>> {
-    if array.shape()[1] != 3 {
-        return Err(PyValueError::new_err(format!(
-            "{name} must have shape (n, 3), got ({}, {})",
-            array.shape()[0],
-            array.shape()[1]
-        )));
-    }
-    let view = array.as_array();
-    Ok(view
-        .rows()
-        .into_iter()
-        .map(|row| Vector3::new(row[0], row[1], row[2]))
-        .collect())
+    Ok(as_vectors(&flat3(name, array)?).to_vec())
 }
 
 /// Owned 3-vector of a `(3,)` array.
@@ -93,7 +81,7 @@ pub(super) fn matrix3(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult
 
 /// Owned samples of an `(n,)` array of any stride.
 pub(super) fn samples<T: numpy::Element + Copy>(array: &PyReadonlyArray1<'_, T>) -> Vec<T> {
-    array.as_array().iter().copied().collect()
+    flat1(array).into_owned()
 }
 
 /// Numbers row by row as rows of `n`.

@@ -1,18 +1,16 @@
 //! Motion in the means of blocks across the seam.
 
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
-};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{as_rows, flat1, flat3};
+use super::arrays::{as_rows, flat3};
 use crate::block_motion::{self, UNKNOWNS, Windows};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(first_clean, module)?)?;
     module.add_function(wrap_pyfunction!(band_power, module)?)?;
-    module.add_function(wrap_pyfunction!(share_equations, module)?)
+    module.add_function(wrap_pyfunction!(share_of_gyroscope, module)?)
 }
 
 fn wrong(what: &str) -> PyErr {
@@ -77,30 +75,18 @@ fn band_power<'py>(
     PyArray1::from_vec(py, bytemuck::cast_vec::<[f64; 3], f64>(found)).reshape([inside.len(), 3])
 }
 
-type Equations<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
-
-/// Normal equations of what the gyro foretells of changes `(n, 3)`, weighed by what `solution` `(12,)` leaves.
+/// `(12,)` by which the gyro foretells the changes of windows best, in units of `scale`.
 #[pyfunction]
-fn share_equations<'py>(
-    py: Python<'py>,
-    change: PyReadonlyArray2<'py, f64>,
-    mean: PyReadonlyArray2<'py, f64>,
-    rate: PyReadonlyArray2<'py, f64>,
+fn share_of_gyroscope(
+    py: Python<'_>,
+    change: PyReadonlyArray2<'_, f64>,
+    mean: PyReadonlyArray2<'_, f64>,
+    rate: PyReadonlyArray2<'_, f64>,
     scale: [f64; 3],
-    solution: Option<PyReadonlyArray1<'py, f64>>,
-) -> PyResult<Equations<'py>> {
+) -> PyResult<[f64; UNKNOWNS]> {
     if mean.shape()[0] != change.shape()[0] || rate.shape()[0] != change.shape()[0] {
         return Err(wrong("change, mean and rate are of the same windows"));
     }
-    let solution: Option<[f64; UNKNOWNS]> = match &solution {
-        None => None,
-        Some(given) => Some(
-            flat1(given)
-                .as_ref()
-                .try_into()
-                .map_err(|_| wrong("a solution is twelve numbers"))?,
-        ),
-    };
     let (change, mean, rate) = (
         flat3("change", &change)?,
         flat3("mean", &mean)?,
@@ -111,7 +97,5 @@ fn share_equations<'py>(
         mean: as_rows(&mean),
         rate: as_rows(&rate),
     };
-    let (gram, side) = super::run(py, || Ok(windows.equations(scale, solution.as_ref())))?;
-    let gram = PyArray1::from_vec(py, gram).reshape([UNKNOWNS, UNKNOWNS])?;
-    Ok((gram, PyArray1::from_vec(py, side)))
+    super::run(py, || Ok(windows.share(scale)))
 }

@@ -24,6 +24,7 @@ mod kalman_norm;
 mod move_signals;
 mod number_text;
 mod poisson;
+mod ranges;
 mod rotation;
 mod screening;
 mod session_model;
@@ -54,6 +55,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     move_signals::register(module)?;
     number_text::register(module)?;
     poisson::register(module)?;
+    ranges::register(module)?;
     kalman::register(module)?;
     accelerometer::register(module)?;
     kalman_norm::register(module)?;

@@ -8,6 +8,7 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::arrays::as_rows;
 use crate::error::Result as KernelResult;
 use crate::simulate::Sample;
 use crate::simulate::mechanism::{self, Bridge};
@@ -59,7 +60,7 @@ fn channels(name: &str, array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Sampl
     if array.is_c_contiguous()
         && let Ok(flat) = array.as_slice()
     {
-        return Ok(flat.chunks_exact(3).map(|r| [r[0], r[1], r[2]]).collect());
+        return Ok(as_rows(flat).to_vec());
     }
     let view = array.as_array();
     Ok(view

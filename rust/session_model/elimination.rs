@@ -65,21 +65,26 @@ pub(super) fn eliminated(
         let own = &d[layout.at(i)..][..pose];
         sum_blocks(&mut summed, others, chain, |one| &one.diagonal[i]);
         for r in 0..pose {
-            for c in 0..pose {
-                *pass.block.at(r, c) = summed[r * pose + c] * own[r] * own[c];
+            let row = &mut pass.block.row(r)[..pose];
+            for ((out, sum), d) in row.iter_mut().zip(&summed[r * pose..]).zip(own) {
+                *out = sum * own[r] * d;
             }
-            *pass.block.at(r, r) += RIDGE;
-            for c in 0..border {
-                *pass.edge.at(r, c) = chain.border[i][(r, c)] * own[r] * d[c];
+            row[r] += RIDGE;
+            let edge = &mut pass.edge.row(r)[..=border];
+            let values = chain.border[i].as_slice();
+            for ((out, value), d) in edge.iter_mut().zip(values[r..].iter().step_by(pose)).zip(d) {
+                *out = value * own[r] * d;
             }
-            *pass.edge.at(r, border) = side[(layout.at(i) + r, 0)] * own[r];
+            edge[border] = side[(layout.at(i) + r, 0)] * own[r];
         }
         if i > 0 {
             let before = &d[layout.at(i - 1)..][..pose];
             sum_blocks(&mut summed, others, chain, |one| &one.next[i - 1]);
             for r in 0..pose {
-                for c in 0..pose {
-                    *pass.coupling.at(r, c) = summed[c * pose + r] * before[r] * own[c];
+                let row = &mut pass.coupling.row(r)[..pose];
+                let values = summed[r..].iter().step_by(pose);
+                for ((out, value), d) in row.iter_mut().zip(values).zip(own) {
+                    *out = value * before[r] * d;
                 }
             }
         }

@@ -5,7 +5,8 @@
 
 use super::Sample;
 use crate::error::{Error, Result};
-use nalgebra::{Matrix2, Vector2};
+use crate::simd::{Instructions, fma, for_each_instruction_set};
+use nalgebra::Matrix2;
 use rayon::prelude::*;
 
 fn positive(name: &str, values: &Sample) -> Result<()> {
@@ -32,28 +33,52 @@ pub fn second_order(
     positive("the frequency of a second-order stage", frequency_hz)?;
     positive("the quality of a second-order stage", quality)?;
     positive("the time step", &[dt; 3])?;
-    for k in 0..3 {
+    let stages = [0, 1, 2].map(|k| {
         let w = std::f64::consts::TAU * frequency_hz[k];
         // State (x, v) in units where time runs in dt: d/dt (x, v) = A (x, v) + (0, w² u).
         let a = Matrix2::new(0.0, dt, -w * w * dt, -w / quality[k] * dt);
-        let phi = exponential(&a);
         // For u = p + s t the settled response is x = p + s (t - c), v = s, with c = 1/(Q w).
-        let lag = 1.0 / (quality[k] * w);
-        let Some(first) = signal.first() else {
-            return Ok(());
-        };
-        let mut u0 = first[k];
-        let mut state = Vector2::new(u0, 0.0);
-        for row in signal.iter_mut() {
-            let u1 = row[k];
-            let slope = (u1 - u0) / dt;
-            let departure = state - Vector2::new(u0 - slope * lag, slope);
-            state = Vector2::new(u1 - slope * lag, slope) + phi * departure;
-            row[k] = state.x;
-            u0 = u1;
+        (exponential(&a), 1.0 / (quality[k] * w))
+    });
+    let phi = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|at| stages.map(|(phi, _)| phi[at]));
+    let lag = stages.map(|(_, lag)| lag);
+    follow_ramps(Instructions::detect(), signal, 1.0 / dt, &phi, &lag);
+    Ok(())
+}
+
+for_each_instruction_set! {
+    /// The three channels side by side: none waits for another, and each step of one for a product and two sums only.
+    fn follow_ramps(signal: &mut [Sample], per_s: f64, phi: &[Sample; 4], lag: &Sample) = follow_ramps_body
+}
+
+#[inline(always)]
+#[expect(
+    clippy::inline_always,
+    reason = "it takes the instructions of its caller"
+)]
+fn follow_ramps_body<const FUSED: bool>(
+    signal: &mut [Sample],
+    per_s: f64,
+    phi: &[Sample; 4],
+    lag: &Sample,
+) {
+    let Some(&first) = signal.first() else { return };
+    let (mut before, mut slope) = (first, [0.0; 3]);
+    // How far (x, v) is from the settled response to the straight line that the signal is on.
+    let (mut x, mut v) = ([0.0; 3], [0.0; 3]);
+    for row in signal {
+        for k in 0..3 {
+            let now = row[k];
+            let next = (now - before[k]) * per_s;
+            let bend = next - slope[k];
+            let (from_x, from_v) = (fma::<FUSED>(bend, lag[k], x[k]), v[k] - bend);
+            x[k] = fma::<FUSED>(phi[0][k], from_x, phi[1][k] * from_v);
+            v[k] = fma::<FUSED>(phi[2][k], from_x, phi[3][k] * from_v);
+            row[k] = fma::<FUSED>(-next, lag[k], now) + x[k];
+            before[k] = now;
+            slope[k] = next;
         }
     }
-    Ok(())
 }
 
 /// Exponential of a 2×2 matrix by its eigenvalues' closed form.
@@ -81,29 +106,30 @@ fn exponential(a: &Matrix2<f64>) -> Matrix2<f64> {
 /// # Errors
 /// A time constant that is negative; zero leaves the channel alone.
 pub fn first_order(signal: &mut [Sample], dt: f64, tau_s: &Sample) -> Result<()> {
-    for k in 0..3 {
-        let tau = tau_s[k];
-        if !(tau.is_finite() && tau >= 0.0) {
+    for tau in tau_s {
+        if !(tau.is_finite() && *tau >= 0.0) {
             return Err(Error::bad_input(format!(
                 "a time constant must not be negative, got {tau} s"
             )));
         }
-        let Some(first) = signal.first() else {
-            return Ok(());
-        };
-        if tau == 0.0 {
-            continue;
-        }
-        let keep = (-dt / tau).exp();
-        let mut u0 = first[k];
-        let mut x = u0;
-        for row in signal.iter_mut() {
-            let u1 = row[k];
-            let slope = (u1 - u0) / dt;
-            // Settled response to a ramp lags it by tau.
-            x = u1 - slope * tau + keep * (x - (u0 - slope * tau));
-            row[k] = x;
-            u0 = u1;
+    }
+    let Some(&first) = signal.first() else {
+        return Ok(());
+    };
+    // The settled response to a ramp lags it by tau.
+    let keep = tau_s.map(|tau| (-dt / tau).exp());
+    let (mut before, mut slope, mut away) = (first, [0.0; 3], [0.0; 3]);
+    for row in signal {
+        for k in 0..3 {
+            if tau_s[k] == 0.0 {
+                continue;
+            }
+            let now = row[k];
+            let next = (now - before[k]) / dt;
+            away[k] = keep[k] * (away[k] + (next - slope[k]) * tau_s[k]);
+            row[k] = now - next * tau_s[k] + away[k];
+            before[k] = now;
+            slope[k] = next;
         }
     }
     Ok(())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from typing import Any
 
 import numpy.typing as npt
@@ -74,7 +73,7 @@ def read(
         )
     except ReadError as error:
         raise ReadError(in_python(str(error))) from None
-    return replace(recording, findings=tuple(finding_in_python(finding) for finding in recording.findings))
+    return recording.with_same_readings(findings=tuple(finding_in_python(finding) for finding in recording.findings))
 
 
 def of_arrays(

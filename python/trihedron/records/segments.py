@@ -45,6 +45,15 @@ class Hold:
             keep[max(first - self.start, 0) : max(last - self.start, 0)] = False
         return np.flatnonzero(keep) + self.start
 
+    def undisturbed(self) -> list[tuple[int, int]]:
+        """The same as ranges ``(start, stop)``."""
+        out, first = [], self.start
+        for begin, end in (*sorted(self.disturbed), (self.stop, self.stop)):
+            if min(begin, self.stop) > first:
+                out.append((first, min(begin, self.stop)))
+            first = max(first, end)
+        return out
+
 
 @dataclass(frozen=True)
 class Move:

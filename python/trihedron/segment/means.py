@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron import _core
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.records import Hold, Recording
 from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise, split_by_halves
@@ -39,19 +39,9 @@ def average_holds(
     for (empirical Bayes). An unsteady hold is taken at its own word, axis by axis.
     """
     n_channels = channels.mean.shape[1]
-    mean = np.empty((len(holds), n_channels))
-    n_averaged = np.empty(len(holds), dtype=np.int64)
-    triads = [a for a in (recording.accelerometer, recording.gyroscope) if a is not None]
-    for k, hold in enumerate(holds):
-        sums = [_Sum() for _ in triads]
-        n_averaged[k] = 0
-        for a, b in _stretches(hold):
-            readings = [triad[a:b] for triad in triads]
-            finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
-            n_averaged[k] += int(np.logical_and.reduce(finite).sum())
-            for sum_, r, f in zip(sums, readings, finite, strict=True):
-                sum_.add(r if f.all() else r[f])
-        mean[k] = np.concatenate([sum_.mean() for sum_ in sums])
+    mean, n_averaged = _sample_means(
+        [a for a in (recording.accelerometer, recording.gyroscope) if a is not None], holds
+    )
     ratio, freedom = _excess(channels, runs, noise)
     steady = np.array([not run.is_unsteady for run in runs], dtype=bool)
     shrunk = ratio.copy()
@@ -69,13 +59,30 @@ def average_holds(
     return HoldMeans(mean, np.sqrt(variance), n_averaged)
 
 
-def _stretches(hold: Hold) -> Iterator[tuple[int, int]]:
-    """The rows of a hold without what disturbed it, in pieces: a hold of hours is not copied as a whole."""
-    first = hold.start
-    for begin, end in (*sorted(hold.disturbed), (hold.stop, hold.stop)):
-        for a in range(first, min(begin, hold.stop), PIECE):
-            yield a, min(a + PIECE, begin, hold.stop)
-        first = max(first, end)
+def _sample_means(triads: list[FloatArray], holds: tuple[Hold, ...]) -> tuple[FloatArray, IntArray]:
+    """(h, c) means over the samples of each hold, and (h,) how many of them are finite in every sensor."""
+    parts = [(k, a, b) for k, hold in enumerate(holds) for a, b in hold.undisturbed()]
+    owner, begins, ends = np.array(parts, dtype=np.int64).reshape(-1, 3).T.copy()
+    spans = np.column_stack([begins, ends])
+    n_rows = np.bincount(owner, spans[:, 1] - spans[:, 0], len(holds)).astype(np.int64)
+    if all(a.flags.c_contiguous and a.dtype == np.float64 for a in triads):
+        found = [_core.means_by_owner(a, spans, owner, len(holds)) for a in triads]
+        if all(np.array_equal(count, n_rows) for _, count in found):
+            return np.hstack([means for means, _ in found]), n_rows
+    mean = np.empty((len(holds), 3 * len(triads)))
+    n_averaged = np.zeros(len(holds), dtype=np.int64)
+    for k, hold in enumerate(holds):
+        sums = [_Sum() for _ in triads]
+        for first, last in hold.undisturbed():
+            # In pieces: a hold of hours is not copied as a whole.
+            for start in range(first, last, PIECE):
+                readings = [triad[start : min(start + PIECE, last)] for triad in triads]
+                finite = [np.asarray(np.isfinite(r).all(axis=1)) for r in readings]
+                n_averaged[k] += int(np.logical_and.reduce(finite).sum())
+                for sum_, r, f in zip(sums, readings, finite, strict=True):
+                    sum_.add(r if f.all() else r[f])
+        mean[k] = np.concatenate([sum_.mean() for sum_ in sums])
+    return mean, n_averaged
 
 
 class _Sum:

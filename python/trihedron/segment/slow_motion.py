@@ -18,8 +18,6 @@ FALSE_ALARM = 1e-5
 """Chance that the halves of a still window are called different; of a hundred overlapping ones, once in some hours."""
 MOST_FITTED = 30_000
 """Windows that the gyro's share is fitted to, evenly spread: they tell twelve numbers to a hundredth of the noise."""
-FREE = 1e-13
-"""Part of the largest eigenvalue of normal equations below which rounding could have made the eigenvalue."""
 FEWEST_WINDOWS = 24
 """Fewer windows than twice the twelve unknowns of the gyro's share do not tell noise from motion."""
 
@@ -117,27 +115,7 @@ def _noise_of_change(channels: Channels, windows: _Windows, half: int, white_var
 def _share_of_gyroscope(windows: _Windows, scale: FloatArray) -> FloatArray:
     """(12,) by which the gyro predicts the changes best, with least absolute deviations in units of ``scale`` (3,)."""
     assert windows.rate is not None
-    solution: FloatArray | None = None
-    for _ in range(6):
-        # Reweighted to least absolute deviations: pushes and settling are not rotation.
-        gram, side = _core.share_equations(windows.change, windows.mean, windows.rate, scale.tolist(), solution)
-        solution = _least_squares(gram, side)
-    assert solution is not None
-    return solution
-
-
-def _least_squares(gram: FloatArray, side: FloatArray) -> FloatArray:
-    """(k,) by normal equations of unit columns, the shortest where the rows leave some free: a dead or unturned axis.
-
-    Half the digits are enough for what readings with a noise of 10⁻⁴ say.
-    """
-    size = np.sqrt(np.diag(gram))
-    size = np.where(size > 0.0, size, 1.0)
-    value, direction = np.linalg.eigh(gram / np.outer(size, size))
-    held = value > FREE * value[-1]
-    along = direction[:, held]
-    solution: FloatArray = along @ ((along.T @ (side / size)) / value[held]) / size
-    return np.ascontiguousarray(solution)
+    return np.array(_core.share_of_gyroscope(windows.change, windows.mean, windows.rate, scale.tolist()))
 
 
 def cut_slow_motion(

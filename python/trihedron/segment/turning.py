@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron import probability
-from trihedron.arrays import BoolArray, FloatArray
-from trihedron.ranges import ranges_of
+from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.ranges import Range, ranges_of
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.runs import CREEP_PART, MIN_HOLD_S, SAME_POSE, SWAY_RAD, speed_of_moves
 
@@ -36,15 +36,17 @@ def turning_blocks(
         # Inside the quiet stretch only: the move next to it has its own say.
         second[a:b] = rolling_mean(reading[a:b], channels.blocks(1.0))
     zero, scatter = _densest(second[quiet])
-    nearest = [np.abs(second[a:b] - zero).min(axis=0) for a, b in ranges if b - a >= channels.blocks(MIN_HOLD_S)]
-    if len(nearest) > 1:
+    long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(MIN_HOLD_S)])
+    if len(long) > 2:
+        nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - zero), long[:-1], axis=0)[::2]
         scatter = np.maximum(scatter, 1.4826 * np.median(nearest, axis=0))
     # A few short holds hold a few independent seconds: the shortest interval among them flatters. No window is known
     # better than the white noise of its blocks.
-    steps = [np.diff(reading[a:b], axis=0) for a, b in ranges if b - a >= 2]
-    if steps:
-        white = np.sqrt(np.median([(step**2).mean(axis=0) / 2.0 for step in steps], axis=0) / channels.blocks(1.0))
-        scatter = np.maximum(scatter, white)
+    inner = _edges([(a, b - 1) for a, b in ranges if b - a >= 2])
+    if len(inner):
+        squares = np.add.reduceat(np.diff(reading[: inner[-1] + 1], axis=0) ** 2, inner[:-1], axis=0)[::2]
+        variance = squares / (2.0 * np.diff(inner)[::2, None])
+        scatter = np.maximum(scatter, np.sqrt(np.median(variance, axis=0) / channels.blocks(1.0)))
     scatter = np.maximum(scatter, channels.quantum[gyro] / np.sqrt(12.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.nan_to_num(np.abs(second - zero) / scatter, nan=0.0)
@@ -66,6 +68,11 @@ def turning_blocks(
             if last - first < WINDOW_BLOCKS and first > 0 and last < b - a:
                 out[a + first : a + last] = False
     return out
+
+
+def _edges(ranges: list[Range]) -> IntArray:
+    """Edges of ranges one after the other, as ``reduceat`` wants them: every other stretch lies between two ranges."""
+    return np.array(ranges, dtype=np.int64).ravel()
 
 
 def _tilts_a_little(channels: Channels, first: int, last: int, gravity: float) -> bool:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron import _core
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.refused import RefusedError
@@ -73,18 +74,19 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         quantum = recording.facts.of(("accelerometer", "gyroscope")[k]).step
         variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s, quantum)
         if sigma is not None and density is not None:
-            halves = np.array([_second_half_minus_first(readings[a:b]) for a, b in spans])
+            halves = _second_halves_minus_first(readings, np.array(spans, dtype=np.int64).reshape(-1, 2))
             variances[:, k] += coloured_variance(sigma, halves, density, lasts, moves_last)
     assert sigmas[0] is not None
     assert densities[0] is not None
     return SessionNoise(sigmas[0], densities[0], sigmas[1], densities[1], variances)
 
 
-def _second_half_minus_first(values: FloatArray) -> FloatArray:
-    middle = (len(values) + 1) // 2
-    out: FloatArray = values[middle:].mean(axis=0) - values[:middle].mean(axis=0)
-    if np.isnan(out).any():
-        out = np.nanmean(values[middle:], axis=0) - np.nanmean(values[:middle], axis=0)
+def _second_halves_minus_first(readings: FloatArray, spans: IntArray) -> FloatArray:
+    """(n, 3) differences of the means of both halves of every span (n, 2)."""
+    middle = spans[:, 0] + (spans[:, 1] - spans[:, 0] + 1) // 2
+    halves = np.column_stack([spans[:, 0], middle, middle, spans[:, 1]]).reshape(-1, 2)
+    means, _ = _core.means_by_owner(readings, halves, np.arange(len(halves)), len(halves))
+    out: FloatArray = means[1::2] - means[::2]
     return out
 
 

@@ -4,12 +4,15 @@
 //! many stretches as a vector has lanes; each is integrated from its own start, and stretches are joined at the end:
 //! `B = B₂ B₁`, `G = G₁ + B₁ᵀ G₂`, `C = C₁ + B₁ᵀ C₂ B₁`.
 
+mod moments;
 mod sensitivities;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
+pub(super) use self::moments::Whole;
+use self::moments::fill;
 use self::sensitivities::add_steps;
-use super::{Turn, WrtScale};
+use super::{RateModel, Turn, WrtScale};
 use crate::simd::Instructions;
 
 /// Stretches of a move.
@@ -18,7 +21,7 @@ type Row = [f64; LANES];
 const ZERO: Row = [0.0; LANES];
 
 /// One step of a move, reduced to what does not depend on the calibration.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Step {
     /// `∫ w' dτ`.
     pub moment0: Vector3<f64>,
@@ -45,9 +48,18 @@ struct StepRow {
     var_extra: [Row; 3],
 }
 
+const EMPTY: StepRow = StepRow {
+    moment0: [ZERO; 3],
+    moment1: [ZERO; 3],
+    change: [ZERO; 3],
+    h: ZERO,
+    fraction: ZERO,
+    var_extra: [ZERO; 3],
+};
+
 /// The steps of a move: step `i` is row `i % rows` of lane `i / rows`; the last lane is filled up with steps of no
 /// duration, which change nothing.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Steps {
     rows: Vec<StepRow>,
     n: usize,
@@ -85,31 +97,23 @@ struct Sums {
 
 impl Steps {
     pub(super) fn new(n: usize) -> Self {
-        let empty = StepRow {
-            moment0: [ZERO; 3],
-            moment1: [ZERO; 3],
-            change: [ZERO; 3],
-            h: ZERO,
-            fraction: ZERO,
-            var_extra: [ZERO; 3],
-        };
         Self {
-            rows: vec![empty; n.div_ceil(LANES)],
+            rows: vec![EMPTY; n.div_ceil(LANES)],
             n,
         }
     }
 
+    /// The steps of a move without missing readings; `odd` makes those that no cubic suits.
+    pub(super) fn of(of: &Whole<'_>, model: RateModel, odd: impl Fn(usize) -> Step) -> Self {
+        let mut out = Self::new(of.n_steps());
+        let n_rows = out.rows.len();
+        set_rows(&mut out.rows, 0, n_rows, of, model, &odd);
+        out
+    }
+
     pub(super) fn set(&mut self, i: usize, step: &Step) {
         let (row, lane) = (i % self.rows.len(), i / self.rows.len());
-        let row = &mut self.rows[row];
-        for k in 0..3 {
-            row.moment0[k][lane] = step.moment0[k];
-            row.moment1[k][lane] = step.moment1[k];
-            row.change[k][lane] = step.change[k];
-            row.var_extra[k][lane] = step.var_extra[k];
-        }
-        row.h[lane] = step.h;
-        row.fraction[lane] = step.fraction;
+        set(&mut self.rows[row], lane, step);
     }
 
     pub(super) fn len(&self) -> usize {
@@ -133,7 +137,68 @@ impl Steps {
     }
 
     pub(super) fn integrate(&self, instructions: Instructions, rate: &Rate) -> Turn {
-        let mut sums = Sums {
+        let mut sums = Sums::new();
+        sums.add(instructions, &self.rows, rate);
+        sums.joined(rate.span_s, self.duration_s())
+    }
+}
+
+/// Rows that are made, integrated and forgotten: they stay where the processor is quickest.
+const BLOCK: usize = 16;
+
+/// The turn over a move without missing readings, integrated once.
+pub(super) fn integrate_whole(
+    instructions: Instructions,
+    of: &Whole<'_>,
+    model: RateModel,
+    rate: &Rate,
+    odd: impl Fn(usize) -> Step,
+) -> Turn {
+    let n_rows = of.n_steps().div_ceil(LANES);
+    let mut block = [EMPTY; BLOCK];
+    let mut sums = Sums::new();
+    for first in (0..n_rows).step_by(BLOCK) {
+        let rows = &mut block[..BLOCK.min(n_rows - first)];
+        set_rows(rows, first, n_rows, of, model, &odd);
+        sums.add(instructions, rows, rate);
+    }
+    sums.joined(rate.span_s, of.time_s[of.n_steps()] - of.time_s[0])
+}
+
+fn set_rows(
+    rows: &mut [StepRow],
+    first: usize,
+    n_rows: usize,
+    of: &Whole<'_>,
+    model: RateModel,
+    odd: &impl Fn(usize) -> Step,
+) {
+    let mut others = Vec::new();
+    fill(rows, first, n_rows, of, model, &mut others);
+    for i in others {
+        let step = if i < of.n_steps() {
+            odd(i)
+        } else {
+            Step::default()
+        };
+        set(&mut rows[i % n_rows - first], i / n_rows, &step);
+    }
+}
+
+fn set(row: &mut StepRow, lane: usize, step: &Step) {
+    for k in 0..3 {
+        row.moment0[k][lane] = step.moment0[k];
+        row.moment1[k][lane] = step.moment1[k];
+        row.change[k][lane] = step.change[k];
+        row.var_extra[k][lane] = step.var_extra[k];
+    }
+    row.h[lane] = step.h;
+    row.fraction[lane] = step.fraction;
+}
+
+impl Sums {
+    fn new() -> Self {
+        let mut sums = Self {
             rotation: [ZERO; 9],
             wrt_scale: [ZERO; 27],
             wrt_bias: [[ZERO; 9]; 3],
@@ -142,17 +207,17 @@ impl Steps {
         for k in [0, 4, 8] {
             sums.rotation[k] = [1.0; LANES];
         }
-        // Stamps with errors let the rate's change over every step count, lost samples that over some.
-        let is_jumpy = rate.var_time > 0.0
-            || self
-                .rows
-                .iter()
-                .any(|row| row.h.iter().any(|&h| h > rate.gap_s));
-        add_steps(instructions, &self.rows, rate, is_jumpy, &mut sums);
-        self.joined(&sums, rate.span_s)
+        sums
     }
 
-    fn joined(&self, sums: &Sums, span_s: f64) -> Turn {
+    fn add(&mut self, instructions: Instructions, rows: &[StepRow], rate: &Rate) {
+        // Stamps with errors let the rate's change over every step count, lost samples that over some.
+        let is_jumpy =
+            rate.var_time > 0.0 || rows.iter().any(|row| row.h.iter().any(|&h| h > rate.gap_s));
+        add_steps(instructions, rows, rate, is_jumpy, self);
+    }
+
+    fn joined(&self, span_s: f64, duration_s: f64) -> Turn {
         let mut rotation = Matrix3::identity();
         let mut wrt_scale = WrtScale::zeros();
         let mut wrt_bias = [Matrix3::zeros(); 3];
@@ -161,15 +226,15 @@ impl Steps {
             let back = rotation.transpose();
             wrt_scale += back
                 * SMatrix::<f64, 3, 9>::from_row_slice(
-                    sums.wrt_scale.map(|row| row[lane]).as_slice(),
+                    self.wrt_scale.map(|row| row[lane]).as_slice(),
                 );
-            for (sum, part) in wrt_bias.iter_mut().zip(&sums.wrt_bias) {
+            for (sum, part) in wrt_bias.iter_mut().zip(&self.wrt_bias) {
                 *sum += back * Matrix3::from_row_slice(part.map(|row| row[lane]).as_slice());
             }
-            let [xx, xy, xz, yy, yz, zz] = sums.cov.map(|row| row[lane]);
+            let [xx, xy, xz, yy, yz, zz] = self.cov.map(|row| row[lane]);
             cov_noise += back * Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * rotation;
             rotation =
-                Matrix3::from_row_slice(sums.rotation.map(|row| row[lane]).as_slice()) * rotation;
+                Matrix3::from_row_slice(self.rotation.map(|row| row[lane]).as_slice()) * rotation;
         }
         let [whole, late, slope] = wrt_bias;
         Turn {
@@ -178,7 +243,7 @@ impl Steps {
             wrt_bias_before: whole - late - slope / span_s,
             wrt_bias_after: late + slope / span_s,
             cov_noise,
-            duration_s: self.duration_s(),
+            duration_s,
         }
     }
 }

@@ -83,7 +83,7 @@ pub(super) fn kalman_least_squares(
     let out = run(py, || {
         Ok(least_squares::recursive(&poses, variance, &mean, &sigma))
     })?;
-    Ok((rows4(py, &out.constants)?, rows4(py, &out.sigma)?))
+    Ok((rows4(py, out.constants)?, rows4(py, out.sigma)?))
 }
 
 type Generalised = (
@@ -116,7 +116,7 @@ pub(super) fn kalman_generalised_least_squares(
         matrix(py, &ordinary.covariance)?.unbind(),
         generalised.constants.to_pyarray(py).unbind(),
         matrix(py, &generalised.covariance)?.unbind(),
-        rows4(py, &recursion.constants)?,
-        rows4(py, &recursion.sigma)?,
+        rows4(py, recursion.constants)?,
+        rows4(py, recursion.sigma)?,
     ))
 }

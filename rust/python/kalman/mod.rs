@@ -3,7 +3,7 @@
 mod least_squares;
 mod poses;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -48,11 +48,12 @@ fn four(name: &str, array: &PyReadonlyArray1<'_, f64>) -> PyResult<[f64; N_CONST
     })
 }
 
-fn rows4(py: Python<'_>, rows: &[[f64; N_CONSTANTS]]) -> PyResult<Py<PyArray2<f64>>> {
-    let flat: Vec<f64> = rows.iter().flatten().copied().collect();
-    Ok(flat
-        .to_pyarray(py)
-        .reshape([rows.len(), N_CONSTANTS])?
+fn rows4(py: Python<'_>, rows: Vec<[f64; N_CONSTANTS]>) -> PyResult<Py<PyArray2<f64>>> {
+    let n = rows.len();
+    Ok(rows
+        .into_flattened()
+        .into_pyarray(py)
+        .reshape([n, N_CONSTANTS])?
         .unbind())
 }
 
@@ -255,15 +256,15 @@ fn kalman_track(
 ) -> PyResult<Track> {
     let (model, prior, poses) = (&model.inner, &start.prior, &poses.poses);
     let out = super::run_long(py, || axis::track(model, prior, poses))?;
-    let column = |values: Vec<f64>| values.to_pyarray(py).unbind();
+    let column = |values: Vec<f64>| values.into_pyarray(py).unbind();
     Ok((
-        rows4(py, &out.constants)?,
-        rows4(py, &out.sigma)?,
+        rows4(py, out.constants)?,
+        rows4(py, out.sigma)?,
         matrix(py, &out.covariance)?.unbind(),
-        column(out.steps.iter().map(|s| s.innovation).collect()),
-        column(out.steps.iter().map(|s| s.innovation_variance).collect()),
-        column(out.drift.iter().map(|d| d.0).collect()),
-        column(out.drift.iter().map(|d| d.1).collect()),
+        column(out.innovation),
+        column(out.innovation_variance),
+        column(out.drift),
+        column(out.drift_sigma),
     ))
 }
 
@@ -284,10 +285,10 @@ fn kalman_smooth(
 ) -> PyResult<SmoothedArrays> {
     let (model, prior, poses) = (&model.inner, &start.prior, &poses.poses);
     let out = super::run_long(py, || smoother::smooth(model, prior, poses))?;
-    let column = |values: Vec<f64>| values.to_pyarray(py).unbind();
+    let column = |values: Vec<f64>| values.into_pyarray(py).unbind();
     Ok((
-        rows4(py, &out.constants)?,
-        rows4(py, &out.sigma)?,
+        rows4(py, out.constants)?,
+        rows4(py, out.sigma)?,
         column(out.drift.iter().map(|d| d.0).collect()),
         column(out.drift.iter().map(|d| d.1).collect()),
     ))

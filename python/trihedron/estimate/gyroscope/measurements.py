@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron import _core
 from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
@@ -94,19 +95,12 @@ def rate_noise_density(recording: Recording, segments: Segments) -> FloatArray:
     """
     gyroscope = _required(recording.gyroscope, "gyroscope")
     step_s = 1.0 / recording.rate_hz
-    sums = np.zeros(3)
-    count = 0
-    for hold in segments.holds:
-        block = gyroscope[hold.samples()]
-        block = block[np.all(np.isfinite(block), axis=1)]
-        length = min(max(1, round(BLOCK_S / step_s)), len(block) // 4)
-        if length < 1:
-            continue
-        n = len(block) // length
-        means = block[: n * length].reshape(n, length, 3).mean(axis=1)
-        difference = np.diff(means, axis=0)
-        sums += 0.5 * np.sum(difference**2, axis=0) * length * step_s
-        count += n - 1
+    kept = [(k, *part) for k, hold in enumerate(segments.holds) for part in hold.undisturbed()]
+    owner, *edges = np.array(kept, dtype=np.int64).reshape(-1, 3).T
+    squares, count = _core.block_differences(
+        gyroscope, np.column_stack(edges), np.ascontiguousarray(owner), max(1, round(BLOCK_S / step_s))
+    )
+    sums = np.array(squares) * step_s
     if count < 8 and segments.gyroscope_sigma is not None:
         variance = np.asarray(segments.gyroscope_sigma) ** 2 * step_s
     elif count:

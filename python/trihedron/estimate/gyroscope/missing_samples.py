@@ -60,13 +60,14 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     is_gap = ~(np.abs(np.diff(recording.time_s) - step_s) < 0.4 * step_s)
     is_gap |= ~np.isfinite(readings[1:]).all(axis=1) | ~np.isfinite(readings[:-1]).all(axis=1)
     is_cut = np.convolve(is_gap, np.ones(2 * HALF_WINDOW + 1), mode="same") > 0.5
+    readings = np.nan_to_num(readings)
     n, n_short, long_steps = 0, 0, []
     for move in segments.moves:
         first = max(move.start, HALF_WINDOW)
         last = min(move.stop, recording.n_samples - HALF_WINDOW - 1)
         if last - first < 2 * HALF_WINDOW:
             continue
-        found = _steps(np.nan_to_num(readings[first - HALF_WINDOW : last + HALF_WINDOW + 1]))
+        found = _steps(readings[first - HALF_WINDOW : last + HALF_WINDOW + 1])
         is_known = ~is_cut[first:last]
         n += int(np.count_nonzero(found.is_sharp & is_known))
         n_short += int(np.count_nonzero(found.is_short & is_known))

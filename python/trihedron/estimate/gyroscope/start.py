@@ -32,15 +32,11 @@ def integral_start(
         keep = np.all(np.isfinite(rate) & np.isfinite(inside), axis=1)
         if clipped or np.count_nonzero(keep) < 2:
             continue
+        if not keep.all():
+            time, inside, rate = time[keep], inside[keep], rate[keep]
         # ∂([f]× S w)/∂S_ij = f × e_i w_j, integrated by trapezoids.
-        product = inside[keep][:, :, None] * rate[keep][:, None, :]
-        moment = _trapezoid(product, time[keep])
-        row = np.zeros((3, 3, 3))
-        for i in range(3):
-            unit = np.zeros(3)
-            unit[i] = 1.0
-            row[:, i, :] = -_cross_matrix(unit) @ moment
-        rows.append(row.reshape(3, 9))
+        moment = (inside * _trapezoid_weights(time)[:, None]).T @ rate
+        rows.append(np.moveaxis(_ACROSS @ moment, 0, 1).reshape(3, 9))
         sides.append(force[:, after] - force[:, before])
     if len(rows) < 3:
         return None
@@ -82,11 +78,15 @@ def starts(
     return np.ascontiguousarray(np.stack(found))
 
 
-def _trapezoid(values: FloatArray, time: FloatArray) -> FloatArray:
-    widths = np.diff(time)[:, None, None]
-    total: FloatArray = np.sum(0.5 * (values[1:] + values[:-1]) * widths, axis=0)
-    return total
+def _trapezoid_weights(time: FloatArray) -> FloatArray:
+    half = 0.5 * np.diff(time)
+    weights = np.zeros(len(time))
+    weights[1:] += half
+    weights[:-1] += half
+    return weights
 
 
-def _cross_matrix(v: FloatArray) -> FloatArray:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+_ACROSS = np.array(
+    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]]
+)
+"""(3, 3, 3) what ``f`` is multiplied by in ``f × e_i``, for every i."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
@@ -76,19 +77,36 @@ def _joined(rows: list[str], numbers: list[int]) -> Rewritten:
 
 def _prefix_of(lines: list[str]) -> re.Pattern[str] | None:
     filled = [line for line in lines[:_SAMPLE_LINES] if line.strip()]
-    for pattern in _PREFIXES:
-        if len(filled) >= 3 and sum(bool(pattern.match(line)) for line in filled) >= NEARLY_ALL * len(filled):
-            return pattern
-    return None
+    if len(filled) < 3:
+        return None
+    return next((pattern for pattern in _PREFIXES if _nearly_all(pattern, filled)), None)
+
+
+def _nearly_all(pattern: re.Pattern[str], lines: list[str]) -> bool:
+    """Nearly all lines begin so; a log of another kind is told by its first few."""
+    left = len(lines)
+    for line in lines:
+        left -= pattern.match(line) is None
+        if left < NEARLY_ALL * len(lines):
+            return False
+    return True
 
 
 def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[int]] | None:
     """(names, rows of values, line of each row) of lines such as ``ax: 0.1, ay: 0.2``, or of groups of such lines."""
-    filled = [(i, line) for i, line in enumerate(lines, start=1) if line.strip()]
-    sample = [_PAIR.findall(line) for _, line in filled[:_SAMPLE_LINES]]
-    signatures = [tuple(label for label, _, _ in pairs) for pairs in sample]
-    if sum(len(s) >= 1 for s in signatures) < max(3.0, NEARLY_ALL * len(signatures)):
+    every = ((i, line) for i, line in enumerate(lines, start=1) if line.strip())
+    filled = list(islice(every, _SAMPLE_LINES))
+    signatures: list[tuple[str, ...]] = []
+    left = len(filled)
+    if not filled:
         return None
+    for _, line in filled:
+        signatures.append(tuple(label for label, _, _ in _PAIR.findall(line)))
+        left -= not signatures[-1]
+        # Most logs are no such text, which their first lines tell.
+        if left < max(3.0, NEARLY_ALL * len(filled)):
+            return None
+    filled += every
     period = _period([s for s in signatures if s])
     if period is None:
         return None

@@ -58,8 +58,10 @@ def is_comment(line: str) -> bool:
 
 def split(line: str, separator: str) -> list[str]:
     """Fields without surrounding blanks and quotes."""
-    fields = line.split() if separator == " " else line.split(separator)
-    return [f.strip().strip('"').strip() for f in fields]
+    if '"' in line:
+        fields = line.split() if separator == " " else line.split(separator)
+        return [f.strip().strip('"').strip() for f in fields]
+    return line.split() if separator == " " else [f.strip() for f in line.split(separator)]
 
 
 def is_number(text: str, decimal_comma: bool) -> bool:
@@ -94,13 +96,18 @@ def _judge(lines: list[str], separator: str, decimal_comma: bool) -> tuple[float
 
 def detect(text: str) -> Layout | None:
     """Layout of a text log from its first lines, or None where no line of numbers is found."""
-    lines = [line.strip("\r") for line in text.split("\n")]
+    lines = [line.strip("\r") for line in text.split("\n")] if "\r" in text else text.split("\n")
     tail = _from_the_end(lines)
     candidates = [(",", False), ("\t", False), (";", False), (" ", False), (";", True), ("\t", True), (" ", True)]
     # Separators that no line holds all explain the lines alike.
     found = {(sep, comma): sep if any(sep in line for line in tail) else "\0" for sep, comma in candidates}
-    scores = {key: _judge(tail, *key) for key in {(found[key], key[1]) for key in candidates}}
-    judged = [(scores[found[key], key[1]], -i, *key) for i, key in enumerate(candidates)]
+    scores: dict[tuple[str, bool], tuple[float, int]] = {}
+    # Those that occur first: one that explains every line is beaten by none, and one that does not occur never does.
+    for key in sorted(dict.fromkeys((found[key], key[1]) for key in candidates), key=lambda key: key[0] == "\0"):
+        scores[key] = _judge(tail, *key)
+        if scores[key][0] == 1.0:
+            break
+    judged = [(scores.get((found[key], key[1]), (0.0, 0)), -i, *key) for i, key in enumerate(candidates)]
     (score, n_fields), _, separator, decimal_comma = max(judged, key=lambda j: (j[0][0], j[1]))
     if score <= 0.0:
         return None
@@ -137,7 +144,8 @@ def detect(text: str) -> Layout | None:
 
 def _from_the_end(lines: list[str]) -> list[str]:
     """The last 200 of the second half of the lines that are neither blank nor remarks."""
-    bodies = (line.strip(" ") for line in reversed(lines) if line.strip() and not is_comment(line.strip()))
+    stripped = ((line, line.strip()) for line in reversed(lines))
+    bodies = (line.strip(" ") for line, plain in stripped if plain and not is_comment(plain))
     body = list(islice(bodies, 2 * _JUDGED))[::-1]
     return body[len(body) // 2 :]
 

@@ -45,7 +45,8 @@ def split_records(text: str) -> tuple[dict[str, Rewritten], Counter[str]] | None
 
 def _separator(lines: list[str]) -> str | None:
     """What follows the first word of lines of three numbers or more; None where most lines have no such word."""
-    if sum(line[:1].isalpha() or line[:1] in "$_" for line in lines) < max(4.0, 0.3 * len(lines)):
+    first = [line[:1] for line in lines]
+    if sum(map(str.isalpha, first)) + sum(map(first.count, ("$", "_", ""))) < max(4.0, 0.3 * len(lines)):
         return None
     for separator in (",", ";", "\t", " "):
         rows = [split(line, separator) for line in lines if line.strip() and not line.startswith(("#", "%"))]

@@ -1,0 +1,105 @@
+//! Means and noise over ranges of rows across the seam.
+
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::arrays::{as_rows, flat1, flat3, rows};
+use crate::ranges;
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(means_by_owner, module)?)?;
+    module.add_function(wrap_pyfunction!(block_differences, module)?)
+}
+
+/// Ranges `(k, 2)` of `n` rows.
+pub(super) fn ranges_within(
+    given: &PyReadonlyArray2<'_, i64>,
+    n: usize,
+) -> PyResult<Vec<[usize; 2]>> {
+    let wrong = || PyValueError::new_err(format!("ranges (k, 2) must lie within the {n} rows"));
+    if given.shape()[1] != 2 {
+        return Err(wrong());
+    }
+    let edge = |value: i64| {
+        usize::try_from(value)
+            .ok()
+            .filter(|&value| value <= n)
+            .ok_or_else(wrong)
+    };
+    given
+        .as_array()
+        .rows()
+        .into_iter()
+        .map(|row| {
+            let (start, stop) = (edge(row[0])?, edge(row[1])?);
+            if start <= stop {
+                Ok([start, stop])
+            } else {
+                Err(wrong())
+            }
+        })
+        .collect()
+}
+
+/// Owners `(k,)` of as many ranges, below `n`.
+fn owners(given: &PyReadonlyArray1<'_, i64>, k: usize, n: usize) -> PyResult<Vec<usize>> {
+    let owner: Vec<usize> = flat1(given)
+        .iter()
+        .filter_map(|&one| usize::try_from(one).ok().filter(|&one| one < n))
+        .collect();
+    if owner.len() == k && given.len() == k {
+        Ok(owner)
+    } else {
+        Err(PyValueError::new_err("every range has one owner below n"))
+    }
+}
+
+/// `(n, 3)` means of readings `(m, 3)` over ranges `(k, 2)` by `owner` `(k,)`, and the `(n,)` rows in each.
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+fn means_by_owner<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    ranges: PyReadonlyArray2<'py, i64>,
+    owner: PyReadonlyArray1<'py, i64>,
+    n: usize,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i64>>)> {
+    let readings = flat3("readings", &readings)?;
+    let ranges = ranges_within(&ranges, readings.len() / 3)?;
+    let owner = owners(&owner, ranges.len(), n)?;
+    let (means, counts) = super::run(py, || {
+        Ok(ranges::means_by_owner(
+            as_rows(&readings),
+            &ranges,
+            &owner,
+            n,
+        ))
+    })?;
+    let counts = counts
+        .into_iter()
+        .filter_map(|k| i64::try_from(k).ok())
+        .collect();
+    Ok((
+        rows(py, means.as_flattened(), 3)?,
+        PyArray1::from_vec(py, counts),
+    ))
+}
+
+/// `(3,)` sums over blocks of `length` rows, and how many differences there were.
+#[pyfunction]
+fn block_differences(
+    py: Python<'_>,
+    readings: PyReadonlyArray2<'_, f64>,
+    ranges: PyReadonlyArray2<'_, i64>,
+    owner: PyReadonlyArray1<'_, i64>,
+    length: usize,
+) -> PyResult<([f64; 3], usize)> {
+    let readings = flat3("readings", &readings)?;
+    let ranges = ranges_within(&ranges, readings.len() / 3)?;
+    let owner = owners(&owner, ranges.len(), usize::MAX)?;
+    super::run(py, || {
+        let rows = as_rows(&readings);
+        Ok(ranges::block_differences(rows, &ranges, &owner, length))
+    })
+}

@@ -1,0 +1,107 @@
+//! Means and noise of readings over ranges of rows: what a log of still poses is asked for again and again.
+
+type Row = [f64; 3];
+
+fn is_number(row: &Row) -> bool {
+    row.iter().all(|value| value.is_finite())
+}
+
+/// Means of rows by owner, `n` of them, with their numbers of rows: range `k` belongs to `owner[k]`. Rows with a missing
+/// reading count as none; an owner without rows has no mean (NaN). Sums are about the first row: an offset costs no digits.
+#[must_use]
+pub fn means_by_owner(
+    rows: &[Row],
+    ranges: &[[usize; 2]],
+    owner: &[usize],
+    n: usize,
+) -> (Vec<Row>, Vec<usize>) {
+    let mut about: Vec<Option<Row>> = vec![None; n];
+    let (mut total, mut count) = (vec![[0.0; 3]; n], vec![0; n]);
+    for (&[start, stop], &k) in ranges.iter().zip(owner) {
+        for row in rows[start..stop].iter().filter(|row| is_number(row)) {
+            let first = about[k].get_or_insert(*row);
+            for c in 0..3 {
+                total[k][c] += row[c] - first[c];
+            }
+            count[k] += 1;
+        }
+    }
+    let mean = |k: usize| {
+        about[k].map_or([f64::NAN; 3], |first| {
+            std::array::from_fn(|c| first[c] + total[k][c] / count[k] as f64)
+        })
+    };
+    ((0..n).map(mean).collect(), count)
+}
+
+/// `Σ ½ (difference of neighbouring block means)² · rows in a block`, and the number of differences: blocks of `length`
+/// rows that are numbers, or of a quarter of the rows of an owner that has fewer than four of those. Ranges of one owner
+/// stand side by side and are read as one.
+#[must_use]
+pub fn block_differences(
+    rows: &[Row],
+    ranges: &[[usize; 2]],
+    owner: &[usize],
+    length: usize,
+) -> (Row, usize) {
+    let (mut sum, mut n) = ([0.0; 3], 0);
+    let mut kept: Vec<Row> = Vec::new();
+    for (k, &[start, stop]) in ranges.iter().enumerate() {
+        kept.extend(rows[start..stop].iter().filter(|row| is_number(row)));
+        if owner.get(k + 1) == Some(&owner[k]) {
+            continue;
+        }
+        let length = length.max(1).min(kept.len() / 4);
+        let mut before: Option<Row> = None;
+        if length == 0 {
+            kept.clear();
+            continue;
+        }
+        for block in kept.chunks_exact(length) {
+            let about = block[0];
+            let mean: Row = std::array::from_fn(|c| {
+                let sum: f64 = block.iter().map(|row| row[c] - about[c]).sum();
+                about[c] + sum / length as f64
+            });
+            if let Some(before) = before {
+                for c in 0..3 {
+                    sum[c] += 0.5 * (mean[c] - before[c]).powi(2) * length as f64;
+                }
+                n += 1;
+            }
+            before = Some(mean);
+        }
+        kept.clear();
+    }
+    (sum, n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{block_differences, means_by_owner};
+
+    #[test]
+    fn rows_with_a_missing_reading_belong_to_no_mean() {
+        let rows = [[1.0, 2.0, 3.0], [f64::NAN, 0.0, 0.0], [3.0, 4.0, 8.0]];
+        let (mean, count) = means_by_owner(&rows, &[[0, 2], [2, 3]], &[0, 0], 2);
+        assert_eq!((mean[0], count[0]), ([2.0, 3.0, 5.5], 2));
+        assert!(mean[1][0].is_nan() && count[1] == 0);
+    }
+
+    #[test]
+    fn neighbouring_blocks_differ_by_what_their_means_do() {
+        let rows: Vec<[f64; 3]> = (0..8).map(|k| [f64::from(k), 1.0, 0.0]).collect();
+        // Means 0.5, 2.5, 4.5, 6.5: three differences of 2, each ½ 2² times two rows.
+        let as_one = ([12.0, 0.0, 0.0], 3);
+        assert_eq!(block_differences(&rows, &[[0, 8]], &[0], 2), as_one);
+        assert_eq!(
+            block_differences(&rows, &[[0, 3], [3, 8]], &[4, 4], 2),
+            as_one
+        );
+        // Three rows are no four blocks, nor are those of two owners together.
+        assert_eq!(
+            block_differences(&rows, &[[0, 3], [3, 6]], &[0, 1], 2),
+            ([0.0; 3], 0)
+        );
+    }
+}
