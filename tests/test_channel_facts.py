@@ -231,6 +231,7 @@ def test_limits_are_decided_in_one_room_and_read_by_all_others():
     assert {name for name in outside if not name.startswith(("channel_facts/", "records/"))} == {
         "read/audit/readings.py",
         "segment/recording.py",
+        "estimate/gyroscope/aligned_moves.py",
         "estimate/gyroscope/clipping.py",
         "estimate/noise/screening.py",
         "diagnose/effects/plateaus.py",

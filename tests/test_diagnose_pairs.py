@@ -99,11 +99,11 @@ def test_a_drift_that_scatter_spoils_is_named_beside_it_and_before_it():
 def test_a_step_that_one_axis_alone_seems_to_have_is_no_converters():
     def axes(*steps):
         white = Measured(1e-4, 0.98e-4, 1.02e-4, 0.01)
-        return tuple(HoldNoise(axis, "rad/s", 100.0, 20, 9000, white, step, (), (), None, 50.0, 0.0)
+        return tuple(HoldNoise(axis, "rad/s", 100.0, 20, 9000, white, 1e-3, step, (), (), None, 50.0, 0.0)
                      for axis, step in zip("xyz", steps, strict=True))  # fmt: skip
 
     def said(model, recording):
-        sides = [Sampled({"gyroscope": one}, {"gyroscope": np.zeros(3)}, {"gyroscope": 100}, 100.0, 0.0)
+        sides = [Sampled({"gyroscope": one}, {"gyroscope": np.zeros(3)}, {"gyroscope": 100}, {"gyroscope": 0.0}, 100.0, 0.0)
                  for one in (model, recording)]  # fmt: skip
         rows = compare_noise(*sides, alpha=0.01)
         return [row.axis for row in rows if row.term == "resolution" and row.significant]

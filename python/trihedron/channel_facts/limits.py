@@ -43,7 +43,11 @@ def find_limits(readings: FloatArray, noise: FloatArray, step: FloatArray) -> tu
     found += [end for end in crowded_together(ends) if end not in found]
     # Channels of one part that come as far end there too, be it for a single reading.
     found += [end for end in ends if end not in found and any(_is_same_code(end, other) for other in found)]
-    return tuple(Limit(end.axis, end.value, end.is_high, end.runs) for end in ends if end in found)
+    return tuple(
+        Limit(end.axis, end.value, end.is_high, end.runs, is_word=is_end_of_word(end.value, end.step))
+        for end in ends
+        if end in found
+    )
 
 
 def share_at_limits(readings: FloatArray, noise: float, step: float) -> float:

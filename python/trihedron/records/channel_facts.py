@@ -16,13 +16,15 @@ SAME_STEP = 0.02
 @dataclass(frozen=True, eq=False)
 class Limit(Frozen):
     """One channel's end of range: ``value`` in raw units and its standard error ``sigma``, 0 where readings show it
-    exactly; ``runs`` (k, 2) of readings that lie there, the first sample of each and the one behind its last."""
+    exactly; ``runs`` (k, 2) of readings that lie there, the first sample of each and the one behind its last.
+    ``is_word``: the value is the code at the end of a converter's word."""
 
     axis: int
     value: float
     is_high: bool
     runs: IntArray
     sigma: float = 0.0
+    is_word: bool = False
 
     @property
     def count(self) -> int:

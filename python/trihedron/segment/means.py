@@ -65,7 +65,8 @@ def _sample_means(triads: list[FloatArray], holds: tuple[Hold, ...]) -> tuple[Fl
     owner, begins, ends = np.array(parts, dtype=np.int64).reshape(-1, 3).T.copy()
     spans = np.column_stack([begins, ends])
     n_rows = np.bincount(owner, spans[:, 1] - spans[:, 0], len(holds)).astype(np.int64)
-    if all(a.flags.c_contiguous and a.dtype == np.float64 for a in triads):
+    # A log on disk stands for its arrays, and is read in parts.
+    if all(isinstance(a, np.ndarray) and a.flags.c_contiguous and a.dtype == np.float64 for a in triads):
         found = [_core.means_by_owner(a, spans, owner, len(holds)) for a in triads]
         if all(np.array_equal(count, n_rows) for _, count in found):
             return np.hstack([means for means, _ in found]), n_rows

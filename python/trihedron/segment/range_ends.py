@@ -19,8 +19,11 @@ USUALLY_STILL = 0.1
 """Quantile of a log's windows whose scatter stands for the noise before stillness is found."""
 NEAR = 4.0
 """Standard deviations of the noise from the end within which readings are cut, and look quieter than they are."""
-MOST_OF_A_LOG = 0.5
-"""A channel that gives one code for longer than this is one whose noise is below its step: nothing is cut."""
+ELSEWHERE = 0.1
+"""Blocks of one code away from the ends, over those at them, beyond which a channel's noise is below its step (that of
+a simulation, none at all) wherever it rests: nothing is cut."""
+SELDOM = 0.1
+"""Share of a log inside the range below which a channel's quiet windows are not told from its loud ones."""
 TELLS_CODES_APART = 0.6
 """Noise over step from which a reading never keeps one code by itself: half a second of it has at least two codes with
 all but one chance in a billion."""
@@ -52,23 +55,25 @@ def range_ends(channels: Channels, limits: Sequence[tuple[int, Limit]] = ()) -> 
     valid = channels.is_valid
     constant = valid[:, None] & (channels.variance <= CONSTANT * channels.quantisation_variance)
     known = {(c, 1 if limit.is_high else -1): limit.value for c, limit in limits}
-    resting = constant.sum(axis=0)
     out: list[RangeEnd] = []
-    for c in range(channels.mean.shape[1]):
-        is_known = any(of == c for of, _ in known)
-        if not (is_known or WINDOW_BLOCKS <= resting[c] <= MOST_OF_A_LOG * valid.sum()):
+    # A gyro at rest is at no end of its range.
+    for c in np.flatnonzero(~channels.is_gyroscope).tolist():
+        if constant[:, c].sum() < WINDOW_BLOCKS and not any(of == c for of, _ in known):
             continue
         noise = _usual_noise(channels, c)
-        if noise == 0.0:
-            continue
         step, rounding = float(channels.quantum[c]), float(channels.quantisation_variance[c])
+        ends = {side: known.get((c, side), side * float(np.max(side * channels.mean[valid, c]))) for side in (1, -1)}
+        at = {side: constant[:, c] & (side * (channels.mean[:, c] - ends[side]) >= -0.5 * step) for side in ends}
+        n_at = int((at[1] | at[-1]).sum())
+        if noise == 0.0 or constant[:, c].sum() - n_at > ELSEWHERE * n_at:
+            continue
         margin = max(NEAR * float(np.sqrt(noise)), step)
         is_certain = noise - rounding > (TELLS_CODES_APART * step) ** 2
-        for side in (1, -1):
-            end = known.get((c, side), side * float(np.max(side * channels.mean[valid, c])))
-            at_end = constant[:, c] & (side * (channels.mean[:, c] - end) >= -0.5 * step)
-            if (c, side) in known or at_end.sum() >= WINDOW_BLOCKS:
-                out.append(RangeEnd(c, side, end, margin, is_certain))
+        out += [
+            RangeEnd(c, side, ends[side], margin, is_certain)
+            for side in ends
+            if (c, side) in known or at[side].sum() >= WINDOW_BLOCKS
+        ]
     return tuple(out)
 
 
@@ -91,6 +96,8 @@ def inside_the_range(channels: Channels, ends: Sequence[RangeEnd]) -> BoolArray:
         reading = np.where(channels.is_valid, end.side * channels.mean[:, end.channel], -np.inf)
         near = (reading >= end.side * end.reading - end.margin)[:, None].astype(np.float64)
         inside[:, end.channel] &= rolling_mean(near, min(WINDOW_BLOCKS, channels.n_blocks))[:, 0] == 0.0
+    # Of a channel that is hardly ever inside nothing else is known.
+    inside[:, inside.mean(axis=0) < SELDOM] = True
     return inside
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.channel_facts.limits import is_end_of_word
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align_screened
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.start import starts
@@ -27,7 +26,7 @@ def measured_and_aligned(
     """
     bridged = _measured(recording, segments, part, options, is_bridged=True)
     facts = recording.facts.of("gyroscope")
-    is_word = any(is_end_of_word(limit.value, float(facts.step[limit.axis])) for limit in facts.limits)
+    is_word = any(limit.is_word for limit in facts.limits)
     if np.any(bridged.clipped_s > 0.0) and not is_word:
         measured = _measured(recording, segments, part, options, is_bridged=False)
         plain = _aligned(recording, measured, part, gravity_m_s2, options)
