@@ -103,8 +103,8 @@ def test_a_step_that_one_axis_alone_seems_to_have_is_no_converters():
                      for axis, step in zip("xyz", steps, strict=True))  # fmt: skip
 
     def said(model, recording):
-        sides = [Sampled({"gyroscope": one}, {"gyroscope": np.zeros(3)}, {"gyroscope": 100}, {"gyroscope": 0.0}, 100.0, 0.0)
-                 for one in (model, recording)]  # fmt: skip
+        excess, count, likeness = {"gyroscope": np.zeros(3)}, {"gyroscope": 100}, {"gyroscope": 0.0}
+        sides = [Sampled({"gyroscope": one}, excess, count, likeness, 100.0, 0.0) for one in (model, recording)]
         rows = compare_noise(*sides, alpha=0.01)
         return [row.axis for row in rows if row.term == "resolution" and row.significant]
 
