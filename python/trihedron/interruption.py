@@ -52,7 +52,7 @@ def install() -> None:
 
 
 def _say_unless_interrupted(lost: sys.UnraisableHookArgs) -> None:
-    # Raised inside a callback of the interpreter, an import's lock let go, it goes nowhere: the thread ends the process.
+    # Raised inside a callback of the interpreter (a lock of imports) it goes nowhere: the thread ends the process.
     if not isinstance(lost.exc_value, Interrupted):
         sys.__unraisablehook__(lost)
 
