@@ -112,3 +112,19 @@ def test_nothing_is_said_about_an_interruption_that_was_told_to_be_ignored():
         out, err = process.communicate(timeout=60)
     assert process.returncode == 0, err
     assert out
+
+
+def test_an_interruption_inside_a_callback_of_the_interpreter_prints_no_traceback():
+    script = (
+        "import os, signal, time, weakref\n"
+        "from trihedron import interruption\n"
+        "interruption.install()\n"
+        "class Lock: pass\n"
+        "lock = Lock()\n"
+        "kept = weakref.ref(lock, lambda _: (os.kill(os.getpid(), signal.SIGINT), time.sleep(0.05)))\n"
+        "del lock\n"
+        "time.sleep(5)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=10)
+    assert done.returncode == 130
+    assert done.stderr == "trihedron: interrupted; what was not finished was not written.\n"

@@ -42,12 +42,19 @@ def install() -> None:
         # What the caller told us to ignore (nohup, a shell's background job) stays ignored.
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _raise)
+    sys.unraisablehook = _say_unless_interrupted
     if os.name != "posix":
         return
     heard, told = os.pipe()
     os.set_blocking(told, False)
     signal.set_wakeup_fd(told, warn_on_full_buffer=False)
     threading.Thread(target=_end_in_time, args=(heard,), daemon=True, name="interruption").start()
+
+
+def _say_unless_interrupted(lost: sys.UnraisableHookArgs) -> None:
+    # Raised inside a callback of the interpreter (a lock of imports) it goes nowhere: the thread ends the process.
+    if not isinstance(lost.exc_value, Interrupted):
+        sys.__unraisablehook__(lost)
 
 
 def _raise(number: int, _frame: FrameType | None) -> None:
