@@ -199,7 +199,7 @@ def _weighed(moves: _Moves, by: _Weighed, shrunk: float, n: int) -> _Weighed:
         rows = left.transpose(1, 0, 2).reshape(moves.n_shapes, -1)
         covariance = (rows * np.repeat(by.weight, 3)) @ rows.T / (3.0 * len(left))
         mean = float(np.trace(covariance)) / moves.n_shapes
-        shapes: FloatArray = np.linalg.inv(covariance + shrunk * mean * np.eye(moves.n_shapes))
+        shapes = np.asarray(np.linalg.inv(covariance + shrunk * mean * np.eye(moves.n_shapes)), np.float64)
         squares = _squares(left, shapes)
         weight = 1.0 / np.maximum(squares, QUIETEST * float(np.median(squares)))
         by = _Weighed(by.value, shapes, weight / weight.mean())
