@@ -164,6 +164,7 @@ def _describe(
         np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in holds], dtype=np.float64),
         np.array([time_s[h.stop - 1] - time_s[h.start] + 1.0 / recording.rate_hz for h in holds], dtype=np.float64),
         tuple(findings),
+        (means.up, means.sigma_up),
     )
 
 
@@ -212,6 +213,7 @@ def _assemble(
     time_mid_s: FloatArray,
     duration_s: FloatArray,
     findings: tuple[Finding, ...],
+    vertical: tuple[FloatArray | None, FloatArray | None] = (None, None),
 ) -> Segments:
     """Channels back to sensors."""
     accelerometer = slice(0, 3) if recording.accelerometer is not None else None
@@ -235,4 +237,6 @@ def _assemble(
         time_mid_s=time_mid_s,
         duration_s=duration_s,
         findings=findings,
+        accelerometer_up=vertical[0],
+        accelerometer_sigma_up=vertical[1],
     )

@@ -70,7 +70,11 @@ class HiddenDrift(DirectEffect):
         return "fewer than six still poses" if context.obs.n_holds < FEWEST_HOLDS else None
 
     def variants(self, context: Context) -> list[Variant]:
-        return drift_variants(context, self.on_axes(context), self.only, self.unit)
+        return drift_variants(context, self.on_axes(context), self.only, self.unit, self.n_waves(context.obs.n_holds))
+
+    def n_waves(self, n_poses: int) -> int:  # noqa: ARG002
+        """Cosines per axis that so many poses tell."""
+        return 4
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
         if variant.label != "warm-up":

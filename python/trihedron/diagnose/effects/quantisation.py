@@ -222,6 +222,10 @@ def _scale_of(context: Context, channel: int) -> tuple[float, float]:
     return float(scale), sigma / abs(float(S[k, k]))
 
 
+LEAST_LEFT = 0.01
+"""Share of a mean's variance that stays, at least, once its codes are resolved."""
+
+
 def _resolved(obs: Observations, one: Lattice) -> Observations:
     """Observations with one channel's hold means and noise as the codes truly tell them."""
     is_accel = one.channel < 3
@@ -234,5 +238,11 @@ def _resolved(obs: Observations, one: Lattice) -> Observations:
     # In motion the staircase is crossed all the time: its error is white, a twelfth of a step squared per reading.
     density[k] = np.sqrt((one.sigma**2 + one.step**2 / 12.0) / obs.recording.rate_hz)
     if is_accel:
-        return replace(obs, hold_force=mean, hold_force_sigma=sigma, force_density=density)
+        along = obs.force_up
+        if along is not None:
+            # The vertical's share of what the codes change.
+            up, error = along
+            changed = up[:, k] ** 2 * (sigma[:, k] ** 2 - obs.hold_force_sigma[:, k] ** 2)
+            along = up, np.sqrt(np.maximum(error**2 + changed, LEAST_LEFT * error**2))
+        return replace(obs, hold_force=mean, hold_force_sigma=sigma, force_density=density, force_up=along)
     return replace(obs, hold_rate=mean, hold_rate_sigma=sigma, rate_density=density)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtri, fdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
@@ -34,8 +35,10 @@ from trihedron.diagnose.session.twin import (
 )
 from trihedron.records.domains import HeldOut
 
+LEAST_P = 1e-300
 VISIBLE = 0.98
 """An effect must lower the held-out misfit of some domain by at least this factor to be worth a name."""
+AT_REST = (STATIC_ACCEL, STATIC_GYRO)
 OF_ACCELEROMETER = (STATIC_ACCEL, DYNAMICS)
 OF_GYROSCOPE = (STATIC_GYRO, MOVES, DYNAMICS)
 """Domains in which a flaw of one sensor must show: velocity needs both, a tilted force being half of it."""
@@ -139,8 +142,33 @@ class Comparison:
         return self.gain_at(stays) - self.cost
 
     def gain_at(self, stays: FloatArray) -> float:
-        """Likelihood gain with each domain's drop of chi-square over the dispersion ``stays``."""
-        return min(self.likelihood_gain, self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum()))
+        """Likelihood gain with each domain's drop of chi-square over the dispersion ``stays``, poses' lengths by F."""
+        # What walks that were tuned anew gain is of the poses too, and counts by their dispersion.
+        tuned = self.likelihood_gain - float(self.drop.sum())
+        at_rest = max(float(stays[d]) for d in own_domains(self.variant.distortion) if d in AT_REST)
+        gain = self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum())
+        gain -= max(tuned, 0.0) * (1.0 - 1.0 / at_rest)
+        return min(self.likelihood_gain, gain) - self._of_few(max(float((self.drop / stays)[STATIC_ACCEL]), 0.0))
+
+    def _of_few(self, drop: float) -> float:
+        """What a fall of chi-square of the poses' lengths is not worth, their scatter being known from few.
+
+        A zero that is another in every pose explains any lengths with one number, its size. Against that rival a fall
+        is a ratio of variances: F with the degrees of freedom that stay, and counts as the chi-square that is as rare.
+        """
+        if self.variant.distortion.force is None or drop <= 0.0:
+            return 0.0
+        k, dof = float(self.n_new), float(self.dof[STATIC_ACCEL])
+        if dof <= 0.0:
+            return drop
+        rare = float(fdtrc(k, dof, drop / k))
+        return max(drop - float(chdtri(k, max(rare, LEAST_P))), 0.0)
+
+    @cached_property
+    def dof(self) -> FloatArray:
+        """(domains,) degrees of freedom that stay with the effect."""
+        free = 1.0 - leverage(self.fitted)
+        return np.array([float(free[self.fitted.system.domain == d].sum()) for d in range(N_DOMAINS)])
 
     @property
     def predicts(self) -> bool:
