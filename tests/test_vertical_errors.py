@@ -1,6 +1,7 @@
 """Only the error along the vertical enters |f|: a support that gives does not hide the accelerometer."""
 
 import numpy as np
+import pytest
 
 import trihedron
 from trihedron import _core
@@ -86,12 +87,8 @@ def test_errors_along_a_gradient_are_the_verticals_own_and_the_axes_across():
 
 def test_poses_refuse_fewer_verticals_than_poses():
     three, one = np.ones((3, 3)), np.ones(3)
-    try:
+    with pytest.raises(ValueError, match="3 poses"):
         _core.SessionPoses(
             time_s=np.arange(3.0), force=three, force_sigma=three, force_density=one, rate=None, rate_sigma=None,
             rate_density=None, force_along=(np.ones((2, 3)), np.ones(2)),
         )  # fmt: skip
-    except ValueError as error:
-        assert "3 poses" in str(error)
-    else:
-        raise AssertionError("two verticals of three poses were taken")

@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.residuals.within_holds import MIN_LINE_SHARE, find_lines
+from trihedron.diagnose.residuals.within_holds import find_lines
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 
@@ -22,8 +22,9 @@ class PeriodicInterference(DirectEffect):
         lines = find_lines(context.obs)
         if not lines:
             return None
-        # Long holds resolve lines a hundredth of the noise high. What counts is what it adds to readings not yet seen.
-        lines = [line for line in lines if line.power_after < (1.0 - MIN_LINE_SHARE) * line.power_before]
+        # Long holds resolve lines a hundredth of the noise high: what its domain calls a disagreement has a name here,
+        # if readings not yet seen are predicted better by it.
+        lines = [line for line in lines if line.has_size and line.power_after < line.power_before]
         if not lines:
             return None
         strongest = min(lines, key=lambda line: line.p_value)

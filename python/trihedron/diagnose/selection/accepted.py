@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.selection.compare import excess
+from trihedron.diagnose.selection.excess import excess
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records.diagnosis import AcceptedEffect, EffectParameter
