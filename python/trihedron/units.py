@@ -116,6 +116,11 @@ def mrad_from_radians(angle_rad: float) -> float:
     return 1000.0 * angle_rad
 
 
+def cm_from_m(length_m: float) -> float:
+    """Centimetres from metres."""
+    return 100.0 * length_m
+
+
 def ms_from_s(time_s: float) -> float:
     """Time, s → ms."""
     return 1000.0 * time_s
