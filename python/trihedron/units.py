@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from enum import Enum
 
+from trihedron.refused import RefusedError
+
 STANDARD_GRAVITY_M_S2 = 9.80665
 """Conventional value that defines the unit ``g``. It is not the gravity at anybody's desk."""
 
@@ -82,7 +84,7 @@ def _value_and_unit(text: str, units: list[str]) -> tuple[float, str]:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"the size of a count is a number and a unit ({', '.join(units)}), not {text!r}")
+        raise RefusedError(f"the size of a count is a number and a unit ({', '.join(units)}), not {text!r}")
     return value, unit
 
 
