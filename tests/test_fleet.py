@@ -186,7 +186,7 @@ def test_the_command_writes_table_and_page_and_says_where(logs, done, capsys):
     ],
 )
 def test_a_defect_met_in_one_log_is_not_called_a_refusal(monkeypatch, error, status):
-    def fails(path, device, options):
+    def fails(*_):
         raise error
 
     monkeypatch.setattr(fleet_work, "_calibrated", fails)

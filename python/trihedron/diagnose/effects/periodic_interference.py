@@ -15,6 +15,7 @@ class PeriodicInterference(DirectEffect):
     """One sinusoid, steady through all poses, in one or more channels."""
 
     id = "periodic-interference"
+    is_of_samples = True
 
     def find(self, context: Context) -> Evidence | None:
         lines = find_lines(context.obs)
