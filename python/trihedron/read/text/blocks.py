@@ -9,6 +9,7 @@ import lzma
 import re
 import zlib
 from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,14 +95,22 @@ def blocks(
 
 
 def beginning(path: Path, compression: str | None, n: int, content: bytes | None = None) -> bytes:
-    """The first ``n`` bytes of the text; none where they cannot be read, which is for :func:`blocks` to complain of."""
+    """The first ``n`` bytes of the text.
+
+    Raises
+    ------
+    ReadError
+        As :func:`blocks`.
+    """
     if content is not None:
         return content[:n]
     try:
         with open_binary(path, compression) as stream:
             return stream.read(n)
     except (EOFError, zlib.error, lzma.LZMAError, OSError):
-        return b""
+        # Said with the line that the damage is behind.
+        with closing(blocks(path, compression, Cursor())) as parts:
+            return next(parts, b"")[:n]
 
 
 _MINUS = "\u2212".encode()
