@@ -17,6 +17,7 @@ class PeriodicInterference(DirectEffect):
     id = "periodic-interference"
     mechanism = "a sinusoid stands in the readings while the sensor is still"
     experiment = "record at rest at another sampling rate: an aliased line moves, a true one stays"
+    is_of_samples = True
 
     def find(self, context: Context) -> Evidence | None:
         lines = find_lines(context.obs)
