@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
+from trihedron.segment.channels import USUALLY_STILL, WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.range_ends import RangeEnd, inside_the_range
 
 SEED_FRACTION = 0.02
@@ -20,8 +20,6 @@ ROUNDING = 1e-7
 FALSE_ALARM = 1e-4
 """Chance that a still window is called moving: once in minutes of windows, and so short a gap is closed again."""
 _MAX_ROUNDS = 60
-USUALLY_STILL = 0.1
-"""Quantile of a log's windows that stands for stillness before it is found."""
 
 
 @dataclass(frozen=True, eq=False)
