@@ -37,29 +37,41 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
     let n_some = POSSIBLE_SCATTER.len() as f64;
     let mut tried = Vec::new();
     let some = POSSIBLE_SCATTER.map(|scatter| (scatter, -n_some.ln()));
-    for (scatter, prior) in std::iter::once((NO_SCATTER, 0.0)).chain(some) {
+    let scatters: Vec<_> = std::iter::once((NO_SCATTER, 0.0)).chain(some).collect();
+    for (which, (scatter, prior)) in scatters.iter().enumerate() {
         for corner in POSSIBLE_CORNER_S {
             let mut at = fit.strengths;
-            at.scatter = [scatter, fit.likely_scatter[1]];
+            at.scatter = [*scatter, fit.likely_scatter[1]];
             at.corner_s[0] = corner;
-            tried.push((prior, at));
+            tried.push((*prior, which, at));
         }
     }
     let tried: Vec<_> = tried
         .into_par_iter()
-        .map(|(prior, at)| (evidence.at(&at) + prior, at))
+        .map(|(prior, which, at)| (evidence.at(&at) + prior, which, at))
         .collect();
     let best = tried
         .iter()
-        .map(|(v, _)| *v)
+        .map(|(v, ..)| *v)
         .fold(f64::NEG_INFINITY, f64::max);
-    let mut out = tried
+    let likely: Vec<_> = tried
+        .into_iter()
+        .map(|(value, which, at)| ((value - best).exp(), which, at))
+        .filter(|(weight, ..)| *weight >= LEAST_WEIGHT)
+        .collect();
+    // Rows of the moves know the scatter, not the corner time.
+    let moves = (0..scatters.len())
         .into_par_iter()
-        .map(|(value, at)| ((value - best).exp(), at))
-        .filter(|(weight, _)| *weight >= LEAST_WEIGHT)
-        .map(|(weight, at)| {
-            let (moves, _) = reweighed(fit, &at)?;
-            let (chain, side) = evidence.combined(&at, &moves);
+        .map(|which| {
+            let first = likely.iter().find(|one| one.1 == which);
+            first.map(|(_, _, at)| reweighed(fit, at)).transpose()
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let mut out = likely
+        .into_par_iter()
+        .filter_map(|(weight, which, at)| Some((weight, moves[which].as_ref()?, at)))
+        .map(|(weight, (moves, _), at)| {
+            let (chain, side) = evidence.combined(&at, moves);
             let factor = chain.factor(RIDGE, None)?;
             let step = -factor.solve(&side).column(0).into_owned();
             Ok(Possible {
