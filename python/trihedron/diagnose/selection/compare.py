@@ -38,7 +38,6 @@ from trihedron.records.domains import HeldOut
 LEAST_P = 1e-300
 VISIBLE = 0.98
 """An effect must lower the held-out misfit of some domain by at least this factor to be worth a name."""
-AT_REST = (STATIC_ACCEL, STATIC_GYRO)
 OF_ACCELEROMETER = (STATIC_ACCEL, DYNAMICS)
 OF_GYROSCOPE = (STATIC_GYRO, MOVES, DYNAMICS)
 """Domains in which a flaw of one sensor must show: velocity needs both, a tilted force being half of it."""
@@ -143,11 +142,10 @@ class Comparison:
 
     def gain_at(self, stays: FloatArray) -> float:
         """Likelihood gain with each domain's drop of chi-square over the dispersion ``stays``, poses' lengths by F."""
-        # What walks that were tuned anew gain is of the poses too, and counts by their dispersion.
-        tuned = self.likelihood_gain - float(self.drop.sum())
-        at_rest = max(float(stays[d]) for d in own_domains(self.variant.distortion) if d in AT_REST)
         gain = self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum())
-        gain -= max(tuned, 0.0) * (1.0 - 1.0 / at_rest)
+        if self.variant.distortion.rate is None:
+            # What the accelerometer's walk gains, tuned anew, is of the poses' lengths and counts by their dispersion.
+            gain -= max(self.likelihood_gain - float(self.drop.sum()), 0.0) * (1.0 - 1.0 / float(stays[STATIC_ACCEL]))
         return min(self.likelihood_gain, gain) - self._of_few(max(float((self.drop / stays)[STATIC_ACCEL]), 0.0))
 
     def _of_few(self, drop: float) -> float:
