@@ -20,6 +20,8 @@ NOISE_DOF = 100.0
 DEAF = 1e3
 """Widening at which a row no longer says anything beside the others."""
 MOST_WIDENINGS = 8
+SETTLED = 1.05
+"""χ² per degree of freedom at which moves that were widened are as uncertain as they miss."""
 STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 """Labels of rows: accelerometer at rest, gravity after a move, velocity over it."""
 
@@ -140,6 +142,8 @@ def _inflation(core: _core.SessionFit, now: tuple[float, float]) -> tuple[float,
     if dynamics < DEAF and dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
         return moves, DEAF  # and gravity after the moves is judged once it no longer bends the fit
     chi2, dof = float(every_chi2[MOVES]), float(every_dof[MOVES])
-    if dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
-        moves *= float(np.sqrt(chi2 / dof))
-    return moves, dynamics
+    if dof < 1.0:
+        return moves, dynamics
+    # Once widened, poses bend less towards the moves: what they then miss is again above its noise.
+    is_short = chi2 / dof > SETTLED if moves > 1.0 else fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM
+    return (moves * float(np.sqrt(chi2 / dof)) if is_short else moves), dynamics
