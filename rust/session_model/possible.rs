@@ -53,13 +53,35 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
         .iter()
         .map(|(v, _)| *v)
         .fold(f64::NEG_INFINITY, f64::max);
-    let mut out = tried
+    let heard = tried
         .into_par_iter()
-        .map(|(value, at)| ((value - best).exp(), at))
-        .filter(|(weight, _)| *weight >= LEAST_WEIGHT)
-        .map(|(weight, at)| {
-            let (moves, _) = reweighed(fit, &at)?;
-            let (chain, side) = evidence.combined(&at, &moves);
+        .map(|(value, at)| (value - best, at))
+        .filter(|(value, _)| *value >= LEAST_WEIGHT.ln())
+        .map(|(value, at)| {
+            let (moves, weight) = reweighed(fit, &at)?;
+            let by_moves = evidence.with(&at, &moves) + weight - evidence.at(&at);
+            Ok((value, by_moves, at, moves))
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let without = |corner: f64| {
+        let none = heard
+            .iter()
+            .filter(|(_, _, at, _)| at.scatter[0] <= NO_SCATTER);
+        none.filter(|(_, _, at, _)| at.corner_s[0].total_cmp(&corner).is_eq())
+            .map(|(_, by_moves, _, _)| *by_moves)
+            .next()
+    };
+    let mut out = heard
+        .par_iter()
+        .map(|(value, by_moves, at, moves)| {
+            // Moves that a scatter would bend, and that are not bent, speak against it; those that are bent may be so
+            // by anything, and do not speak for it.
+            let against = without(at.corner_s[0]).map_or(0.0, |none| (by_moves - none).min(0.0));
+            ((value + against).exp(), at, moves)
+        })
+        .filter(|(weight, _, _)| *weight >= LEAST_WEIGHT)
+        .map(|(weight, at, moves)| {
+            let (chain, side) = evidence.combined(at, moves);
             let factor = chain.factor(RIDGE, None)?;
             let step = -factor.solve(&side).column(0).into_owned();
             Ok(Possible {
