@@ -52,6 +52,8 @@ NOT_PAIRED = {
 }  # fmt: skip
 NAMED_NUISANCES = {"gyro-zero-scatter", "accel-zero-scatter", "periodic-interference"}
 """What the nuisances of this bench are: named, they are no false name, and missing physics is said rightly."""
+FAINT = 0.09
+"""Share of the samples' variance below which a line of the recording is a footnote, no missing physics."""
 IS_TOO = {"accel-size-effect": ("lever-arm",)}
 """Three accelerometers drawn at three places lie, in their mean, away from the centre of rotation."""
 GROUPS = (
@@ -282,6 +284,12 @@ def left_open(effects: list[tuple[str, str, list[str]]]) -> set[str]:
     return {group for _, name, _ in effects for group in by_id.get(name, ())}
 
 
+def is_footnote(effect: dict[str, Any]) -> bool:
+    """A pushed pose, or a faint line of the recording: true, named, and no physics that the simulation lacks."""
+    is_faint = effect["id"] == "periodic-interference" and effect["share"] < FAINT
+    return effect["in"] == "recording" and (effect["id"] == "disturbed-pose" or is_faint)
+
+
 def nuisances_of(pair: Pair, effect: str) -> set[str]:
     """What a pair's recording has besides ``effect``, which was drawn; a knock is a disturbed pose."""
     named = (NAMED_NUISANCES if pair.nuisances else set()) | ({"disturbed-pose"} if pair.settling else set())
@@ -336,8 +344,9 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
     if side:
         expected = "missing-physics"
     if pair.nuisances:
-        is_only_nuisance = bool(effects) and all(
-            w == "recording" and e in nuisances_of(pair, answer["effect"]) for w, e, _ in effects
+        counted = [e for e in document["effects"] if not is_footnote(e)]
+        is_only_nuisance = bool(counted) and all(
+            e["in"] == "recording" and e["id"] in nuisances_of(pair, answer["effect"]) for e in counted
         )
         expected = "missing-physics" if is_only_nuisance and not side else expected
         effects = [e for e in effects if not (e[0] == "recording" and e[1] in nuisances_of(pair, answer["effect"]))]

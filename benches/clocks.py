@@ -1,6 +1,6 @@
 """The clock behind stamps, held against loggers drawn without a look at it: `python benches/clocks.py [seeds]`.
 
-Rate, kind and losses over seven ways of stamping even samples and two of sampling unevenly, 0.1 Hz to 2 kHz, 300 to
+Rate, kind and losses over eight ways of stamping even samples and two of sampling unevenly, 0.1 Hz to 2 kHz, 300 to
 30 000 rows (`--long`: 10⁶), losses of 0, 0.3 and 3 % (bursts of 2 to 30 besides, a fifth as often), a wandering rate.
 """
 
@@ -22,6 +22,7 @@ NEAR = 40
 KINDS = {
     "exact": {StampKind.EXACT},
     "rounded": {StampKind.ROUNDED, StampKind.EXACT},
+    "milliseconds": {StampKind.ROUNDED},
     "scattered": {StampKind.SCATTERED},
     "renewal": {StampKind.IRREGULAR},
     "loop": {StampKind.IRREGULAR},

@@ -2,15 +2,23 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 
 import trihedron
 from trihedron.diagnose.against import compare_effects
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise
-from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter
+from trihedron.records.diagnosis import (
+    AcceptedEffect,
+    Candidate,
+    EffectParameter,
+    NoiseDifference,
+    ParameterDifference,
+)
 from trihedron.records.domains import HeldOut
 from trihedron.records.hold_noise import HoldNoise, Measured
+from trihedron.report.diagnosis_words import verdict_in_words
 from trihedron.simulate import Scenario, hand_session, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.profiles import profile_by_name
@@ -112,3 +120,49 @@ def test_a_step_that_one_axis_alone_seems_to_have_is_no_converters():
     converter = axes(3e-4, 3e-4, 3e-4)
     assert said(converter, axes(1e-9, 0.0, 3e-5)) == []
     assert said(converter, axes(3e-5, 3e-5, 3e-5)) == ["x", "y", "z"]
+
+
+def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
+    pushed = effect("disturbed-pose", share=0.7, variant="")
+    faint = effect("periodic-interference", share=0.05, variant="")
+    strong = effect("periodic-interference", share=0.25, variant="")
+    assert not compare_effects([], [pushed, faint], [], alpha=0.01).differ
+    assert compare_effects([], [pushed, strong], [], alpha=0.01).differ
+    assert compare_effects([], [pushed, effect("accel-cubic")], [], alpha=0.01).differ
+    # What only the model has is no footnote of the recording.
+    tried = [Candidate("periodic-interference", 0.4, True)]
+    assert compare_effects([faint], [], tried, alpha=0.01).differ
+
+
+def test_a_headline_counts_what_it_does_not_say_and_leads_with_the_most_certain():
+    groups = ("accel-zero", "accel-scale", "accel-misalignment", "gyro-zero", "gyro-scale")
+    numbers = tuple(
+        ParameterDifference(name, "both", axis, 0.0, size, size, 0.1, "1", 10.0 ** -(20 - k), True)
+        for k, name in enumerate(groups)
+        # Nine times the other, and nothing beside its error.
+        for axis, size in (("x", 1.0), ("y", 0.9), ("z", 0.09))
+    )
+    noise = tuple(
+        NoiseDifference("gyroscope", "x", "octave", 1.0, 2.0, 0.5, None, "", 0.0, True, f"Octave {k} differs; much.")
+        for k in range(40)
+    )
+    found = SimpleNamespace(
+        verdict="parameters-differ", domains=(), remaining=(), effects=(), parameters=numbers, noise_compared=noise
+    )
+    said = verdict_in_words(found)
+    assert len(said) < 300
+    assert said.index("accelerometer zeros (up to 100 %)") < said.index("accelerometer scales")
+    assert "and 40 more differences" in said  # two groups and 38 octaves
+
+
+def test_few_poses_of_another_unit_are_numbers_beside_an_ideal_simulation_and_no_physics():
+    profile = profile_by_name("mpu")
+    accel, gyro = profile.unit(31)
+    # Six poses of one half: what is open stays open, and the simulation's numbers are no knowledge of this unit's.
+    few = Scenario(hand_session(9, hold_s=4.0, layout=11), "few", accel, gyro, profile.clock)
+    recording, _ = simulate(few, 3)
+    plain = Scenario(hand_session(9, hold_s=4.0, layout=12), "data sheet", profile.accelerometer, profile.gyroscope)
+    found = trihedron.diagnose(recording, against=simulate(plain, 4)[0], gravity_m_s2=9.80665)
+    assert not [one.id for one in found.effects]
+    assert found.parameters
+    assert found.verdict == "parameters-differ"

@@ -77,6 +77,12 @@ def rounded(taken: FloatArray, period_s: float, rng: Rng) -> FloatArray:
     return np.asarray(np.floor(taken / grid + rng.random()) * grid)
 
 
+def milliseconds(taken: FloatArray, period_s: float, rng: Rng) -> FloatArray:
+    """Whole decimal ticks of the logger's clock, four to forty in a step (a sensor near 100 Hz in milliseconds)."""
+    grid = 10.0 ** np.floor(np.log10(period_s / 4.0))
+    return np.asarray(np.round(taken / grid + rng.random()) * grid)
+
+
 def late(taken: FloatArray, period_s: float, rng: Rng) -> FloatArray:
     """Independent exponential delays of a tenth to eight tenths of a step behind a fixed one, in a queue."""
     mean = period_s * rng.uniform(0.1, 0.8)
@@ -115,8 +121,8 @@ def scattered(taken: FloatArray, period_s: float, rng: Rng) -> FloatArray:
 
 
 LAWS: dict[str, Callable[[FloatArray, float, Rng], FloatArray]] = {
-    "exact": exact, "rounded": rounded, "late": late, "stalled": stalled, "batched": batched, "polled": polled,
-    "scattered": scattered,
+    "exact": exact, "rounded": rounded, "milliseconds": milliseconds, "late": late, "stalled": stalled,
+    "batched": batched, "polled": polled, "scattered": scattered,
 }  # fmt: skip
 IRREGULAR = ("renewal", "loop")
 

@@ -135,7 +135,7 @@ def _of_poses(
         findings += _protocol(simulated.segments, segments)
     begun = 0.05 if simulated is None else 0.45
     tell(begun, "calibrating")
-    used, free = _start(calibrated, gravity, known)
+    used, free = _start(calibrated, gravity, known, is_simulation=simulated is not None)
     recording_used, segments_used = recording, segments
     # Where the poses leave the model open the twin starts from nominal values, for the gyro too.
     if recording.gyroscope is not None and used.gyroscope is None and not (free and is_open(used)):
@@ -189,11 +189,14 @@ class _Free:
     frames: tuple[NoiseDifference, ...] = ()
 
 
-def _start(calibrated: Calibrated, gravity: float, known: Calibration | None) -> tuple[Calibration, bool]:
+def _start(
+    calibrated: Calibrated, gravity: float, known: Calibration | None, *, is_simulation: bool
+) -> tuple[Calibration, bool]:
     """The model that the search begins from, and whether it is the recording's own.
 
-    A given model is compared with what the recording says of itself. Where its poses are too few to say it, the given
-    numbers stay, with their error bars as knowledge.
+    A given model is compared with what the recording says of itself. Where its poses are too few to say it, the numbers
+    of a calibration stay, with their error bars as knowledge. Those of a simulation are none: its errors say how well
+    its own log shows its numbers, and nothing of how far this unit lies from them.
     """
     if known is None:
         return calibrated(), True
@@ -202,7 +205,7 @@ def _start(calibrated: Calibrated, gravity: float, known: Calibration | None) ->
     except REFUSALS:
         return replace(known, gravity_m_s2=gravity), False
     is_poor = is_open(own) or (known.gyroscope is not None and own.gyroscope is None)
-    return (replace(known, gravity_m_s2=gravity), False) if is_poor else (own, True)
+    return (replace(known, gravity_m_s2=gravity), False) if is_poor and not is_simulation else (own, True)
 
 
 def _simulated_log(against: GivenModel, recording: Recording, segments: Segments, gravity: float) -> Recording:

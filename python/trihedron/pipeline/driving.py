@@ -22,6 +22,7 @@ from trihedron.segment import resegment
 from trihedron.simulate import Scenario, simulate, twin_scenario
 
 FEWEST_MOVES = 6
+"""Moves from which their rms, the worst left out, is known to a third."""
 FEWEST_POSES_TO_SPARE = 4
 """Degrees of freedom of the lengths of gravity below which no scatter of theirs is told."""
 ALIKE = 1.05

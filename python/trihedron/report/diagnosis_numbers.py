@@ -29,7 +29,10 @@ _GROUPS = {
     "triad-alignment": "the gyro triad's alignment",
     "gravity": "gravity",
 }
-MOST_NAMED = 5
+MOST_NUMBERS, MOST_NOISE = 3, 2
+"""Clauses of numbers and of noise in a headline, which is one sentence; a table holds them all."""
+_SENTENCES_FIRST = ("unit", "frame", "range", "rate")
+"""What is wrong with every reading of a sensor is said before its noise."""
 _STAGES = {
     "as-given": "as given",
     "numbers": "numbers re-estimated",
@@ -46,7 +49,7 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
         if p.significant:
             groups.setdefault(p.id, []).append(p)
     for members in groups.values():
-        size = [abs(p.difference) / max(p.std, 1e-300) for p in members]
+        size = [_in_sigmas(p) for p in members]
         said += [
             f"{_named(p)} {_difference(p)}"
             for p, s in zip(members, size, strict=True)
@@ -57,26 +60,62 @@ def differing_numbers(diagnosis: Diagnosis) -> list[str]:
 
 
 def differing_in_short(diagnosis: Diagnosis) -> list[str]:
-    """What differs for one sentence: every number while they are few, else the groups with their largest."""
-    # Sentences of noise become clauses of one.
-    noise = [word[0].lower() + word[1:].rstrip(".") for word in differing_noise(diagnosis)]
-    numbers = differing_numbers(diagnosis)
-    if len(numbers) <= MOST_NAMED:
-        return [*numbers, *noise]
-    largest: dict[str, ParameterDifference] = {}
+    """What differs for one sentence: every number while they are few, else the groups with their largest.
+
+    The most certain first; what no longer fits is counted.
+    """
+    clauses = {sentence: _as_clause(sentence) for sentence in differing_noise(diagnosis)}
+    noise = list(clauses.values())
+    whole = [clauses[_sentence(n)] for n in _noise_that_differs(diagnosis) if n.term in _SENTENCES_FIRST]
+    noise = list(dict.fromkeys([*whole, *noise]))
+    numbers = [word for word in differing_numbers(diagnosis) if word not in _remarks(diagnosis)]
+    if len(numbers) > MOST_NUMBERS:
+        numbers = _groups_in_short(diagnosis)
+    left = max(len(numbers) - MOST_NUMBERS, 0) + max(len(noise) - MOST_NOISE, 0)
+    more = [f"{left} more {'difference' if left == 1 else 'differences'} (see the tables)"] if left else []
+    return [*numbers[:MOST_NUMBERS], *noise[:MOST_NOISE], *more]
+
+
+def _as_clause(sentence: str) -> str:
+    """A sentence of noise as a clause of another: without what it adds behind a semicolon."""
+    return (sentence[0].lower() + sentence[1:]).split("; ")[0].rstrip(".")
+
+
+def _groups_in_short(diagnosis: Diagnosis) -> list[str]:
+    """Groups that differ, the most certain first, each with the largest of its members beyond their errors."""
+    groups: dict[str, list[ParameterDifference]] = {}
     for p in diagnosis.parameters:
-        if p.significant and abs(p.difference) >= abs(largest.get(p.id, p).difference):
-            largest[p.id] = p
-    return [*(f"{_GROUPS.get(p.id, p.id)} (up to {_size(p)})" for p in largest.values()), *noise]
+        if p.significant:
+            groups.setdefault(p.id, []).append(p)
+    said = []
+    for name, members in sorted(groups.items(), key=lambda group: group[1][0].p_value):
+        clear = max(map(_in_sigmas, members))
+        largest = max(
+            (p for p in members if _in_sigmas(p) >= min(NAMED_SIGMAS, clear)), key=lambda p: abs(p.difference)
+        )
+        said.append(f"{_GROUPS.get(name, name)} (up to {_size(largest)})")
+    return said
+
+
+def _in_sigmas(p: ParameterDifference) -> float:
+    return abs(p.difference) / max(p.std, 1e-300)
+
+
+def _remarks(diagnosis: Diagnosis) -> set[str]:
+    return {p.remark for p in diagnosis.parameters if p.remark}
+
+
+def _noise_that_differs(diagnosis: Diagnosis) -> list[NoiseDifference]:
+    return [n for n in diagnosis.noise_compared if n.significant]
+
+
+def _sentence(n: NoiseDifference) -> str:
+    return n.remark or f"{_sensor(n)} {n.term} is {_ratio(n)} times the recording's"
 
 
 def differing_noise(diagnosis: Diagnosis) -> list[str]:
     """One sentence for every figure of noise or sampling that differs."""
-    said: dict[str, None] = {}
-    for n in diagnosis.noise_compared:
-        if n.significant:
-            said.setdefault(n.remark or f"{_sensor(n)} {n.term} is {_ratio(n)} times the recording's", None)
-    return list(said)
+    return list(dict.fromkeys(map(_sentence, _noise_that_differs(diagnosis))))
 
 
 def numbers_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:

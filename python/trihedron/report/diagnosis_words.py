@@ -27,7 +27,10 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     left: list[str] = [d.domain for d in diagnosis.remaining if d.disagrees]
     numbers = differing_in_short(diagnosis)
     if diagnosis.verdict == "consistent":
-        return "CONSISTENT: the model and its noise account for this recording; nothing is missing that it could show."
+        return (
+            "CONSISTENT: the model and its noise account for this recording; nothing is missing that it could show"
+            f"{_footnotes(diagnosis)}."
+        )
     if diagnosis.verdict == "unexplained":
         named = [effect.id for effect in diagnosis.effects if effect.side == "recording"]
         off = left if named else off
@@ -44,9 +47,9 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
             "more poses of 3 to 5 s in different directions."
         )
     if diagnosis.verdict == "parameters-differ":
-        return f"PARAMETERS DIFFER: {listed(numbers)}; nothing else, no physics is missing."
-    missing = [effect.id for effect in diagnosis.effects if effect.side == "recording"]
-    surplus = [effect.id for effect in diagnosis.effects if effect.side == "model"]
+        return f"PARAMETERS DIFFER: {listed(numbers)}; nothing else, no physics is missing{_footnotes(diagnosis)}."
+    missing = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
+    surplus = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "model"))
     tail = (
         f"; {listed(left)} still {'disagree' if len(left) > 1 else 'disagrees'}."
         if left
@@ -60,6 +63,12 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if numbers:
         said.append(f"numbers differ ({listed(numbers)})")
     return f"MISSING PHYSICS: {'; '.join(said)}{tail}"
+
+
+def _footnotes(diagnosis: Diagnosis) -> str:
+    """What was found and is no physics of the model: a pose that was pushed, a faint line."""
+    named = list(dict.fromkeys(effect.id for effect in diagnosis.effects))
+    return f" (beside: {listed(named)})" if named else ""
 
 
 def rms_in_words(test: DomainTest) -> str:

@@ -19,6 +19,8 @@ BLOCK_SAMPLES = 5
 WINDOW_BLOCKS = 5
 """Stillness is judged over five blocks (half a second): long enough to see a turn of 1 deg/s in gravity, and shorter
 than the shortest hold by half."""
+USUALLY_STILL = 0.1
+"""Quantile of a log's windows that stands for stillness before it is found."""
 
 FINEST = 1e-7
 """Part of a channel's span that stands for its step where it is finer: no converter has 23 bits of what it measures,

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
+from trihedron.segment.channels import USUALLY_STILL, WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.range_ends import RangeEnd, inside_the_range
 
 SEED_FRACTION = 0.02
@@ -20,8 +20,6 @@ ROUNDING = 1e-7
 FALSE_ALARM = 1e-4
 """Chance that a still window is called moving: once in minutes of windows, and so short a gap is closed again."""
 _MAX_ROUNDS = 60
-USUALLY_STILL = 0.1
-"""Quantile of a log's windows that stands for stillness before it is found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +104,29 @@ def measure_activity(channels: Channels, ends: Sequence[RangeEnd] = ()) -> Activ
     white[alive] = _median_of(inside_alive, tells, quiet)
     wander[alive] = _median_of(between_alive, tells, quiet) / _chi2_median_ratio(max(width - 1, 1))
     return Activity(fast, slow, limits[0], limits[1], quiet, white, wander + np.zeros(n_channels))
+
+
+def quiet_channels(channels: Channels, activity: Activity, which: BoolArray) -> BoolArray:
+    """(m,) windows in which the channels ``which`` (c,) alone are at the noise floor, whatever the others read."""
+    width = min(WINDOW_BLOCKS, channels.n_blocks)
+    alive = which & (activity.white_variance > 0.0) & (activity.slow_variance > 0.0)
+    if not alive.any() or not activity.is_quiet.any():
+        return activity.is_quiet.copy()
+    is_valid = channels.is_valid[:, None]
+    mean = np.where(
+        is_valid, channels.mean[:, alive] - np.mean(channels.mean[activity.is_quiet][:, alive], axis=0), 0.0
+    )
+    variance = np.where(is_valid, channels.variance[:, alive], 0.0)
+    whole: BoolArray = rolling_mean((~is_valid).astype(np.float64), width)[:, 0] == 0.0
+    between = (rolling_mean(mean**2, width) - rolling_mean(mean, width) ** 2) * (width / max(width - 1, 1))
+    out = whole
+    levels = ((rolling_mean(variance, width), activity.white_variance), (between, activity.slow_variance))
+    n = int(alive.sum())
+    freedoms = (width * (channels.length - 1) * n, max(width - 1, 1) * n)
+    for (level, floor), freedom in zip(levels, freedoms, strict=True):
+        ratio = np.log(np.maximum((level / floor[alive]).mean(axis=1), ROUNDING))
+        out = np.asarray(out & (ratio <= _limit(ratio[activity.is_quiet], freedom)))
+    return out
 
 
 def _usual(power: FloatArray, tells: BoolArray) -> FloatArray:

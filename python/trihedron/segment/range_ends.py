@@ -11,17 +11,10 @@ from trihedron.arrays import BoolArray
 from trihedron.ranges import Range
 from trihedron.records import Recording
 from trihedron.records.channel_facts import Limit
-from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
+from trihedron.segment.channels import USUALLY_STILL, WINDOW_BLOCKS, Channels, rolling_mean
 
-CONSTANT = 0.01
-"""Variance of a block over that of rounding below which its readings are one code."""
-USUALLY_STILL = 0.1
-"""Quantile of a log's windows whose scatter stands for the noise before stillness is found."""
 NEAR = 4.0
 """Standard deviations of the noise from the end within which readings are cut, and look quieter than they are."""
-ELSEWHERE = 0.1
-"""Blocks of one code away from the ends, over those at them, beyond which a channel's noise is below its step (that of
-a simulation, none at all) wherever it rests: nothing is cut."""
 SELDOM = 0.1
 """Share of a log inside the range below which a channel's quiet windows are not told from its loud ones."""
 TELLS_CODES_APART = 0.6
@@ -34,7 +27,7 @@ CUT = 0.01
 
 @dataclass(frozen=True)
 class RangeEnd:
-    """The outermost reading of channel ``channel`` on the side ``side`` (1 or -1), where the log rests at it.
+    """The outermost reading of channel ``channel`` on the side ``side`` (1 or -1).
 
     ``margin`` is how near to it readings are cut (raw units); ``is_certain`` where noise would have told codes apart.
     """
@@ -46,34 +39,20 @@ class RangeEnd:
     is_certain: bool
 
 
-def range_ends(channels: Channels, limits: Sequence[tuple[int, Limit]] = ()) -> tuple[RangeEnd, ...]:
-    """Ends at which windows stand on one code although the channel's noise elsewhere moves the last digit.
+def range_ends(channels: Channels, limits: Sequence[tuple[int, Limit]]) -> tuple[RangeEnd, ...]:
+    """The ends among the (channel, limit) of all readings that poses may stand at.
 
-    ``limits`` are (channel, limit) of all readings, where they were looked at: poses whose noise is cut in half are
-    told by those alone.
+    A stream has no limits: its readings are not all seen at once (:mod:`trihedron.channel_facts.limits`).
     """
-    valid = channels.is_valid
-    constant = valid[:, None] & (channels.variance <= CONSTANT * channels.quantisation_variance)
-    known = {(c, 1 if limit.is_high else -1): limit.value for c, limit in limits}
     out: list[RangeEnd] = []
-    # A gyro at rest is at no end of its range.
-    for c in np.flatnonzero(~channels.is_gyroscope).tolist():
-        if constant[:, c].sum() < WINDOW_BLOCKS and not any(of == c for of, _ in known):
-            continue
-        noise = _usual_noise(channels, c)
-        step, rounding = float(channels.quantum[c]), float(channels.quantisation_variance[c])
-        ends = {side: known.get((c, side), side * float(np.max(side * channels.mean[valid, c]))) for side in (1, -1)}
-        at = {side: constant[:, c] & (side * (channels.mean[:, c] - ends[side]) >= -0.5 * step) for side in ends}
-        n_at = int((at[1] | at[-1]).sum())
-        if noise == 0.0 or constant[:, c].sum() - n_at > ELSEWHERE * n_at:
-            continue
-        margin = max(NEAR * float(np.sqrt(noise)), step)
-        is_certain = noise - rounding > (TELLS_CODES_APART * step) ** 2
-        out += [
-            RangeEnd(c, side, ends[side], margin, is_certain)
-            for side in ends
-            if (c, side) in known or at[side].sum() >= WINDOW_BLOCKS
-        ]
+    for c, limit in limits:
+        noise = 0.0 if channels.is_gyroscope[c] else _usual_noise(channels, c)
+        # A gyro at rest is at no end of its range, and a channel without noise has no tail to be cut.
+        if noise > 0.0:
+            step, rounding = float(channels.quantum[c]), float(channels.quantisation_variance[c])
+            margin = max(NEAR * float(np.sqrt(noise)), step)
+            is_certain = noise - rounding > (TELLS_CODES_APART * step) ** 2
+            out.append(RangeEnd(c, 1 if limit.is_high else -1, limit.value, margin, is_certain))
     return tuple(out)
 
 

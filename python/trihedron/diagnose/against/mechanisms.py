@@ -15,6 +15,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.accepted import HEADLINE
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.records.domains import Domain
+from trihedron.records.words import effect_words
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 FRAME_TOLERANCE = 0.03
@@ -24,6 +25,9 @@ the first order of the mechanisms) is no difference."""
 FREE_CURVES = frozenset({"curve", "smooth"})
 """Variants of a drift that have no mechanism: waves over a session, and a curve drawn through its zeros. Of sessions of
 unlike length, or begun at another warmth, they are no numbers to compare."""
+
+FAINT = 1.0 - 1.0 / 1.05**2
+"""Of the variance inside still poses: a line of this share raises their scatter by 5 %, as 30 K raise white noise."""
 
 LARGEST_READ: Mapping[str, float] = MappingProxyType({"accel-zero": STANDARD_GRAVITY_M_S2, "gyro-zero": 1.0})
 """What a scale that follows temperature is a share of where it is taken for a zero: gravity; a turn by hand [rad/s]."""
@@ -83,9 +87,8 @@ class ComparedEffects:
 
     @property
     def differ(self) -> bool:
-        """Whether instruments do: an arm of the motion that no domain of misfit asks for is none of the model's."""
-        of_motion = {effect.id for effect in catalogue() if effect.is_of_motion}
-        return bool(self.surplus) or any(e.share or e.id not in of_motion for e in self.missing)
+        """Whether instruments do: footnotes are no physics that a model lacks."""
+        return bool(self.surplus) or not all(is_footnote(effect) for effect in self.missing)
 
     @property
     def in_order(self) -> tuple[AcceptedEffect, ...]:
@@ -149,6 +152,17 @@ def compare_effects(
     return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))
 
 
+def is_footnote(effect: AcceptedEffect) -> bool:
+    """Whether an effect of the recording is none that its simulation lacks.
+
+    So are a pose that was pushed, which happened to the session and to no instrument; an arm of the motion that no
+    domain of misfit asks for; and a line so faint that it adds less to the scatter inside poses than noise strays by.
+    """
+    of = {one.id: one for one in catalogue()}[effect.id]
+    share = effect.share or 0.0
+    return of.is_local or (of.is_of_motion and not share) or (of.is_of_samples and share < FAINT)
+
+
 def _is_beside(effect: AcceptedEffect) -> bool:
     """Whether it follows behind mechanisms: a scatter, or what states that it carries little (a faint line)."""
     is_spread = {one.id: one.is_spread for one in catalogue()}[effect.id]
@@ -164,9 +178,10 @@ def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:
 
 
 def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
-    said = f"Only the model has it: {effect.statement}"
     reasons = [c.reason for c in candidates if c.id == effect.id and not c.applicable]
-    return f"{said} Of the recording {reasons[0]}, and nothing in it drifts by as much." if reasons else said
+    return effect_words(
+        effect.id, "only-model", statement=effect.statement, has_reason=bool(reasons), reason="".join(reasons[:1])
+    )
 
 
 def _is_free(effect: AcceptedEffect) -> bool:

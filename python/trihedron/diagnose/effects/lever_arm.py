@@ -15,6 +15,7 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.sample_steps import clipped_samples
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
+from trihedron.records.words import why_not
 
 MIN_SHARE = 0.1
 """One arm must predict at least this share of the motion of moves it was not fitted to: a hand also just travels, but
@@ -42,6 +43,9 @@ SHRUNK = (0.02, 100.0)
 shapes count alike, which a few moves with long arms need; the better of the two answers, paid for twice."""
 N_WEIGHINGS, N_AGAIN = 6, 3
 """Rounds from nothing known, and from where one move less changes little."""
+MOST_GROUPS = 40
+"""Parts of a session left out in turn: from so many on the error bar's own error (a ninth) no longer matters, and the
+time of a session with many moves stays linear in them."""
 QUIETEST = 0.5
 """Of the median: no move counts for more than twice the median one, however little the hand travels in it."""
 N_ARM = 3
@@ -60,13 +64,9 @@ class LeverArm(DirectEffect):
 
     id = "lever-arm"
     is_of_motion = True
-    mechanism = "the accelerometers sit away from the centre of rotation"
-    experiment = (
-        "turn about another point: an arm follows the centre of rotation, a displacement inside the case does not"
-    )
 
     def unavailable(self, context: Context) -> str | None:
-        return "fewer than six moves with a gyro" if len(_true_moves(context)) < FEWEST_MOVES else None
+        return why_not("six-moves") if len(_true_moves(context)) < FEWEST_MOVES else None
 
     def find(self, context: Context) -> Evidence | None:
         moves = _written(context)
@@ -94,9 +94,7 @@ class LeverArm(DirectEffect):
         strength = float(len(by.weight) * np.log(whole / left)) if 1.0 - left / whole > MOSTLY else 0.0
         return Evidence(
             max(len(SHRUNK) * found.p_value, 1e-300), strength, parameters,
-            f"The accelerometers sit {100 * length:.1f} cm from the centre of rotation: one arm predicts "
-            f"{100 * share:.0f} % of the acceleration in moves it was not fitted to (what hands do most weighs least).",
-            "dynamics", Where(("ax", "ay", "az")), (held,),
+            self.told("arm", arm_m=length, share=share), "dynamics", Where(("ax", "ay", "az")), (held,),
         )  # fmt: skip
 
 
@@ -117,7 +115,8 @@ class _Moves:
 @dataclass(frozen=True, eq=False)
 class _Arm:
     """``value`` (4,) arm [m] and delay [s], the arm's jackknife ``covariance`` (3, 3) and Hotelling's ``p_value``;
-    ``without_one`` (m, 4) the value without each move, ``delay_without_one`` (m,) that of a delay alone."""
+    ``without_one`` (m, 4) the value without each move and those left out with it, ``delay_without_one`` (m,) that of a
+    delay alone."""
 
     value: FloatArray
     covariance: FloatArray
@@ -178,20 +177,24 @@ class _Weighed:
 
 def _normal(moves: _Moves, by: _Weighed) -> tuple[FloatArray, FloatArray]:
     """(m, 4, 4) normal matrices and (m, 4) right-hand sides."""
-    weighted = np.einsum("kl,mlib->mkib", by.shapes, moves.columns) * by.weight[:, None, None, None]
-    normal = np.einsum("mkia,mkib->mab", moves.columns, weighted)
+    m = len(moves.target)
+    flat = moves.columns.reshape(m, -1, N_ARM + 1)
+    weighted = by.weight[:, None, None] * (by.shapes @ moves.columns.reshape(m, moves.n_shapes, -1)).reshape(flat.shape)
+    normal = flat.transpose(0, 2, 1) @ weighted
     # Turns about the vertical alone show no delay; it is zero then.
     normal[:, N_ARM, N_ARM] += ROUNDING * np.trace(normal[:, :N_ARM, :N_ARM], axis1=1, axis2=2)
-    return normal, np.einsum("mkia,mki->ma", weighted, moves.target)
+    return normal, (weighted.transpose(0, 2, 1) @ moves.target.reshape(m, -1, 1))[:, :, 0]
 
 
 def _weighed(moves: _Moves, by: _Weighed, shrunk: float, n: int) -> _Weighed:
     """The answer again, ``n`` times, in the noise that the last one left."""
     for _ in range(n):
         left = moves.target - moves.columns @ by.value
-        covariance = np.einsum("mki,mli->kl", left * by.weight[:, None, None], left) / (3.0 * len(left))
+        # (shapes, 3 m): one product instead of one for each move.
+        rows = left.transpose(1, 0, 2).reshape(moves.n_shapes, -1)
+        covariance = (rows * np.repeat(by.weight, 3)) @ rows.T / (3.0 * len(left))
         mean = float(np.trace(covariance)) / moves.n_shapes
-        shapes = np.linalg.inv(covariance + shrunk * mean * np.eye(moves.n_shapes))
+        shapes = np.asarray(np.linalg.inv(covariance + shrunk * mean * np.eye(moves.n_shapes)), np.float64)
         squares = _squares(left, shapes)
         weight = 1.0 / np.maximum(squares, QUIETEST * float(np.median(squares)))
         by = _Weighed(by.value, shapes, weight / weight.mean())
@@ -201,30 +204,36 @@ def _weighed(moves: _Moves, by: _Weighed, shrunk: float, n: int) -> _Weighed:
 
 
 def _fitted(moves: _Moves, shrunk: float) -> tuple[_Arm, _Weighed]:
-    """The arm, each move left out in turn for its error bar: covariance and weights are made again without it.
+    """The arm, each move (or fortieth of the moves) left out in turn for its error bar: covariance and weights are made
+    again without it.
 
     A move that decides alone, or makes the noise in which it stands out, makes that wide.
     """
     m = len(moves.target)
     start = _Weighed(np.zeros(N_ARM + 1), np.eye(moves.n_shapes), np.ones(m))
     whole = _weighed(moves, start, shrunk, N_WEIGHINGS)
-    without_one = np.empty((m, N_ARM + 1))
-    for k in range(m):
-        others = np.arange(m) != k
+    groups = min(m, MOST_GROUPS)
+    group = np.arange(m) % groups
+    without_one = np.empty((groups, N_ARM + 1))
+    for k in range(groups):
+        others = group != k
         few = _Moves(moves.target[others], moves.columns[others])
         without_one[k] = _weighed(few, replace(whole, weight=whole.weight[others]), shrunk, N_AGAIN).value
     away = (without_one - whole.value)[:, :N_ARM]
-    covariance = away.T @ away * ((m - 1) / (m - 3))
+    covariance = away.T @ away * ((groups - 1) / (groups - 3))
     arm = whole.value[:N_ARM]
-    wald = float(arm @ np.linalg.solve(covariance, arm)) / 3.0 * (m - 3) / (m - 1)
+    wald = float(arm @ np.linalg.solve(covariance, arm)) / 3.0 * (groups - 3) / (groups - 1)
+    p_value = float(fdtrc(3.0, groups - 3.0, wald))
     normal, side = _normal(moves, whole)
-    delay = (side.sum(axis=0) - side)[:, N_ARM] / (normal.sum(axis=0) - normal)[:, N_ARM, N_ARM]
-    return _Arm(whole.value, covariance, float(fdtrc(3.0, m - 3.0, wald)), without_one, delay), whole
+    of_group = np.eye(groups)[group]
+    delay = (side.sum(axis=0) - of_group.T @ side)[:, N_ARM]
+    delay /= normal[:, N_ARM, N_ARM].sum() - of_group.T @ normal[:, N_ARM, N_ARM]
+    return _Arm(whole.value, covariance, p_value, without_one[group], delay[group]), whole
 
 
 def _squares(left: FloatArray, shapes: FloatArray) -> FloatArray:
     """(m,) sums of squares of curves (m, shapes, 3), their covariance in time divided out."""
-    return np.asarray((left * np.einsum("kl,mli->mki", shapes, left)).sum(axis=(1, 2)))
+    return np.asarray((left * (shapes @ left)).sum(axis=(1, 2)))
 
 
 def _held_out(moves: _Moves, found: _Arm, shapes: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -11,7 +11,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, earliest, lateness, track
-from trihedron.read.clock.period import find_period
+from trihedron.read.clock.period import Period, find_period
 from trihedron.read.clock.rounded import numbers_of_rounded
 from trihedron.records.sampling import StampKind
 
@@ -67,12 +67,17 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
     if n < FEWEST_ROWS or not time_s[-1] > time_s[0]:
         return None
     found = find_period(time_s)
-    period, sees = found.period_s, found.is_seen
     if counter is None and found.grid_s > 0.0:
         numbers = numbers_of_rounded(time_s, found.grid_s)
-        numbered = None if numbers is None else find_even_clock(time_s, numbers)
+        numbered = None if numbers is None else _clock_of(time_s, numbers, found)
         if numbered is not None and numbered.kind is not StampKind.IRREGULAR:
             return numbered
+    return _clock_of(time_s, counter, found)
+
+
+def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> EvenClock:
+    """The clock of stamps (n,) whose period was ``found``."""
+    n, period, sees = len(time_s), found.period_s, found.is_seen
     if counter is not None:
         tick, pauses, width, moved_back = (
             counter,
