@@ -22,6 +22,7 @@ from trihedron.segment.range_ends import range_ends
 from trihedron.segment.runs import (
     MIN_HOLD_S,
     SWAY_RAD,
+    EdgeNoise,
     Run,
     close_gaps,
     find_unsteady,
@@ -118,7 +119,8 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
     long = channels.blocks(LONG_S)
     core = [(a + (b - a) // 4, b - (b - a) // 4) if b - a >= long else (a, b) for a, b in seen]
     noise = pool_mean_noise(channels, core, is_robust=True)
-    steady = [trim_edges(channels, run, noise) for run in join_quiet(channels, quiet, loose, noise)]
+    edges = EdgeNoise.of(channels, noise)
+    steady = [trim_edges(channels, run, noise, edges) for run in join_quiet(channels, quiet, loose, noise)]
     unsteady = find_unsteady(channels, loose, steady, _gravity_reading(recording, channels))
     return sorted([*steady, *unsteady], key=lambda run: run.first)
 
