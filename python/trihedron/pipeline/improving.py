@@ -12,6 +12,7 @@ import numpy as np
 import tomllib
 
 from trihedron.diagnose.against import model_of_diagnosis
+from trihedron.estimate.noise import gain_of
 from trihedron.files.scenario import improved_scenario
 from trihedron.pipeline.comparing_noise import Sampled, sampled
 from trihedron.pipeline.comparing_quantisation import white_and_quantisation
@@ -24,12 +25,15 @@ from trihedron.simulate import (
     Scenario,
     Smoother,
     diagnosed_sizes,
+    low_pass_like,
     noise_of_octaves,
     read_scenario,
     scenario_from_table,
 )
 
 FEWEST_OCTAVES = 4
+N_FREQUENCIES = 256
+"""At which a filter is compared with what was seen: a sixteenth of an octave in the middle of the band."""
 
 
 @dataclass(frozen=True)
@@ -92,16 +96,19 @@ def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
         bands = [o for o in bands if all(o.low_hz in one for one in by_axis)]
         if len(bands) < FEWEST_OCTAVES:
             continue
+        low_pass = _low_pass(axes)
         rounding = np.array([axis.step**2 / (12.0 * recording.rate_hz) for axis in axes])
         density = np.array([[one[o.low_hz].value for one in by_axis] for o in bands])
         relative = np.array([[one[o.low_hz].sigma_log for one in by_axis] for o in bands])
-        out[str(name)] = noise_of_octaves(
+        terms = noise_of_octaves(
             np.array([(o.low_hz, o.high_hz) for o in bands]),
             np.maximum(density - rounding, 1e-3 * density),
             relative,
             1.0 / recording.rate_hz,
-            _corner(axes),
+            low_pass,
+            [None if axis.white is None else (axis.white.value, axis.white.sigma_log) for axis in axes],
         )
+        out[str(name)] = terms, low_pass
     return out
 
 
@@ -117,10 +124,13 @@ def white_and_quantisation_of(seen: Sampled, name: str) -> dict[str, list[float]
     }
 
 
-def _corner(axes: Sequence[HoldNoise]) -> float | None:
-    """Corner [Hz] of the low-pass that most axes show, ``None`` where they show none."""
-    seen = [math.log(axis.corner_hz.value) for axis in axes if axis.corner_hz is not None]
-    return math.exp(sum(seen) / len(seen)) if 2 * len(seen) > len(axes) else None
+def _low_pass(axes: Sequence[HoldNoise]) -> Smoother:
+    """The low-pass of a sensor whose gain is that of the filters seen on its axes; none where none was seen."""
+    rate = axes[0].rate_hz
+    frequency_hz = rate * (np.arange(N_FREQUENCIES) + 0.5) / (2 * N_FREQUENCIES)
+    seen = [None if one.corner_hz is None else (one.corner_hz.value, one.corner_shape) for one in axes]
+    gains = {one: gain_of(frequency_hz, *one, rate) for one in seen if one is not None}
+    return low_pass_like(frequency_hz, [None if one is None else gains[one] for one in seen], 1.0 / rate)
 
 
 def _shared(found: DiagnosisResult, ids: set[str]) -> list[AcceptedEffect]:
@@ -167,8 +177,12 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
         if name in holds and has_shape and differing:
             noise, low_pass = holds[name]
             terms["N"] = list(noise.N)
-            if low_pass.corner_hz > 0.0:
+            if any(low_pass.corners_hz):
+                tables[name]["noise_filter"] = {"corners_hz": list(low_pass.corners_hz), "order": low_pass.order}
+            elif low_pass.corner_hz > 0.0:
                 tables[name]["noise_filter"] = {"corner_hz": low_pass.corner_hz, "order": low_pass.order}
+            elif any(getattr(given, name).noise_filter.of_axes_hz):
+                tables[name]["noise_filter"] = {"corner_hz": 0.0}
             if "B" not in terms and any(noise.B):
                 terms["B"] = list(noise.B)
         if "Q" in terms:

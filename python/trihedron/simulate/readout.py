@@ -105,29 +105,47 @@ class Smoother:
     """Digital low-pass of the part as its noise meets it, at the output rate.
 
     Butterworth poles of ``corner_hz`` (0: none) and ``order`` 1 to 6, carried over by ``z = exp(s dt)``; gain one at
-    rest.
+    rest. ``corners_hz``: one for each axis, in place of the common corner, where any of them is not 0.
     """
 
     corner_hz: float = 0.0
     order: int = 1
+    corners_hz: Triple = NONE
 
     def __post_init__(self) -> None:
-        if not (self.corner_hz >= 0.0 and 1 <= self.order <= 6):
-            raise ValueError(f"a smoother needs corner_hz >= 0 and order 1..6, got {self.corner_hz} Hz, {self.order}")
+        if not (min(self.corner_hz, *self.corners_hz) >= 0.0 and 1 <= self.order <= 6):
+            raise ValueError(
+                f"a smoother needs corners >= 0 and order 1..6, got {self.corner_hz} Hz, {self.corners_hz} Hz, "
+                f"{self.order}"
+            )
 
-    def feedback(self, dt: float) -> FloatArray:
-        """(order + 1,) denominator in powers of 1/z."""
+    @property
+    def of_axes_hz(self) -> Triple:
+        """The corner of every axis."""
+        return self.corners_hz if any(self.corners_hz) else (self.corner_hz,) * 3
+
+    def feedback(self, dt: float, corner_hz: float) -> FloatArray:
+        """(order + 1,) denominator in powers of 1/z of an axis with this corner."""
         n = self.order
         angles = np.pi * (2.0 * np.arange(n) + n + 1.0) / (2.0 * n)
-        poles = np.exp(2.0 * np.pi * self.corner_hz * dt * np.exp(1j * angles))
+        poles = np.exp(2.0 * np.pi * corner_hz * dt * np.exp(1j * angles))
         out: FloatArray = np.real(np.poly(poles))
         return out
 
     def apply(self, signal: FloatArray, dt: float) -> FloatArray:
         """(n, 3) → (n, 3), settled on the first sample."""
-        if self.corner_hz == 0.0:
+        corners = self.of_axes_hz
+        if not any(corners):
             return signal
-        a = self.feedback(dt)
+        if len(set(corners)) == 1:
+            return self._filtered(signal, dt, corners[0])
+        columns = [self._filtered(signal[:, [k]], dt, corner) for k, corner in enumerate(corners)]
+        return np.ascontiguousarray(np.hstack(columns))
+
+    def _filtered(self, signal: FloatArray, dt: float, corner_hz: float) -> FloatArray:
+        if corner_hz == 0.0:
+            return signal
+        a = self.feedback(dt, corner_hz)
         gain = [float(a.sum())]
         settled = lfilter_zi(gain, a)[:, None] * signal[:1]
         return np.ascontiguousarray(lfilter(gain, a, signal, axis=0, zi=settled)[0])
