@@ -100,15 +100,14 @@ def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
         rounding = np.array([axis.step**2 / (12.0 * recording.rate_hz) for axis in axes])
         density = np.array([[one[o.low_hz].value for one in by_axis] for o in bands])
         relative = np.array([[one[o.low_hz].sigma_log for one in by_axis] for o in bands])
-        terms = noise_of_octaves(
+        out[str(name)] = noise_of_octaves(
             np.array([(o.low_hz, o.high_hz) for o in bands]),
             np.maximum(density - rounding, 1e-3 * density),
             relative,
             1.0 / recording.rate_hz,
             low_pass,
-            [None if axis.white is None else (axis.white.value, axis.white.sigma_log) for axis in axes],
+            _white(axes),
         )
-        out[str(name)] = terms, low_pass
     return out
 
 
@@ -124,13 +123,31 @@ def white_and_quantisation_of(seen: Sampled, name: str) -> dict[str, list[float]
     }
 
 
-def _low_pass(axes: Sequence[HoldNoise]) -> Smoother:
-    """The low-pass of a sensor whose gain is that of the filters seen on its axes; none where none was seen."""
+def _low_pass(axes: Sequence[HoldNoise]) -> Smoother | float | None:
+    """The low-pass whose gain is that of the filter seen on all axes, none where none was seen.
+
+    Where axes show unlike ones that colour is a hand's or a stand's too: roughly the corner [Hz] of most of them, for
+    the octaves to tell the shape; ``None`` where most show none.
+    """
     rate = axes[0].rate_hz
+    seen = [(one.corner_hz.value, one.corner_shape) for one in axes if one.corner_hz is not None]
+    if not seen:
+        return Smoother()
+    if len(seen) < len(axes) or len(set(seen)) > 1:
+        mean = math.exp(sum(math.log(corner) for corner, _ in seen) / len(seen))
+        return mean if 2 * len(seen) > len(axes) else None
     frequency_hz = rate * (np.arange(N_FREQUENCIES) + 0.5) / (2 * N_FREQUENCIES)
-    seen = [None if one.corner_hz is None else (one.corner_hz.value, one.corner_shape) for one in axes]
-    gains = {one: gain_of(frequency_hz, *one, rate) for one in seen if one is not None}
-    return low_pass_like(frequency_hz, [None if one is None else gains[one] for one in seen], 1.0 / rate)
+    return low_pass_like(frequency_hz, gain_of(frequency_hz, *seen[0], rate), 1.0 / rate)
+
+
+def _white(axes: Sequence[HoldNoise]) -> list[tuple[float, float] | None]:
+    """N of every axis with its relative error, where all axes show one filter or none.
+
+    What lies below a corner of an axis' own is its motion.
+    """
+    if len({(one.corner_hz, one.corner_shape) for one in axes}) > 1:
+        return [None] * len(axes)
+    return [None if one.white is None else (one.white.value, one.white.sigma_log) for one in axes]
 
 
 def _shared(found: DiagnosisResult, ids: set[str]) -> list[AcceptedEffect]:
@@ -177,11 +194,9 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
         if name in holds and has_shape and differing:
             noise, low_pass = holds[name]
             terms["N"] = list(noise.N)
-            if any(low_pass.corners_hz):
-                tables[name]["noise_filter"] = {"corners_hz": list(low_pass.corners_hz), "order": low_pass.order}
-            elif low_pass.corner_hz > 0.0:
+            if low_pass.corner_hz > 0.0:
                 tables[name]["noise_filter"] = {"corner_hz": low_pass.corner_hz, "order": low_pass.order}
-            elif any(getattr(given, name).noise_filter.of_axes_hz):
+            elif getattr(given, name).noise_filter.corner_hz > 0.0:
                 tables[name]["noise_filter"] = {"corner_hz": 0.0}
             if "B" not in terms and any(noise.B):
                 terms["B"] = list(noise.B)

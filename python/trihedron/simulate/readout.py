@@ -11,6 +11,7 @@ from scipy.signal import lfilter, lfilter_zi
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.refused import RefusedError
 
 Triple: TypeAlias = tuple[float, float, float]
 Matrix: TypeAlias = tuple[Triple, Triple, Triple]
@@ -84,7 +85,7 @@ class Filter:
 
     def __post_init__(self) -> None:
         if not (self.cutoff_hz >= 0.0 and 1 <= self.order <= 8):
-            raise ValueError(f"a filter needs cutoff_hz >= 0 and order 1..8, got {self.cutoff_hz} Hz, {self.order}")
+            raise RefusedError(f"a filter needs cutoff_hz >= 0 and order 1..8, got {self.cutoff_hz} Hz, {self.order}")
 
     def apply(self, signal: FloatArray, dt: float) -> FloatArray:
         """(n, 3) → (n, 3), settled at the start."""
@@ -105,47 +106,29 @@ class Smoother:
     """Digital low-pass of the part as its noise meets it, at the output rate.
 
     Butterworth poles of ``corner_hz`` (0: none) and ``order`` 1 to 6, carried over by ``z = exp(s dt)``; gain one at
-    rest. ``corners_hz``: one for each axis, in place of the common corner, where any of them is not 0.
+    rest.
     """
 
     corner_hz: float = 0.0
     order: int = 1
-    corners_hz: Triple = NONE
 
     def __post_init__(self) -> None:
-        if not (min(self.corner_hz, *self.corners_hz) >= 0.0 and 1 <= self.order <= 6):
-            raise ValueError(
-                f"a smoother needs corners >= 0 and order 1..6, got {self.corner_hz} Hz, {self.corners_hz} Hz, "
-                f"{self.order}"
-            )
+        if not (self.corner_hz >= 0.0 and 1 <= self.order <= 6):
+            raise RefusedError(f"a smoother needs corner_hz >= 0 and order 1..6, got {self.corner_hz} Hz, {self.order}")
 
-    @property
-    def of_axes_hz(self) -> Triple:
-        """The corner of every axis."""
-        return self.corners_hz if any(self.corners_hz) else (self.corner_hz,) * 3
-
-    def feedback(self, dt: float, corner_hz: float) -> FloatArray:
-        """(order + 1,) denominator in powers of 1/z of an axis with this corner."""
+    def feedback(self, dt: float) -> FloatArray:
+        """(order + 1,) denominator in powers of 1/z."""
         n = self.order
         angles = np.pi * (2.0 * np.arange(n) + n + 1.0) / (2.0 * n)
-        poles = np.exp(2.0 * np.pi * corner_hz * dt * np.exp(1j * angles))
+        poles = np.exp(2.0 * np.pi * self.corner_hz * dt * np.exp(1j * angles))
         out: FloatArray = np.real(np.poly(poles))
         return out
 
     def apply(self, signal: FloatArray, dt: float) -> FloatArray:
         """(n, 3) → (n, 3), settled on the first sample."""
-        corners = self.of_axes_hz
-        if not any(corners):
+        if self.corner_hz == 0.0:
             return signal
-        if len(set(corners)) == 1:
-            return self._filtered(signal, dt, corners[0])
-        columns = [self._filtered(signal[:, [k]], dt, corner) for k, corner in enumerate(corners)]
-        return np.ascontiguousarray(np.hstack(columns))
-
-    def _filtered(self, signal: FloatArray, dt: float, corner_hz: float) -> FloatArray:
-        if corner_hz == 0.0:
-            return signal
-        a = self.feedback(dt, corner_hz)
+        a = self.feedback(dt)
         gain = [float(a.sum())]
         settled = lfilter_zi(gain, a)[:, None] * signal[:1]
         return np.ascontiguousarray(lfilter(gain, a, signal, axis=0, zi=settled)[0])
@@ -217,7 +200,7 @@ def sense_axes(S: Matrix, name: str) -> tuple[FloatArray, FloatArray]:
     """
     matrix = np.asarray(S, dtype=np.float64)
     if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)) or np.linalg.cond(matrix) > 1e12:
-        raise ValueError(f"S of the {name} must be an invertible 3x3 matrix, got {matrix.tolist()}")
+        raise RefusedError(f"S of the {name} must be an invertible 3x3 matrix, got {matrix.tolist()}")
     inverse = np.linalg.inv(matrix)
     gain: FloatArray = np.linalg.norm(inverse, axis=1)
     return inverse / gain[:, None], gain

@@ -19,8 +19,12 @@ _FREQUENCIES = np.pi * (np.arange(1 << 13) + 0.5) / (1 << 13)
 _CORNERS = (0.03, 0.045, 0.06, 0.08, 0.1, 0.12, 0.15, 0.19, 0.24, 0.3, 0.37, 0.45)
 _ORDERS = (1, 2, 3, 4, 6)
 
+FILTER_EARNS = 16.0
+"""Twice the log-likelihood that a low-pass must win over none, as where its corner is measured."""
 FLICKER_EARNS = 6.63
 """Twice the log-likelihood that flicker must win over none: χ² of one degree of freedom passes it in 1 %."""
+NEAR = 0.3
+"""In the logarithm: neighbours of the corners that are tried differ by about as much."""
 HIDDEN = 1e-2
 """Power gain below which a converter's rounding and what leaks hide the shape of a filter."""
 LOWEST, HIGHEST = 5e-3, 2.0
@@ -40,7 +44,7 @@ def noise_of_holds(
     measured = [_pooled(signal[:, k], holds, float(steps[k])) for k in range(3)]
     filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
     windows = [_windows(axis[0]) for axis in measured]
-    powers = [_power(low_pass, dt, low_pass.corner_hz) for low_pass in filters]
+    powers = [_power(low_pass, dt) for low_pass in filters]
     fits = [
         [_fit(axis, dt, window @ power) for axis, window in zip(measured, windows, strict=True)] for power in powers
     ]
@@ -58,74 +62,67 @@ def noise_of_octaves(
     density: FloatArray,
     relative: FloatArray,
     dt: float,
-    low_pass: Smoother,
+    low_pass: Smoother | float | None = None,
     white: Sequence[tuple[float, float] | None] = (None, None, None),
-) -> NoiseTerms:
-    """Terms per axis from mean densities in frequency bands, beneath a low-pass that is known.
+) -> tuple[NoiseTerms, Smoother]:
+    """Terms per axis and the low-pass that all axes share, from mean densities in frequency bands.
 
     ``bands_hz`` (m, 2), ``density`` (m, 3) two-sided, unit²/Hz (that of white noise is N²), ``relative`` (m, 3) their
-    relative standard errors. ``white``: N of each axis with its relative error, where it was measured below the
-    low-pass: one more density, of white noise alone.
+    relative standard errors. ``low_pass`` where it is known, or roughly its corner [Hz]: then one of a list near there;
+    else one that earns ``FILTER_EARNS``, or all colour would become one. ``white``: N of each axis with its relative
+    error, where it was measured below a low-pass: one more density, of white noise alone.
     """
     frequency_hz = _FREQUENCIES / (2.0 * np.pi * dt)
     inside = [(low <= frequency_hz) & (frequency_hz < high) for low, high in bands_hz]
     flicker = np.array([float(np.mean(1.0 / (2.0 * np.pi * frequency_hz[one]))) for one in inside])
-    terms = []
-    for k, corner_hz in enumerate(low_pass.of_axes_hz):
-        power = _power(low_pass, dt, corner_hz)
+
+    def fitted(low_pass: Smoother) -> tuple[list[FloatArray], float]:
+        power = _power(low_pass, dt)
         design = np.column_stack([[float(power[one].mean()) for one in inside], flicker])
-        seen, error = density[:, k], relative[:, k]
-        known = white[k]
-        if known is not None:
-            design = np.vstack([design, [1.0, 0.0]])
-            seen, error = np.append(seen, known[0] ** 2), np.append(error, 2.0 * known[1])
-        variances, _ = _earned(design, seen, error)
-        terms.append(np.sqrt(variances))
-    N, B = ((float(x), float(y), float(z)) for x, y, z in np.array(terms).T)
-    return NoiseTerms(N=N, B=B)
+        terms, misfit = [], 0.0
+        for k, known in enumerate(white):
+            rows, seen, error = design, density[:, k], relative[:, k]
+            if known is not None:
+                rows = np.vstack([design, [1.0, 0.0]])
+                seen, error = np.append(seen, known[0] ** 2), np.append(error, 2.0 * known[1])
+            variances, own = _earned(rows, seen, error)
+            terms.append(np.sqrt(variances))
+            misfit += own
+        return terms, misfit
+
+    if not isinstance(low_pass, Smoother):
+        filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
+        misfits = [fitted(one)[1] for one in filters]
+        corner_hz = low_pass
+        near = [k for k in range(1, len(filters)) if corner_hz and abs(np.log(filters[k].corner_hz / corner_hz)) < NEAR]
+        best = min(near or range(len(filters)), key=lambda k: misfits[k])
+        low_pass = filters[best if near or misfits[0] - misfits[best] > FILTER_EARNS else 0]
+    N, B = ((float(x), float(y), float(z)) for x, y, z in np.array(fitted(low_pass)[0]).T)
+    return NoiseTerms(N=N, B=B), low_pass
 
 
-def low_pass_like(frequency_hz: FloatArray, gains: Sequence[FloatArray | None], dt: float) -> Smoother:
-    """The low-pass whose power gain is nearest to those of three axes, in the logarithm.
+def low_pass_like(frequency_hz: FloatArray, gain: FloatArray, dt: float) -> Smoother:
+    """The low-pass whose power gain is nearest to ``gain`` (m,) at ``frequency_hz`` (m,), in the logarithm.
 
-    ``gains``: (m,) at ``frequency_hz`` (m,) below half the rate, one at rest; ``None`` for an axis without a filter.
-    One order for all, each axis its own corner where their gains are others. A gain below ``HIDDEN`` counts no further.
+    A gain below ``HIDDEN`` counts no further.
     """
-    given = [gain for gain in gains if gain is not None]
-    if not given:
-        return Smoother()
-    fits = [_nearest_corners(frequency_hz, gains, dt, order) for order in _ORDERS]
-    _, order, corners = min(fits)
-    if len(set(corners)) == 1:
-        return Smoother(corners[0], order)
-    x, y, z = corners
-    return Smoother(0.0, order, (x, y, z))
-
-
-def _nearest_corners(
-    frequency_hz: FloatArray, gains: Sequence[FloatArray | None], dt: float, order: int
-) -> tuple[float, int, tuple[float, ...]]:
-    """Misfit, order and the corner of every axis of the nearest filter of an order."""
-    total, corners = 0.0, []
     turns = np.exp(-2j * np.pi * frequency_hz * dt)
-    for gain in gains:
-        if gain is None:
-            corners.append(0.0)
-            continue
-        wanted = np.log(np.maximum(gain, HIDDEN))
+    wanted = np.log(np.maximum(gain, HIDDEN))
 
-        def misfit(log_corner: float, wanted: FloatArray = wanted) -> float:
-            a = Smoother(order=order).feedback(dt, float(np.exp(log_corner)))
-            made = np.abs(a.sum() / np.polyval(a[::-1], turns)) ** 2
-            return float(np.mean((np.log(np.maximum(made, HIDDEN)) - wanted) ** 2))
+    def misfit(log_corner: float, order: int) -> float:
+        a = Smoother(float(np.exp(log_corner)), order).feedback(dt)
+        made = np.abs(a.sum() / np.polyval(a[::-1], turns)) ** 2
+        return float(np.mean((np.log(np.maximum(made, HIDDEN)) - wanted) ** 2))
 
-        tried = np.log(np.geomspace(LOWEST / dt, HIGHEST / dt, 40))
-        start = int(np.argmin([misfit(one) for one in tried]))
+    tried = np.log(np.geomspace(LOWEST / dt, HIGHEST / dt, 40))
+    found = []
+    for order in _ORDERS:
+        start = int(np.argmin([misfit(one, order) for one in tried]))
         bounds = tried[max(start - 1, 0)], tried[min(start + 1, len(tried) - 1)]
-        best = minimize_scalar(misfit, bounds=bounds, method="bounded")
-        total += float(best.fun)
-        corners.append(float(np.exp(best.x)))
-    return total, order, tuple(corners)
+        best = minimize_scalar(misfit, args=(order,), bounds=bounds, method="bounded")
+        found.append((float(best.fun), order, float(np.exp(best.x))))
+    _, order, corner_hz = min(found)
+    return Smoother(corner_hz, order)
 
 
 def _earned(design: FloatArray, density: FloatArray, relative: FloatArray) -> tuple[FloatArray, float]:
@@ -208,10 +205,10 @@ def _windows(size: FloatArray) -> FloatArray:
     return np.array([2.0 / m**2 * np.sin(half * m) ** 4 / np.sin(half) ** 2 / len(half) for m in size])
 
 
-def _power(low_pass: Smoother, dt: float, corner_hz: float) -> FloatArray:
-    """(8192,) power transfer of the low-pass at a corner of it."""
-    if corner_hz == 0.0:
+def _power(low_pass: Smoother, dt: float) -> FloatArray:
+    """(8192,) power transfer of the low-pass."""
+    if low_pass.corner_hz == 0.0:
         return np.ones(len(_FREQUENCIES))
-    a = low_pass.feedback(dt, corner_hz)
+    a = low_pass.feedback(dt)
     out: FloatArray = np.abs(a.sum() / np.polyval(a[::-1], np.exp(-1j * _FREQUENCIES))) ** 2
     return out
