@@ -174,3 +174,69 @@ def test_equations_that_the_code_cites_are_in_the_documents():
     for path in [*PACKAGE.rglob("*.py"), *(ROOT / "rust").rglob("*.rs")]:
         missing = set(EQUATION.findall(path.read_text())) - stated
         assert not missing, f"{path.relative_to(ROOT)} cites {sorted(missing)}"
+
+
+# Records that only stages make: what does not fit together there is a defect, to be seen with its trace.
+DEFECTS = {
+    "records/calibration.py",
+    "records/noise.py",
+    "records/segments.py",
+    "report/findings/wording.py",
+    "cli/allan.py",  # caught one line below
+}
+
+
+def raised(path):
+    """Names of what a file raises by calling it."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Raise) and node.exc is not None:
+            called = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
+            yield called.id if isinstance(called, ast.Name) else ast.unparse(called)
+
+
+def test_a_refusal_is_told_from_a_defect():
+    plain = {str(p.relative_to(PACKAGE)) for p in PACKAGE.rglob("*.py") if "ValueError" in set(raised(p))}
+    assert plain == DEFECTS
+    errors = [
+        (f"{path.name}: {node.name}", {ast.unparse(base) for base in node.bases})
+        for path in PACKAGE.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ClassDef)
+    ]
+    # A wrong type is a TypeError first.
+    assert [name for name, bases in errors if "ValueError" in bases] == ["checked.py: WrongTypeError"]
+
+
+# Calls that a handler of ValueError may stand round; pipeline/asking.py says what it catches in Python's words.
+CONVERSIONS = {
+    "pipeline/temperature.py: float",
+    "pipeline/capturing.py: float",
+    "pipeline/streaming.py: json.loads",
+    "pipeline/streaming.py: note.read_text",
+    "pipeline/reading.py: np.ma.asanyarray",
+    "pipeline/asking.py: result_in_python",
+    "pipeline/asking.py: verb",
+    "pipeline/arguments.py: item.item",
+    "pipeline/arguments.py: hasattr",
+    "fleet/running.py: json.loads",
+    "fleet/running.py: path.read_text",
+    "fleet/running.py: distributed.Client",
+    "fleet/logs.py: os.stat",
+}
+
+
+def is_of(handler, name):
+    """Whether a handler catches an exception by this name."""
+    return handler.type is not None and name in {n.id for n in ast.walk(handler.type) if isinstance(n, ast.Name)}
+
+
+def test_no_handler_takes_a_defect_of_a_whole_fit_for_a_refusal():
+    """Where readings become numbers, ValueError is caught only round a conversion of one value or one note."""
+    found = set()
+    for room in ("estimate", "diagnose", "segment", "session", "channel_facts", "pipeline", "fleet"):
+        for path in (PACKAGE / room).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.Try) and any(is_of(h, "ValueError") for h in node.handlers):
+                    calls = [n.func for part in node.body for n in ast.walk(part) if isinstance(n, ast.Call)]
+                    found |= {f"{path.relative_to(PACKAGE)}: {ast.unparse(called)}" for called in calls}
+    assert found == CONVERSIONS

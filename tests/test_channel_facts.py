@@ -146,6 +146,18 @@ def test_swings_of_one_height_end_on_no_limit(sigma):
         assert Recording(t, None, swings, 100.0).facts.of("gyroscope").limits == (), seed
 
 
+@pytest.mark.parametrize("step", [0.1, 1.48, 1.499, 4.0])
+def test_a_table_that_turns_at_one_rate_both_ways_ends_on_no_limit(step):
+    # About y at 160 deg/s and about z at -160: two channels end at one code, on which everything stands still.
+    rng = np.random.default_rng(16)
+    ramp = np.linspace(0.0, 1.0, 50)
+    course = np.concatenate([np.zeros(200), ramp, np.ones(400), ramp[::-1]])
+    axes = [(40.0, 0), (-40.0, 1), (80.0, 2), (-80.0, 0), (160.0, 1), (-160.0, 2)]
+    rates = np.vstack([np.outer(rate * course, np.eye(3)[axis]) for rate, axis in axes])
+    read = step * np.round((rates + 0.08 * rng.normal(size=rates.shape)) / step)
+    assert Recording(np.arange(len(read)) / 100.0, None, read, 100.0).facts.of("gyroscope").limits == ()
+
+
 @pytest.mark.parametrize("sigma", [1.0, 5.0])
 def test_noise_that_ends_abruptly_ends_on_a_limit(sigma):
     # A wall at half to one and a half sigma; with noise of one step half of these looked like tails to older rules.

@@ -19,7 +19,7 @@ MOST_RUNS = 1000
 """Runs that are looked at, evenly spread where there are more."""
 
 
-def is_cut(end: End, *, is_known: bool) -> bool:
+def is_cut(end: End, *, is_known: bool, is_word: bool = False) -> bool:
     """Some of the runs on an end far from where the axis mostly is are no smooth peak that happens to share a code.
 
     A parabola of which n samples stay within a step q has a curvature of at most 8 q/((n − 1)² − 1), n even, or
@@ -27,12 +27,13 @@ def is_cut(end: End, *, is_known: bool) -> bool:
     a tremor makes it steeper (``TOP``), rounding may add a step, and noise its own jumps. The readings fall by more at
     *both* ends of a run that was cut: a turn at a steady rate begins and ends steeply and meanwhile wavers about its
     extreme. Two equal samples may lie on either side of any peak: they are the limit's only where it ``is_known``
-    otherwise, or two peaks end at it.
+    otherwise, or two peaks end at it. Standing still at the end of a word is the limit's too; on a code that another
+    channel ends at as well it may be a table's steady turn one way and the other.
     """
     column = end.column
     if not end.lasts or abs(end.value - end.middle) <= FAR * end.span:
         return False
-    runs = end.runs if is_known else end.moving_runs
+    runs = end.runs if is_word else end.moving_runs
     runs = runs[np.diff(runs, axis=1)[:, 0] > 1]
     steps = np.abs(np.concatenate([np.diff(part[np.isfinite(part)]) for part in end.stretches]))
     noise = TO_SIGMA * float(np.median(steps)) / np.sqrt(2.0) if len(steps) else 0.0

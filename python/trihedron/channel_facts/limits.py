@@ -73,7 +73,7 @@ def _is_limit(end: End, lasting: list[End]) -> bool:
     is_word = is_end_of_word(end.value, end.step)
     is_known = is_word or any(_is_same_code(end, other) for other in lasting if other is not end)
     return (
-        is_cut(end, is_known=is_known)
+        is_cut(end, is_known=is_known, is_word=is_word)
         or is_wall(end, is_known=is_word)
         or is_repeated(end, is_known=is_word)
         or is_cut_noise(end)

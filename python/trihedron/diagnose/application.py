@@ -28,7 +28,7 @@ N_ITERATIONS = 2
 """Effects are per mille of the motion: the second pass of the fixed point leaves their square."""
 
 
-class SignalMissing(ValueError):
+class SignalMissing(RefusedError):
     """The recording lacks a channel that an effect follows."""
 
 

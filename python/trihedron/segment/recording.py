@@ -26,10 +26,13 @@ from trihedron.segment.runs import (
     close_gaps,
     find_unsteady,
     join_quiet,
+    long_enough,
     loose_blocks,
+    set_down,
     trim_edges,
     widen,
 )
+from trihedron.segment.shaken import find_shaken
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks
 from trihedron.segment.turn_scale import centre_of, radians_per_reading
 from trihedron.segment.turning import turning_blocks
@@ -89,6 +92,7 @@ def segment_blocks(
     report(0.4, "still stretches")
     quiet = widen(close_gaps(activity.is_quiet, channels.is_valid), channels.is_valid)
     gravity = _gravity_reading(recording, channels)
+    scale = None
     if gravity is None:
         turning = turning_blocks(channels, quiet, None, None)
         quiet &= ~turning
@@ -104,6 +108,8 @@ def segment_blocks(
         )
     loose = loose_blocks(activity, channels.is_valid) & ~turning
     found = _find_runs(recording, channels, quiet, loose)
+    found += find_shaken(recording, channels, activity, found, ~turning, (gravity, scale))
+    found.sort(key=lambda run: run.first)
     runs, said = without_cut(recording, channels, found, ends)
     report(0.7, "means and their errors")
     segments = _describe(recording, channels, activity, runs, turning)
@@ -118,9 +124,11 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
     long = channels.blocks(LONG_S)
     core = [(a + (b - a) // 4, b - (b - a) // 4) if b - a >= long else (a, b) for a, b in seen]
     noise = pool_mean_noise(channels, core, is_robust=True)
-    steady = [trim_edges(channels, run, noise) for run in join_quiet(channels, quiet, loose, noise)]
+    joined = join_quiet(channels, quiet, loose, noise)
+    steady = [trim_edges(channels, run, noise) for run in long_enough(channels, joined, MIN_HOLD_S)]
     unsteady = find_unsteady(channels, loose, steady, _gravity_reading(recording, channels))
-    return sorted([*steady, *unsteady], key=lambda run: run.first)
+    short = [trim_edges(channels, run, noise) for run in set_down(channels, joined, loose, [*steady, *unsteady])]
+    return sorted([*steady, *unsteady, *short], key=lambda run: run.first)
 
 
 def _gravity_reading(recording: Recording, channels: Channels) -> float | None:

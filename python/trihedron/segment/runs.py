@@ -15,6 +15,10 @@ from trihedron.segment.noise import MeanNoise
 
 MIN_HOLD_S = 1.0
 """A hand that hesitates stops for a few tenths of a second; a person who holds, holds a second."""
+SEEN_S = 0.8
+"""What is left to see of the shortest hold at the noise floor: its ends share their blocks with the moves."""
+SET_DOWN_S = 0.5
+"""A sensor set down for a second comes to rest, and leaves, in less than this; a hand that calms down takes longer."""
 BUMP_S = 2.0
 """A push and the ringing after it last less than this; what lasts longer is a move even if the pose comes back."""
 RETURN = 0.3
@@ -99,9 +103,8 @@ def speed_of_moves(channels: Channels, quiet: BoolArray) -> float:
 
 
 def join_quiet(channels: Channels, quiet: BoolArray, loose: BoolArray, noise: MeanNoise) -> list[Run]:
-    """Holds from quiet stretches: neighbours in one pose, with only a bump between, are one hold."""
+    """Stretches of one pose from quiet ones, however short: neighbours with only a bump between are one."""
     runs: list[Run] = []
-    shortest = channels.blocks(MIN_HOLD_S)
     creeping = CREEP_PART * speed_of_moves(channels, quiet)
     for first, last in ranges_of(quiet):
         piece = Run(first, last)
@@ -114,7 +117,31 @@ def join_quiet(channels: Channels, quiet: BoolArray, loose: BoolArray, noise: Me
                 runs[-1] = Run(before.first, last, (*before.bumps, (before.last, first)))
                 continue
         runs.append(piece)
+    return runs
+
+
+def long_enough(channels: Channels, runs: list[Run], shortest_s: float) -> list[Run]:
+    """Those whose quiet parts last as long."""
+    shortest = channels.blocks(shortest_s)
     return [run for run in runs if sum(b - a for a, b in run.quiet_ranges()) >= shortest]
+
+
+def set_down(channels: Channels, runs: list[Run], loose: BoolArray, taken: list[Run]) -> list[Run]:
+    """Short stretches between moves on either side: poses of a second, not calm moments of a longer one or of a hand.
+
+    ``loose`` (m,) as of :func:`loose_blocks`, ``taken`` what is a hold already.
+    """
+    most, found = channels.blocks(SET_DOWN_S), []
+    for run in long_enough(channels, runs, SEEN_S):
+        first, last = run.first, run.last
+        while first > 0 and loose[first - 1]:
+            first -= 1
+        while last < len(loose) and loose[last]:
+            last += 1
+        is_free = all(other.outer_last <= first or other.outer_first >= last for other in taken)
+        if is_free and first > 0 and last < len(loose) and max(run.first - first, last - run.last) <= most:
+            found.append(run)
+    return found
 
 
 def _is_same_pose(channels: Channels, before: Run, after: Run, noise: MeanNoise, creeping: float) -> bool:

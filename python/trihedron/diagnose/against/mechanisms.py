@@ -15,6 +15,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.accepted import HEADLINE
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.records.domains import Domain
+from trihedron.records.words import effect_words
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 FRAME_TOLERANCE = 0.03
@@ -196,9 +197,10 @@ def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:
 
 
 def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
-    said = f"Only the model has it: {effect.statement}"
     reasons = [c.reason for c in candidates if c.id == effect.id and not c.applicable]
-    return f"{said} Of the recording {reasons[0]}, and nothing in it drifts by as much." if reasons else said
+    return effect_words(
+        effect.id, "only-model", statement=effect.statement, has_reason=bool(reasons), reason="".join(reasons[:1])
+    )
 
 
 def _is_free(effect: AcceptedEffect) -> bool:

@@ -13,7 +13,6 @@ from trihedron.diagnose.effects.hidden_drift import HiddenDrift
 from trihedron.diagnose.session.twin import Distortion
 from trihedron.diagnose.zeros.curve import DriftCurve
 from trihedron.diagnose.zeros.of_session import SessionEvidence, accel_evidence, share_of_curve
-from trihedron.units import mm_s2_from_m_s2
 
 BEYOND_NOISE = 3.0
 """Rms of the curve over the error of a pose's mean."""
@@ -24,8 +23,7 @@ class AccelHiddenDrift(HiddenDrift):
 
     id = "accel-hidden-drift"
     leaves_open = ("accel-zero",)
-    mechanism = "accelerometer bias drifts smoothly in time though no logged channel explains it"
-    sensor, domain, unit, shown_unit = "accelerometer", "static-accel", "m/s^2", "mm/s²"
+    domain, unit = "static-accel", "m/s^2"
     fewest_poses = 25
 
     def on_axes(self, context: Context) -> Callable[[FloatArray], FloatArray]:
@@ -43,9 +41,6 @@ class AccelHiddenDrift(HiddenDrift):
 
     def share(self, found: SessionEvidence, curve: DriftCurve) -> float:
         return min(1.0, share_of_curve(found, curve.rms / np.sqrt(3.0)))
-
-    def shown(self, value: float) -> float:
-        return mm_s2_from_m_s2(value)
 
     def curve_variant(self, context: Context, curve: DriftCurve) -> Variant:
         values = np.stack([np.interp(context.time_s, curve.time_s, v) for v in curve.values], axis=1)

@@ -15,8 +15,6 @@ class PeriodicInterference(DirectEffect):
     """One sinusoid, steady through all poses, in one or more channels."""
 
     id = "periodic-interference"
-    mechanism = "a sinusoid stands in the readings while the sensor is still"
-    experiment = "record at rest at another sampling rate: an aliased line moves, a true one stays"
     is_of_samples = True
 
     def find(self, context: Context) -> Evidence | None:
@@ -47,7 +45,6 @@ class PeriodicInterference(DirectEffect):
         )  # fmt: skip
         return Evidence(
             strongest.p_value, float(-2 * np.log(strongest.p_value)), tuple(parameters),
-            f"A line at {strongest.frequency_hz:.3f} Hz stands in {', '.join(line.channel for line in same)} while the "
-            "sensor is still.",
+            self.told("line", frequency_hz=strongest.frequency_hz, channels=[line.channel for line in same]),
             "within-static", where, (held,), share=min(max(line.share for line in same), 1.0),
         )  # fmt: skip

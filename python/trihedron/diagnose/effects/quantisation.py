@@ -133,8 +133,6 @@ class Quantisation(DirectEffect):
     """Steps so wide against the noise that averaging no longer resolves between them."""
 
     id = "quantisation"
-    mechanism = "the resolution is too coarse for the noise: means of still poses sit on steps"
-    experiment = "choose a finer range, or add a little motion or noise (dither) while averaging"
     is_proof = True
 
     def find(self, context: Context) -> Evidence | None:
@@ -152,15 +150,13 @@ class Quantisation(DirectEffect):
         strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_holds)
         grid = worst.step**2 / 12.0  # variance of the staircase, beside that of the noise in front of it
         names = tuple(CHANNELS[one.channel] for one in found)
-        what = (
-            f"do not move within {worst.dead:.4g} raw units of zero"
-            if worst.dead
-            else f"move in steps of {worst.step:.4g} raw units, {worst.step / worst.sigma:.2g} times their noise"
-        )
+        told = self.told(
+            "steps", channels=names, is_dead=bool(worst.dead), dead=worst.dead, step=worst.step,
+            times=worst.step / worst.sigma,
+        )  # fmt: skip
         return Evidence(
-            1e-300, strength, _parameters(context, found),
-            f"Readings of {', '.join(names)} {what}: averaging does not resolve between steps.",
-            "within-static", Where(names), reweigh=reweigh, share=grid / (grid + worst.sigma**2),
+            1e-300, strength, _parameters(context, found), told, "within-static", Where(names),
+            reweigh=reweigh, share=grid / (grid + worst.sigma**2),
             restate=lambda later: _parameters(later, found),  # the staircase had bent the scale factors
         )  # fmt: skip
 

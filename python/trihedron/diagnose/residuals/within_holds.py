@@ -227,7 +227,9 @@ def judge_within_holds(obs: Observations, alpha: float) -> DomainTest:
     """Lines and noisy poses, as one domain; the p-value is the smallest, paid for by the number of looks."""
     scatter = hold_scatter(obs)
     n_looks = scatter.p_value.size
-    loud = np.where(scatter.ratio > LOUD, scatter.p_value, 1.0)
+    # A pose that was found shaking is said to, and weighed by its own scatter: nothing is left to explain.
+    steady = np.array([not hold.is_unsteady for hold in obs.segments.holds])
+    loud = np.where(steady[:, None] & (scatter.ratio > LOUD), scatter.p_value, 1.0)
     p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0
     lines = [line for line in find_lines(obs) if line.share > MIN_LINE_SHARE]
     p_line = min((line.p_value for line in lines), default=1.0)

@@ -15,6 +15,7 @@ from trihedron.diagnose.effects import Effect, catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.session.solve import N_DOMAINS, Fit, leverage, reduce, score
 from trihedron.diagnose.session.twin import PRIOR
+from trihedron.records.words import why_not
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +111,7 @@ def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored],
             if best is None or merit > best.merit:
                 best = scored
         if best is None:
-            missing.append((effect.id, "the calibration itself imitates it in this recording"))
+            missing.append((effect.id, why_not("imitated")))
         else:
             out.append(replace(best, merits=tuple(merits)))
     out.sort(key=lambda s: -s.merit)
