@@ -12,6 +12,7 @@ mod ends;
 mod evidence;
 pub mod factor;
 pub mod fit;
+mod gaps;
 pub mod held_out;
 mod lanes;
 pub mod move_rows;

@@ -56,8 +56,8 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
         .fold(f64::NEG_INFINITY, f64::max);
     let likely: Vec<_> = tried
         .into_iter()
-        .map(|(value, which, at)| ((value - best).exp(), which, at))
-        .filter(|(weight, ..)| *weight >= LEAST_WEIGHT)
+        .map(|(value, which, at)| (value - best, which, at))
+        .filter(|(value, ..)| *value >= LEAST_WEIGHT.ln())
         .collect();
     // Rows of the moves know the scatter, not the corner time.
     let moves = (0..scatters.len())
@@ -67,11 +67,32 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
             first.map(|(_, _, at)| reweighed(fit, at)).transpose()
         })
         .collect::<Result<Vec<_>>>()?;
-    let mut out = likely
-        .into_par_iter()
-        .filter_map(|(weight, which, at)| Some((weight, moves[which].as_ref()?, at)))
-        .map(|(weight, (moves, _), at)| {
-            let (chain, side) = evidence.combined(&at, moves);
+    let heard: Vec<_> = likely
+        .par_iter()
+        .filter_map(|(value, which, at)| {
+            let (rows, weight) = moves[*which].as_ref()?;
+            let by_moves = evidence.with(at, rows) + weight - evidence.at(at);
+            Some((*value, by_moves, rows, at))
+        })
+        .collect();
+    let without = |corner: f64| {
+        heard
+            .iter()
+            .filter(|(_, _, _, at)| at.scatter[0] <= NO_SCATTER)
+            .find(|(_, _, _, at)| at.corner_s[0].total_cmp(&corner).is_eq())
+            .map(|(_, by_moves, _, _)| *by_moves)
+    };
+    let mut out = heard
+        .par_iter()
+        .map(|(value, by_moves, rows, at)| {
+            // Moves that a scatter would bend, and that are not bent, speak against it; those that are bent may be so
+            // by anything, and do not speak for it.
+            let against = without(at.corner_s[0]).map_or(0.0, |none| (by_moves - none).min(0.0));
+            ((value + against).exp(), rows, at)
+        })
+        .filter(|(weight, ..)| *weight >= LEAST_WEIGHT)
+        .map(|(weight, rows, at)| {
+            let (chain, side) = evidence.combined(at, rows);
             let factor = chain.factor(RIDGE, None)?;
             let step = -factor.solve(&side).column(0).into_owned();
             Ok(Possible {

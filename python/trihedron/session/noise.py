@@ -72,7 +72,7 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         if readings is None or not ranges:
             continue
         quantum = recording.facts.of(("accelerometer", "gyroscope")[k]).step
-        variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s, quantum)
+        variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s, quantum, recording.time_s)
         if sigma is not None and density is not None:
             halves = _second_halves_minus_first(readings, np.array(spans, dtype=np.int64).reshape(-1, 2))
             variances[:, k] += coloured_variance(sigma, halves, density, lasts, moves_last)
