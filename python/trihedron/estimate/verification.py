@@ -110,7 +110,7 @@ def _carried(
         gyroscope.S, gyroscope.covariance[:9, :9],
     )  # fmt: skip
     g = calibration.gravity_m_s2
-    noise, total = np.sqrt(seen.floor2) / g, np.sqrt(seen.floor2 + np.maximum(seen.model2, 0.0)) / g
+    noise, total = np.sqrt(seen.floor2) / g, np.sqrt(seen.floor2 + seen.model2) / g
     return seen.angle_deg, np.degrees(noise), np.degrees(total)
 
 
