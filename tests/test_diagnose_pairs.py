@@ -134,6 +134,21 @@ def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
     assert compare_effects([faint], [], tried, alpha=0.01).differ
 
 
+def test_an_effect_that_the_simulations_own_test_calls_likely_is_not_missing_from_it():
+    own = [effect("gyro-g-sensitivity", domain="static-gyro")]
+
+    def missing(p, model=()):
+        tried = [Candidate("gyro-g-sensitivity", p, True), *(Candidate(f"other-{k}", 0.5, True) for k in range(20))]
+        return [one.id for one in compare_effects(model, own, [], alpha=0.01, tried_on_model=tried).missing]
+
+    assert missing(1e-6) == []
+    assert missing(1e-3) == ["gyro-g-sensitivity"]  # times 21 candidates
+    # What another effect of the simulation does to the same rates is no evidence of this one.
+    assert missing(1e-6, [effect("gyro-zero-scatter", domain="static-gyro")]) == []
+    other = effect("gyro-thermal-bias", domain="static-gyro")
+    assert missing(1e-6, [other]) == ["gyro-g-sensitivity"]
+
+
 def test_a_headline_counts_what_it_does_not_say_and_leads_with_the_most_certain():
     groups = ("accel-zero", "accel-scale", "accel-misalignment", "gyro-zero", "gyro-scale")
     numbers = tuple(

@@ -104,6 +104,7 @@ def compare_effects(
     alpha: float,
     unexplained: Collection[Domain] = (),
     misses: Mapping[Domain, float] = MappingProxyType({}),
+    tried_on_model: Sequence[Candidate] = (),
 ) -> ComparedEffects:
     """Pair the effects of both sides by name, or by what neither recording could tell apart.
 
@@ -112,6 +113,8 @@ def compare_effects(
     Nor is an effect that would show in a domain of which the recording leaves more ``unexplained`` than its noise:
     it may be there, and hidden. ``misses``: rms of the recording's residuals in each domain before any effect; an
     effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than that.
+    ``tried_on_model``: candidates of the simulation's own diagnosis. Nor is an effect of the recording missing that the
+    simulation's own test calls likely, where nothing else was found there that could be mistaken for it.
     """
     by_id = {effect.id: effect for effect in catalogue()}
     of_session = {effect.id for effect in by_id.values() if effect.is_of_session or effect.is_of_motion}
@@ -133,7 +136,8 @@ def compare_effects(
     for effect in recording:
         partner = next((m for m in left if _are_one(m, effect)), None)
         if partner is None:
-            missing.append(effect)
+            if not _is_likely(effect, tried_on_model, model, alpha):
+                missing.append(effect)
         else:
             left.remove(partner)
             pairs.append((partner, effect))
@@ -150,6 +154,21 @@ def compare_effects(
     ]
     parameters = [p for m, r in alike for p in _parameters(m, r, alpha)]
     return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))
+
+
+def _is_likely(
+    effect: AcceptedEffect, tried: Sequence[Candidate], others: Sequence[AcceptedEffect], alpha: float
+) -> bool:
+    """Whether a log's own test, the search paid for, calls an effect likely that did not earn its place there."""
+    applicable = [c for c in tried if c.applicable]
+    own = [c.p_value for c in applicable if c.id == effect.id and c.p_value is not None]
+    domains = {seen.domain for seen in effect.held_out[:1]}
+    spreads = {one.id for one in catalogue() if one.is_spread}
+    # A scatter is what any effect of the poses looks like until it is named.
+    is_shown_otherwise = any(
+        domains & {seen.domain for seen in one.held_out[:1]} for one in others if one.id not in spreads
+    )
+    return bool(own) and len(applicable) * own[0] < alpha and not is_shown_otherwise
 
 
 def is_footnote(effect: AcceptedEffect) -> bool:
