@@ -41,21 +41,26 @@ impl SessionPoses {
         force_along: Option<(Array2<'_>, Array1<'_>)>,
     ) -> PyResult<Self> {
         type Along<'a> = Option<(&'a [Vector3<f64>], &'a [f64])>;
-        let at_rest = |mean: &Array2<'_>, sigma: &Array2<'_>, density: &Array1<'_>, along: Along<'_>| {
-            let (mean, sigma) = (rows3("hold means", mean)?, rows3("hold sigmas", sigma)?);
-            AtRest::of(mean, sigma, vector3("density", density)?, along)
-                .map_err(|error| PyValueError::new_err(error.to_string()))
-        };
+        let at_rest =
+            |mean: &Array2<'_>, sigma: &Array2<'_>, density: &Array1<'_>, along: Along<'_>| {
+                let (mean, sigma) = (rows3("hold means", mean)?, rows3("hold sigmas", sigma)?);
+                AtRest::of(mean, sigma, vector3("density", density)?, along)
+                    .map_err(|error| PyValueError::new_err(error.to_string()))
+            };
         let along = force_along
             .as_ref()
             .map(|(up, error)| Ok::<_, PyErr>((rows3("verticals", up)?, samples(error))))
             .transpose()?;
-        let along = along.as_ref().map(|(up, error)| (up.as_slice(), error.as_slice()));
+        let along = along
+            .as_ref()
+            .map(|(up, error)| (up.as_slice(), error.as_slice()));
         Ok(Self {
             time_s: samples(&time_s),
             force: at_rest(&force, &force_sigma, &force_density, along)?,
             rate: match (&rate, &rate_sigma, &rate_density) {
-                (Some(mean), Some(sigma), Some(density)) => Some(at_rest(mean, sigma, density, None)?),
+                (Some(mean), Some(sigma), Some(density)) => {
+                    Some(at_rest(mean, sigma, density, None)?)
+                }
                 _ => None,
             },
         })
