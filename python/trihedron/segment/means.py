@@ -160,8 +160,8 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     """
     if not runs:
         return np.zeros(channels.mean.shape[1])
-    own = [np.vstack([channels.variance[a:b] for a, b in run.quiet_ranges()]) for run in runs]
-    mean = np.array([np.vstack([channels.mean[a:b] for a, b in run.quiet_ranges()]).mean(axis=0) for run in runs])
+    own = [run.quiet_rows(channels.variance) for run in runs]
+    mean = np.array([run.quiet_rows(channels.mean).mean(axis=0) for run in runs])
     q2 = np.where(channels.quantum > 0.0, channels.quantum**2, 1.0)
     noise = np.maximum(np.nanmean(np.vstack(own), axis=0) - channels.quantisation_variance, 0.0)
     # Readings that only toggle between two neighbours (variance up to q²/4) do not show how large the noise is.

@@ -22,6 +22,7 @@ from trihedron.segment.range_ends import range_ends
 from trihedron.segment.runs import (
     MIN_HOLD_S,
     SWAY_RAD,
+    EdgeNoise,
     Run,
     close_gaps,
     find_unsteady,
@@ -124,10 +125,12 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
     long = channels.blocks(LONG_S)
     core = [(a + (b - a) // 4, b - (b - a) // 4) if b - a >= long else (a, b) for a, b in seen]
     noise = pool_mean_noise(channels, core, is_robust=True)
+    edges = EdgeNoise.of(channels, noise)
     joined = join_quiet(channels, quiet, loose, noise)
-    steady = [trim_edges(channels, run, noise) for run in long_enough(channels, joined, MIN_HOLD_S)]
+    steady = [trim_edges(channels, run, noise, edges) for run in long_enough(channels, joined, MIN_HOLD_S)]
     unsteady = find_unsteady(channels, loose, steady, _gravity_reading(recording, channels))
-    short = [trim_edges(channels, run, noise) for run in set_down(channels, joined, loose, [*steady, *unsteady])]
+    other = set_down(channels, joined, loose, [*steady, *unsteady])
+    short = [trim_edges(channels, run, noise, edges) for run in other]
     return sorted([*steady, *unsteady, *short], key=lambda run: run.first)
 
 

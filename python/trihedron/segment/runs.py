@@ -27,6 +27,8 @@ RETURN = 0.3
 """A push and its return cancel: what is left of the turn is less than this part of the way turned to and fro."""
 CLEAN_EDGE = 2e-3
 """Chance that a clean stretch at an end is trimmed, where it costs some tenths of a second."""
+EDGE_BLOCKS = [2**k for k in range(16)]
+"""Stretches at an end of a hold that are compared with its middle."""
 CREEP_PART = 0.02
 """A creeping support turns slower than this part of the speed of the log's own moves."""
 SAME_POSE = 1e-3
@@ -62,6 +64,11 @@ class Run:
         """The stretches between bumps."""
         edges = [self.first, *(k for bump in self.bumps for k in bump), self.last]
         return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
+
+    def quiet_rows(self, values: FloatArray) -> FloatArray:
+        """(k, c) of one row a block ``values`` (m, c): those between bumps; a view where there are none."""
+        parts = [values[a:b] for a, b in self.quiet_ranges()]
+        return parts[0] if len(parts) == 1 else np.vstack(parts)
 
 
 def loose_blocks(activity: Activity, is_valid: BoolArray) -> BoolArray:
@@ -184,7 +191,7 @@ def _comes_back(channels: Channels, before: Run, after: Run, noise: MeanNoise, c
 
 def run_mean(channels: Channels, run: Run) -> tuple[FloatArray, int]:
     """(c,) mean reading of the quiet blocks of a run, and how many they are."""
-    blocks = np.vstack([channels.mean[a:b] for a, b in run.quiet_ranges()])
+    blocks = run.quiet_rows(channels.mean)
     return blocks.mean(axis=0), len(blocks)
 
 
@@ -248,7 +255,25 @@ def _sway(attitude: FloatArray, runs: list[Run]) -> float:
     return float(np.linalg.norm(blocks.std(axis=0)))
 
 
-def trim_edges(channels: Channels, run: Run, noise: MeanNoise) -> Run:
+@dataclass(frozen=True, eq=False)
+class EdgeNoise:
+    """What an end of a hold is compared by: ``variance`` (k, c) of the mean of 1, 2, 4 ... blocks, and the ``limit`` of
+    χ² of the channels that are ``live`` (c,)."""
+
+    variance: FloatArray
+    live: BoolArray
+    limit: float
+
+    @classmethod
+    def of(cls, channels: Channels, noise: MeanNoise) -> EdgeNoise:
+        """The same for all holds of a log."""
+        live = np.asarray(noise.variance(1.0) > 0.0)
+        duration_s = np.array(EDGE_BLOCKS, dtype=np.float64)[:, None] * channels.step_s
+        limit = float(probability.chdtri(int(live.sum()), CLEAN_EDGE))
+        return cls(noise.variance(duration_s), live, limit)
+
+
+def trim_edges(channels: Channels, run: Run, noise: MeanNoise, edges: EdgeNoise) -> Run:
     """Take blocks off both ends until no stretch at an end departs from the middle of the hold.
 
     Stretches of 1, 2, 4 ... blocks at each end are compared with the central half; at most a third is taken off.
@@ -267,7 +292,10 @@ def trim_edges(channels: Channels, run: Run, noise: MeanNoise) -> Run:
     off = np.where(good[:, None], mean - level, 0.0)
     core_variance = noise.variance(core.sum() * channels.step_s)
     most = n // 3
-    start, tail = (_clean_from(side, core_variance, channels, noise, most) for side in (off, off[::-1]))
+    sizes = [size for size in EDGE_BLOCKS if size <= most]
+    known = edges.variance[: len(sizes)] + core_variance + channels.quantisation_variance
+    variance = np.where(edges.live, known, 0.0)
+    start, tail = (_clean_from(side, most, sizes, variance, edges.limit) for side in (off, off[::-1]))
     if start + tail > n // 2:
         # Hardly a middle is left: the hold creeps throughout, which is said instead of trimmed.
         start = tail = 0
@@ -277,13 +305,7 @@ def trim_edges(channels: Channels, run: Run, noise: MeanNoise) -> Run:
     return replace(run, first=run.first + start, last=run.first + stop, bumps=bumps, trimmed=(start, n - stop))
 
 
-def _clean_from(off: FloatArray, core_variance: FloatArray, channels: Channels, noise: MeanNoise, most: int) -> int:
-    sizes = [2**k for k in range(16) if 2**k <= most]
-    live = np.flatnonzero(noise.variance(1.0) > 0.0)
-    limit = float(probability.chdtri(len(live), CLEAN_EDGE))
-    duration_s = np.array(sizes, dtype=np.float64)[:, None] * channels.step_s
-    variance = np.zeros((len(sizes), off.shape[1]))
-    variance[:, live] = (noise.variance(duration_s) + core_variance + channels.quantisation_variance)[:, live]
+def _clean_from(off: FloatArray, most: int, sizes: list[int], variance: FloatArray, limit: float) -> int:
     clean = _core.first_clean(off, most, sizes, variance, limit)
     # A soft beginning goes on below what can be seen: as much again is given away; and one block, which may be the
     # one the motion begins in.

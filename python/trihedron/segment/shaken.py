@@ -12,7 +12,7 @@ from trihedron.records import Recording
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.floor import Activity, quiet_channels
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
-from trihedron.segment.runs import BUMP_S, SEEN_S, SWAY_RAD, Run, close_gaps, trim_edges, widen
+from trihedron.segment.runs import BUMP_S, SEEN_S, SWAY_RAD, EdgeNoise, Run, close_gaps, trim_edges, widen
 
 SMOOTH_S = 1.0
 """Raised cosine over which a shaking of some hertz and more averages out of the attitude, and a carried body's way
@@ -99,7 +99,8 @@ def _poses(channels: Channels, seen: _Seen, calm: BoolArray, taken: list[Run], s
         run = Run(first, last, (), True)
         if any(_is_one_pose(channels, seen.attitude, run, near) for near in [*taken, *found]):
             continue
-        run = trim_edges(channels, run, _own_noise(channels, run, seen.steady))
+        noise = _own_noise(channels, run, seen.steady)
+        run = trim_edges(channels, run, noise, EdgeNoise.of(channels, noise))
         if run.last - run.first >= WINDOW_BLOCKS:
             found.append(run)
     return found

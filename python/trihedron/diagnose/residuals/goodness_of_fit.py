@@ -40,7 +40,7 @@ _CHANNELS = {
 
 
 def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
-    """Chi-square of every row domain against its degrees of freedom (eq. 8.9).
+    """Chi-square of every row domain against its degrees of freedom (eq. 8.7).
 
     ``alpha`` is the chance that a healthy recording disagrees in any domain; it is shared by six domains.
     """

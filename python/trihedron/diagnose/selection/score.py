@@ -1,4 +1,4 @@
-"""Rao's score test of every candidate against the model as it stands (eq. 8.7)."""
+"""Rao's score test of every candidate against the model as it stands (eq. 8.8)."""
 
 from __future__ import annotations
 
