@@ -76,6 +76,10 @@ def test_scatter_of_the_model_is_surplus_only_beyond_what_the_recording_misses_a
     model = [effect("accel-zero-scatter", 1.5e-3, 1.0e-3, variant="")]
     assert not compare_effects(model, [], tried, alpha=0.01, misses={"static-accel": 1.4e-3}).surplus
     assert compare_effects(model, [], tried, alpha=0.01, misses={"static-accel": 0.8e-3}).surplus
+    # Twelve poses know a mean square to 40 %: twice another's is chance (F(12, 12) passes 4.2 in 1 %), ten times not.
+    for misses, is_surplus in ((0.8e-3, False), (0.35e-3, True)):
+        sizes = {"misses": {"static-accel": misses}, "freedom": {"static-accel": 12.0}}
+        assert bool(compare_effects(model, [], tried, alpha=0.01, **sizes).surplus) is is_surplus
 
 
 def scattered(recording, sigma, seed):

@@ -50,6 +50,7 @@ def compared(
     effects = compare_effects(
         given_effects, found.effects, found.candidates, alpha=alpha, unexplained=unexplained,
         misses={test.domain: test.rms for test in found.domains},
+        freedom={test.domain: test.dof for test in found.domains},
         tried_on_model=() if simulated is None else simulated[0].candidates,
     )  # fmt: skip
     numbers = compare_numbers(

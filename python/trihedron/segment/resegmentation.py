@@ -1,4 +1,4 @@
-"""Poses once more, as a joint model needs them: cut where they were bumped, found in hours that only drift."""
+"""Poses once more, as a joint model needs them: cut where they were bumped, found where they were only shaken."""
 
 from __future__ import annotations
 
@@ -11,12 +11,16 @@ from trihedron.arrays import FloatArray
 from trihedron.ranges import ranges_of
 from trihedron.records import Hold, Move, Recording, Segments
 
+RESTING = 1e-3
+"""A mean rate of a thousandth of the moves' rms, five times over, is rest: below 1 °/s after moves of 3 rad/s."""
+
 
 def resegment(recording: Recording, segments: Segments, shortest_s: float = 0.3) -> Segments:
-    """Poses as a model of the whole session needs them: cut where they were bumped, found in hours that only drift.
+    """Poses as a model of the whole session needs them: cut where they were bumped, found where only shaken.
 
     A bump inside a hold turns the body; averaged over, it contradicts the moves on both sides. Cut there, the gyro
-    carries the attitude across it like across any move.
+    carries the attitude across it like across any move. A pose that vibrates is no rest, but its slow part stands
+    still: it becomes a hold of its own, so that a bias that follows the vibration can be seen.
 
     The answer's ``whole`` are the poses as they were found, each averaged over whatever happened in it.
     """
@@ -36,9 +40,9 @@ def resegment(recording: Recording, segments: Segments, shortest_s: float = 0.3)
         if not kept:
             kept = [(hold.start, hold.stop)]
         spans += [(a, b, i) for a, b in kept]
-    drifting = _drifting(recording, segments)
-    merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in drifting)]))
-    if len(merged) == segments.n_holds and not drifting and not was_bumped:
+    shaken = [*_shaken(recording, segments), *_drifting(recording, segments)]
+    merged = _in_pieces(recording, sorted([*spans, *((a, b, -1) for a, b in shaken)]))
+    if len(merged) == segments.n_holds and not shaken and not was_bumped:
         return segments
     return replace(_segments_of(recording, segments, merged), whole=_averaged_whole(recording, segments))
 
@@ -152,3 +156,49 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
         accelerometer_up=None if up is None else up[sources],
         accelerometer_sigma_up=None if error_up is None else np.where(same, error_up[sources], np.nan),
     )
+
+
+MAX_TURNING = 0.05
+"""Scatter of the rate in a shaken pose, as a share of the fastest rate of the recording."""
+
+
+def _shaken(
+    recording: Recording, segments: Segments, block_s: float = 0.1, shortest_s: float = 0.8
+) -> list[tuple[int, int]]:
+    """Stretches of moves whose block means stand still while the samples shake."""
+    if recording.gyroscope is None or recording.accelerometer is None or segments.gyroscope_mean is None:
+        return []
+    assert segments.accelerometer_sigma is not None
+    block = max(round(block_s * recording.rate_hz), 5)
+    zero = np.median(segments.gyroscope_mean, axis=0)
+    assert segments.gyroscope_sigma is not None
+    spread = np.maximum(np.std(segments.gyroscope_mean, axis=0), segments.gyroscope_sigma / np.sqrt(block))
+    # A bias that follows the shaking is no motion: rates far below those of real moves count as none.
+    moving = np.concatenate([recording.gyroscope[m.start : m.stop] for m in segments.moves] or [np.zeros((1, 3))])
+    spread = np.maximum(spread, RESTING * float(np.sqrt(np.nanmean((moving - zero) ** 2))))
+    fastest = float(np.nanmax(np.abs(recording.gyroscope - zero)))
+    out: list[tuple[int, int]] = []
+    for move in segments.moves:
+        a, b = move.start, move.stop
+        n = (b - a) // block
+        if n * block < shortest_s * recording.rate_hz:
+            continue
+        gyro = recording.gyroscope[a : a + n * block].reshape(n, block, 3)
+        accel = recording.accelerometer[a : a + n * block].reshape(n, block, 3)
+        rate_mean = np.nanmean(gyro, axis=1)
+        own = np.nanstd(gyro, axis=1) / np.sqrt(block)
+        force_mean = np.nanmean(accel, axis=1)
+        force_own = np.nanstd(accel, axis=1)
+        # Zero rate within its own scatter, and force that steps from block to block by less than it shakes in one.
+        still = (np.abs(rate_mean - zero) < 5.0 * np.hypot(own, spread)).all(axis=1)
+        step = np.abs(np.diff(force_mean, axis=0, prepend=force_mean[:1]))
+        calm = (step < 4.0 * np.sqrt(2.0 / block) * np.maximum(force_own, segments.accelerometer_sigma)).all(axis=1)
+        shaking = (force_own > 3.0 * segments.accelerometer_sigma).any(axis=1)
+        # A hand that swings back and forth is no pose: what only shakes turns slowly beside the session's moves.
+        turning = (np.nanstd(gyro, axis=1) > MAX_TURNING * fastest).any(axis=1)
+        good = still & calm & shaking & ~turning
+        for first, last in ranges_of(good):
+            start, stop = a + first * block + block, a + last * block - block
+            if stop - start >= shortest_s * recording.rate_hz:
+                out.append((start, stop))
+    return out

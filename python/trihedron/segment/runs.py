@@ -19,6 +19,8 @@ SEEN_S = 0.8
 """What is left to see of the shortest hold at the noise floor: its ends share their blocks with the moves."""
 SET_DOWN_S = 0.5
 """A sensor set down for a second comes to rest, and leaves, in less than this; a hand that calms down takes longer."""
+FAR_SHORTER = 0.1
+"""Of the usual hold: who holds for half a minute does not set down for a second, but hesitates."""
 BUMP_S = 2.0
 """A push and the ringing after it last less than this; what lasts longer is a move even if the pose comes back."""
 RETURN = 0.3
@@ -139,7 +141,10 @@ def set_down(channels: Channels, runs: list[Run], loose: BoolArray, taken: list[
     ``loose`` (m,) as of :func:`loose_blocks`, ``taken`` what is a hold already.
     """
     most, found = channels.blocks(SET_DOWN_S), []
+    usual = float(np.median([run.last - run.first for run in taken])) if taken else 0.0
     for run in long_enough(channels, runs, SEEN_S):
+        if run.last - run.first < FAR_SHORTER * usual:
+            continue
         first, last = run.first, run.last
         while first > 0 and loose[first - 1]:
             first -= 1

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
+from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
 from trihedron.diagnose.effects import catalogue
@@ -105,6 +106,7 @@ def compare_effects(
     unexplained: Collection[Domain] = (),
     misses: Mapping[Domain, float] = MappingProxyType({}),
     tried_on_model: Sequence[Candidate] = (),
+    freedom: Mapping[Domain, float] = MappingProxyType({}),
 ) -> ComparedEffects:
     """Pair the effects of both sides by name, or by what neither recording could tell apart.
 
@@ -112,7 +114,8 @@ def compare_effects(
     session: they are never surplus.
     Nor is an effect that would show in a domain of which the recording leaves more ``unexplained`` than its noise:
     it may be there, and hidden. ``misses``: rms of the recording's residuals in each domain before any effect; an
-    effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than that.
+    effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than that; a
+    scatter by more than two of one size differ by chance, each known with the domain's degrees of ``freedom``.
     ``tried_on_model``: candidates of the simulation's own diagnosis. Nor is an effect of the recording missing that the
     simulation's own test calls likely, where nothing else was found there that could be mistaken for it.
     """
@@ -147,7 +150,7 @@ def compare_effects(
         if effect.id not in of_session
         and effect.id in excluded
         and not {seen.domain for seen in effect.held_out[:1]} & set(unexplained)
-        and (_would_show(effect, misses) or not by_id[effect.id].is_spread)
+        and (not by_id[effect.id].is_spread or _would_show(effect, _beyond_chance(misses, freedom, alpha)))
     ]
     alike = [
         (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
@@ -194,6 +197,17 @@ def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:
     return any(
         seen.rms_before**2 - seen.rms_after**2 > misses.get(seen.domain, 0.0) ** 2 for seen in effect.held_out[:1]
     )
+
+
+def _beyond_chance(
+    misses: Mapping[Domain, float], freedom: Mapping[Domain, float], alpha: float
+) -> dict[Domain, float]:
+    """What a scatter as large as the recording's comes to, in one draw of many, beside another draw of it."""
+    return {
+        domain: rms * (math.sqrt(float(f_distribution.isf(alpha, dof, dof))) if dof >= 1.0 else 1.0)
+        for domain, rms in misses.items()
+        for dof in (freedom.get(domain, 0.0),)
+    }
 
 
 def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
