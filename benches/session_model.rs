@@ -54,10 +54,9 @@ fn session(n_poses: usize) -> (Session, State) {
             m * SAMPLES_PER_MOVE,
         ));
     }
-    let at_rest = |mean: Vec<Vector3<f64>>, sigma: f64| AtRest {
-        sigma: vec![Vector3::repeat(sigma); mean.len()],
-        mean,
-        density: Vector3::repeat(2.0 * sigma),
+    let at_rest = |mean: Vec<Vector3<f64>>, sigma: f64| {
+        let axes = vec![Vector3::repeat(sigma); mean.len()];
+        AtRest::of(mean, axes, Vector3::repeat(2.0 * sigma), None).expect("one error a pose")
     };
     let zeros = vec![Vector3::zeros(); n_poses];
     let session = Session {

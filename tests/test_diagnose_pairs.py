@@ -76,6 +76,10 @@ def test_scatter_of_the_model_is_surplus_only_beyond_what_the_recording_misses_a
     model = [effect("accel-zero-scatter", 1.5e-3, 1.0e-3, variant="")]
     assert not compare_effects(model, [], tried, alpha=0.01, misses={"static-accel": 1.4e-3}).surplus
     assert compare_effects(model, [], tried, alpha=0.01, misses={"static-accel": 0.8e-3}).surplus
+    # Twelve poses know a mean square to 40 %: twice another's is chance (F(12, 12) passes 4.2 in 1 %), ten times not.
+    for misses, is_surplus in ((0.8e-3, False), (0.35e-3, True)):
+        sizes = {"misses": {"static-accel": misses}, "freedom": {"static-accel": 12.0}}
+        assert bool(compare_effects(model, [], tried, alpha=0.01, **sizes).surplus) is is_surplus
 
 
 def scattered(recording, sigma, seed):
@@ -132,6 +136,21 @@ def test_pushed_poses_and_faint_lines_are_no_physics_that_a_simulation_lacks():
     # What only the model has is no footnote of the recording.
     tried = [Candidate("periodic-interference", 0.4, True)]
     assert compare_effects([faint], [], tried, alpha=0.01).differ
+
+
+def test_an_effect_that_the_simulations_own_test_calls_likely_is_not_missing_from_it():
+    own = [effect("gyro-g-sensitivity", domain="static-gyro")]
+
+    def missing(p, model=()):
+        tried = [Candidate("gyro-g-sensitivity", p, True), *(Candidate(f"other-{k}", 0.5, True) for k in range(20))]
+        return [one.id for one in compare_effects(model, own, [], alpha=0.01, tried_on_model=tried).missing]
+
+    assert missing(1e-6) == []
+    assert missing(1e-3) == ["gyro-g-sensitivity"]  # times 21 candidates
+    # What another effect of the simulation does to the same rates is no evidence of this one.
+    assert missing(1e-6, [effect("gyro-zero-scatter", domain="static-gyro")]) == []
+    other = effect("gyro-thermal-bias", domain="static-gyro")
+    assert missing(1e-6, [other]) == ["gyro-g-sensitivity"]
 
 
 def test_a_headline_counts_what_it_does_not_say_and_leads_with_the_most_certain():

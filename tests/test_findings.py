@@ -135,6 +135,14 @@ def test_a_place_becomes_words_as_its_rule_says(template, value, words):
     assert filled(template, {"x": value}, {"x": "{v0} at {v1:.1f}"}) == words
 
 
+def test_a_unit_that_a_place_leaves_out_stands_behind_a_later_number_of_the_same_sentence():
+    for text in [part for entry in ENTRIES for part in (entry.seen, entry.cause, entry.action)]:
+        for left_out in re.finditer(r" ![^}]+\}", text):
+            unit = left_out[0][2:-1]
+            near = text[left_out.end() : left_out.end() + 40]
+            assert f" {unit}" in near or near.startswith(unit), text
+
+
 def test_a_finding_carries_its_numbers_for_machines():
     found = Finding.of(FindingCode.FEW_POSES, holds=np.int64(1), duration_s=np.float64(12.5), needed=9)
     assert found.seen.startswith("1 still pose found in 12.5 s")

@@ -13,7 +13,10 @@ import trihedron
 from hand_made_sessions import G, Instrument, recorded
 from trihedron.cli import main
 from trihedron.fleet import find_jobs, running, summarise
+from trihedron.fleet import work as fleet_work
 from trihedron.fleet.work import work
+from trihedron.records.checked import WrongTypeError
+from trihedron.refused import RefusedError
 
 
 @pytest.fixture(scope="module")
@@ -171,3 +174,20 @@ def test_the_command_writes_table_and_page_and_says_where(logs, done, capsys):
     assert "fleet.parquet" in said.err
     assert main(["fleet", str(Path(out) / "nothing*.csv"), "--out", str(out)]) == 1
     assert "no log was found" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (RefusedError("the log holds no still pose."), "refused"),
+        (WrongTypeError("rate_hz is a number."), "refused"),
+        (FileNotFoundError(2, "No such file"), "refused"),
+        (ValueError("operands could not be broadcast together"), "crashed"),
+    ],
+)
+def test_a_defect_met_in_one_log_is_not_called_a_refusal(monkeypatch, error, status):
+    def fails(*_):
+        raise error
+
+    monkeypatch.setattr(fleet_work, "_calibrated", fails)
+    assert fleet_work.work("a.csv", None, {})["status"] == status

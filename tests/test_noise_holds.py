@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
@@ -124,3 +125,18 @@ def test_a_line_is_neither_white_noise_nor_a_corner_nor_the_noise_of_its_octave(
     # Left in, half its square would be 2 and 22 % of the density.
     assert np.abs(np.log(ratios)).max() < 0.01
     assert corners == [None] * 6
+
+
+@pytest.mark.parametrize(("quality", "size"), [(8.0, 1.0), (4.0, 0.5)])
+def test_a_stand_that_rings_on_one_axis_is_no_filter_and_no_white_noise(quality, size):
+    rng = np.random.default_rng(0)
+    x = 1e-2 * rng.standard_normal((12_000, 3))
+    # A resonance at 6.4 Hz, as large as the noise or half of it: a line, and a hump about it.
+    radius = np.exp(-np.pi * 0.064 / quality)
+    hump = lfilter([1.0], [1.0, -2.0 * radius * np.cos(2.0 * np.pi * 0.064), radius**2], rng.standard_normal(12_000))
+    x[:, 1] += 1e-2 * size * hump / hump.std()
+    axes = noise_of_holds(x, 100.0, [(k * 400, k * 400 + 300) for k in range(30)])
+    assert axes[1].lines
+    assert [axis.corner_hz for axis in axes] == [None] * 3
+    # 9000 readings: a density to 1 %; what the hump leaves elsewhere adds some.
+    assert axes[1].white.value == pytest.approx(1e-3, rel=0.05)

@@ -8,6 +8,7 @@ import pytest
 from trihedron import calibrate, diagnose, verify
 from trihedron.records.published import published_figures
 from trihedron.report.calibration import figures_in_words
+from trihedron.report.machine import calibration_record
 from trihedron.simulate import hand_session, scenario_by_name, simulate
 
 
@@ -37,6 +38,7 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
     _, _, result, diagnosis = healthy
     figures = published_figures(result.calibration)
     assert diagnosis.to_dict()["figures"] == figures
+    assert calibration_record(result.calibration, result.segments, result.recording)["figures"] == figures
     assert set(figures) == {"gravity_at_rest", "gravity_after_moves"}
     assert "one zero for the session" in figures["gravity_at_rest"]["definition"]
     assert "a zero per pose" in figures["gravity_after_moves"]["definition"]

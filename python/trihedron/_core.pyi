@@ -551,6 +551,7 @@ class SessionPoses:
         rate: FloatArray | None,
         rate_sigma: FloatArray | None,
         rate_density: FloatArray | None,
+        force_along: tuple[FloatArray, FloatArray] | None = None,
     ) -> SessionPoses: ...
 
 @final

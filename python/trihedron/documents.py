@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.printable import one_line
+from trihedron.refused import RefusedError
 
 MOST_BYTES = 64_000_000
 """A diagnosis of a day's log with all its curves has 3 MB."""
@@ -19,7 +20,7 @@ MOST_DIGITS = 300
 """Of a whole number: more do not fit into a float."""
 
 
-class DocumentError(ValueError):
+class DocumentError(RefusedError):
     """What is wrong with a file, as the rest of a sentence that begins with its name."""
 
 

@@ -10,6 +10,8 @@ import os
 import sys
 import threading
 
+from trihedron.refused import RefusedError
+
 PATIENCE_S = 2.0
 """A trial takes milliseconds where the library works; a loaded machine may take a hundred times as long."""
 
@@ -45,7 +47,7 @@ def check_tables() -> None:
     answered = threading.Event()
     threading.Thread(target=_try, args=(answered,), daemon=True).start()
     if not answered.wait(PATIENCE_S):
-        raise ValueError(f"{SENTENCE}.")
+        raise RefusedError(f"{SENTENCE}.")
     _is_doubtful = False
 
 

@@ -28,6 +28,11 @@ def fdtri(top: float, bottom: float, below: float) -> float:
     return _core.f_upper(1.0 - below, top, bottom)
 
 
+def f_upper(top: float, bottom: float, above: float) -> float:
+    """Value that an F variate exceeds with probability ``above``, however small."""
+    return _core.f_upper(above, top, bottom)
+
+
 def betaincinv(a: float, b: float, below: float) -> float:
     """Value that a beta variate stays below with probability ``below``: an F variate in other words."""
     ratio = a * fdtri(2.0 * a, 2.0 * b, below)

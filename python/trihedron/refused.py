@@ -1,7 +1,8 @@
 """What is refused on purpose, told from what goes wrong: only the former may end in "was not calibrated".
 
 A wrong shape or a wrong key in the program raises a ``ValueError`` of NumPy or Python, and is to be seen as the defect
-that it is.
+that it is; so does a record of a stage's own making (``records/segments.py``, the arrays of a calibration or of an
+Allan curve) that does not fit together. Every other refusal, of a file, a value or a question, is a ``RefusedError``.
 """
 
 from __future__ import annotations

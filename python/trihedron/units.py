@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from enum import Enum
 
+from trihedron.refused import RefusedError
+
 STANDARD_GRAVITY_M_S2 = 9.80665
 """Conventional value that defines the unit ``g``. It is not the gravity at anybody's desk."""
 
@@ -82,7 +84,7 @@ def _value_and_unit(text: str, units: list[str]) -> tuple[float, str]:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"the size of a count is a number and a unit ({', '.join(units)}), not {text!r}")
+        raise RefusedError(f"the size of a count is a number and a unit ({', '.join(units)}), not {text!r}")
     return value, unit
 
 
@@ -114,6 +116,11 @@ def mm_s2_from_m_s2(acceleration_m_s2: float) -> float:
 def mrad_from_radians(angle_rad: float) -> float:
     """Angle, rad → mrad."""
     return 1000.0 * angle_rad
+
+
+def cm_from_m(length_m: float) -> float:
+    """Centimetres from metres."""
+    return 100.0 * length_m
 
 
 def ms_from_s(time_s: float) -> float:

@@ -245,6 +245,28 @@ mod tests {
         out
     }
 
+    /// Against solutions there and back, of columns that touch poses and of such that do not.
+    #[test]
+    fn inner_products_by_one_pass_forward_are_those_of_the_solutions() {
+        let layout = Layout {
+            border: 5,
+            pose: 4,
+            n_poses: 7,
+        };
+        let all: Vec<Rows> = (0..7).map(|i| rows(layout, i, 9, i as f64)).collect();
+        let factor = Chain::of(layout, &all)
+            .factor(RIDGE, None)
+            .expect("positive definite");
+        let mut side = numbers(layout.n(), 4, 3.0);
+        side.view_mut((5, 1), (28, 1)).fill(0.0);
+        side.view_mut((5, 3), (28, 1)).fill(0.0);
+        for columns in [&[0, 1, 2, 3][..], &[1, 3], &[2]] {
+            let side = side.select_columns(columns);
+            let want = side.tr_mul(&factor.solve(&side));
+            assert!((factor.inner(&side) - &want).amax() < 1e-9 * want.amax());
+        }
+    }
+
     /// Against the sum factored as a whole and solved there and back.
     #[test]
     fn one_pass_forward_gives_what_the_factor_of_the_sum_gives() {

@@ -25,12 +25,16 @@ pub(super) struct Part {
 impl Part {
     /// This and another one, whose rows count `factor` times.
     fn and(&self, other: &Self, factor: f64) -> Self {
-        let squared = factor * factor;
         let mut out = self.clone();
-        out.chain.add_scaled(&other.chain, squared);
-        out.side += &other.side * squared;
-        out.sum += other.sum * squared;
+        out.add(other, factor);
         out
+    }
+
+    fn add(&mut self, other: &Self, factor: f64) {
+        let squared = factor * factor;
+        self.chain.add_scaled(&other.chain, squared);
+        self.side += &other.side * squared;
+        self.sum += other.sum * squared;
     }
 }
 
@@ -92,7 +96,7 @@ impl Evidence {
     pub(super) fn combined(&self, strengths: &Strengths, moves: &Part) -> (Chain, DMatrix<f64>) {
         let mut out = self.rest.and(moves, 1.0);
         for (part, factor) in self.process.iter().zip(self.factors(strengths)) {
-            out = out.and(part, factor);
+            out.add(part, factor);
         }
         (out.chain, out.side)
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::blocks::{add_product, solve};
+use super::blocks::{add_gram, add_product, forward, mirror, solve};
 use super::chain::{Layout, Rows, scaled};
 
 /// A factored chain.
@@ -32,6 +32,47 @@ impl Factor {
             row /= *d;
         }
         x
+    }
+
+    /// `sideᵀ (JᵀJ)⁻¹ side` for columns `(n, k)`: forward alone, and through the poses only what touches them.
+    #[must_use]
+    pub fn inner(&self, side: &DMatrix<f64>) -> DMatrix<f64> {
+        let layout = self.layout;
+        let (nb, k) = (layout.border, side.ncols());
+        let mut x = side.clone();
+        for mut column in x.column_iter_mut() {
+            column.component_div_assign(&self.scale);
+        }
+        let touches = |c: &usize| x.column(*c).iter().skip(nb).any(|value| *value != 0.0);
+        let of_poses: Vec<usize> = (0..k).filter(touches).collect();
+        let n_poses = of_poses.len();
+        let picked = x.select_columns(&of_poses);
+        let mut corner = picked.rows(0, nb).into_owned();
+        let mut along = DMatrix::zeros(n_poses, n_poses);
+        let mut before: Option<DMatrix<f64>> = None;
+        for i in 0..if n_poses > 0 { layout.n_poses } else { 0 } {
+            let mut y = picked.rows(layout.at(i), layout.pose).into_owned();
+            if let Some(before) = &before {
+                add_product(&mut y, -1.0, &self.gain[i - 1], before);
+            }
+            let z = solve(&self.diagonal[i], &y);
+            add_product(&mut corner, -1.0, &self.border[i], &z);
+            add_product(&mut along, 1.0, &y, &z);
+            before = Some(y);
+        }
+        let mut edge = x.rows(0, nb).into_owned();
+        for (from, to) in of_poses.iter().enumerate() {
+            edge.set_column(*to, &corner.column(from));
+        }
+        let mut out = DMatrix::zeros(k, k);
+        add_gram(&mut out, 1.0, &forward(&self.corner, &edge), k);
+        for (i, row) in of_poses.iter().enumerate() {
+            for (j, column) in of_poses.iter().enumerate() {
+                out[(*row, *column)] += 0.5 * (along[(i, j)] + along[(j, i)]);
+            }
+        }
+        mirror(&mut out);
+        out
     }
 
     fn solve_scaled(&self, x: &mut DMatrix<f64>, n_border: usize) {

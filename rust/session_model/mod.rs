@@ -12,6 +12,7 @@ mod ends;
 mod evidence;
 pub mod factor;
 pub mod fit;
+mod gaps;
 pub mod held_out;
 mod lanes;
 pub mod move_rows;
@@ -28,7 +29,7 @@ mod zero_rows;
 
 use std::sync::Arc;
 
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use crate::error::{Error, Result};
 use chain::Layout;
@@ -51,8 +52,63 @@ pub struct AtRest {
     pub mean: Vec<Vector3<f64>>,
     /// Its standard error.
     pub sigma: Vec<Vector3<f64>>,
+    /// `Σ^(-1/2)` of its error.
+    pub white: Vec<Matrix3<f64>>,
     /// White noise, raw unit · √s.
     pub density: Vector3<f64>,
+}
+
+impl AtRest {
+    /// Means with standard errors along the sensor's axes, and, where `along` says so, another error along one direction
+    /// (a unit vector and its standard error, not finite where nothing is known).
+    ///
+    /// # Errors
+    /// When there are not as many directions as poses.
+    pub fn of(
+        mean: Vec<Vector3<f64>>,
+        sigma: Vec<Vector3<f64>>,
+        density: Vector3<f64>,
+        along: Option<(&[Vector3<f64>], &[f64])>,
+    ) -> Result<Self> {
+        if let Some((direction, error)) = along
+            && (direction.len(), error.len()) != (sigma.len(), sigma.len())
+        {
+            return Err(Error::bad_input(format!(
+                "{} poses need as many verticals and errors along them",
+                sigma.len()
+            )));
+        }
+        let white = sigma
+            .iter()
+            .enumerate()
+            .map(|(i, axes)| {
+                let plain = Matrix3::from_diagonal(&axes.map(f64::recip));
+                let Some((direction, error)) = along.map(|(d, e)| (d[i], e[i])) else {
+                    return plain;
+                };
+                if !(error.is_finite() && error > 0.0) {
+                    return plain;
+                }
+                // Errors across the direction as the axes have them, one of its own along it.
+                let across = Matrix3::identity() - direction * direction.transpose();
+                let covariance = across * Matrix3::from_diagonal(&axes.map(|s| s * s)) * across
+                    + direction * direction.transpose() * (error * error);
+                let eigen = covariance.symmetric_eigen();
+                let inverse = eigen
+                    .eigenvalues
+                    .map(|v| v.max(f64::MIN_POSITIVE).sqrt().recip());
+                eigen.eigenvectors
+                    * Matrix3::from_diagonal(&inverse)
+                    * eigen.eigenvectors.transpose()
+            })
+            .collect();
+        Ok(Self {
+            mean,
+            sigma,
+            white,
+            density,
+        })
+    }
 }
 
 /// Values the linear models are held to.

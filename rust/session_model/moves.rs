@@ -7,6 +7,7 @@
 
 use nalgebra::{Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
 
+use super::gaps::{Gap, gaps};
 use crate::poisson::{RateModel, StepWeights, step_weights};
 use crate::rotation::exp_and_left_jacobian;
 
@@ -38,6 +39,8 @@ pub struct Move {
     pub step_s: f64,
     /// Variance of the integrals of force and rate by motion faster than the samples, (raw unit · s)².
     pub unresolved: [Vector3<f64>; 2],
+    /// Steps over samples that were lost.
+    pub gaps: Vec<Gap>,
     /// First of its samples among the points of all moves.
     pub first_point: usize,
 }
@@ -71,6 +74,7 @@ impl Move {
         let duration_s = last - first;
         // Zeros belong to the middles of their holds.
         let span = (anchors_s[1] - anchors_s[0]).max(duration_s);
+        let steps = step_weights(time_s, &used, RateModel::Coning);
         Self {
             before,
             fraction: time_s
@@ -82,7 +86,8 @@ impl Move {
                 .map(|t| ((t - first) / duration_s.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0))
                 .collect(),
             weight,
-            steps: step_weights(time_s, &used, RateModel::Coning),
+            gaps: gaps(&steps, &force, &rate),
+            steps,
             duration_s,
             step_s: duration_s / (used.len().max(2) - 1) as f64,
             rate,

@@ -37,29 +37,62 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
     let n_some = POSSIBLE_SCATTER.len() as f64;
     let mut tried = Vec::new();
     let some = POSSIBLE_SCATTER.map(|scatter| (scatter, -n_some.ln()));
-    for (scatter, prior) in std::iter::once((NO_SCATTER, 0.0)).chain(some) {
+    let scatters: Vec<_> = std::iter::once((NO_SCATTER, 0.0)).chain(some).collect();
+    for (which, (scatter, prior)) in scatters.iter().enumerate() {
         for corner in POSSIBLE_CORNER_S {
             let mut at = fit.strengths;
-            at.scatter = [scatter, fit.likely_scatter[1]];
+            at.scatter = [*scatter, fit.likely_scatter[1]];
             at.corner_s[0] = corner;
-            tried.push((prior, at));
+            tried.push((*prior, which, at));
         }
     }
     let tried: Vec<_> = tried
         .into_par_iter()
-        .map(|(prior, at)| (evidence.at(&at) + prior, at))
+        .map(|(prior, which, at)| (evidence.at(&at) + prior, which, at))
         .collect();
     let best = tried
         .iter()
-        .map(|(v, _)| *v)
+        .map(|(v, ..)| *v)
         .fold(f64::NEG_INFINITY, f64::max);
-    let mut out = tried
+    let likely: Vec<_> = tried
+        .into_iter()
+        .map(|(value, which, at)| (value - best, which, at))
+        .filter(|(value, ..)| *value >= LEAST_WEIGHT.ln())
+        .collect();
+    // Rows of the moves know the scatter, not the corner time.
+    let moves = (0..scatters.len())
         .into_par_iter()
-        .map(|(value, at)| ((value - best).exp(), at))
-        .filter(|(weight, _)| *weight >= LEAST_WEIGHT)
-        .map(|(weight, at)| {
-            let (moves, _) = reweighed(fit, &at)?;
-            let (chain, side) = evidence.combined(&at, &moves);
+        .map(|which| {
+            let first = likely.iter().find(|one| one.1 == which);
+            first.map(|(_, _, at)| reweighed(fit, at)).transpose()
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let heard: Vec<_> = likely
+        .par_iter()
+        .filter_map(|(value, which, at)| {
+            let (rows, weight) = moves[*which].as_ref()?;
+            let by_moves = evidence.with(at, rows) + weight - evidence.at(at);
+            Some((*value, by_moves, rows, at))
+        })
+        .collect();
+    let without = |corner: f64| {
+        heard
+            .iter()
+            .filter(|(_, _, _, at)| at.scatter[0] <= NO_SCATTER)
+            .find(|(_, _, _, at)| at.corner_s[0].total_cmp(&corner).is_eq())
+            .map(|(_, by_moves, _, _)| *by_moves)
+    };
+    let mut out = heard
+        .par_iter()
+        .map(|(value, by_moves, rows, at)| {
+            // Moves that a scatter would bend, and that are not bent, speak against it; those that are bent may be so
+            // by anything, and do not speak for it.
+            let against = without(at.corner_s[0]).map_or(0.0, |none| (by_moves - none).min(0.0));
+            ((value + against).exp(), rows, at)
+        })
+        .filter(|(weight, ..)| *weight >= LEAST_WEIGHT)
+        .map(|(weight, rows, at)| {
+            let (chain, side) = evidence.combined(at, rows);
             let factor = chain.factor(RIDGE, None)?;
             let step = -factor.solve(&side).column(0).into_owned();
             Ok(Possible {

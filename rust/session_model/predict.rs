@@ -109,11 +109,11 @@ impl Fit {
         let possible = possible_scatters(self, session)?;
         for one in &possible {
             let shift = map.tr_mul(&one.step);
-            covariance += map.tr_mul(&one.factor.solve(&map)) * one.weight;
+            covariance += one.factor.inner(&map) * one.weight;
             covariance.ger(one.weight, &shift, &shift, 1.0);
         }
         if possible.is_empty() {
-            covariance = map.tr_mul(&self.factor.solve(&map));
+            covariance = self.factor.inner(&map);
         }
         let mut corner = covariance.view_mut((21, 21), (3, 3));
         corner += beyond;
@@ -158,11 +158,7 @@ impl Fit {
         }
         let step = -factor.solve(&side).column(0).into_owned();
         let map = force_map(layout, origin, 12);
-        let covariance = map.tr_mul(&factor.solve(&map));
-        Ok((
-            self.state.moved(&step, layout),
-            (&covariance + covariance.transpose()) * 0.5,
-        ))
+        Ok((self.state.moved(&step, layout), factor.inner(&map)))
     }
 
     /// Covariance of the five residuals of each move, SI, before the fit used any of it up.

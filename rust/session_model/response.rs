@@ -3,11 +3,9 @@
 
 use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
 
+use super::gaps::GAP;
 use super::moves::{Carried, Move, MoveCovariance, MoveNoise, N_MOVE, Sees};
 use crate::rotation::skew;
-
-/// A step longer than this many usual ones has lost samples.
-const GAP: f64 = 1.5;
 
 /// Response of the five residuals to rate and force at each sample.
 #[derive(Debug, Clone)]
@@ -41,7 +39,8 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
         .copy_from(&(lever * skew(&sees.up[0])));
     let var_jitter = noise.jitter_s * noise.jitter_s;
     let mut still_to_come = Vector3::zeros();
-    for (step, turn) in one.steps.iter().zip(&carried.turns).rev() {
+    let mut gaps = one.gaps.iter().rev().peekable();
+    for (i, (step, turn)) in one.steps.iter().zip(&carried.turns).enumerate().rev() {
         still_to_come += by_force[step.to] * carried.force[step.to];
         to_turn
             .fixed_rows_mut::<3>(2)
@@ -55,10 +54,27 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
                 by_rate[step.sample[j]] += zeroth * step.zeroth[j] + first * step.first[j];
             }
         }
-        let is_gap = step.h > GAP * noise.nominal_step_s;
-        if var_jitter > 0.0 || is_gap {
-            // A lost sample leaves the rate anywhere between its neighbours: uniform, so h²/12.
-            let var = var_jitter + if is_gap { step.h * step.h / 12.0 } else { 0.0 };
+        let gap = gaps.next_if(|gap| gap.step == i);
+        let density = [&noise.force_density, &noise.rate_density];
+        let missed = gap.and_then(|gap| gap.variance(density, one.step_s));
+        if let Some([of_force, of_rate]) = &missed {
+            let spread = |scale: &Matrix3<f64>, v: &Vector3<f64>| {
+                scale * Matrix3::from_diagonal(v) * scale.transpose()
+            };
+            covariance += zeroth * spread(&sees.rate_scale, of_rate) * zeroth.transpose();
+            let turned = carried.attitude[step.from].transpose();
+            let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
+            velocity += turned * spread(&sees.force_scale, of_force) * turned.transpose();
+        }
+        // Where the move does not tell, a lost sample leaves the rate anywhere between its neighbours: uniform, so h²/12.
+        let is_unknown = missed.is_none() && step.h > GAP * noise.nominal_step_s;
+        if var_jitter > 0.0 || is_unknown {
+            let var = var_jitter
+                + if is_unknown {
+                    step.h * step.h / 12.0
+                } else {
+                    0.0
+                };
             let jump = zeroth * (carried.rate[step.to] - carried.rate[step.from]);
             covariance.ger(var, &jump, &jump, 1.0);
             let jump = carried.attitude[step.from]
@@ -68,18 +84,22 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
         }
     }
     add_white(one, sees, noise, &by_rate, &by_force, &mut covariance);
-    for i in 0..N_MOVE {
-        for j in 0..N_MOVE {
-            covariance[(i, j)] *=
-                noise.inflation[usize::from(i >= 2)] * noise.inflation[usize::from(j >= 2)];
-        }
-    }
+    widen(&mut covariance, noise.inflation);
     Response {
         by_rate,
         by_force,
         covariance,
         lever,
     }
+}
+
+/// Widens gravity and velocity, each by its own factor. What they miss beyond the noise of the samples is not known to be
+/// common to both: widened along, their correlation would make a velocity that is not heard tell gravity's noise.
+fn widen(covariance: &mut MoveCovariance, inflation: [f64; 2]) {
+    let mut gravity = covariance.fixed_view_mut::<2, 2>(0, 0);
+    gravity *= inflation[0] * inflation[0];
+    let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
+    velocity *= inflation[1] * inflation[1];
 }
 
 /// `M [v]×`.

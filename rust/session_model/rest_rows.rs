@@ -118,12 +118,12 @@ fn collapsed() -> Error {
     Error::not_determined("a sensor's triad has collapsed: its S cannot be inverted")
 }
 
-pub(super) fn weight_of(sensor: &AtRest, pose: usize) -> Vector3<f64> {
-    sensor.sigma[pose].map(f64::recip)
+pub(super) fn weight_of(sensor: &AtRest, pose: usize) -> Matrix3<f64> {
+    sensor.white[pose]
 }
 
 fn at_rest(sensor: &AtRest, pose: usize, read: &Vector3<f64>, layout: Layout) -> Group {
-    let residual = (sensor.mean[pose] - read).component_mul(&weight_of(sensor, pose));
+    let residual = weight_of(sensor, pose) * (sensor.mean[pose] - read);
     Group::of(
         DVector::from_column_slice(residual.as_slice()),
         layout,
@@ -133,9 +133,10 @@ fn at_rest(sensor: &AtRest, pose: usize, read: &Vector3<f64>, layout: Layout) ->
     )
 }
 
-fn set(matrix: &mut DMatrix<f64>, column: usize, slope: &Vector3<f64>, weight: &Vector3<f64>) {
+fn set(matrix: &mut DMatrix<f64>, column: usize, slope: &Vector3<f64>, weight: &Matrix3<f64>) {
+    let white = weight * slope;
     for i in 0..3 {
-        matrix[(i, column)] = slope[i] * weight[i];
+        matrix[(i, column)] = white[i];
     }
 }
 
@@ -161,7 +162,7 @@ pub(super) fn rest_columns(
     k: usize,
     pose: usize,
     inverse: &Matrix3<f64>,
-    weight: &Vector3<f64>,
+    weight: &Matrix3<f64>,
     out: &mut DMatrix<f64>,
 ) {
     if let Some(columns) = columns {
@@ -178,7 +179,7 @@ fn set_effect(
     k: usize,
     pose: usize,
     inverse: &Matrix3<f64>,
-    weight: &Vector3<f64>,
+    weight: &Matrix3<f64>,
     group: &mut Group,
 ) {
     let mut out = DMatrix::zeros(3, k);

@@ -1,9 +1,10 @@
 //! The power of phase sums of stamps, from which the sampling period is read.
 
 use std::f64::consts::PI;
+use std::sync::{Arc, Mutex};
 
 use rayon::prelude::*;
-use realfft::RealFftPlanner;
+use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::error::{Error, Result};
 
@@ -24,6 +25,25 @@ pub fn next_fast_length(n: usize) -> usize {
     best
 }
 
+type Transform = Arc<dyn RealToComplex<f64>>;
+
+/// The transform of a length, and the one asked for before again: windows of most logs are equally long, and the factors
+/// of a transform take longer than using it.
+fn transform_of(length: usize) -> Transform {
+    static LAST: Mutex<Option<Transform>> = Mutex::new(None);
+    // Never waited for: a child forked while it was held would wait for good.
+    if let Ok(last) = LAST.try_lock()
+        && let Some(known) = last.as_ref().filter(|one| one.len() == length)
+    {
+        return Arc::clone(known);
+    }
+    let made = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+    if let Ok(mut last) = LAST.try_lock() {
+        *last = Some(Arc::clone(&made));
+    }
+    made
+}
+
 /// `|mean exp(2πi f t)|²` on the grid of a transform of `length` cells, the mean of all windows by their stamps.
 ///
 /// Windows are tapered (Hann) so that lines have no skirts; a stamp is shared linearly between neighbouring cells, which
@@ -35,12 +55,17 @@ pub fn phase_power(windows: &[&[f64]], cell: f64, length: usize) -> Result<Vec<f
     if length < 2 {
         return Err(Error::bad_input("a transform needs two cells and more"));
     }
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+    let transform = transform_of(length);
+    let room = || {
+        let (spectrum, scratch) = (transform.make_output_vec(), transform.make_scratch_vec());
+        (Vec::new(), spectrum, scratch)
+    };
     let each: Vec<Option<Vec<f64>>> = windows
         .par_iter()
-        .map(|window| {
+        .map_init(room, |(shared, spectrum, scratch), window| {
             let n = window.len() as f64;
-            let mut shared = vec![0.0; length + 1];
+            shared.clear();
+            shared.resize(length + 1, 0.0);
             let mut taken = 0.0;
             for (i, stamp) in window.iter().enumerate() {
                 let position = stamp / cell;
@@ -61,8 +86,9 @@ pub fn phase_power(windows: &[&[f64]], cell: f64, length: usize) -> Result<Vec<f
                 taken += taper;
             }
             shared.truncate(length);
-            let mut spectrum = transform.make_output_vec();
-            transform.process(&mut shared, &mut spectrum).ok()?;
+            transform
+                .process_with_scratch(shared, spectrum, scratch)
+                .ok()?;
             let scale = n / (taken * taken);
             Some(spectrum.iter().map(|z| scale * z.norm_sqr()).collect())
         })

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from trihedron.refused import RefusedError
 
-class CaptureError(ValueError):
+
+class CaptureError(RefusedError):
     """The question cannot be answered: one sentence says what, where and what to do."""
 
 

@@ -11,6 +11,7 @@ import typer
 
 from trihedron.cli.options import Force
 from trihedron.cli.output import leave, put, step, style
+from trihedron.refused import RefusedError
 
 FOLDER = "trihedron-demo"
 
@@ -29,7 +30,7 @@ def demo(
     """Two acts, simulated: calibrate and compare with the truth; then a simulation that a log contradicts."""
     target = _free_folder() if folder is None and not force else folder or Path(FOLDER)
     if folder is not None and folder.exists() and not force:
-        raise ValueError(f"{folder}: this exists and was left alone; choose another name or add --force.")
+        raise RefusedError(f"{folder}: this exists and was left alone; choose another name or add --force.")
     from trihedron.pipeline.demonstrating import demonstrate
     from trihedron.report import to_text
 

@@ -28,7 +28,7 @@ N_ITERATIONS = 2
 """Effects are per mille of the motion: the second pass of the fixed point leaves their square."""
 
 
-class SignalMissing(ValueError):
+class SignalMissing(RefusedError):
     """The recording lacks a channel that an effect follows."""
 
 
@@ -112,7 +112,7 @@ def take_off(
     accelerometer: tuple[FloatArray, FloatArray],
     gyroscope: tuple[FloatArray, FloatArray] | None,
 ) -> TakenOff:
-    """Take accepted effects off raw readings: ``a' − S⁻¹ D(f) p``, with f the motion without them (eq. 8.2).
+    """Take accepted effects off raw readings: ``a' − S⁻¹ D(f) p``, with f the motion without them (eq. 11.3).
 
     ``effects`` and ``references`` are those of a diagnosis (``Diagnosis.to_dict``), ``accelerometer`` and
     ``gyroscope`` the extended model's ``(S, b)``. What cannot be taken off is left, and said.

@@ -10,7 +10,10 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.direct import DirectEffect
+from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.effects.dropped_samples import DroppedSamples
+from trihedron.diagnose.effects.sample_steps import step_errors
+from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
 from trihedron.diagnose.laws.find import laws_of_rest
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
 from trihedron.diagnose.residuals.creep import settling, with_settling
@@ -226,8 +229,16 @@ def _widened(obs: Observations, remaining: tuple[DomainTest, ...]) -> Observatio
 
 
 def _all_domains(context: Context, alpha: float, refused: Collection[str] = ()) -> tuple[DomainTest, ...]:
+    common = common_time_error(step_errors(context), 1.0 / context.obs.recording.rate_hz)
     return (
         *judge_rows(context.fitted, alpha),
         judge_within_holds(context.obs, alpha),
-        judge_timing(context, alpha, refused),
+        judge_timing(common, _found(context, refused) if np.isfinite(common[1]) else [], alpha),
     )
+
+
+def _found(context: Context, refused: Collection[str]) -> list[Evidence]:
+    """What the sharper looks at the sampling find; ``refused`` are ids of effects that did not predict held-out moves
+    any better: jolts look like lost samples."""
+    looks = [effect for effect in (DroppedSamples(), TimingJitter()) if effect.id not in refused]
+    return [evidence for look in looks if (evidence := look.find(context)) is not None]

@@ -25,8 +25,8 @@ from trihedron.estimate.gyroscope.verification import held_out
 from trihedron.estimate.session.carried import carried
 from trihedron.estimate.session.figures import held_out as held_out_of_session
 from trihedron.estimate.session.figures import move_quality, norm_quality
-from trihedron.estimate.session.fit import SessionSolution, solve_session
-from trihedron.estimate.session.observed import arranged
+from trihedron.estimate.session.fit import SessionSolution, far_moves, solve_session
+from trihedron.estimate.session.observed import Observed, arranged
 from trihedron.records.calibration import Calibration, FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
@@ -89,8 +89,15 @@ def _by_session(
     """The session model from where the moves alone stand, in the lower frame (docs/model-session.md)."""
     S_start, b_start = np.asarray(aligned.fit.accelerometer_scale), np.asarray(aligned.fit.accelerometer_bias)
     R = reframing(S_start, b_start, "lower").rotation
-    observed = arranged(recording, segments, measured, gravity_m_s2, aligned.used)
-    solution = solve_session(observed, np.tril(R @ S_start), R @ b_start, R @ np.asarray(aligned.fit.gyroscope_scale))
+    start = np.tril(R @ S_start), R @ b_start, R @ np.asarray(aligned.fit.gyroscope_scale)
+    while True:
+        observed = arranged(recording, segments, measured, gravity_m_s2, aligned.used)
+        solution = solve_session(observed, *start)
+        fewer = _without_far_moves(aligned, measured, observed, solution)
+        if fewer is None:
+            break
+        # One move that was knocked would be shared out among all as if each were so uncertain.
+        aligned = fewer
     anchors = segments.time_mid_s[measured.links]
     seen = carried(recording.time_s, measured, anchors, solution.S_a, solution.b_a, solution.S_w)
     left_out = held_out_of_session(recording.time_s, observed, measured, anchors, solution, options.n_folds)
@@ -148,6 +155,19 @@ def _by_session(
             *losses.findings(own_sigma),
         ),
     )
+
+
+def _without_far_moves(
+    aligned: Aligned, measured: MoveMeasurements, observed: Observed, solution: SessionSolution
+) -> Aligned | None:
+    """The alignment without moves that the session's fit shows to be outliers; ``None`` where none is, or too few
+    would be left to judge them by.
+    """
+    far = np.isin(measured.links[:, 0], observed.before[far_moves(solution, len(observed.before))]) & aligned.used
+    used = aligned.used & ~far
+    if not np.any(far) or 2 * int(np.count_nonzero(used)) <= min(9, aligned.fit.rank) + 2:
+        return None
+    return replace(aligned, used=used, outliers=tuple(sorted((*aligned.outliers, *map(int, np.flatnonzero(far))))))
 
 
 def _poses_above_noise(quality: FitQuality, solution: SessionSolution) -> tuple[Finding, ...]:

@@ -48,7 +48,7 @@ def verify_calibration(
     if segments.n_holds == 0:
         raise RefusedError("verification needs still poses, and none was found: hold the sensor still for some seconds")
     accelerometer = calibration.accelerometer
-    noise = _variance(segments.accelerometer_sigma_mean, segments.n_holds)
+    noise = _variance(segments.norm_sigma, segments.n_holds)
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
     empty = np.zeros(0)
     angle, angle_noise, angle_sigma = empty, empty, empty
@@ -110,7 +110,7 @@ def _carried(
         gyroscope.S, gyroscope.covariance[:9, :9],
     )  # fmt: skip
     g = calibration.gravity_m_s2
-    noise, total = np.sqrt(seen.floor2) / g, np.sqrt(seen.floor2 + np.maximum(seen.model2, 0.0)) / g
+    noise, total = np.sqrt(seen.floor2) / g, np.sqrt(seen.floor2 + seen.model2) / g
     return seen.angle_deg, np.degrees(noise), np.degrees(total)
 
 

@@ -29,6 +29,7 @@ from trihedron.records import (
     SensorCalibration,
 )
 from trihedron.records.plain import as_plain, from_plain
+from trihedron.refused import RefusedError
 
 FORMAT = "trihedron calibration"
 FORMAT_VERSION = 1
@@ -47,7 +48,7 @@ FRAME_MEANING = {
 }
 
 
-class CalibrationFileError(ValueError):
+class CalibrationFileError(RefusedError):
     """A calibration file that cannot be read. One sentence: which file, what is wrong, what to do."""
 
 
@@ -103,7 +104,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
             continue
         block = calibration.covariance[12 * k : 12 * k + 12, 12 * k : 12 * k + 12]
         if not np.array_equal(block, sensor.covariance):
-            raise ValueError(f"the {name}'s covariance is not its block of the full covariance")
+            raise RefusedError(f"the {name}'s covariance is not its block of the full covariance")
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -240,10 +241,10 @@ def _sensor(document: dict[str, Any], covariance: npt.NDArray[np.float64]) -> Se
 def _from_checked(document: dict[str, Any]) -> Calibration:
     covariance = _array(document["covariance"])
     if document["parameter_order"] != _parameter_order(document["gyroscope"] is not None):
-        raise ValueError("parameter_order is not S row by row, then b, accelerometer first")
+        raise RefusedError("parameter_order is not S row by row, then b, accelerometer first")
     n = 12 if document["gyroscope"] is None else 24
     if covariance.shape != (n, n):
-        raise ValueError(f"covariance must be {n} x {n}, got {' x '.join(map(str, covariance.shape))}")
+        raise RefusedError(f"covariance must be {n} x {n}, got {' x '.join(map(str, covariance.shape))}")
     return Calibration(
         accelerometer=_sensor(document["accelerometer"], covariance[:12, :12]),
         gyroscope=None if n == 12 else _sensor(document["gyroscope"], covariance[12:, 12:]),

@@ -16,6 +16,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.files.output import write_whole
+from trihedron.refused import RefusedError
 
 EVERY_S = 30.0
 """Between two times of keeping: what a stopped run does again, and far longer than writing takes."""
@@ -53,16 +54,16 @@ class Checkpoint:
             # Written unpacked: a file that unpacks to more than it is was not written here.
             with zipfile.ZipFile(self.path) as archive:
                 if any(member.compress_type != zipfile.ZIP_STORED for member in archive.infolist()):
-                    raise ValueError("packed")
+                    raise RefusedError("packed")
             with np.load(self.path, allow_pickle=False) as held:
                 found = {name: held[name] for name in held.files}
             of, rows = str(found.pop(_MADE_OF)), int(found.pop(_ROWS))
         except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
-            raise ValueError(
+            raise RefusedError(
                 f"{self.path}: this is no checkpoint and was left alone; name another file with --checkpoint."
             ) from None
         if of != self.made_of:
-            raise ValueError(
+            raise RefusedError(
                 f"{self.path}: this checkpoint is of another log, or of other columns, units or rate; remove it to "
                 "begin anew, or name another file with --checkpoint."
             )

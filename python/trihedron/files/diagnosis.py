@@ -11,9 +11,10 @@ from typing import Any
 from trihedron.documents import DocumentError, of_path, parse_json, read_text
 from trihedron.files.calibration import plain
 from trihedron.records.diagnosis import SCHEMA_VERSION, Diagnosis
+from trihedron.refused import RefusedError
 
 
-class DiagnosisFileError(ValueError):
+class DiagnosisFileError(RefusedError):
     """A diagnosis that cannot be read. One sentence: which file, what is wrong, what to do."""
 
 
@@ -28,7 +29,7 @@ def diagnosis_document(diagnosis: Diagnosis) -> dict[str, Any]:
     document: dict[str, Any] = plain(diagnosis.to_dict())
     complaint = complaint_about(document)
     if complaint:
-        raise ValueError(f"this diagnosis does not follow its own schema ({complaint}); please report this.")
+        raise RefusedError(f"this diagnosis does not follow its own schema ({complaint}); please report this.")
     return document
 
 

@@ -16,6 +16,7 @@ from trihedron.records.frame_declaration import (
     FrameField,
     Role,
 )
+from trihedron.refused import RefusedError
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -41,19 +42,19 @@ def read_frame_declaration(path: str | Path) -> FrameDeclaration:
         table = tomllib.loads(read_text(path, "declaration of a frame"))
         check_values(table)
     except DocumentError as error:
-        raise ValueError(of_path(path, error)) from None
+        raise RefusedError(of_path(path, error)) from None
     except RecursionError:
-        raise ValueError(f"{path}: this is nested too deeply.") from None
+        raise RefusedError(f"{path}: this is nested too deeply.") from None
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path} is not TOML: {error}.") from None
+        raise RefusedError(f"{path} is not TOML: {error}.") from None
     try:
         return _declaration(table, path.stem)
     except OverflowError:
-        raise ValueError(f"{path}: a length or a place is not a finite number of bytes.") from None
+        raise RefusedError(f"{path}: a length or a place is not a finite number of bytes.") from None
     except (KeyError, TypeError) as error:
-        raise ValueError(f"{path}: {_said(error)}; docs/capture.md shows a whole declaration.") from None
+        raise RefusedError(f"{path}: {_said(error)}; docs/capture.md shows a whole declaration.") from None
     except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+        raise RefusedError(f"{path}: {error}") from None
 
 
 def _said(error: Exception) -> str:
@@ -63,7 +64,7 @@ def _said(error: Exception) -> str:
 def _known(table: dict[str, Any], allowed: set[str], where: str) -> None:
     for key in table:
         if key not in allowed:
-            raise ValueError(f"{where} has no key '{key}'; there are {', '.join(sorted(allowed))}.")
+            raise RefusedError(f"{where} has no key '{key}'; there are {', '.join(sorted(allowed))}.")
 
 
 def _declaration(table: dict[str, Any], stem: str) -> FrameDeclaration:
@@ -71,10 +72,10 @@ def _declaration(table: dict[str, Any], stem: str) -> FrameDeclaration:
     try:
         sync = bytes.fromhex(str(table["sync"]).replace("0x", "").replace(",", " "))
     except ValueError:
-        raise ValueError(f'sync = "{table["sync"]}" is not hexadecimal; write for example "AA 55".') from None
+        raise RefusedError(f'sync = "{table["sync"]}" is not hexadecimal; write for example "AA 55".') from None
     endian = table.get("endian", "little")
     if endian not in ("little", "big"):
-        raise ValueError(f"endian is 'little' or 'big', not '{endian}'.")
+        raise RefusedError(f"endian is 'little' or 'big', not '{endian}'.")
     fields: list[FrameField] = []
     at = len(sync)
     for entry in table["field"]:
@@ -84,7 +85,7 @@ def _declaration(table: dict[str, Any], stem: str) -> FrameDeclaration:
     _known(check, _CHECKSUM_KEYS, "[checksum]")
     kind = check["kind"]
     if kind not in CHECKSUMS:
-        raise ValueError(f"there is no checksum '{kind}'; choose one of {', '.join(CHECKSUMS)}.")
+        raise RefusedError(f"there is no checksum '{kind}'; choose one of {', '.join(CHECKSUMS)}.")
     size = CHECKSUM_SIZES[kind]
     length = int(table.get("length", at + size))
     place = int(check.get("at", length - size))
@@ -105,14 +106,14 @@ def _field(entry: dict[str, Any], at: int) -> FrameField:
     _known(entry, _FIELD_KEYS, "a [[field]]")
     name, kind, unit = str(entry["name"]), entry["type"], str(entry.get("unit", ""))
     if kind not in FIELD_TYPES:
-        raise ValueError(f"field {name} has no type '{kind}'; choose one of {', '.join(FIELD_TYPES)}.")
+        raise RefusedError(f"field {name} has no type '{kind}'; choose one of {', '.join(FIELD_TYPES)}.")
     usual: dict[str, Role] = {"counter": "counter", "time": "clock", "clock": "clock"}
     role: Role = entry.get("role") or usual.get(name, "value")
     if role not in ("value", "counter", "clock"):
-        raise ValueError(f"field {name} has no role '{role}'; choose value, counter or clock.")
+        raise RefusedError(f"field {name} has no role '{role}'; choose value, counter or clock.")
     tick = float(entry.get("tick_s", _TICKS.get(unit, 0.0) * float(entry.get("scale", 1.0))))
     if role == "clock" and not tick > 0:
-        raise ValueError(f'the clock {name} needs its step: unit = "us", "ms" or "s", or tick_s = 0.0001.')
+        raise RefusedError(f'the clock {name} needs its step: unit = "us", "ms" or "s", or tick_s = 0.0001.')
     if role != "value" and kind in ("f32", "f64"):
-        raise ValueError(f"the {role} {name} must be a whole number, not {kind}.")
+        raise RefusedError(f"the {role} {name} must be a whole number, not {kind}.")
     return FrameField(name, kind, int(entry.get("at", at)), float(entry.get("scale", 1.0)), unit, role, tick)

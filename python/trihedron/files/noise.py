@@ -9,11 +9,12 @@ from typing import Any
 
 from trihedron.documents import DocumentError, of_path, parse_json, read_text
 from trihedron.files.export.contract import NoiseFigure, SensorNoise
+from trihedron.refused import RefusedError
 
 _SENSORS = {"m/s^2": "accelerometer", "rad/s": "gyroscope"}
 
 
-class NoiseFileError(ValueError):
+class NoiseFileError(RefusedError):
     """Noise that cannot be read. One sentence: which file, what is wrong, what to do."""
 
 

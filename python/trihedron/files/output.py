@@ -13,9 +13,10 @@ from pathlib import Path
 
 from trihedron.files.special import is_stream, write_stream
 from trihedron.files.temporary import Temporary, clear_leftovers
+from trihedron.refused import RefusedError
 
 
-class OutputError(ValueError):
+class OutputError(RefusedError):
     """A file that cannot be written. One sentence: which file, why, what to do."""
 
 

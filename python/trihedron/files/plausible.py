@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.records import Calibration, SensorCalibration
+from trihedron.refused import RefusedError
 
 LARGEST_CONDITION = 100.0
 """Of S with its columns at one length: two axes 0.6 degrees apart. Beyond it the matrix is a mistake, not a sensor."""
@@ -28,14 +29,14 @@ def require_plausible(calibration: Calibration) -> Calibration:
     for name, sensor in named_sensors(calibration):
         lengths = np.linalg.norm(sensor.S, axis=0)
         if not np.all(lengths > 0.0) or np.linalg.cond(sensor.S / lengths) > LARGEST_CONDITION:
-            raise ValueError(
+            raise RefusedError(
                 f"the {name}'s S is singular or nearly so (two of its axes are parallel): this is no sensor's "
                 "calibration; calibrate again with more poses."
             )
         if sensor.raw_unit == sensor.si_unit:
             sizes = np.linalg.svd(sensor.S, compute_uv=False)
             if sizes[0] > LARGEST_SI_FACTOR or sizes[-1] < 1.0 / LARGEST_SI_FACTOR:
-                raise ValueError(
+                raise RefusedError(
                     f"the {name}'s S turns {sensor.raw_unit} into {sensor.si_unit} by a factor of "
                     f"{sizes[0] if sizes[0] > LARGEST_SI_FACTOR else sizes[-1]:.3g}: the unit of the readings was "
                     "mistaken; calibrate again with their unit said."
@@ -60,12 +61,12 @@ def named_sensors(calibration: Calibration) -> list[tuple[str, SensorCalibration
 def _require_covariance(name: str, covariance: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
     variance = np.diag(covariance)
     if np.any(variance < 0.0):
-        raise ValueError(f"the {name} covariance has a negative variance: the file is damaged; calibrate again.")
+        raise RefusedError(f"the {name} covariance has a negative variance: the file is damaged; calibrate again.")
     known = variance > 0.0
     sigma = np.sqrt(variance[known])
     correlation = covariance[np.ix_(known, known)] / np.outer(sigma, sigma)
     if known.any() and np.linalg.eigvalsh(correlation)[0] < -ROUNDING * len(sigma):
-        raise ValueError(
+        raise RefusedError(
             f"the {name} covariance is none (its correlations contradict one another): the file is damaged; "
             "calibrate again."
         )

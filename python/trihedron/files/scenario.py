@@ -13,6 +13,7 @@ from tomlkit.items import AoT, Item
 
 from trihedron.documents import DocumentError, of_path, read_text
 from trihedron.files.output import write_whole
+from trihedron.refused import RefusedError
 
 
 def improved_scenario(
@@ -42,9 +43,9 @@ def improved_scenario(
     try:
         document = tomlkit.parse(read_text(path, "scenario file"))
     except DocumentError as error:
-        raise ValueError(of_path(path, error)) from None
+        raise RefusedError(of_path(path, error)) from None
     except (TOMLKitError, RecursionError) as error:
-        raise ValueError(f"{path}: this is not a TOML file: {error}") from None
+        raise RefusedError(f"{path}: this is not a TOML file: {error}") from None
     for name, values in tables.items():
         if values:
             _merge(document, name, values)

@@ -14,6 +14,7 @@ import numpy as np
 
 from trihedron.files.output import OutputError, write_whole
 from trihedron.records.truth import TrueSegment, Truth
+from trihedron.refused import RefusedError
 
 _ARRAYS = (
     "accelerometer_time_s",
@@ -75,7 +76,7 @@ def read_truth(path: str | os.PathLike[str]) -> Truth:
             header = json.loads(str(archive["header"]))
             arrays = {name: archive[name] for name in _ARRAYS if name in archive.files}
     except (KeyError, ValueError) as error:
-        raise ValueError(f"{path}: this is not a truth file written as .npz ({error})") from None
+        raise RefusedError(f"{path}: this is not a truth file written as .npz ({error})") from None
     segments = tuple(TrueSegment(**{**entry, "axis": tuple(entry["axis"])}) for entry in header.pop("segments"))
     effects = {name: MappingProxyType(values) for name, values in header.pop("effects").items()}
     noise = {

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.read import devices_of
+from trihedron.refused import RefusedError
 
 ENDINGS = (
     *(".csv", ".tsv", ".txt", ".log", ".dat", ".npz", ".npy", ".parquet", ".zip", ".gz", ".bag", ".mcap", ".db3"),
@@ -59,15 +60,15 @@ def find_jobs(
         path for path in _paths(source) if apart_from is None or apart_from.resolve() not in path.resolve().parents
     ]
     if not paths:
-        raise ValueError(
+        raise RefusedError(
             f"{source}: no log was found there; name a folder with logs, or a pattern such as 'logs/*.csv'."
         )
     try:
         pattern = None if serial is None else re.compile(serial)
     except re.error as error:
-        raise ValueError(f"--serial {serial!r} is not a regular expression ({error}).") from None
+        raise RefusedError(f"--serial {serial!r} is not a regular expression ({error}).") from None
     if pattern is not None and pattern.groups != 1:
-        raise ValueError(
+        raise RefusedError(
             f"--serial {serial!r} needs one group in parentheses: the part of the path that is the device."
         )
     root = os.path.commonpath([str(path.parent.resolve()) for path in paths])
@@ -86,7 +87,9 @@ def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
         return [path for one in source for path in _paths(one)]
     if not os.fspath(source):
         # What a shell makes of a variable that is not set would be every log below here.
-        raise ValueError("the name of the logs is empty; name a folder, a file or a pattern ('.' for the folder here).")
+        raise RefusedError(
+            "the name of the logs is empty; name a folder, a file or a pattern ('.' for the folder here)."
+        )
     path = Path(source)
     try:
         os.stat(source)
@@ -94,7 +97,7 @@ def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
         pass
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
-        raise ValueError(f"{source}: this cannot be opened ({why}); check the name.") from None
+        raise RefusedError(f"{source}: this cannot be opened ({why}); check the name.") from None
     if path.is_dir():
         found = (p for p in path.rglob("*") if p.suffix.lower() in ENDINGS and not p.name.startswith("."))
         return sorted(p for p in found if p.is_file())
@@ -102,7 +105,7 @@ def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
         return [path]
     matched = sorted(Path(name) for name in glob.glob(str(source), recursive=True))
     if not matched and not glob.has_magic(str(source)):
-        raise ValueError(f"{source}: there is no such file or folder; check the name.")
+        raise RefusedError(f"{source}: there is no such file or folder; check the name.")
     return [one for one in matched if one.is_file()]
 
 
@@ -110,7 +113,7 @@ def _serial(path: Path, device: int | None, pattern: re.Pattern[str] | None, roo
     if pattern is not None:
         found = pattern.search(str(path))
         if found is None:
-            raise ValueError(f"{path}: --serial {pattern.pattern!r} does not fit this path.")
+            raise RefusedError(f"{path}: --serial {pattern.pattern!r} does not fit this path.")
         return found.group(1)
     if device is not None:
         return f"device {device}"

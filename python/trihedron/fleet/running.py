@@ -17,6 +17,7 @@ from trihedron.fleet.summary import FleetResult, summarise
 from trihedron.fleet.table import write_tables
 from trihedron.fleet.work import Row, work
 from trihedron.records.progress import Progress
+from trihedron.refused import RefusedError
 
 RESULTS = "results"
 DEATHS = 3
@@ -82,12 +83,12 @@ def fleet(
         "diagnose": diagnose,
     }
     if workers is not None and workers < 0:
-        raise ValueError(f"--workers is 0 or more, not {workers}.")
+        raise RefusedError(f"--workers is 0 or more, not {workers}.")
     tell = progress or (lambda _fraction, _text: None)
     tell(0.0, "looking at logs")
     jobs = find_jobs(logs, options, serial=serial, apart_from=folder)
     if folder.exists() and not folder.is_dir():
-        raise ValueError(f"{folder}: this is a file; name a folder for the results.")
+        raise RefusedError(f"{folder}: this is a file; name a folder for the results.")
     (folder / RESULTS).mkdir(parents=True, exist_ok=True)
     rows = {job.key: kept for job in jobs if (kept := _kept(folder, job)) is not None}
     todo = list({job.key: job for job in jobs if job.key not in rows}.values())
@@ -163,7 +164,7 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     try:
         dask, distributed = import_module("dask"), import_module("distributed")
     except ModuleNotFoundError:
-        raise ValueError(
+        raise RefusedError(
             "several workers need Dask, which is not installed: pip install 'trihedron[fleet]', or say --workers 0 to "
             "do one log after the other in this process."
         ) from None
@@ -184,7 +185,7 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             try:
                 client = distributed.Client(scheduler, timeout="15s", set_as_default=False)
             except (OSError, TimeoutError, ValueError) as error:
-                raise ValueError(f"{scheduler}: no Dask scheduler answers there ({error}).") from None
+                raise RefusedError(f"{scheduler}: no Dask scheduler answers there ({error}).") from None
             with client:
                 yield client
             return

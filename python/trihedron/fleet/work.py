@@ -11,8 +11,12 @@ from typing import Any
 import numpy as np
 
 from trihedron.fleet.logs import program
+from trihedron.records.checked import WrongTypeError
+from trihedron.refused import REFUSALS, RefusedError
 
 Row = dict[str, Any]
+REFUSED: tuple[type[Exception], ...] = (*REFUSALS, WrongTypeError, OSError)
+"""What says of a log, a file or an option that it will not do."""
 
 
 def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
@@ -25,7 +29,7 @@ def work(path: str, device: int | None, options: Mapping[str, Any]) -> Row:
     row: Row = {"version": program(), "worker": os.getpid()}
     try:
         row |= {"status": "done", "reason": "", **_calibrated(path, device, options)}
-    except (ValueError, OSError) as error:
+    except REFUSED as error:
         row |= {"status": "refused", "reason": str(error)}
     except MemoryError:
         row |= {"status": "crashed", "reason": "there was not enough memory for this log"}
@@ -52,7 +56,7 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
         if found.calibration is None:
             grave = [f.seen for f in found.findings if f.severity.value != "note"]
             why = grave[0] if grave else "its poses determine no calibration."
-            raise ValueError(f"{recording.source}: {why} `trihedron diagnose` says what else it shows.")
+            raise RefusedError(f"{recording.source}: {why} `trihedron diagnose` says what else it shows.")
         result = CalibrationResult(found.calibration, found.segments, recording)
         diagnosis = {
             "verdict": found.verdict,

@@ -187,10 +187,10 @@ def _by_poses(
     turns_deg: Sequence[float] | None,
 ) -> Calibration:
     assert segments.accelerometer_mean is not None
-    assert segments.accelerometer_sigma_mean is not None
+    assert segments.norm_sigma is not None
     accelerometer, found = calibrate_norm(
         segments.accelerometer_mean,
-        segments.accelerometer_sigma_mean,
+        segments.norm_sigma,
         gravity,
         raw_unit=recording.accelerometer_unit,
         frame=frame,

@@ -171,7 +171,7 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
         table = Table(Path("the stream"), names, tuple(np.ascontiguousarray(column) for column in cells.T))
         try:
             columns = find_columns(table, mapping, None)
-        except ValueError:
+        except RefusedError:
             if mapping is not None:
                 raise
             columns = _by_content(cells) if names is None else Columns()

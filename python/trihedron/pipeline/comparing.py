@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import f as f_distribution
 
 from trihedron.diagnose.against import (
     FREE_CURVES,
@@ -17,6 +16,7 @@ from trihedron.diagnose.against import (
 )
 from trihedron.diagnose.against.numbers import SPREAD_DOF, CommonFactor
 from trihedron.estimate.verification import verify_calibration
+from trihedron.probability import f_upper
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import (
     AcceptedEffect,
@@ -50,6 +50,8 @@ def compared(
     effects = compare_effects(
         given_effects, found.effects, found.candidates, alpha=alpha, unexplained=unexplained,
         misses={test.domain: test.rms for test in found.domains},
+        freedom={test.domain: test.dof for test in found.domains},
+        tried_on_model=() if simulated is None else simulated[0].candidates,
     )  # fmt: skip
     numbers = compare_numbers(
         model,
@@ -112,7 +114,7 @@ def _numbers_test(parameters: tuple[ParameterDifference, ...]) -> DomainTest:
     channels = tuple(dict.fromkeys(f"{p.id} {p.name}" for p in significant))
     return DomainTest(
         "numbers",
-        float(f_distribution.isf(max(worst.p_value, 1e-300), n, SPREAD_DOF)),
+        f_upper(n, SPREAD_DOF, max(worst.p_value, 1e-300)),
         float(n),
         worst.p_value,
         bool(significant),

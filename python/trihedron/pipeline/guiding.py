@@ -206,10 +206,10 @@ def _known(
 ) -> Known:
     """The plan's own covariances, from where the poses lie, how the moves went and the noise: known at any moment."""
     relative = np.full(len(up), 1e-3)
-    if segments.accelerometer_sigma_mean is not None and len(up):
+    if segments.norm_sigma is not None and len(up):
         length = np.linalg.norm((_means(segments) - _centre_of(segments, up)) @ matrix.T, axis=1)
         size = gravity if _is_determined(calibration) else float(np.median(length)) or 1.0
-        relative = np.sqrt(np.mean((segments.accelerometer_sigma_mean @ np.abs(matrix).T) ** 2, axis=1)) / size
+        relative = np.sqrt(np.mean((segments.norm_sigma @ np.abs(matrix).T) ** 2, axis=1)) / size
     relative = np.maximum(relative, 1e-6)
     rows = design_rows(up) / relative[:, None] if len(up) else np.zeros((0, 9))
     accelerometer = np.linalg.inv(rows.T @ rows + np.eye(9) / PRIOR**2)

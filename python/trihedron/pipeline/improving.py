@@ -12,6 +12,7 @@ import numpy as np
 import tomllib
 
 from trihedron.diagnose.against import model_of_diagnosis
+from trihedron.estimate.noise import gain_of
 from trihedron.files.scenario import improved_scenario
 from trihedron.pipeline.comparing_noise import Sampled, sampled
 from trihedron.pipeline.comparing_quantisation import white_and_quantisation
@@ -24,12 +25,15 @@ from trihedron.simulate import (
     Scenario,
     Smoother,
     diagnosed_sizes,
+    low_pass_like,
     noise_of_octaves,
     read_scenario,
     scenario_from_table,
 )
 
 FEWEST_OCTAVES = 4
+N_FREQUENCIES = 256
+"""At which a filter is compared with what was seen: a sixteenth of an octave in the middle of the band."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,7 @@ def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
         bands = [o for o in bands if all(o.low_hz in one for one in by_axis)]
         if len(bands) < FEWEST_OCTAVES:
             continue
+        low_pass = _low_pass(axes)
         rounding = np.array([axis.step**2 / (12.0 * recording.rate_hz) for axis in axes])
         density = np.array([[one[o.low_hz].value for one in by_axis] for o in bands])
         relative = np.array([[one[o.low_hz].sigma_log for one in by_axis] for o in bands])
@@ -100,7 +105,8 @@ def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
             np.maximum(density - rounding, 1e-3 * density),
             relative,
             1.0 / recording.rate_hz,
-            _corner(axes),
+            low_pass,
+            _white(axes),
         )
     return out
 
@@ -117,10 +123,31 @@ def white_and_quantisation_of(seen: Sampled, name: str) -> dict[str, list[float]
     }
 
 
-def _corner(axes: Sequence[HoldNoise]) -> float | None:
-    """Corner [Hz] of the low-pass that most axes show, ``None`` where they show none."""
-    seen = [math.log(axis.corner_hz.value) for axis in axes if axis.corner_hz is not None]
-    return math.exp(sum(seen) / len(seen)) if 2 * len(seen) > len(axes) else None
+def _low_pass(axes: Sequence[HoldNoise]) -> Smoother | float | None:
+    """The low-pass whose gain is that of the filter seen on all axes, none where none was seen.
+
+    Where axes show unlike ones that colour is a hand's or a stand's too: roughly the corner [Hz] of most of them, for
+    the octaves to tell the shape; ``None`` where most show none.
+    """
+    rate = axes[0].rate_hz
+    seen = [(one.corner_hz.value, one.corner_shape) for one in axes if one.corner_hz is not None]
+    if not seen:
+        return Smoother()
+    if len(seen) < len(axes) or len(set(seen)) > 1:
+        mean = math.exp(sum(math.log(corner) for corner, _ in seen) / len(seen))
+        return mean if 2 * len(seen) > len(axes) else None
+    frequency_hz = rate * (np.arange(N_FREQUENCIES) + 0.5) / (2 * N_FREQUENCIES)
+    return low_pass_like(frequency_hz, gain_of(frequency_hz, *seen[0], rate), 1.0 / rate)
+
+
+def _white(axes: Sequence[HoldNoise]) -> list[tuple[float, float] | None]:
+    """N of every axis with its relative error, where all axes show one filter or none.
+
+    What lies below a corner of an axis' own is its motion.
+    """
+    if len({(one.corner_hz, one.corner_shape) for one in axes}) > 1:
+        return [None] * len(axes)
+    return [None if one.white is None else (one.white.value, one.white.sigma_log) for one in axes]
 
 
 def _shared(found: DiagnosisResult, ids: set[str]) -> list[AcceptedEffect]:
@@ -169,6 +196,8 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
             terms["N"] = list(noise.N)
             if low_pass.corner_hz > 0.0:
                 tables[name]["noise_filter"] = {"corner_hz": low_pass.corner_hz, "order": low_pass.order}
+            elif getattr(given, name).noise_filter.corner_hz > 0.0:
+                tables[name]["noise_filter"] = {"corner_hz": 0.0}
             if "B" not in terms and any(noise.B):
                 terms["B"] = list(noise.B)
         if "Q" in terms:

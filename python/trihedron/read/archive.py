@@ -17,6 +17,7 @@ from trihedron.arrays import FloatArray
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.room import check_memory, check_unpacked
 from trihedron.read.table import Table, file_sha256
+from trihedron.refused import RefusedError
 
 _BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")
 # NumPy evaluates a header as Python text, so a damaged one fails in the ways of a parser.
@@ -34,7 +35,7 @@ def read_npy(path: Path) -> Table:
             shape, _, dtype = header(stream)
             cells = math.prod(shape)
             if min(shape, default=1) < 0 or dtype.itemsize * cells != path.stat().st_size - stream.tell():
-                raise ValueError(f"its header says {dtype} of shape {shape}, and it has another length")
+                raise RefusedError(f"its header says {dtype} of shape {shape}, and it has another length")
             check_memory(path, cells, 1)
             stream.seek(0)
             # Read, not mapped: a mapped file that somebody shortens ends the process.
@@ -54,7 +55,7 @@ def header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, by_columns, dtype = read(stream)
     if dtype.hasobject:
-        raise ValueError("objects of Python are not read")
+        raise RefusedError("objects of Python are not read")
     return shape, bool(by_columns), dtype
 
 
@@ -82,7 +83,7 @@ def _check_members(path: Path, archive: Any) -> None:
             if member.peek(6)[:6] == b"\x93NUMPY":
                 shape, _, dtype = header(member)
                 if min(shape, default=1) < 0 or dtype.itemsize * math.prod(shape) > info.file_size:
-                    raise ValueError(f"{info.filename} says {dtype} of shape {shape} and is shorter")
+                    raise RefusedError(f"{info.filename} says {dtype} of shape {shape} and is shorter")
         unpacked += said
     check_unpacked(path, packed, unpacked)
 

@@ -17,6 +17,7 @@ from trihedron.read.errors import ReadError
 from trihedron.read.table import StatedClock, Table, file_sha256
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.records import Finding, FindingCode
+from trihedron.refused import RefusedError
 
 _TYPES = ["IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
 _STAMPS = (("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS", "ms"))
@@ -106,7 +107,7 @@ def _keep(
     if key not in names:
         stamp, unit = next(((s, u) for s, u in _STAMPS if s in fields), ("", ""))
         if not stamp:
-            raise ValueError(f"{message.get_type()} has no time stamp")
+            raise RefusedError(f"{message.get_type()} has no time stamp")
         names[key] = [f"{stamp} [{unit}]", *(name for name in _FIELDS[word] if name in fields)]
         rows[key] = []
     plain = [names[key][0].split(" ")[0], *names[key][1:]]

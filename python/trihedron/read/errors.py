@@ -6,9 +6,10 @@ import os
 from pathlib import Path
 
 from trihedron.forked import check_tables
+from trihedron.refused import RefusedError
 
 
-class ReadError(ValueError):
+class ReadError(RefusedError):
     """A file that cannot become a recording. The text is one sentence: which file, which line, what to do."""
 
 

@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import prod
 
+from trihedron.refused import RefusedError
+
 _SIZE = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 17: 2, 18: 4}
 """Bytes of a value by type of element."""
 _INT8, _INT32, _UINT32, _MATRIX, _COMPRESSED, _UTF8 = 1, 5, 6, 14, 15, 16
@@ -22,7 +24,7 @@ _DEEPEST = 40
 _LONGEST_NAME = 1024
 
 
-class DamagedError(ValueError):
+class DamagedError(RefusedError):
     """The walk met what no writer writes; the sentence says where."""
 
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from trihedron.read.archive import DAMAGE, header
 from trihedron.read.errors import ReadError, from_os_error
+from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ def rows_on_disk(path: Path) -> RowsOnDisk:
             shape, by_columns, dtype = header(stream)
             offset = stream.tell()
             if min(shape, default=1) < 0 or dtype.itemsize * math.prod(shape) != path.stat().st_size - offset:
-                raise ValueError(f"its header says {dtype} of shape {shape}, and it has another length")
+                raise RefusedError(f"its header says {dtype} of shape {shape}, and it has another length")
     except OSError as error:
         raise from_os_error(path, error) from None
     except DAMAGE as error:

@@ -14,6 +14,7 @@ from trihedron.records.checked import WrongTypeError, all_of, kind_of, number_of
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
+from trihedron.refused import RefusedError
 
 Frame = Literal["lower", "symmetric", "case"]
 """Instrument trihedron Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
@@ -152,7 +153,7 @@ class Calibration(Presented):
         covariance.setflags(write=False)
         object.__setattr__(self, "covariance", covariance)
         if not 1.0 < number_of("gravity_m_s2", self.gravity_m_s2) < 100.0:
-            raise ValueError(f"gravity must be in m/s², got {self.gravity_m_s2}")
+            raise RefusedError(f"gravity must be in m/s², got {self.gravity_m_s2}")
         freeze(self)
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.records.frozen import Frozen
+from trihedron.refused import RefusedError
 
 SAME_STEP = 0.02
 """Part by which one step of three converters may be measured differently where text has cut its digits."""
@@ -94,5 +95,5 @@ class RecordingFacts(Frozen):
         """
         facts = {"accelerometer": self.accelerometer, "gyroscope": self.gyroscope}[sensor]
         if facts is None:
-            raise ValueError(f"the recording has no {sensor}")
+            raise RefusedError(f"the recording has no {sensor}")
         return facts

@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from trihedron.refused import RefusedError
+
 LONGEST_SHOWN = 60
 """Characters of a wrong value that a sentence repeats."""
 
@@ -66,7 +68,7 @@ def number_of(name: str, value: Any) -> float:
     except (OverflowError, ValueError):
         number = math.inf
     if not math.isfinite(number):
-        raise ValueError(f"{name} is a finite number, not {said(value)}.")
+        raise RefusedError(f"{name} is a finite number, not {said(value)}.")
     return number
 
 

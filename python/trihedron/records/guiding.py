@@ -9,6 +9,7 @@ from enum import Enum
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.refused import RefusedError
 
 LEAST_POSES = 12
 """Nine numbers of the accelerometer, and three poses more than numbers: residuals that can contradict it."""
@@ -39,7 +40,7 @@ class Accuracy:
             except ValueError:
                 size = 0.0
             if found is None or not 0.0 < size < 0.2:
-                raise ValueError(
+                raise RefusedError(
                     f"--accuracy: '{part}' is not understood; write for example \"accel 0.05 %, gyro 0.1 %\"."
                 )
             chosen["accelerometer" if found.group(1).startswith("acc") else "gyroscope"] = size

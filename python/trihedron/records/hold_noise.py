@@ -48,8 +48,8 @@ class HoldNoise:
     their differences over √2, rounding taken off; zero where it is hidden), which is N times the root of the rate
     where there is no filter. ``step`` [u] is the resolution, zero where the readings are finer than their noise shows.
     ``corner_hz`` is the corner of a low-pass filter where one shows, ``corner_above_hz`` what it lies above where none
-    does. ``scatter`` is by how much the noise differs from hold to hold beyond chance (standard deviation of the
-    logarithm of its power).
+    does; ``corner_shape`` is the order of the Butterworth filter that it resembles, 0 for a Gaussian. ``scatter`` is by
+    how much the noise differs from hold to hold beyond chance (standard deviation of the logarithm of its power).
     """
 
     name: str
@@ -65,6 +65,7 @@ class HoldNoise:
     corner_hz: Measured | None
     corner_above_hz: float
     scatter: float
+    corner_shape: int = 0
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from trihedron.printable import one_line
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.frozen import Frozen, freeze
 from trihedron.records.presented import Presented
+from trihedron.refused import RefusedError
 
 AllanKind = Literal["overlapping", "non-overlapping", "modified", "hadamard", "total"]
 
@@ -93,7 +94,7 @@ class AllanCurve(Presented):
             When it is of several channels.
         """
         if self.n_channels > 1:
-            raise ValueError(f"this curve is of {self.n_channels} channels, not of one series")
+            raise RefusedError(f"this curve is of {self.n_channels} channels, not of one series")
         flat = {name: getattr(self, name).reshape(-1) for name in _PER_CHANNEL}
         return replace(self, **flat)
 
@@ -196,7 +197,7 @@ class NoiseAxis(Frozen):
     def __post_init__(self) -> None:
         missing = [term.value for term in TermName if term not in self.terms]
         if missing:
-            raise ValueError(f"the noise of axis {self.name} lacks the terms {', '.join(missing)}")
+            raise RefusedError(f"the noise of axis {self.name} lacks the terms {', '.join(missing)}")
         freeze(self)
 
     def value(self, symbol: TermName | str) -> float:
@@ -239,11 +240,11 @@ class NoiseAxis(Frozen):
         of that length: the weight of one hold when one bias is fitted to all of them.
         """
         if not window_s > 0:
-            raise ValueError(f"a window must last longer than 0 s, got {window_s}")
+            raise RefusedError(f"a window must last longer than 0 s, got {window_s}")
         if session_s is None:
             return float(self.allan_variance(window_s)[0])
         if session_s < window_s:
-            raise ValueError(f"a session of {session_s} s holds no window of {window_s} s")
+            raise RefusedError(f"a session of {session_s} s holds no window of {window_s} s")
         Q, N, B, K, R = (self.fitted(term) for term in TermName)
         t, d = window_s, session_s
         total = 2 * Q**2 * (1 / t**2 - 1 / d**2) + N**2 * (1 / t - 1 / d) + B**2 / math.pi * math.log(d / t)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_origin
 import numpy as np
 
 from trihedron.records.frozen import thawed
+from trihedron.refused import RefusedError
 
 if TYPE_CHECKING:
     from cattrs import Converter
@@ -62,7 +63,7 @@ def from_plain(document: dict[str, Any], kind: type[Record]) -> Record:
     try:
         return _converter().structure(document, kind)
     except ForbiddenExtraKeysError as error:
-        raise ValueError(f"{kind.__name__} has no {', '.join(sorted(error.extra_fields))}") from None
+        raise RefusedError(f"{kind.__name__} has no {', '.join(sorted(error.extra_fields))}") from None
 
 
 @cache

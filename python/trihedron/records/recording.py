@@ -18,6 +18,7 @@ from trihedron.records.finding import Finding
 from trihedron.records.frozen import freeze
 from trihedron.records.presented import Presented
 from trihedron.records.sampling import UNJUDGED, Sampling
+from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, RateUnit
 
 
@@ -37,7 +38,7 @@ def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) ->
         want is not None and got != want for got, want in zip(out.shape, shape, strict=True)
     ):
         wanted = "(" + ", ".join("n" if s is None else str(s) for s in shape) + ")"
-        raise ValueError(f"{name} must have shape {wanted}, got {out.shape}")
+        raise RefusedError(f"{name} must have shape {wanted}, got {out.shape}")
     out.setflags(write=False)
     return out
 
@@ -125,13 +126,13 @@ class Recording(Presented):
         time_s = _readonly(self.time_s, "time_s", (None,))
         n = len(time_s)
         if n == 0:
-            raise ValueError("a recording needs at least one sample")
+            raise RefusedError("a recording needs at least one sample")
         # Between finite ends, what never steps back (NaN would) is finite.
         if not (np.isfinite(time_s[0]) and np.isfinite(time_s[-1]) and np.all(time_s[1:] >= time_s[:-1])):
-            raise ValueError("time_s must be finite and non-decreasing")
+            raise RefusedError("time_s must be finite and non-decreasing")
         object.__setattr__(self, "time_s", time_s)
         if self.accelerometer is None and self.gyroscope is None:
-            raise ValueError("a recording needs an accelerometer or a gyroscope")
+            raise RefusedError("a recording needs an accelerometer or a gyroscope")
         for name in ("accelerometer", "gyroscope"):
             value = getattr(self, name)
             if value is not None:
@@ -141,7 +142,7 @@ class Recording(Presented):
             if value is not None:
                 object.__setattr__(self, name, _readonly(value, name, (n,)))
         if number_of("rate_hz", self.rate_hz) <= 0.0:
-            raise ValueError(f"rate_hz must be a positive number, got {self.rate_hz}")
+            raise RefusedError(f"rate_hz must be a positive number, got {self.rate_hz}")
         number_of("start_epoch_s", self.start_epoch_s)
         units = (("accelerometer_unit", AccelerationUnit), ("gyroscope_unit", RateUnit))
         for name, kind in units:

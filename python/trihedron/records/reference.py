@@ -11,6 +11,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.records.finding import Finding
 from trihedron.records.plain import Layout, Plain
+from trihedron.refused import RefusedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +37,9 @@ class ReferenceMotion:
     def __post_init__(self) -> None:
         n = len(self.time_s)
         if n < 2 or not np.all(np.isfinite(self.time_s)) or np.any(np.diff(self.time_s) <= 0.0):
-            raise ValueError("a reference needs at least two rows with times that increase")
+            raise RefusedError("a reference needs at least two rows with times that increase")
         if self.attitude is None and self.rate is None:
-            raise ValueError("a reference needs attitude or rate")
+            raise RefusedError("a reference needs attitude or rate")
         for name, shape in (
             ("attitude", (n, 3, 3)),
             ("rate", (n, 3)),
@@ -47,7 +48,7 @@ class ReferenceMotion:
         ):
             value = getattr(self, name)
             if value is not None and value.shape != shape:
-                raise ValueError(f"{name} must have shape {shape}, got {value.shape}")
+                raise RefusedError(f"{name} must have shape {shape}, got {value.shape}")
 
     @property
     def kind(self) -> str:

@@ -79,6 +79,9 @@ class Segments(Presented):
     whiteness: slow noise inside a hold raises it). ``n_averaged`` (n_holds,) counts the samples behind each mean,
     ``time_mid_s`` (n_holds,) and ``duration_s`` (n_holds,) say when and how long. ``whole`` are the poses before they
     were cut at bumps, each averaged over all of its samples; ``None`` where nothing was cut.
+    ``accelerometer_up`` (n_holds, 3) is the vertical in raw units (unit vectors, by whose direction |f| grows fastest)
+    and ``accelerometer_sigma_up`` (n_holds,) the standard error of the mean along it, NaN where only those of the axes
+    are known: a body that settles turns gravity across itself, its length stays; ``None`` where no vertical is known.
     """
 
     holds: tuple[Hold, ...]
@@ -94,6 +97,8 @@ class Segments(Presented):
     duration_s: FloatArray
     findings: tuple[Finding, ...] = ()
     whole: Segments | None = None
+    accelerometer_up: FloatArray | None = None
+    accelerometer_sigma_up: FloatArray | None = None
 
     def __post_init__(self) -> None:
         all_of("holds", self.holds, Hold)
@@ -106,10 +111,13 @@ class Segments(Presented):
             if is_array and not (value is None and "None" in str(field.type)):
                 object.__setattr__(self, field.name, numbers_of(field.name, value))
         n = len(self.holds)
-        for name in ("accelerometer_mean", "gyroscope_mean", "accelerometer_sigma_mean", "gyroscope_sigma_mean"):
+        for name in ("accelerometer_mean", "gyroscope_mean", "accelerometer_sigma_mean", "gyroscope_sigma_mean",
+                     "accelerometer_up"):  # fmt: skip
             value = getattr(self, name)
             if value is not None and value.shape != (n, 3):
                 raise ValueError(f"{name} must have shape ({n}, 3), got {value.shape}")
+        if self.accelerometer_sigma_up is not None and self.accelerometer_sigma_up.shape != (n,):
+            raise ValueError(f"accelerometer_sigma_up must have shape ({n},), got {self.accelerometer_sigma_up.shape}")
         for move in self.moves:
             if not (0 <= move.hold_before < n and 0 <= move.hold_after < n and move.start <= move.stop):
                 raise ValueError(f"move {move.index} does not join two holds")
@@ -119,6 +127,18 @@ class Segments(Presented):
     def n_holds(self) -> int:
         """Number of still poses."""
         return len(self.holds)
+
+    @property
+    def norm_sigma(self) -> FloatArray | None:
+        """(n_holds, 3) standard errors of the accelerometer's means for what asks of their length alone.
+
+        Alike on three axes where the error along the vertical is known: that is all that enters |f|.
+        """
+        axes, up = self.accelerometer_sigma_mean, self.accelerometer_sigma_up
+        if axes is None or up is None:
+            return axes
+        out: FloatArray = np.where(np.isfinite(up)[:, None], up[:, None], axes)
+        return out
 
     def __repr__(self) -> str:
         poses = f"{self.n_holds} still pose{'' if self.n_holds == 1 else 's'}"

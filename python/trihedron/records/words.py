@@ -21,3 +21,30 @@ def words(phrase: str, /, **values: Any) -> Words:
         When the catalogue has no such phrase, or a place of it has no value.
     """
     return Words(import_module("trihedron.report.findings.phrases").phrase(phrase, values))
+
+
+def effect_words(effect_id: str, case: str, /, **values: Any) -> Words:
+    """What is said of an effect that is accepted, by its id and case, with values (``report/effects``).
+
+    Raises
+    ------
+    KeyError
+        When the catalogue has no such case, or a place of it has no value.
+    """
+    return Words(import_module("trihedron.report.effects.catalogue").effect_words(effect_id, case, values))
+
+
+def experiment_for(effect_id: str, *, at_rest: bool = False) -> Words:
+    """What to record so that an effect cannot be mistaken for another; empty where the catalogue has none."""
+    return Words(import_module("trihedron.report.effects.catalogue").experiment(effect_id, at_rest=at_rest))
+
+
+def why_not(name: str, /, **values: Any) -> Words:
+    """Why a recording cannot show an effect, by its id (``report/effects/reasons.py``).
+
+    Raises
+    ------
+    KeyError
+        When there is no such reason, or a place of it has no value.
+    """
+    return Words(import_module("trihedron.report.effects.catalogue").why_not(name, values))

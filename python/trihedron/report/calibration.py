@@ -200,6 +200,10 @@ def _angle_words(quality: FitQuality) -> str:
     angles = _angles(quality)
     if angles:
         parts = [f"{plain_number(rms)}° rms, {plain_number(worst)}° worst {label}" for label, rms, worst in angles]
+        assert quality.angle_deg is not None
+        n_seen, n_counted = int(np.isfinite(quality.angle_deg).sum()), int(counted_moves(quality).sum())
+        if n_counted < n_seen:
+            parts[0] += f" ({n_counted} of {n_seen} moves, the others left out)"
         parts.append(f"noise alone {plain_number(_move_floor(quality))}° rms")
         return "; ".join(parts)
     if quality.dof <= 0:

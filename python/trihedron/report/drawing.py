@@ -6,11 +6,13 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
+from trihedron.refused import RefusedError
+
 if TYPE_CHECKING:
     from trihedron.report.figures import ShownFigure
 
 
-class NoFiguresError(ValueError):
+class NoFiguresError(RefusedError):
     """Figures were asked for where matplotlib is not installed."""
 
 

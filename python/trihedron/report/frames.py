@@ -20,6 +20,7 @@ from trihedron.records import (
     Verification,
 )
 from trihedron.records.diagnosis import Diagnosis
+from trihedron.refused import RefusedError
 from trihedron.report.noise_units import PER_UNIT
 
 Columns = dict[str, Sequence[Any] | npt.NDArray[Any]]
@@ -34,13 +35,13 @@ def made_by(library: str, columns: Columns) -> Any:
         When it is another library, or not installed.
     """
     if library not in {"polars", "pandas"}:
-        raise ValueError(f"a data frame is made by 'polars' or 'pandas', not by {library!r}.")
+        raise RefusedError(f"a data frame is made by 'polars' or 'pandas', not by {library!r}.")
     from importlib import import_module
 
     try:
         frames = import_module(library)
     except ModuleNotFoundError:
-        raise ValueError(f"{library} is not installed: pip install {library}.") from None
+        raise RefusedError(f"{library} is not installed: pip install {library}.") from None
     # Polars takes no read-only arrays of NumPy without a word; both libraries own what they are given here.
     owned = {
         name: np.array(values) if isinstance(values, np.ndarray) else list(values) for name, values in columns.items()

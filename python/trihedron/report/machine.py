@@ -8,6 +8,7 @@ from typing import Any
 from trihedron.files.calibration import calibration_document, plain
 from trihedron.printable import printable_json
 from trihedron.records import AllanCurve, Calibration, Finding, Recording, Segments, Verification
+from trihedron.records.published import published_figures
 
 
 def recording_record(recording: Recording) -> dict[str, Any]:
@@ -95,9 +96,10 @@ def segments_record(recording: Recording, segments: Segments) -> dict[str, Any]:
 
 
 def calibration_record(calibration: Calibration, segments: Segments, recording: Recording) -> dict[str, Any]:
-    """The calibration file's content, with the segments that it was made from."""
+    """The calibration file's content, the figures that every report prints, the segments that it was made from."""
     document = calibration_document(calibration)
-    return {**document, "segments": segments_record(recording, segments)}
+    figures = published_figures(calibration)
+    return {**document, "figures": figures, "segments": segments_record(recording, segments)}
 
 
 def verification_record(verification: Verification) -> dict[str, Any]:

@@ -106,6 +106,29 @@ def measure_activity(channels: Channels, ends: Sequence[RangeEnd] = ()) -> Activ
     return Activity(fast, slow, limits[0], limits[1], quiet, white, wander + np.zeros(n_channels))
 
 
+def quiet_channels(channels: Channels, activity: Activity, which: BoolArray) -> BoolArray:
+    """(m,) windows in which the channels ``which`` (c,) alone are at the noise floor, whatever the others read."""
+    width = min(WINDOW_BLOCKS, channels.n_blocks)
+    alive = which & (activity.white_variance > 0.0) & (activity.slow_variance > 0.0)
+    if not alive.any() or not activity.is_quiet.any():
+        return activity.is_quiet.copy()
+    is_valid = channels.is_valid[:, None]
+    mean = np.where(
+        is_valid, channels.mean[:, alive] - np.mean(channels.mean[activity.is_quiet][:, alive], axis=0), 0.0
+    )
+    variance = np.where(is_valid, channels.variance[:, alive], 0.0)
+    whole: BoolArray = rolling_mean((~is_valid).astype(np.float64), width)[:, 0] == 0.0
+    between = (rolling_mean(mean**2, width) - rolling_mean(mean, width) ** 2) * (width / max(width - 1, 1))
+    out = whole
+    levels = ((rolling_mean(variance, width), activity.white_variance), (between, activity.slow_variance))
+    n = int(alive.sum())
+    freedoms = (width * (channels.length - 1) * n, max(width - 1, 1) * n)
+    for (level, floor), freedom in zip(levels, freedoms, strict=True):
+        ratio = np.log(np.maximum((level / floor[alive]).mean(axis=1), ROUNDING))
+        out = np.asarray(out & (ratio <= _limit(ratio[activity.is_quiet], freedom)))
+    return out
+
+
 def _usual(power: FloatArray, tells: BoolArray) -> FloatArray:
     """(c,) logarithm of a channel's power when still, roughly: channels of different units are then averaged alike."""
     return np.log([np.quantile(power[mask, c], USUALLY_STILL) for c, mask in enumerate(tells.T)])

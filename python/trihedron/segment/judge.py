@@ -79,7 +79,7 @@ def judge_runs(
 
 def _creep_size(channels: Channels, run: Run, noise: MeanNoise, chance: float) -> float:
     """Distance of the two halves in standard errors where it is more than chance allows, else 0."""
-    blocks = np.vstack([channels.mean[a:b] for a, b in run.quiet_ranges()])
+    blocks = run.quiet_rows(channels.mean)
     half = len(blocks) // 2
     if half < 2:
         return 0.0

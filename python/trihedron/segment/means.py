@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
@@ -12,9 +13,13 @@ from trihedron.records import Hold, Recording
 from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise, split_by_halves
 from trihedron.segment.runs import Run
+from trihedron.segment.vertical import along, noise_along, upright
+from trihedron.units import AccelerationUnit
 
 PIECE = 1 << 18
 """Rows of a hold that are read at a time."""
+SIZED = (AccelerationUnit.M_S2, AccelerationUnit.G)
+"""Units of readings whose zero is small beside gravity."""
 OCTAVES = 4
 """A hold's own excess noise is judged on stretches from a half down to a sixteenth of it: the four octaves that weigh
 in the error of its mean."""
@@ -22,11 +27,16 @@ in the error of its mean."""
 
 @dataclass(frozen=True, eq=False)
 class HoldMeans:
-    """``mean``, ``sigma`` (h, c) raw units; ``n_averaged`` (h,) finite samples."""
+    """``mean``, ``sigma`` (h, c) raw units; ``n_averaged`` (h,) finite samples.
+
+    ``up`` (h, 3), ``sigma_up`` (h,) the accelerometer's vertical and its mean's standard error along it, or ``None``.
+    """
 
     mean: FloatArray
     sigma: FloatArray
     n_averaged: np.ndarray[tuple[int], np.dtype[np.int64]]
+    up: FloatArray | None = None
+    sigma_up: FloatArray | None = None
 
 
 def average_holds(
@@ -49,14 +59,31 @@ def average_holds(
         axes = slice(3 * triad, 3 * triad + 3)
         # At rest the axes of a triad differ from the common law alike: their excess is one number. A tremor does
         # not: it turns gravity across itself, and leaves the reading along it, which tells |g|, as quiet as ever.
-        r, nu = ratio[:, axes].mean(axis=1), freedom * 3.0
-        prior = _prior_freedom(r[steady], nu[steady])
-        pulled = ((prior + nu * r) / (prior + nu))[:, None]
-        shrunk[:, axes] = np.where(steady[:, None], pulled, np.maximum(ratio[:, axes], 1.0))
+        shrunk[:, axes] = _shrunk(ratio[:, axes], freedom, steady)
     duration = np.array([sum(b - a for a, b in run.quiet_ranges()) * channels.step_s for run in runs])
-    variance = noise.variance(duration[:, None]) * shrunk
-    variance += rounding_bias_variance(channels, runs)
-    return HoldMeans(mean, np.sqrt(variance), n_averaged)
+    rounding = rounding_bias_variance(channels, runs)
+    variance = noise.variance(duration[:, None]) * shrunk + rounding
+    out = HoldMeans(mean, np.sqrt(variance), n_averaged)
+    up = (
+        upright(mean[:, :3], has_unit=recording.accelerometer_unit in SIZED)
+        if recording.accelerometer is not None and runs
+        else None
+    )
+    if up is None:
+        return out
+    upward = along(channels, runs, up)
+    law = noise_along(upward, runs)
+    ratio, freedom = _excess(upward, runs, law)
+    own = law.variance(duration[:, None])[:, 0] * _shrunk(ratio[:, :1], freedom, steady)[:, 0]
+    return replace(out, up=up, sigma_up=np.sqrt(own + up**2 @ rounding[:3]))
+
+
+def _shrunk(ratio: FloatArray, freedom: FloatArray, steady: npt.NDArray[np.bool_]) -> FloatArray:
+    """(h, k) excess of every hold on axes that are alike: drawn towards 1 where steady, at its own word elsewhere."""
+    r, nu = ratio.mean(axis=1), freedom * ratio.shape[1]
+    prior = _prior_freedom(r[steady], nu[steady])
+    pulled = ((prior + nu * r) / (prior + nu))[:, None]
+    return np.where(steady[:, None], pulled, np.maximum(ratio, 1.0))
 
 
 def _sample_means(triads: list[FloatArray], holds: tuple[Hold, ...]) -> tuple[FloatArray, IntArray]:
@@ -160,8 +187,8 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     """
     if not runs:
         return np.zeros(channels.mean.shape[1])
-    own = [np.vstack([channels.variance[a:b] for a, b in run.quiet_ranges()]) for run in runs]
-    mean = np.array([np.vstack([channels.mean[a:b] for a, b in run.quiet_ranges()]).mean(axis=0) for run in runs])
+    own = [run.quiet_rows(channels.variance) for run in runs]
+    mean = np.array([run.quiet_rows(channels.mean).mean(axis=0) for run in runs])
     q2 = np.where(channels.quantum > 0.0, channels.quantum**2, 1.0)
     noise = np.maximum(np.nanmean(np.vstack(own), axis=0) - channels.quantisation_variance, 0.0)
     # Readings that only toggle between two neighbours (variance up to q²/4) do not show how large the noise is.

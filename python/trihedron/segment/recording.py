@@ -22,14 +22,18 @@ from trihedron.segment.range_ends import range_ends
 from trihedron.segment.runs import (
     MIN_HOLD_S,
     SWAY_RAD,
+    EdgeNoise,
     Run,
     close_gaps,
     find_unsteady,
     join_quiet,
+    long_enough,
     loose_blocks,
+    set_down,
     trim_edges,
     widen,
 )
+from trihedron.segment.shaken import find_shaken
 from trihedron.segment.slow_motion import cut_slow_motion, drifting_blocks
 from trihedron.segment.turn_scale import centre_of, radians_per_reading
 from trihedron.segment.turning import turning_blocks
@@ -89,6 +93,7 @@ def segment_blocks(
     report(0.4, "still stretches")
     quiet = widen(close_gaps(activity.is_quiet, channels.is_valid), channels.is_valid)
     gravity = _gravity_reading(recording, channels)
+    scale = None
     if gravity is None:
         turning = turning_blocks(channels, quiet, None, None)
         quiet &= ~turning
@@ -104,6 +109,8 @@ def segment_blocks(
         )
     loose = loose_blocks(activity, channels.is_valid) & ~turning
     found = _find_runs(recording, channels, quiet, loose)
+    found += find_shaken(recording, channels, activity, found, ~turning, (gravity, scale))
+    found.sort(key=lambda run: run.first)
     runs, said = without_cut(recording, channels, found, ends)
     report(0.7, "means and their errors")
     segments = _describe(recording, channels, activity, runs, turning)
@@ -118,9 +125,13 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
     long = channels.blocks(LONG_S)
     core = [(a + (b - a) // 4, b - (b - a) // 4) if b - a >= long else (a, b) for a, b in seen]
     noise = pool_mean_noise(channels, core, is_robust=True)
-    steady = [trim_edges(channels, run, noise) for run in join_quiet(channels, quiet, loose, noise)]
+    edges = EdgeNoise.of(channels, noise)
+    joined = join_quiet(channels, quiet, loose, noise)
+    steady = [trim_edges(channels, run, noise, edges) for run in long_enough(channels, joined, MIN_HOLD_S)]
     unsteady = find_unsteady(channels, loose, steady, _gravity_reading(recording, channels))
-    return sorted([*steady, *unsteady], key=lambda run: run.first)
+    other = set_down(channels, joined, loose, [*steady, *unsteady])
+    short = [trim_edges(channels, run, noise, edges) for run in other]
+    return sorted([*steady, *unsteady, *short], key=lambda run: run.first)
 
 
 def _gravity_reading(recording: Recording, channels: Channels) -> float | None:
@@ -164,6 +175,7 @@ def _describe(
         np.array([0.5 * (time_s[h.start] + time_s[h.stop - 1]) for h in holds], dtype=np.float64),
         np.array([time_s[h.stop - 1] - time_s[h.start] + 1.0 / recording.rate_hz for h in holds], dtype=np.float64),
         tuple(findings),
+        (means.up, means.sigma_up),
     )
 
 
@@ -212,6 +224,7 @@ def _assemble(
     time_mid_s: FloatArray,
     duration_s: FloatArray,
     findings: tuple[Finding, ...],
+    vertical: tuple[FloatArray | None, FloatArray | None] = (None, None),
 ) -> Segments:
     """Channels back to sensors."""
     accelerometer = slice(0, 3) if recording.accelerometer is not None else None
@@ -235,4 +248,6 @@ def _assemble(
         time_mid_s=time_mid_s,
         duration_s=duration_s,
         findings=findings,
+        accelerometer_up=vertical[0],
+        accelerometer_sigma_up=vertical[1],
     )

@@ -134,6 +134,14 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
     )
     gyro_mean, gyro_error = statistics(recording.gyroscope, segments.gyroscope_sigma, segments.gyroscope_sigma_mean)
     t = recording.time_s
+    same = np.array(
+        [
+            source >= 0 and holds[k].stop - holds[k].start == segments.holds[source].stop - segments.holds[source].start
+            for k, (_, _, source) in enumerate(spans)
+        ]
+    )
+    sources = np.array([source for _, _, source in spans])
+    up, error_up = segments.accelerometer_up, segments.accelerometer_sigma_up
     return replace(
         segments,
         holds=holds,
@@ -145,6 +153,8 @@ def _segments_of(recording: Recording, segments: Segments, spans: list[tuple[int
         n_averaged=np.array([b - a for a, b, _ in spans]),
         time_mid_s=np.array([0.5 * (t[a] + t[b - 1]) for a, b, _ in spans]),
         duration_s=np.array([(b - a) / recording.rate_hz for a, b, _ in spans]),
+        accelerometer_up=None if up is None else up[sources],
+        accelerometer_sigma_up=None if error_up is None else np.where(same, error_up[sources], np.nan),
     )
 
 

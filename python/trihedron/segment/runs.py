@@ -15,12 +15,20 @@ from trihedron.segment.noise import MeanNoise
 
 MIN_HOLD_S = 1.0
 """A hand that hesitates stops for a few tenths of a second; a person who holds, holds a second."""
+SEEN_S = 0.8
+"""What is left to see of the shortest hold at the noise floor: its ends share their blocks with the moves."""
+SET_DOWN_S = 0.5
+"""A sensor set down for a second comes to rest, and leaves, in less than this; a hand that calms down takes longer."""
+FAR_SHORTER = 0.1
+"""Of the usual hold: who holds for half a minute does not set down for a second, but hesitates."""
 BUMP_S = 2.0
 """A push and the ringing after it last less than this; what lasts longer is a move even if the pose comes back."""
 RETURN = 0.3
 """A push and its return cancel: what is left of the turn is less than this part of the way turned to and fro."""
 CLEAN_EDGE = 2e-3
 """Chance that a clean stretch at an end is trimmed, where it costs some tenths of a second."""
+EDGE_BLOCKS = [2**k for k in range(16)]
+"""Stretches at an end of a hold that are compared with its middle."""
 CREEP_PART = 0.02
 """A creeping support turns slower than this part of the speed of the log's own moves."""
 SAME_POSE = 1e-3
@@ -56,6 +64,11 @@ class Run:
         """The stretches between bumps."""
         edges = [self.first, *(k for bump in self.bumps for k in bump), self.last]
         return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
+
+    def quiet_rows(self, values: FloatArray) -> FloatArray:
+        """(k, c) of one row a block ``values`` (m, c): those between bumps; a view where there are none."""
+        parts = [values[a:b] for a, b in self.quiet_ranges()]
+        return parts[0] if len(parts) == 1 else np.vstack(parts)
 
 
 def loose_blocks(activity: Activity, is_valid: BoolArray) -> BoolArray:
@@ -99,9 +112,8 @@ def speed_of_moves(channels: Channels, quiet: BoolArray) -> float:
 
 
 def join_quiet(channels: Channels, quiet: BoolArray, loose: BoolArray, noise: MeanNoise) -> list[Run]:
-    """Holds from quiet stretches: neighbours in one pose, with only a bump between, are one hold."""
+    """Stretches of one pose from quiet ones, however short: neighbours with only a bump between are one."""
     runs: list[Run] = []
-    shortest = channels.blocks(MIN_HOLD_S)
     creeping = CREEP_PART * speed_of_moves(channels, quiet)
     for first, last in ranges_of(quiet):
         piece = Run(first, last)
@@ -114,7 +126,34 @@ def join_quiet(channels: Channels, quiet: BoolArray, loose: BoolArray, noise: Me
                 runs[-1] = Run(before.first, last, (*before.bumps, (before.last, first)))
                 continue
         runs.append(piece)
+    return runs
+
+
+def long_enough(channels: Channels, runs: list[Run], shortest_s: float) -> list[Run]:
+    """Those whose quiet parts last as long."""
+    shortest = channels.blocks(shortest_s)
     return [run for run in runs if sum(b - a for a, b in run.quiet_ranges()) >= shortest]
+
+
+def set_down(channels: Channels, runs: list[Run], loose: BoolArray, taken: list[Run]) -> list[Run]:
+    """Short stretches between moves on either side: poses of a second, not calm moments of a longer one or of a hand.
+
+    ``loose`` (m,) as of :func:`loose_blocks`, ``taken`` what is a hold already.
+    """
+    most, found = channels.blocks(SET_DOWN_S), []
+    usual = float(np.median([run.last - run.first for run in taken])) if taken else 0.0
+    for run in long_enough(channels, runs, SEEN_S):
+        if run.last - run.first < FAR_SHORTER * usual:
+            continue
+        first, last = run.first, run.last
+        while first > 0 and loose[first - 1]:
+            first -= 1
+        while last < len(loose) and loose[last]:
+            last += 1
+        is_free = all(other.outer_last <= first or other.outer_first >= last for other in taken)
+        if is_free and first > 0 and last < len(loose) and max(run.first - first, last - run.last) <= most:
+            found.append(run)
+    return found
 
 
 def _is_same_pose(channels: Channels, before: Run, after: Run, noise: MeanNoise, creeping: float) -> bool:
@@ -152,7 +191,7 @@ def _comes_back(channels: Channels, before: Run, after: Run, noise: MeanNoise, c
 
 def run_mean(channels: Channels, run: Run) -> tuple[FloatArray, int]:
     """(c,) mean reading of the quiet blocks of a run, and how many they are."""
-    blocks = np.vstack([channels.mean[a:b] for a, b in run.quiet_ranges()])
+    blocks = run.quiet_rows(channels.mean)
     return blocks.mean(axis=0), len(blocks)
 
 
@@ -216,7 +255,25 @@ def _sway(attitude: FloatArray, runs: list[Run]) -> float:
     return float(np.linalg.norm(blocks.std(axis=0)))
 
 
-def trim_edges(channels: Channels, run: Run, noise: MeanNoise) -> Run:
+@dataclass(frozen=True, eq=False)
+class EdgeNoise:
+    """What an end of a hold is compared by: ``variance`` (k, c) of the mean of 1, 2, 4 ... blocks, and the ``limit`` of
+    χ² of the channels that are ``live`` (c,)."""
+
+    variance: FloatArray
+    live: BoolArray
+    limit: float
+
+    @classmethod
+    def of(cls, channels: Channels, noise: MeanNoise) -> EdgeNoise:
+        """The same for all holds of a log."""
+        live = np.asarray(noise.variance(1.0) > 0.0)
+        duration_s = np.array(EDGE_BLOCKS, dtype=np.float64)[:, None] * channels.step_s
+        limit = float(probability.chdtri(int(live.sum()), CLEAN_EDGE))
+        return cls(noise.variance(duration_s), live, limit)
+
+
+def trim_edges(channels: Channels, run: Run, noise: MeanNoise, edges: EdgeNoise) -> Run:
     """Take blocks off both ends until no stretch at an end departs from the middle of the hold.
 
     Stretches of 1, 2, 4 ... blocks at each end are compared with the central half; at most a third is taken off.
@@ -235,7 +292,10 @@ def trim_edges(channels: Channels, run: Run, noise: MeanNoise) -> Run:
     off = np.where(good[:, None], mean - level, 0.0)
     core_variance = noise.variance(core.sum() * channels.step_s)
     most = n // 3
-    start, tail = (_clean_from(side, core_variance, channels, noise, most) for side in (off, off[::-1]))
+    sizes = [size for size in EDGE_BLOCKS if size <= most]
+    known = edges.variance[: len(sizes)] + core_variance + channels.quantisation_variance
+    variance = np.where(edges.live, known, 0.0)
+    start, tail = (_clean_from(side, most, sizes, variance, edges.limit) for side in (off, off[::-1]))
     if start + tail > n // 2:
         # Hardly a middle is left: the hold creeps throughout, which is said instead of trimmed.
         start = tail = 0
@@ -245,13 +305,7 @@ def trim_edges(channels: Channels, run: Run, noise: MeanNoise) -> Run:
     return replace(run, first=run.first + start, last=run.first + stop, bumps=bumps, trimmed=(start, n - stop))
 
 
-def _clean_from(off: FloatArray, core_variance: FloatArray, channels: Channels, noise: MeanNoise, most: int) -> int:
-    sizes = [2**k for k in range(16) if 2**k <= most]
-    live = np.flatnonzero(noise.variance(1.0) > 0.0)
-    limit = float(probability.chdtri(len(live), CLEAN_EDGE))
-    duration_s = np.array(sizes, dtype=np.float64)[:, None] * channels.step_s
-    variance = np.zeros((len(sizes), off.shape[1]))
-    variance[:, live] = (noise.variance(duration_s) + core_variance + channels.quantisation_variance)[:, live]
+def _clean_from(off: FloatArray, most: int, sizes: list[int], variance: FloatArray, limit: float) -> int:
     clean = _core.first_clean(off, most, sizes, variance, limit)
     # A soft beginning goes on below what can be seen: as much again is given away; and one block, which may be the
     # one the motion begins in.

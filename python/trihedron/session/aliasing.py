@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 
 _AT_HALF = [1.0 / 16.0, -4.0 / 16.0, 6.0 / 16.0, -4.0 / 16.0, 1.0 / 16.0]
 """Unit gain at half the sampling frequency, fourth-order zero at rest: smooth motion does not pass."""
@@ -26,6 +26,10 @@ OF_A_STEP = 1.0 / 3.0
 OF_ITS_BAND = 0.4
 """Part of the power around a quarter of the sampling frequency that is not slower motion, where a body knocks and rocks
 at a tenth of it."""
+LENGTH = 5
+"""Of both filters, samples."""
+GAP = 1.5
+"""A step longer than this many usual ones has lost samples."""
 MARGIN = 3.0
 """Standard deviations of the noise's own power that are not yet motion."""
 
@@ -36,6 +40,7 @@ def unresolved_variance(
     hold_ranges: list[tuple[int, int]],
     step_s: float,
     quantum: FloatArray,
+    time_s: FloatArray | None = None,
 ) -> FloatArray:
     """Variance of every move's integral by motion above half the sampling frequency.
 
@@ -49,6 +54,8 @@ def unresolved_variance(
         Sample step, s.
     quantum : (3,)
         Step of the converter, whose rounding no hold shows where the zero stays inside one step, and every move does.
+    time_s : (n,)
+        Stamps: filters run from gap to gap, across which smooth motion would look fast.
 
     Returns
     -------
@@ -56,16 +63,20 @@ def unresolved_variance(
     """
     moves = np.array(move_ranges, dtype=np.int64).reshape(-1, 2)
     holds = np.array([(a, b) for a, b in hold_ranges if b - a > 8], dtype=np.int64).reshape(-1, 2)
-    n_moves, n_holds = ((ranges[:, 1] - ranges[:, 0] - 4)[:, None] for ranges in (moves, holds))
-    n_moves = np.maximum(n_moves, 0)
+    n_whole = np.maximum(moves[:, 1] - moves[:, 0] - (LENGTH - 1), 0)[:, None]
+    n_holds = (holds[:, 1] - holds[:, 0] - 4)[:, None]
+    pieces, of_move = _between_gaps(moves, time_s, step_s)
+    n_moves = np.bincount(of_move, pieces[:, 1] - pieces[:, 0] - (LENGTH - 1), len(moves))[:, None]
 
     def excess(taps: list[float]) -> FloatArray:
-        power = _core.band_power(readings, taps, np.concatenate([holds, moves]))
+        power = _core.band_power(readings, taps, np.concatenate([holds, pieces]))
         level = np.median(power[: len(holds)] / n_holds, axis=0) if len(holds) else np.zeros(3)
         level = np.maximum(level, quantum**2 / 12.0)
         # Neighbouring outputs of five taps share samples: about a third as many independent squares.
         usual = level * (1.0 + MARGIN * np.sqrt(6.0 / np.maximum(n_moves, 1)))
-        out: FloatArray = np.maximum(power[len(holds) :] - usual * n_moves, 0.0)
+        of_moves = np.stack([np.bincount(of_move, p, len(moves)) for p in power[len(holds) :].T], axis=1)
+        # What lies across gaps is as lively as the rest.
+        out: FloatArray = np.maximum(of_moves - usual * n_moves, 0.0) * (n_whole / np.maximum(n_moves, 1))
         return out
 
     at_half, at_quarter = excess(_AT_HALF), excess(_AT_QUARTER)
@@ -77,3 +88,24 @@ def unresolved_variance(
     part = max(fall / (2.0 - fall), min(slowest / (2.0 - slowest), OF_A_STEP))
     variance: FloatArray = at_half * part * step_s**2
     return variance
+
+
+def _between_gaps(ranges: IntArray, time_s: FloatArray | None, step_s: float) -> tuple[IntArray, IntArray]:
+    """Half-open sample ranges (p, 2) that hold a filter and no gap, and which of ``ranges`` (m, 2) each is a piece of.
+
+    A range whose steps are mostly long has stamps that say little of the samples, and stays whole.
+    """
+    after = np.zeros(0, dtype=np.int64) if time_s is None else np.flatnonzero(np.diff(time_s) > GAP * step_s) + 1
+    pieces, owners = [], []
+    for k, (start, stop) in enumerate(ranges):
+        inside = after[(after > start) & (after < stop)]
+        ends = np.concatenate([[start], inside, [stop]])
+        own = np.stack([ends[:-1], ends[1:]], axis=1)
+        windows = own[:, 1] - own[:, 0] - (LENGTH - 1)
+        own = own[windows > 0] if 2 * windows[windows > 0].sum() > stop - start else np.array([[start, stop]])
+        own = own[own[:, 1] - own[:, 0] >= LENGTH]
+        pieces.append(own)
+        owners.append(np.full(len(own), k, dtype=np.int64))
+    if not pieces:
+        return np.zeros((0, 2), dtype=np.int64), np.zeros(0, dtype=np.int64)
+    return np.concatenate(pieces), np.concatenate(owners)

@@ -70,6 +70,9 @@ def means_beside_lines(recording: Recording, segments: Segments) -> tuple[Segmen
             new_error[k] = np.where(has_line, colour * own, error[k])
         if (new_mean != mean).any():
             changed |= {f"{sensor}_mean": new_mean, f"{sensor}_sigma_mean": new_error}
+            if s == 0 and segments.accelerometer_sigma_up is not None:
+                moved = (new_mean != mean).any(axis=1)
+                changed["accelerometer_sigma_up"] = np.where(moved, np.nan, segments.accelerometer_sigma_up)
     return (replace(segments, **changed) if changed else segments), swing  # type: ignore[arg-type]
 
 

@@ -16,6 +16,8 @@ from trihedron.session.coloured_noise import coloured_variance
 
 LEAST_SHARE = 1e-9
 """Where nothing scatters (a simulation without noise) a billionth of a unit stands for the rounding of the log."""
+Along = tuple[FloatArray, FloatArray]
+"""Directions (h, 3) and the standard errors (h,) of pose means along them."""
 START_STRENGTHS = ((160.0, 160.0), (1e-3, 1e-3), (1.0, 1.0))
 """Where the search of the zeros' strengths begins: corner times [s], scatter that counts as none, straying between
 poses in units of the scatter; accelerometer, gyro each."""
@@ -27,7 +29,8 @@ class SessionNoise:
 
     Standard errors of pose means (h, 3), white noise ``density`` (3,) raw · √s, and ``unresolved`` (m, 2, 3): variance
     of every move's integrals, force and rate, (raw unit · s)², by motion faster than the samples and by noise slower
-    than a move.
+    than a move. ``force_up`` are the verticals (h, 3) and the standard errors (h,) of the means along them, NaN where
+    those of the axes hold; ``None`` where no vertical is known.
     """
 
     force_sigma: FloatArray
@@ -35,6 +38,7 @@ class SessionNoise:
     rate_sigma: FloatArray | None
     rate_density: FloatArray | None
     unresolved: FloatArray
+    force_up: Along | None = None
 
 
 def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[int, int]]) -> SessionNoise:
@@ -72,13 +76,31 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
         if readings is None or not ranges:
             continue
         quantum = recording.facts.of(("accelerometer", "gyroscope")[k]).step
-        variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s, quantum)
+        variances[:, k] = unresolved_variance(readings, tuple(ranges), spans, step_s, quantum, recording.time_s)
         if sigma is not None and density is not None:
             halves = _second_halves_minus_first(readings, np.array(spans, dtype=np.int64).reshape(-1, 2))
             variances[:, k] += coloured_variance(sigma, halves, density, lasts, moves_last)
     assert sigmas[0] is not None
     assert densities[0] is not None
-    return SessionNoise(sigmas[0], densities[0], sigmas[1], densities[1], variances)
+    up, error = segments.accelerometer_up, segments.accelerometer_sigma_up
+    along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
+    return SessionNoise(sigmas[0], densities[0], sigmas[1], densities[1], variances, along)
+
+
+def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray) -> FloatArray:
+    """(h,) standard errors of what grows with the means by ``gradient`` (h, 3), errors as the session model has them.
+
+    Across the vertical those of the axes (h, 3), along it the vertical's own where it is known.
+    """
+    plain = (gradient**2 * sigma**2).sum(axis=1)
+    if along is None:
+        return np.asarray(np.sqrt(plain))
+    up, error = along
+    share = (gradient * up).sum(axis=1)
+    across = gradient - share[:, None] * up
+    known = np.isfinite(error)
+    own = share**2 * np.where(known, error, 0.0) ** 2
+    return np.asarray(np.sqrt(np.where(known, (across**2 * sigma**2).sum(axis=1) + own, plain)))
 
 
 def _second_halves_minus_first(readings: FloatArray, spans: IntArray) -> FloatArray:
@@ -90,13 +112,16 @@ def _second_halves_minus_first(readings: FloatArray, spans: IntArray) -> FloatAr
     return out
 
 
-def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None) -> FloatArray:
+def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: Along | None = None) -> FloatArray:
     """(2, 3) the scatter that strength one means: the usual standard error of a pose, accelerometer and gyro, raw.
 
-    One size for three axes: an axis that is noisier than the others need not scatter more.
+    One size for three axes: an axis that is noisier than the others need not scatter more. The accelerometer's is that
+    along the vertical where it is known: no other scatter shows at rest.
     """
     out = np.ones((2, 3))
     out[0] = np.sqrt(np.mean(np.median(force_sigma, axis=0) ** 2))
+    if along is not None and np.isfinite(along[1]).any():
+        out[0] = np.nanmedian(along[1])
     if rate_sigma is not None:
         out[1] = np.sqrt(np.mean(np.median(rate_sigma, axis=0) ** 2))
     return np.maximum(out, 1e-300)

@@ -22,7 +22,7 @@ from trihedron.simulate.sessions import (
     table_turns,
 )
 from trihedron.simulate.twin import twin_scenario
-from trihedron.simulate.twin_noise import noise_of_octaves
+from trihedron.simulate.twin_noise import low_pass_like, noise_of_octaves
 
 __all__ = [
     "EFFECT_IDS",
@@ -61,6 +61,7 @@ __all__ = [
     "hand_session",
     "list_scenarios",
     "long_rest",
+    "low_pass_like",
     "make_noise",
     "noise_of_octaves",
     "poses_in_order",

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from trihedron.refused import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.gyroscope import Gyroscope
@@ -162,5 +163,5 @@ def scenario_by_name(name: str) -> Scenario:
         When there is none of that name.
     """
     if name not in _SCENARIOS:
-        raise ValueError(f"no scenario is called {name!r}; there are {', '.join(_SCENARIOS)}")
+        raise RefusedError(f"no scenario is called {name!r}; there are {', '.join(_SCENARIOS)}")
     return _SCENARIOS[name]()

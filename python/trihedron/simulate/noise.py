@@ -10,6 +10,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.refused import RefusedError
 
 Triple: TypeAlias = tuple[float, float, float]
 
@@ -34,12 +35,12 @@ class NoiseTerms:
         for name in "QNBKR":
             values = getattr(self, name)
             if any(not np.isfinite(v) or (v < 0.0 and name != "R") for v in values):
-                raise ValueError(f"noise term {name} must hold three numbers that are not negative, got {values}")
+                raise RefusedError(f"noise term {name} must hold three numbers that are not negative, got {values}")
 
 
 def _sequence(seed: int, stage: str) -> np.random.SeedSequence:
     if seed < 0:
-        raise ValueError(f"the seed must not be negative, got {seed}")
+        raise RefusedError(f"the seed must not be negative, got {seed}")
     return np.random.SeedSequence([seed, zlib.crc32(stage.encode())])
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from trihedron.refused import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer, ProofMass
 from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.noise import NoiseTerms, stream
@@ -184,5 +185,5 @@ def profile_by_name(name: str) -> Profile:
         When there is none of that name.
     """
     if name not in PROFILES:
-        raise ValueError(f"no profile is called {name!r}; there are {', '.join(PROFILES)}")
+        raise RefusedError(f"no profile is called {name!r}; there are {', '.join(PROFILES)}")
     return PROFILES[name]

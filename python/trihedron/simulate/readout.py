@@ -11,6 +11,7 @@ from scipy.signal import lfilter, lfilter_zi
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.refused import RefusedError
 
 Triple: TypeAlias = tuple[float, float, float]
 Matrix: TypeAlias = tuple[Triple, Triple, Triple]
@@ -84,7 +85,7 @@ class Filter:
 
     def __post_init__(self) -> None:
         if not (self.cutoff_hz >= 0.0 and 1 <= self.order <= 8):
-            raise ValueError(f"a filter needs cutoff_hz >= 0 and order 1..8, got {self.cutoff_hz} Hz, {self.order}")
+            raise RefusedError(f"a filter needs cutoff_hz >= 0 and order 1..8, got {self.cutoff_hz} Hz, {self.order}")
 
     def apply(self, signal: FloatArray, dt: float) -> FloatArray:
         """(n, 3) → (n, 3), settled at the start."""
@@ -113,7 +114,7 @@ class Smoother:
 
     def __post_init__(self) -> None:
         if not (self.corner_hz >= 0.0 and 1 <= self.order <= 6):
-            raise ValueError(f"a smoother needs corner_hz >= 0 and order 1..6, got {self.corner_hz} Hz, {self.order}")
+            raise RefusedError(f"a smoother needs corner_hz >= 0 and order 1..6, got {self.corner_hz} Hz, {self.order}")
 
     def feedback(self, dt: float) -> FloatArray:
         """(order + 1,) denominator in powers of 1/z."""
@@ -199,7 +200,7 @@ def sense_axes(S: Matrix, name: str) -> tuple[FloatArray, FloatArray]:
     """
     matrix = np.asarray(S, dtype=np.float64)
     if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)) or np.linalg.cond(matrix) > 1e12:
-        raise ValueError(f"S of the {name} must be an invertible 3x3 matrix, got {matrix.tolist()}")
+        raise RefusedError(f"S of the {name} must be an invertible 3x3 matrix, got {matrix.tolist()}")
     inverse = np.linalg.inv(matrix)
     gain: FloatArray = np.linalg.norm(inverse, axis=1)
     return inverse / gain[:, None], gain

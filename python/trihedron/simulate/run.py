@@ -12,6 +12,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.records.recording import Recording
 from trihedron.records.truth import TrueSegment, Truth
+from trihedron.refused import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import effects_of
 from trihedron.simulate.gyroscope import Gyroscope
@@ -44,7 +45,7 @@ def simulate(scenario: Scenario, seed: int = 0) -> tuple[Recording, Truth]:
     accel, gyro = scenario.accelerometer, scenario.gyroscope
     n = len(clock.instants_s) or int(np.floor(plan.duration_s * clock.true_rate_hz + 1e-9))
     if n < 1:
-        raise ValueError(f"the motion lasts {plan.duration_s:g} s, less than one sample at {clock.rate_hz:g} Hz")
+        raise RefusedError(f"the motion lasts {plan.duration_s:g} s, less than one sample at {clock.rate_hz:g} Hz")
     true_s = _sample_instants(clock, n, seed)
     gyro_s = true_s + clock.gyroscope_offset_s
 
@@ -176,7 +177,7 @@ def _kept(clock: Clock, true_s: FloatArray, seed: int) -> npt.NDArray[np.bool_]:
     if clock.loss_probability > 0.0:
         kept &= stream(seed, "clock/loss").random(len(true_s)) >= clock.loss_probability
     if not kept.any():
-        raise ValueError("every sample is lost: lower the losses")
+        raise RefusedError("every sample is lost: lower the losses")
     return kept
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.documents import DocumentError, check_values, of_path, read_text
+from trihedron.refused import RefusedError
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.motion import LEVEL, Disturb, Hold, Motion, MoveTo, Oscillate, Turn, Vibrate, attitude_with_up
 from trihedron.simulate.named import SESSIONS
@@ -49,18 +50,18 @@ def read_scenario(path: str | Path) -> Scenario:
         table = tomllib.loads(read_text(path, "scenario file"))
         check_values(table)
     except DocumentError as error:
-        raise ValueError(of_path(path, error)) from None
+        raise RefusedError(of_path(path, error)) from None
     except RecursionError:
-        raise ValueError(f"{path}: this is nested too deeply.") from None
+        raise RefusedError(f"{path}: this is nested too deeply.") from None
     except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{path.name} is not a TOML file: {error}") from None
+        raise RefusedError(f"{path.name} is not a TOML file: {error}") from None
     try:
         return scenario_from_table(table, path.stem)
     except (TypeError, OverflowError):
         kinds = "unit is a whole number, table_tilt_deg two numbers, an effect a table"
-        raise ValueError(f"{path.name}: a value is of another kind than its key takes ({kinds}).") from None
+        raise RefusedError(f"{path.name}: a value is of another kind than its key takes ({kinds}).") from None
     except ValueError as error:
-        raise ValueError(f"{path.name}: {error}") from None
+        raise RefusedError(f"{path.name}: {error}") from None
 
 
 _MOST_POSES = 100_000
@@ -84,7 +85,7 @@ def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Sce
     )
     effects = table.get("effect", [])
     if not isinstance(effects, list):
-        raise ValueError("effects are written as [[effect]], each with its id")
+        raise RefusedError("effects are written as [[effect]], each with its id")
     for effect in effects:
         size = dict(effect)
         scenario = with_effect(scenario, str(size.pop("id", "")), **size)
@@ -93,14 +94,14 @@ def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Sce
 
 def _motion(table: Mapping[str, Any]) -> Motion:
     if "step" in table and "session" in table:
-        raise ValueError("give either a session or [[step]] tables, not both")
+        raise RefusedError("give either a session or [[step]] tables, not both")
     if "step" in table:
         steps = []
         for k, entry in enumerate(table["step"]):
             values = dict(entry)
             kind = str(values.pop("kind", ""))
             if kind not in _STEPS:
-                raise ValueError(f"step {k} is of kind {kind!r}; there are {', '.join(_STEPS)}")
+                raise RefusedError(f"step {k} is of kind {kind!r}; there are {', '.join(_STEPS)}")
             steps.append(_made(_STEPS[kind], values, f"step {k} ({kind})"))
         start = attitude_with_up(table["start_up"]) if "start_up" in table else LEVEL
         motion = Motion(tuple(steps), start)
@@ -108,15 +109,15 @@ def _motion(table: Mapping[str, Any]) -> Motion:
         values = dict(table.get("session", {"kind": "hand"}))
         kind = str(values.pop("kind", "hand"))
         if kind not in SESSIONS:
-            raise ValueError(f"no session is of kind {kind!r}; there are {', '.join(SESSIONS)}")
+            raise RefusedError(f"no session is of kind {kind!r}; there are {', '.join(SESSIONS)}")
         values = {key: _tupled(value) for key, value in values.items()}
         for key, value in values.items():
             if isinstance(value, int) and abs(value) > _MOST_POSES:
-                raise ValueError(f"session {kind}: {key} is {value:.3g}, and a session has at most {_MOST_POSES}")
+                raise RefusedError(f"session {kind}: {key} is {value:.3g}, and a session has at most {_MOST_POSES}")
         try:
             motion = SESSIONS[kind](**values)
         except TypeError as error:
-            raise ValueError(f"session {kind}: {str(error).split('() ', 1)[-1]}") from None
+            raise RefusedError(f"session {kind}: {str(error).split('() ', 1)[-1]}") from None
     if "table_tilt_deg" in table:
         a, b = table["table_tilt_deg"]
         motion = dataclasses.replace(motion, table_tilt_deg=(float(a), float(b)))
@@ -132,13 +133,13 @@ def _refuse_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: st
         if key not in known:
             near = difflib.get_close_matches(key, known, 1)
             meant = f" (is {near[0]!r} meant?)" if near else ""
-            raise ValueError(f"{where} has no key {key!r}{meant}; it knows {', '.join(known)}")
+            raise RefusedError(f"{where} has no key {key!r}{meant}; it knows {', '.join(known)}")
 
 
 def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:
     """A dataclass with some fields replaced by values of a table."""
     if not isinstance(values, Mapping):
-        raise ValueError(f"{where} must be a table, got {values!r}")
+        raise RefusedError(f"{where} must be a table, got {values!r}")
     cls = type(base)
     names = tuple(f.name for f in dataclasses.fields(cls))
     _refuse_unknown(values, names, where)
@@ -155,7 +156,7 @@ def _made(cls: type[Any], values: Mapping[str, Any], where: str) -> Any:
     try:
         return cls(**{key: _value(hints[key], value, None, f"{where}.{key}") for key, value in values.items()})
     except TypeError as error:
-        raise ValueError(f"{where}: {str(error).split('() ', 1)[-1]}") from None
+        raise RefusedError(f"{where}: {str(error).split('() ', 1)[-1]}") from None
 
 
 def _value(hint: Any, value: Any, base: Any, where: str) -> Any:
@@ -169,21 +170,21 @@ def _value(hint: Any, value: Any, base: Any, where: str) -> Any:
         try:
             return hint(value)
         except ValueError:
-            raise ValueError(f"{where} is one of {', '.join(m.value for m in hint)}, got {value!r}") from None
+            raise RefusedError(f"{where} is one of {', '.join(m.value for m in hint)}, got {value!r}") from None
     if hint is float and isinstance(value, (int, float)) and not isinstance(value, bool):
         return float(value)
     if hint in (bool, int, str) and type(value) is hint:
         return value
-    raise ValueError(f"{where} must be {getattr(hint, '__name__', hint)}, got {value!r}")
+    raise RefusedError(f"{where} must be {getattr(hint, '__name__', hint)}, got {value!r}")
 
 
 def _tuple_value(items: tuple[Any, ...], value: Any, where: str) -> Any:
     if len(items) == 2 and items[1] is Ellipsis:
         if not isinstance(value, list):
-            raise ValueError(f"{where} must be a list, got {value!r}")
+            raise RefusedError(f"{where} must be a list, got {value!r}")
         return tuple(_value(items[0], v, None, where) for v in value)
     if isinstance(value, (int, float)) and all(item is float for item in items):
         return tuple(float(value) for _ in items)
     if not isinstance(value, list) or len(value) != len(items):
-        raise ValueError(f"{where} must hold {len(items)} values (or one for all), got {value!r}")
+        raise RefusedError(f"{where} must hold {len(items)} values (or one for all), got {value!r}")
     return tuple(_value(item, v, None, where) for item, v in zip(items, value, strict=True))

@@ -15,6 +15,7 @@ from scipy.linalg import solveh_banded
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.records import Calibration, Recording, Segments
+from trihedron.refused import RefusedError
 from trihedron.sensor_model import correct
 from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.gyroscope import Gyroscope
@@ -37,9 +38,9 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
         When the recording lacks a sensor, was never still, or the calibration has no gyro.
     """
     if recording.accelerometer is None or recording.gyroscope is None or calibration.gyroscope is None:
-        raise ValueError("a twin needs both sensors in the recording and in the calibration")
+        raise RefusedError("a twin needs both sensors in the recording and in the calibration")
     if not segments.holds:
-        raise ValueError("a twin needs at least one still pose; the recording has none")
+        raise RefusedError("a twin needs at least one still pose; the recording has none")
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     time_s = recording.time_s
     readings = (_filled(recording.accelerometer), _filled(recording.gyroscope))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import nnls
+from scipy.optimize import minimize_scalar, nnls
 
 from trihedron.arrays import FloatArray
 from trihedron.simulate.noise import NoiseTerms, Triple
@@ -22,9 +22,13 @@ _ORDERS = (1, 2, 3, 4, 6)
 FILTER_EARNS = 16.0
 """Twice the log-likelihood that a low-pass must win over none, as where its corner is measured."""
 FLICKER_EARNS = 6.63
-"""The same for flicker: χ² of one degree of freedom passes it in 1 %."""
+"""Twice the log-likelihood that flicker must win over none: χ² of one degree of freedom passes it in 1 %."""
 NEAR = 0.3
 """In the logarithm: neighbours of the corners that are tried differ by about as much."""
+HIDDEN = 1e-2
+"""Power gain below which a converter's rounding and what leaks hide the shape of a filter."""
+LOWEST, HIGHEST = 5e-3, 2.0
+"""Of the rate: corners that are seen at all (a 64th of Nyquist, four times Nyquist)."""
 SHAPES = 0.1
 """Relative error of a density that two terms and a low-pass do not follow: lines, sharper filters."""
 
@@ -54,30 +58,71 @@ def noise_of_holds(
 
 
 def noise_of_octaves(
-    bands_hz: FloatArray, density: FloatArray, relative: FloatArray, dt: float, corner_hz: float | None = None
+    bands_hz: FloatArray,
+    density: FloatArray,
+    relative: FloatArray,
+    dt: float,
+    low_pass: Smoother | float | None = None,
+    white: Sequence[tuple[float, float] | None] = (None, None, None),
 ) -> tuple[NoiseTerms, Smoother]:
     """Terms per axis and the low-pass that all axes share, from mean densities in frequency bands.
 
     ``bands_hz`` (m, 2), ``density`` (m, 3) two-sided, unit²/Hz (that of white noise is N²), ``relative`` (m, 3) their
-    relative standard errors. A low-pass must earn ``FILTER_EARNS``, else all colour would become one; where its
-    ``corner_hz`` was seen otherwise it is one near there.
+    relative standard errors. ``low_pass`` where it is known, or roughly its corner [Hz]: then one of a list near there;
+    else one that earns ``FILTER_EARNS``, or all colour would become one. ``white``: N of each axis with its relative
+    error, where it was measured below a low-pass: one more density, of white noise alone.
     """
-    filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
     frequency_hz = _FREQUENCIES / (2.0 * np.pi * dt)
     inside = [(low <= frequency_hz) & (frequency_hz < high) for low, high in bands_hz]
     flicker = np.array([float(np.mean(1.0 / (2.0 * np.pi * frequency_hz[one]))) for one in inside])
-    fits = []
-    for low_pass in filters:
+
+    def fitted(low_pass: Smoother) -> tuple[list[FloatArray], float]:
         power = _power(low_pass, dt)
         design = np.column_stack([[float(power[one].mean()) for one in inside], flicker])
-        axes = [_earned(design, density[:, k], relative[:, k]) for k in range(density.shape[1])]
-        fits.append((axes, sum(misfit for _, misfit in axes)))
-    near = [k for k in range(1, len(fits)) if corner_hz is None or abs(np.log(filters[k].corner_hz / corner_hz)) < NEAR]
-    best = min(near or range(1, len(fits)), key=lambda k: fits[k][1])
-    best = best if corner_hz is not None or fits[0][1] - fits[best][1] > FILTER_EARNS else 0
-    terms = np.sqrt([variances for variances, _ in fits[best][0]])
-    N, B = ((float(x), float(y), float(z)) for x, y, z in terms.T)
-    return NoiseTerms(N=N, B=B), filters[best]
+        terms, misfit = [], 0.0
+        for k, known in enumerate(white):
+            rows, seen, error = design, density[:, k], relative[:, k]
+            if known is not None:
+                rows = np.vstack([design, [1.0, 0.0]])
+                seen, error = np.append(seen, known[0] ** 2), np.append(error, 2.0 * known[1])
+            variances, own = _earned(rows, seen, error)
+            terms.append(np.sqrt(variances))
+            misfit += own
+        return terms, misfit
+
+    if not isinstance(low_pass, Smoother):
+        filters = [Smoother(), *(Smoother(part / dt, order) for order in _ORDERS for part in _CORNERS)]
+        misfits = [fitted(one)[1] for one in filters]
+        corner_hz = low_pass
+        near = [k for k in range(1, len(filters)) if corner_hz and abs(np.log(filters[k].corner_hz / corner_hz)) < NEAR]
+        best = min(near or range(len(filters)), key=lambda k: misfits[k])
+        low_pass = filters[best if near or misfits[0] - misfits[best] > FILTER_EARNS else 0]
+    N, B = ((float(x), float(y), float(z)) for x, y, z in np.array(fitted(low_pass)[0]).T)
+    return NoiseTerms(N=N, B=B), low_pass
+
+
+def low_pass_like(frequency_hz: FloatArray, gain: FloatArray, dt: float) -> Smoother:
+    """The low-pass whose power gain is nearest to ``gain`` (m,) at ``frequency_hz`` (m,), in the logarithm.
+
+    A gain below ``HIDDEN`` counts no further.
+    """
+    turns = np.exp(-2j * np.pi * frequency_hz * dt)
+    wanted = np.log(np.maximum(gain, HIDDEN))
+
+    def misfit(log_corner: float, order: int) -> float:
+        a = Smoother(float(np.exp(log_corner)), order).feedback(dt)
+        made = np.abs(a.sum() / np.polyval(a[::-1], turns)) ** 2
+        return float(np.mean((np.log(np.maximum(made, HIDDEN)) - wanted) ** 2))
+
+    tried = np.log(np.geomspace(LOWEST / dt, HIGHEST / dt, 40))
+    found = []
+    for order in _ORDERS:
+        start = int(np.argmin([misfit(one, order) for one in tried]))
+        bounds = tried[max(start - 1, 0)], tried[min(start + 1, len(tried) - 1)]
+        best = minimize_scalar(misfit, args=(order,), bounds=bounds, method="bounded")
+        found.append((float(best.fun), order, float(np.exp(best.x))))
+    _, order, corner_hz = min(found)
+    return Smoother(corner_hz, order)
 
 
 def _earned(design: FloatArray, density: FloatArray, relative: FloatArray) -> tuple[FloatArray, float]:

@@ -25,9 +25,11 @@ pub(super) struct SessionPoses {
 
 #[pymethods]
 impl SessionPoses {
-    /// `time_s` `(h,)`, means and standard errors `(h, 3)`, densities `(3,)`: raw and centred.
+    /// `time_s` `(h,)`, means and standard errors `(h, 3)`, densities `(3,)`: raw and centred; `force_along`: directions
+    /// `(h, 3)` and the standard errors `(h,)` of the means along them, NaN where those of the axes hold.
     #[new]
-    #[pyo3(signature = (*, time_s, force, force_sigma, force_density, rate, rate_sigma, rate_density))]
+    #[pyo3(signature = (*, time_s, force, force_sigma, force_density, rate, rate_sigma, rate_density, force_along=None))]
+    #[allow(clippy::too_many_arguments)]
     fn new(
         time_s: Array1<'_>,
         force: Array2<'_>,
@@ -36,19 +38,29 @@ impl SessionPoses {
         rate: Option<Array2<'_>>,
         rate_sigma: Option<Array2<'_>>,
         rate_density: Option<Array1<'_>>,
+        force_along: Option<(Array2<'_>, Array1<'_>)>,
     ) -> PyResult<Self> {
-        let at_rest = |mean: &Array2<'_>, sigma: &Array2<'_>, density: &Array1<'_>| {
-            Ok::<_, PyErr>(AtRest {
-                mean: rows3("hold means", mean)?,
-                sigma: rows3("hold sigmas", sigma)?,
-                density: vector3("density", density)?,
-            })
-        };
+        type Along<'a> = Option<(&'a [Vector3<f64>], &'a [f64])>;
+        let at_rest =
+            |mean: &Array2<'_>, sigma: &Array2<'_>, density: &Array1<'_>, along: Along<'_>| {
+                let (mean, sigma) = (rows3("hold means", mean)?, rows3("hold sigmas", sigma)?);
+                AtRest::of(mean, sigma, vector3("density", density)?, along)
+                    .map_err(|error| PyValueError::new_err(error.to_string()))
+            };
+        let along = force_along
+            .as_ref()
+            .map(|(up, error)| Ok::<_, PyErr>((rows3("verticals", up)?, samples(error))))
+            .transpose()?;
+        let along = along
+            .as_ref()
+            .map(|(up, error)| (up.as_slice(), error.as_slice()));
         Ok(Self {
             time_s: samples(&time_s),
-            force: at_rest(&force, &force_sigma, &force_density)?,
+            force: at_rest(&force, &force_sigma, &force_density, along)?,
             rate: match (&rate, &rate_sigma, &rate_density) {
-                (Some(mean), Some(sigma), Some(density)) => Some(at_rest(mean, sigma, density)?),
+                (Some(mean), Some(sigma), Some(density)) => {
+                    Some(at_rest(mean, sigma, density, None)?)
+                }
                 _ => None,
             },
         })

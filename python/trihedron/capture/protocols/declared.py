@@ -8,6 +8,7 @@ from trihedron.capture.protocols.checksums import CHECKSUM_OF
 from trihedron.capture.protocols.contract import Frame
 from trihedron.capture.protocols.framing import MORE, FramedDecoder
 from trihedron.records.frame_declaration import CHECKSUM_SIZES, SIZES, FrameDeclaration
+from trihedron.refused import RefusedError
 
 _CODES = {"u8": "B", "i8": "b", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "i64": "q"}
 _CODES |= {"f32": "f", "f64": "d"}
@@ -31,7 +32,7 @@ class DeclaredDecoder(FramedDecoder):
         layout, at = order, 0
         for field in ordered:
             if field.at < at:
-                raise ValueError(f"{self.name}: field {field.name} overlaps the one before it.")
+                raise RefusedError(f"{self.name}: field {field.name} overlaps the one before it.")
             layout += f"{field.at - at}x{_CODES[field.type]}"
             at = field.at + SIZES[field.type]
         self._struct = struct.Struct(layout)

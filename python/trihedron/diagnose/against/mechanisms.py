@@ -9,12 +9,14 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
+from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.accepted import HEADLINE
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.records.domains import Domain
+from trihedron.records.words import effect_words
 from trihedron.units import STANDARD_GRAVITY_M_S2
 
 FRAME_TOLERANCE = 0.03
@@ -103,6 +105,8 @@ def compare_effects(
     alpha: float,
     unexplained: Collection[Domain] = (),
     misses: Mapping[Domain, float] = MappingProxyType({}),
+    tried_on_model: Sequence[Candidate] = (),
+    freedom: Mapping[Domain, float] = MappingProxyType({}),
 ) -> ComparedEffects:
     """Pair the effects of both sides by name, or by what neither recording could tell apart.
 
@@ -110,7 +114,10 @@ def compare_effects(
     session: they are never surplus.
     Nor is an effect that would show in a domain of which the recording leaves more ``unexplained`` than its noise:
     it may be there, and hidden. ``misses``: rms of the recording's residuals in each domain before any effect; an
-    effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than that.
+    effect of a channel that the recording did not log, or a scatter, is surplus only if it makes more than that; a
+    scatter by more than two of one size differ by chance, each known with the domain's degrees of ``freedom``.
+    ``tried_on_model``: candidates of the simulation's own diagnosis. Nor is an effect of the recording missing that the
+    simulation's own test calls likely, where nothing else was found there that could be mistaken for it.
     """
     by_id = {effect.id: effect for effect in catalogue()}
     of_session = {effect.id for effect in by_id.values() if effect.is_of_session or effect.is_of_motion}
@@ -132,7 +139,8 @@ def compare_effects(
     for effect in recording:
         partner = next((m for m in left if _are_one(m, effect)), None)
         if partner is None:
-            missing.append(effect)
+            if not _is_likely(effect, tried_on_model, model, alpha):
+                missing.append(effect)
         else:
             left.remove(partner)
             pairs.append((partner, effect))
@@ -142,13 +150,28 @@ def compare_effects(
         if effect.id not in of_session
         and effect.id in excluded
         and not {seen.domain for seen in effect.held_out[:1]} & set(unexplained)
-        and (_would_show(effect, misses) or not by_id[effect.id].is_spread)
+        and (not by_id[effect.id].is_spread or _would_show(effect, _beyond_chance(misses, freedom, alpha)))
     ]
     alike = [
         (m, r) for m, r in pairs if m.id == r.id and m.id not in of_session and not _is_free(m) and not _is_free(r)
     ]
     parameters = [p for m, r in alike for p in _parameters(m, r, alpha)]
     return ComparedEffects(tuple(missing), tuple(surplus), tuple(parameters))
+
+
+def _is_likely(
+    effect: AcceptedEffect, tried: Sequence[Candidate], others: Sequence[AcceptedEffect], alpha: float
+) -> bool:
+    """Whether a log's own test, the search paid for, calls an effect likely that did not earn its place there."""
+    applicable = [c for c in tried if c.applicable]
+    own = [c.p_value for c in applicable if c.id == effect.id and c.p_value is not None]
+    domains = {seen.domain for seen in effect.held_out[:1]}
+    spreads = {one.id for one in catalogue() if one.is_spread}
+    # A scatter is what any effect of the poses looks like until it is named.
+    is_shown_otherwise = any(
+        domains & {seen.domain for seen in one.held_out[:1]} for one in others if one.id not in spreads
+    )
+    return bool(own) and len(applicable) * own[0] < alpha and not is_shown_otherwise
 
 
 def is_footnote(effect: AcceptedEffect) -> bool:
@@ -176,10 +199,22 @@ def _would_show(effect: AcceptedEffect, misses: Mapping[Domain, float]) -> bool:
     )
 
 
+def _beyond_chance(
+    misses: Mapping[Domain, float], freedom: Mapping[Domain, float], alpha: float
+) -> dict[Domain, float]:
+    """What a scatter as large as the recording's comes to, in one draw of many, beside another draw of it."""
+    return {
+        domain: rms * (math.sqrt(float(f_distribution.isf(alpha, dof, dof))) if dof >= 1.0 else 1.0)
+        for domain, rms in misses.items()
+        for dof in (freedom.get(domain, 0.0),)
+    }
+
+
 def _only_there(effect: AcceptedEffect, candidates: Sequence[Candidate]) -> str:
-    said = f"Only the model has it: {effect.statement}"
     reasons = [c.reason for c in candidates if c.id == effect.id and not c.applicable]
-    return f"{said} Of the recording {reasons[0]}, and nothing in it drifts by as much." if reasons else said
+    return effect_words(
+        effect.id, "only-model", statement=effect.statement, has_reason=bool(reasons), reason="".join(reasons[:1])
+    )
 
 
 def _is_free(effect: AcceptedEffect) -> bool:

@@ -10,8 +10,6 @@ class AccelCubic(Effect):
     """Adds K3 f³ along each axis: the first odd term of ξ/2 (1 + ξ²/4 + …)."""
 
     id = "accel-cubic"
-    mechanism = "accelerometers respond to the cube of specific force, as a differential capacitive bridge does"
-    experiment = "add tilts between the faces (20° steps): an odd curve bends between level and 1 g"
     applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:

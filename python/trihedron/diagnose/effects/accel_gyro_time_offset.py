@@ -6,19 +6,16 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only
 from trihedron.diagnose.effects.late_readings import by_delay, is_confirmed, times_for
+from trihedron.records.words import why_not
 
 
 class AccelGyroTimeOffset(Effect):
     """Accelerometer readings belong to an earlier instant: f(t) reads f(t − δ); where δ < 0 the gyro is late."""
 
     id = "accel-gyro-time-offset"
-    mechanism = "accelerometer and gyro samples with the same time stamp belong to different instants"
-    experiment = (
-        "shake the sensor about one axis at several frequencies: a delay grows with frequency, a low-pass saturates"
-    )
 
     def unavailable(self, context: Context) -> str | None:
-        return "the log has no moves with a gyro" if not context.moves else None
+        return why_not("no-moves") if not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:
         return [

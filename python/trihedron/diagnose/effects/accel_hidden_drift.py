@@ -13,8 +13,10 @@ from trihedron.diagnose.effects.hidden_drift import HiddenDrift
 from trihedron.diagnose.session.twin import Distortion
 from trihedron.diagnose.zeros.curve import DriftCurve
 from trihedron.diagnose.zeros.of_session import SessionEvidence, accel_evidence, share_of_curve
-from trihedron.units import mm_s2_from_m_s2
 
+FEWEST_OF_WAVES = ((25, 4), (18, 2))
+"""Poses from which a curve of so many cosines an axis is tried: one length a pose, nine spent on S and b, three a
+cosine, and some that are left to judge it by."""
 BEYOND_NOISE = 3.0
 """Rms of the curve over the error of a pose's mean."""
 
@@ -24,9 +26,8 @@ class AccelHiddenDrift(HiddenDrift):
 
     id = "accel-hidden-drift"
     leaves_open = ("accel-zero",)
-    mechanism = "accelerometer bias drifts smoothly in time though no logged channel explains it"
-    sensor, domain, unit, shown_unit = "accelerometer", "static-accel", "m/s^2", "mm/s²"
-    fewest_poses = 25
+    domain, unit = "static-accel", "m/s^2"
+    fewest_poses = 18
 
     def on_axes(self, context: Context) -> Callable[[FloatArray], FloatArray]:
         return context.on_accelerometers
@@ -41,11 +42,11 @@ class AccelHiddenDrift(HiddenDrift):
         noise = float(np.sqrt(np.mean(found.zeros.readings.sigma**2) / 2.0))
         return not bool((curve.rms < BEYOND_NOISE * noise).all())
 
+    def n_waves(self, n_poses: int) -> int:
+        return next((waves for fewest, waves in FEWEST_OF_WAVES if n_poses >= fewest), 0)
+
     def share(self, found: SessionEvidence, curve: DriftCurve) -> float:
         return min(1.0, share_of_curve(found, curve.rms / np.sqrt(3.0)))
-
-    def shown(self, value: float) -> float:
-        return mm_s2_from_m_s2(value)
 
     def curve_variant(self, context: Context, curve: DriftCurve) -> Variant:
         values = np.stack([np.interp(context.time_s, curve.time_s, v) for v in curve.values], axis=1)

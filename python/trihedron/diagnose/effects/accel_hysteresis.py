@@ -19,8 +19,6 @@ class AccelHysteresis(Effect):
     """Offset per axis that depends on the direction of arrival (play operator) or creeps after a turn."""
 
     id = "accel-hysteresis"
-    mechanism = "accelerometer offsets remember the previous orientation"
-    experiment = "reach the same pose from opposite directions, twice each"
 
     def variants(self, context: Context) -> list[Variant]:
         return [self._play(context, width) for width in PLAY_WIDTHS_M_S2] + [

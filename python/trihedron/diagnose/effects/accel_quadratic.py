@@ -10,8 +10,6 @@ class AccelQuadratic(Effect):
     """Adds K2 f² along each accelerometer's own axis."""
 
     id = "accel-quadratic"
-    mechanism = "accelerometers respond to the square of specific force"
-    experiment = "add tilts of 30°, 45° and 60° on both sides of level: a square and a modulus differ between the faces"
     applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:

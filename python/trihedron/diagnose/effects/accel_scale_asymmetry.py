@@ -12,8 +12,6 @@ class AccelScaleAsymmetry(Effect):
     """Adds a |f|: half the difference between the scales of the two directions."""
 
     id = "accel-scale-asymmetry"
-    mechanism = "accelerometers scale positive and negative force differently"
-    experiment = "add tilts of 30°, 45° and 60° on both sides of level: a square and a modulus differ between the faces"
     applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:

@@ -6,17 +6,16 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES, Effect, Variant, force_only
+from trihedron.records.words import why_not
 
 
 class AccelSizeEffect(Effect):
     """Accelerometers 2 and 3 displaced from accelerometer 1: each reads its own α×r + ω×(ω×r)."""
 
     id = "accel-size-effect"
-    mechanism = "the three accelerometers do not sit at one point"
-    experiment = "spin and shake the sensor about each axis in turn"
 
     def unavailable(self, context: Context) -> str | None:
-        return "the log has no moves with a gyro" if not context.moves else None
+        return why_not("no-moves") if not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:
         w, a = context.rate, context.angular_acceleration

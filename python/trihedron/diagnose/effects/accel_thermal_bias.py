@@ -7,6 +7,7 @@ import numpy as np
 from trihedron.diagnose.context import LEAST_SWING_K, Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only
 from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants
+from trihedron.records.words import why_not
 
 
 class AccelThermalBias(Effect):
@@ -15,17 +16,13 @@ class AccelThermalBias(Effect):
     id = "accel-thermal-bias"
     leaves_open = ("accel-zero",)
     drifts_as = "accel-hidden-drift"
-    mechanism = "accelerometer bias follows the temperature"
-    experiment = (
-        "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"
-    )
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
         if context.temperature is None:
-            return "the log has no temperature"
+            return why_not("no-temperature")
         if np.ptp(context.temperature) < LEAST_SWING_K:
-            return f"the temperature changes by less than {LEAST_SWING_K:g} °C"
+            return why_not("steady-temperature", least_k=LEAST_SWING_K)
         return None
 
     def variants(self, context: Context) -> list[Variant]:

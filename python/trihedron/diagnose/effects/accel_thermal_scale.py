@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.diagnose.context import LEAST_SWING_K, Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
+from trihedron.records.words import why_not
 
 
 class AccelThermalScale(Effect):
@@ -14,15 +15,13 @@ class AccelThermalScale(Effect):
     id = "accel-thermal-scale"
     leaves_open = ("accel-zero", "accel-scale")
     drifts_as = "accel-hidden-drift"
-    mechanism = "accelerometer scale follows the temperature"
-    experiment = "repeat the same faces and turns at two temperatures"
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
         if context.temperature is None:
-            return "the log has no temperature"
+            return why_not("no-temperature")
         if np.ptp(context.temperature) < LEAST_SWING_K:
-            return f"the temperature changes by less than {LEAST_SWING_K:g} °C"
+            return why_not("steady-temperature", least_k=LEAST_SWING_K)
         return None
 
     def variants(self, context: Context) -> list[Variant]:

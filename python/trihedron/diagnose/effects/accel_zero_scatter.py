@@ -14,7 +14,7 @@ from trihedron.diagnose.zeros.of_session import (
     share_of_zeros,
     with_accel_scatter,
 )
-from trihedron.units import mm_s2_from_m_s2
+from trihedron.records.words import why_not
 
 
 class AccelZeroScatter(DirectEffect):
@@ -22,14 +22,12 @@ class AccelZeroScatter(DirectEffect):
 
     is_spread = True
     id = "accel-zero-scatter"
-    mechanism = "the accelerometer's zero is another in every pose"
-    experiment = "hold one pose, turn away and come back to it ten times: what differs is scatter, what repeats is not"
     is_proof = True
     is_late = True
 
     def unavailable(self, context: Context) -> str | None:
         few = context.obs.n_holds < FEWEST_NORM_POSES
-        return f"fewer than {FEWEST_NORM_POSES} still poses" if few else None
+        return why_not("few-poses", fewest=FEWEST_NORM_POSES) if few else None
 
     def find(self, context: Context) -> Evidence | None:
         found = accel_evidence(context)
@@ -42,8 +40,7 @@ class AccelZeroScatter(DirectEffect):
             found.evidence.p_scatter_spared,
             0.0,
             scatter_parameters(found, "m/s^2"),
-            f"The accelerometer's zero is another in every pose, by {mm_s2_from_m_s2(sigma):.2g} mm/s² per axis (one "
-            "standard deviation), beyond noise and drift; no pose or temperature accounts for it.",
+            self.told("scatter", sigma=sigma),
             "static-accel",
             reweigh=lambda obs: with_accel_scatter(obs, sigma, si),
             share=share_of_zeros(found),

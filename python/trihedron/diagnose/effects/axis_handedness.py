@@ -18,8 +18,6 @@ class AxisHandedness(DirectEffect):
     """The gyro's axes, as documented, turn against the accelerometers' as documented."""
 
     id = "axis-handedness"
-    mechanism = "the documented axes do not form one right-handed triad"
-    experiment = "tilt each axis up in turn and turn about it by hand: the signs show which axis is documented wrongly"
 
     def find(self, context: Context) -> Evidence | None:
         S = context.fitted.twin.gyro_S
@@ -40,20 +38,14 @@ class AxisHandedness(DirectEffect):
         n_reversed = int((signs < 0).sum())
         reversed_axes = [AXES[j] for j in range(3) if signs[j] < 0]
         kept = [AXES[j] for j in range(3) if signs[j] > 0]
-        if n_reversed == 1:
-            which = f"gyro axis {reversed_axes[0]}, or both other gyro axes and that accelerometer axis"
-        elif n_reversed == 2:
-            # Reflecting accelerometer axis k makes the rates about the other two axes appear reversed.
-            which = f"accelerometer axis {kept[0]}, or gyro axes {reversed_axes[0]} and {reversed_axes[1]}"
-        elif n_reversed == 3:
-            which = "all accelerometer axes (the log holds gravity instead of specific force), or all gyro axes"
-        else:
-            which = "the order of the axes"
+        # Reflecting accelerometer axis k makes the rates about the other two axes appear reversed.
+        told = self.told(
+            "reversed", is_one=n_reversed == 1, is_two=n_reversed == 2, is_three=n_reversed == 3,
+            reversed=reversed_axes, kept=kept,
+        )  # fmt: skip
         parameters = tuple(
             EffectParameter(f"gyro_sign_{axis}", float(s), 0.0, "1") for axis, s in zip(AXES, signs, strict=True)
         )
         return Evidence(
-            1e-300, 1e6, parameters,
-            f"The documented axes of accelerometer and gyro do not fit one right-handed triad: reversed is {which}.",
-            "moves", Where(tuple(f"g{axis}" for axis in reversed_axes)),
+            1e-300, 1e6, parameters, told, "moves", Where(tuple(f"g{axis}" for axis in reversed_axes)),
         )  # fmt: skip

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.session.twin import Distortion
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain
+from trihedron.records.words import Words, effect_words, experiment_for
 
 AXES = ("x", "y", "z")
 SHAPE_NAMES = ("time_constant", "half_width", "pose")
@@ -45,9 +46,10 @@ class Effect(ABC):
     """One physical mechanism."""
 
     id: ClassVar[str]
-    mechanism: ClassVar[str]
+    mechanism: ClassVar[str] = ""
+    """What it is called, of an effect that a user's own file adds: the words of ours stand in ``report/effects``."""
     experiment: ClassVar[str] = ""
-    """What to record so that this effect cannot be mistaken for another."""
+    """What to record so that a user's own effect cannot be mistaken for another."""
     applies_elsewhere: ClassVar[bool] = False
     """Whether the fitted effect can be taken off another recording of the same sensor, from logged signals alone."""
     repeatable: ClassVar[bool] = False
@@ -134,13 +136,23 @@ class Effect(ABC):
         """How many of the parameters, at the end, are shape numbers."""
         return sum(1 for p in parameters if p.name in SHAPE_NAMES)
 
+    def told(self, case: str, /, **values: Any) -> Words:
+        """The catalogue's sentence for this effect, by case and values (SI)."""
+        return effect_words(self.id, case, **values)
+
     def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
-        """The finding in one plain sentence."""
+        """What is said of it where it competed with others: the mechanism with its strongest term."""
         strongest = max(
             parameters[: len(parameters) - self.n_shape(parameters)], key=lambda p: abs(p.value) / max(p.std, 1e-300)
         )
-        size = f"{strongest.value:.3g} ± {strongest.std:.1g} {strongest.unit}"
-        return f"{self.mechanism} (strongest term {strongest.name}: {size})."
+        return self.told(
+            "strongest", mechanism=self.mechanism, name=strongest.name, value=strongest.value, std=strongest.std,
+            unit=strongest.unit,
+        )  # fmt: skip
+
+    def separating_experiment(self) -> str:
+        """What to record so that it cannot be mistaken for another."""
+        return experiment_for(self.id) or self.experiment
 
 
 def per_axis(symbol: str) -> tuple[str, ...]:

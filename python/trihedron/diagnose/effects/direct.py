@@ -28,6 +28,7 @@ class Evidence:
     observations claim (noise, excluded moves), or None; ``strength`` is the gain in 2 log-likelihood, for ranking.
     ``touched`` are the moves whose readings ``reweigh`` changes, ``None`` for all: there the change must help.
     ``share`` is the part of its domain's misfit that it explains, where that is not a matter of poses and moves.
+    ``statement`` is the catalogue's (:meth:`Effect.told`), or what a user's own effect says.
     ``series`` is a curve that belongs to the answer, as plain JSON types.
     ``restate`` gives the parameters once more from the twin that was fitted with the evidence taken into account.
     """

@@ -17,6 +17,7 @@ from trihedron.diagnose.session.solve import fit, folds_of, leverage, predict_he
 from trihedron.diagnose.session.twin import NO_DISTORTION, STATIC_ACCEL
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
+from trihedron.records.words import Words
 
 MOST = 0.25
 """If more than a quarter of the poses are restless it is not a pose that was disturbed but the place that shakes."""
@@ -36,6 +37,8 @@ SHAKES_P = 1e-6
 not come below 0.02 (benches/diagnosis_thresholds.py), and real noise is not as white."""
 IN_EITHER_HALF = 0.5
 """Share of ``LOUD`` that shaking reaches in both halves of its pose; a push is in one of them."""
+MOST_NAMED = 4
+"""Poses of each kind that the sentence names."""
 LEAST_DOF = 0.1
 """Degrees of freedom at least: a pose whose rows the fit has used up cannot be off by a rounding error."""
 
@@ -152,8 +155,6 @@ class DisturbedPose(DirectEffect):
 
     id = "disturbed-pose"
     is_of_session = True
-    mechanism = "one pose was not still or was pushed"
-    experiment = "repeat that pose"
     repeatable = True
     is_local = True
 
@@ -181,14 +182,13 @@ class DisturbedPose(DirectEffect):
         spans = tuple(bumped) + tuple((float(t[holds[i].start]), float(t[holds[i].stop - 1])) for i in restless)
         # A nuisance that the twin has already cut out: it ranks behind whatever the fit gains by.
         strength = 10.0 * (len(bumped) + len(restless))
-        parts = []
-        if bumped:
-            parts.append("bumped at " + ", ".join(f"{0.5 * (a + b):.2f} s" for a, b in bumped[:4]))
-        if restless:
-            parts.append("restless: pose " + ", ".join(str(i) for i in restless[:4]))
+        told = self.told(
+            "not-still", is_bumped=bool(bumped), bumped_s=[(0.5 * (a + b),) for a, b in bumped[:MOST_NAMED]],
+            is_restless=bool(restless), restless=restless[:MOST_NAMED], are_both=bool(bumped and restless),
+        )  # fmt: skip
         parameters = tuple(EffectParameter("pose_at", 0.5 * (a + b), 0.5 * max(b - a, 0.1), "s") for a, b in spans[:6])
         return Evidence(
-            1e-30, strength, parameters, f"Not every pose was still ({'; '.join(parts)}).", "within-static",
+            1e-30, strength, parameters, told, "within-static",
             Where((), tuple(f"hold {i}" for i in restless), spans), held, share=min(len(spans) / obs.n_holds, 1.0),
         )  # fmt: skip
 
@@ -201,9 +201,7 @@ class DisturbedPose(DirectEffect):
             out.append(Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, shape, f"pose {i}"))
         return out
 
-    def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
+    def statement(self, parameters: tuple[EffectParameter, ...]) -> Words:
         pose = next(p.value for p in parameters if p.name == "pose")
         size = float(np.sqrt(sum(p.value**2 for p in parameters if p.name.startswith("push"))))
-        return (
-            f"Pose {pose:.0f} was not still or was pushed: its mean is off by {size:.2g} m/s²; repeat or leave it out."
-        )
+        return self.told("pushed", pose=pose, off=size)

@@ -25,8 +25,9 @@ def drift_variants(
     on_axes: Callable[[FloatArray], FloatArray],
     only: Callable[[FloatArray], Distortion],
     unit: str,
+    n_waves: int = 4,
 ) -> list[Variant]:
-    """Line, warm-up exponentials, and a slow curve of four cosines per axis."""
+    """Line, warm-up exponentials, and a slow curve of so many cosines per axis."""
     x = context.elapsed
     three = np.ones(3)
     out = [Variant(only(on_axes((x - 0.5)[:, None] * three)), per_axis("drift"), (unit,) * 3, label="line")]
@@ -34,7 +35,9 @@ def drift_variants(
     shortest = shortest_time_constant(context)
     taus = [fraction * duration for fraction in WARM_UP_FRACTIONS]
     out += [warm_up_variant(context, on_axes, only, unit, tau) for tau in taus if tau >= shortest]
-    orders = (1, 2, 3, 4)
+    if not n_waves:
+        return out
+    orders = tuple(range(1, n_waves + 1))
     axes = on_axes(np.ones((1, 3)))[0]
     # Every wave along every axis, as one product of matrices.
     spread = np.zeros((len(orders), 3, 3 * len(orders)))
@@ -43,7 +46,7 @@ def drift_variants(
     waves = np.cos(np.pi * np.outer(x, orders)) @ spread.reshape(len(orders), -1)
     waves = waves.reshape(-1, 3, 3 * len(orders))
     names = tuple(name for k in orders for name in per_axis(f"cosine{k}"))
-    out.append(Variant(only(waves), names, (unit,) * 12, label="curve"))
+    out.append(Variant(only(waves), names, (unit,) * len(names), label="curve"))
     return out
 
 

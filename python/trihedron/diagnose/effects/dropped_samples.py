@@ -16,6 +16,7 @@ from trihedron.diagnose.session.solve import fit, move_misfit
 from trihedron.diagnose.session.twin import NO_DISTORTION, Twin
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
+from trihedron.records.words import why_not
 
 CLEAR_COUNT = 3.0
 """Standard errors by which a count must differ from none."""
@@ -101,11 +102,9 @@ class DroppedSamples(DirectEffect):
     id = "dropped-samples"
     is_sought_again = True
     is_of_session = True
-    mechanism = "samples are missing though the time stamps run on evenly"
-    experiment = "log the sensor's own sample counter"
 
     def unavailable(self, context: Context) -> str | None:
-        return "the log has no moves with a gyro" if not context.moves else None
+        return why_not("no-moves") if not context.moves else None
 
     def find(self, context: Context) -> Evidence | None:
         losses, sigmas = counted_losses(context)
@@ -128,8 +127,10 @@ class DroppedSamples(DirectEffect):
                 for one in losses
             ),
         )
-        places = ", ".join(f"{loss.count} at {t[loss.sample]:.2f} s" for loss in losses[:NAMED])
-        more = f" and {len(losses) - NAMED} more" if len(losses) > NAMED else ""
+        told = self.told(
+            "losses", losses=[(loss.count, t[loss.sample]) for loss in losses[:NAMED]],
+            has_more=len(losses) > NAMED, more=len(losses) - NAMED,
+        )  # fmt: skip
 
         def reweigh(old: Observations) -> Observations:
             recording, segments = insert_samples(old.recording, old.segments, counts)
@@ -152,6 +153,6 @@ class DroppedSamples(DirectEffect):
         weakest = min(max(loss.per_sensor) for loss in losses)
         p = float(np.clip(np.exp(-0.5 * weakest) * n_intervals * 60, 1e-300, 1.0))
         return Evidence(
-            p, gain, parameters, f"Samples are missing though the time stamps run on: {places}{more}.", "timing", where,
+            p, gain, parameters, told, "timing", where,
             reweigh=reweigh, touched=tuple(sorted({loss.move for loss in losses})),
         )  # fmt: skip

@@ -11,6 +11,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, rate_only
 from trihedron.gravity import EARTH_RATE_RAD_S, normal_gravity
 from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.words import Words, why_not
 from trihedron.units import degrees_from_radians, radians_from_degrees
 
 STEPS = 91, 180
@@ -105,14 +106,10 @@ class EarthRate(Effect):
     """Earth rate in the level frame of the first pose: two horizontal components and the vertical one."""
 
     id = "earth-rate"
-    mechanism = "the gyros see the Earth turn"
-    experiment = (
-        "turn the level sensor by 180° on the table: Earth rate changes its horizontal part, g-sensitivity does not"
-    )
 
     def unavailable(self, context: Context) -> str | None:
         if context.obs.raw_rate is None or not context.moves:
-            return "the log has no moves with a gyro"
+            return why_not("no-moves")
         return None
 
     def variants(self, context: Context) -> list[Variant]:
@@ -140,10 +137,10 @@ class EarthRate(Effect):
             *super().parameters(variant, value, covariance),
         )
 
-    def statement(self, parameters: tuple[EffectParameter, ...]) -> str:
+    def statement(self, parameters: tuple[EffectParameter, ...]) -> Words:
         by_name = {p.name: p for p in parameters}
         at, heading = by_name["latitude"], by_name["north_azimuth"]
-        return (
-            f"{self.mechanism} (at its one rate that is a latitude of {abs(at.value):.0f}° ± {at.std:.1g}°; north lies "
-            f"{heading.value:.0f}° ± {heading.std:.1g}° from the first pose's x)."
-        )
+        return self.told(
+            "latitude", latitude_deg=at.value, latitude_std_deg=at.std, azimuth_deg=heading.value,
+            azimuth_std_deg=heading.std,
+        )  # fmt: skip

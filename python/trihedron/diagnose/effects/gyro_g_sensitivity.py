@@ -8,20 +8,17 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES, Effect, Variant, rate_only
 from trihedron.diagnose.laws.find import ROOM_VECTOR, gyro_zero_laws
 from trihedron.diagnose.zeros.of_session import STANDS_OUT, gyro_evidence
+from trihedron.records.words import why_not
 
 
 class GyroGSensitivity(Effect):
     """Rate bias linear in specific force: ω reads G f more."""
 
     id = "gyro-g-sensitivity"
-    mechanism = "gyro bias depends on specific force: the rate read at rest changes with the pose"
-    experiment = (
-        "hold each of the six faces for a minute; turn the table by 180° under a level sensor to rule out Earth rate"
-    )
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
-        return "the log has no gyro" if context.obs.raw_rate is None else None
+        return why_not("no-gyro") if context.obs.raw_rate is None else None
 
     def withstands(self, context: Context) -> bool:
         if any(ROOM_VECTOR in law.depends_on for law in gyro_zero_laws(context).laws):

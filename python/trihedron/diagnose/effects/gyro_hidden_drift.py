@@ -13,7 +13,7 @@ from trihedron.diagnose.effects.hidden_drift import HiddenDrift
 from trihedron.diagnose.session.twin import Distortion
 from trihedron.diagnose.zeros.curve import DriftCurve
 from trihedron.diagnose.zeros.of_session import SessionEvidence, gyro_evidence, share_of_curve, walk_of_noise
-from trihedron.units import degrees_from_radians
+from trihedron.records.words import why_not
 
 BEYOND_NOISE = 3.0
 """Range of the curve over the largest rms that the noise identified in the holds could walk in such a session."""
@@ -24,14 +24,12 @@ class GyroHiddenDrift(HiddenDrift):
 
     id = "gyro-hidden-drift"
     leaves_open = ("gyro-zero",)
-    mechanism = "gyro bias drifts smoothly in time though no logged channel explains it"
     is_proof = True
-    sensor, domain, unit, shown_unit = "gyro", "static-gyro", "rad/s", "°/s"
+    domain, unit = "static-gyro", "rad/s"
     fewest_poses = 15
-    walk = "as a walk, beyond its noise"
 
     def unavailable(self, context: Context) -> str | None:
-        return "the log has no gyro" if context.obs.raw_rate is None else super().unavailable(context)
+        return why_not("no-gyro") if context.obs.raw_rate is None else super().unavailable(context)
 
     def on_axes(self, context: Context) -> Callable[[FloatArray], FloatArray]:
         return context.on_gyros
@@ -47,9 +45,6 @@ class GyroHiddenDrift(HiddenDrift):
 
     def share(self, found: SessionEvidence, curve: DriftCurve) -> float:
         return share_of_curve(found, curve.rms)
-
-    def shown(self, value: float) -> float:
-        return degrees_from_radians(value)
 
     def curve_variant(self, context: Context, curve: DriftCurve) -> Variant:
         values = np.stack([np.interp(context.time_s, curve.time_s, v) for v in curve.values], axis=1)

@@ -6,18 +6,17 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, rate_only
+from trihedron.records.words import why_not
 
 
 class GyroScaleNonlinearity(Effect):
     """Cubic (odd), quadratic (even), or both, along each gyro's own axis."""
 
     id = "gyro-scale-nonlinearity"
-    mechanism = "gyro scale depends on the rate"
-    experiment = "turn by the same angle slowly and fast, both ways, about each axis"
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
-        return "the log has no moves with a gyro" if not context.moves else None
+        return why_not("no-moves") if not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:
         w = context.axis_rate

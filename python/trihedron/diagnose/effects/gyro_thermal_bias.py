@@ -8,6 +8,7 @@ from trihedron.diagnose.context import LEAST_SWING_K, Context
 from trihedron.diagnose.effects.contract import Effect, Variant, rate_only
 from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants
 from trihedron.diagnose.zeros.of_session import STANDS_OUT, gyro_evidence
+from trihedron.records.words import why_not
 
 
 class GyroThermalBias(Effect):
@@ -16,17 +17,13 @@ class GyroThermalBias(Effect):
     id = "gyro-thermal-bias"
     leaves_open = ("gyro-zero",)
     drifts_as = "gyro-hidden-drift"
-    mechanism = "gyro bias follows the temperature"
-    experiment = (
-        "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"
-    )
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
         if context.temperature is None:
-            return "the log has no temperature"
+            return why_not("no-temperature")
         if np.ptp(context.temperature) < LEAST_SWING_K:
-            return f"the temperature changes by less than {LEAST_SWING_K:g} °C"
+            return why_not("steady-temperature", least_k=LEAST_SWING_K)
         return None
 
     def withstands(self, context: Context) -> bool:

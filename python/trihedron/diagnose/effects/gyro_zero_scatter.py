@@ -18,7 +18,7 @@ from trihedron.diagnose.zeros.of_session import (
     share_of_zeros,
     with_gyro_scatter,
 )
-from trihedron.units import degrees_from_radians
+from trihedron.records.words import why_not
 
 
 class GyroZeroScatter(DirectEffect):
@@ -26,15 +26,13 @@ class GyroZeroScatter(DirectEffect):
 
     is_spread = True
     id = "gyro-zero-scatter"
-    mechanism = "the gyro's zero is another in every pose"
-    experiment = "hold one pose, turn away and come back to it ten times: what differs is scatter, what repeats is not"
     is_proof = True
     is_late = True
 
     def unavailable(self, context: Context) -> str | None:
         if context.obs.raw_rate is None:
-            return "the log has no gyro"
-        return f"fewer than {FEWEST_FOR_SIZE} still poses" if context.obs.n_holds < FEWEST_FOR_SIZE else None
+            return why_not("no-gyro")
+        return why_not("few-poses", fewest=FEWEST_FOR_SIZE) if context.obs.n_holds < FEWEST_FOR_SIZE else None
 
     def find(self, context: Context) -> Evidence | None:
         found = gyro_evidence(context)
@@ -47,13 +45,11 @@ class GyroZeroScatter(DirectEffect):
         if settling(context).is_motion:
             return None  # the poses themselves turn
         sigma, si = found.evidence.scatter, context.si_per_raw("gyroscope")
-        sizes = ", ".join(f"{degrees_from_radians(s):.2g}" for s in sigma)
         return Evidence(
             found.evidence.p_scatter_spared,
             0.0,
             scatter_parameters(found, "rad/s"),
-            f"The gyro's zero is another in every pose, by {sizes} °/s (x, y, z; one standard deviation), beyond noise "
-            "and drift; it follows neither gravity nor a logged temperature.",
+            self.told("scatter", sigma=sigma),
             "static-gyro",
             reweigh=lambda obs: with_gyro_scatter(obs, sigma, si),
             share=share_of_zeros(found),

@@ -18,6 +18,7 @@ from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
 from trihedron.diagnose.zeros.of_session import SessionEvidence
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Domain
+from trihedron.records.words import why_not
 
 AXES = ("x", "y", "z")
 FEWEST_HOLDS = 6
@@ -27,16 +28,11 @@ FEWEST_HOLDS = 6
 class HiddenDrift(DirectEffect):
     """Warm-up exponential, straight line or slow curve per axis; where none of them fits, a free smooth curve."""
 
-    experiment = "log the temperature, or let the sensor warm up and repeat the first poses at the end"
     is_late = True
-    sensor: ClassVar[str]
-    """As it is called in the statement."""
     domain: ClassVar[Domain]
     unit: ClassVar[str]
-    shown_unit: ClassVar[str]
     fewest_poses: ClassVar[int]
     """A free curve is told from scatter, or from the length of gravity, with this many poses."""
-    walk: ClassVar[str] = "as a walk"
 
     @abstractmethod
     def on_axes(self, context: Context) -> Callable[[FloatArray], FloatArray]:
@@ -59,18 +55,18 @@ class HiddenDrift(DirectEffect):
         """Part of the excess χ² that the curve explains."""
 
     @abstractmethod
-    def shown(self, value: float) -> float:
-        """A range in the unit of the statement."""
-
-    @abstractmethod
     def curve_variant(self, context: Context, curve: DriftCurve) -> Variant:
         """The curve itself, one column an axis: its factor is 1 where session and poses agree."""
 
     def unavailable(self, context: Context) -> str | None:
-        return "fewer than six still poses" if context.obs.n_holds < FEWEST_HOLDS else None
+        return why_not("six-poses") if context.obs.n_holds < FEWEST_HOLDS else None
 
     def variants(self, context: Context) -> list[Variant]:
-        return drift_variants(context, self.on_axes(context), self.only, self.unit)
+        return drift_variants(context, self.on_axes(context), self.only, self.unit, self.n_waves(context.obs.n_holds))
+
+    def n_waves(self, n_poses: int) -> int:  # noqa: ARG002
+        """Cosines per axis that so many poses tell."""
+        return 4
 
     def reshaped(self, context: Context, variant: Variant, value: float) -> Variant | None:
         if variant.label != "warm-up":
@@ -93,17 +89,13 @@ class HiddenDrift(DirectEffect):
         curve = _curve(context, found)
         if not self.is_beyond_noise(context, found, curve):
             return None
-        spans = ", ".join(f"{self.shown(r):.2g}" for r in curve.range)
         parameters = tuple(
             EffectParameter(f"range_{axis}", float(r), float(np.hypot(s[v.argmax()], s[v.argmin()])), self.unit)
             for axis, r, v, s in zip(AXES, curve.range, curve.values, curve.sigma, strict=True)
         )
-        told = {"drift": "smoothly", "walk": self.walk, "slow": "slowly"}[found.evidence.kind]
         return Evidence(
-            found.evidence.p_slow, 0.0, parameters,
-            f"The {self.sensor}'s zero drifts {told} through {spans} {self.shown_unit} (x, y, z); no logged channel "
-            "explains it.",
-            self.domain, variant=self.curve_variant(context, curve), share=self.share(found, curve),
+            found.evidence.p_slow, 0.0, parameters, self.told(found.evidence.kind, range=curve.range), self.domain,
+             variant=self.curve_variant(context, curve), share=self.share(found, curve),
             series={
                 "time_s": curve.time_s.tolist(), "value": curve.values.tolist(), "sigma": curve.sigma.tolist(),
                 "unit": self.unit,

@@ -15,6 +15,7 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.sample_steps import clipped_samples
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
+from trihedron.records.words import why_not
 
 MIN_SHARE = 0.1
 """One arm must predict at least this share of the motion of moves it was not fitted to: a hand also just travels, but
@@ -63,13 +64,9 @@ class LeverArm(DirectEffect):
 
     id = "lever-arm"
     is_of_motion = True
-    mechanism = "the accelerometers sit away from the centre of rotation"
-    experiment = (
-        "turn about another point: an arm follows the centre of rotation, a displacement inside the case does not"
-    )
 
     def unavailable(self, context: Context) -> str | None:
-        return "fewer than six moves with a gyro" if len(_true_moves(context)) < FEWEST_MOVES else None
+        return why_not("six-moves") if len(_true_moves(context)) < FEWEST_MOVES else None
 
     def find(self, context: Context) -> Evidence | None:
         moves = _written(context)
@@ -97,9 +94,7 @@ class LeverArm(DirectEffect):
         strength = float(len(by.weight) * np.log(whole / left)) if 1.0 - left / whole > MOSTLY else 0.0
         return Evidence(
             max(len(SHRUNK) * found.p_value, 1e-300), strength, parameters,
-            f"The accelerometers sit {100 * length:.1f} cm from the centre of rotation: one arm predicts "
-            f"{100 * share:.0f} % of the acceleration in moves it was not fitted to (what hands do most weighs least).",
-            "dynamics", Where(("ax", "ay", "az")), (held,),
+            self.told("arm", arm_m=length, share=share), "dynamics", Where(("ax", "ay", "az")), (held,),
         )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.residuals.within_holds import MIN_LINE_SHARE, find_lines
+from trihedron.diagnose.residuals.within_holds import find_lines
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import HeldOut, Where
 
@@ -15,16 +15,15 @@ class PeriodicInterference(DirectEffect):
     """One sinusoid, steady through all poses, in one or more channels."""
 
     id = "periodic-interference"
-    mechanism = "a sinusoid stands in the readings while the sensor is still"
-    experiment = "record at rest at another sampling rate: an aliased line moves, a true one stays"
     is_of_samples = True
 
     def find(self, context: Context) -> Evidence | None:
         lines = find_lines(context.obs)
         if not lines:
             return None
-        # Long holds resolve lines a hundredth of the noise high. What counts is what it adds to readings not yet seen.
-        lines = [line for line in lines if line.power_after < (1.0 - MIN_LINE_SHARE) * line.power_before]
+        # Long holds resolve lines a hundredth of the noise high: what its domain calls a disagreement has a name here,
+        # if readings not yet seen are predicted better by it.
+        lines = [line for line in lines if line.has_size and line.power_after < line.power_before]
         if not lines:
             return None
         strongest = min(lines, key=lambda line: line.p_value)
@@ -47,7 +46,6 @@ class PeriodicInterference(DirectEffect):
         )  # fmt: skip
         return Evidence(
             strongest.p_value, float(-2 * np.log(strongest.p_value)), tuple(parameters),
-            f"A line at {strongest.frequency_hz:.3f} Hz stands in {', '.join(line.channel for line in same)} while the "
-            "sensor is still.",
+            self.told("line", frequency_hz=strongest.frequency_hz, channels=[line.channel for line in same]),
             "within-static", where, (held,), share=min(max(line.share for line in same), 1.0),
         )  # fmt: skip

@@ -133,8 +133,6 @@ class Quantisation(DirectEffect):
     """Steps so wide against the noise that averaging no longer resolves between them."""
 
     id = "quantisation"
-    mechanism = "the resolution is too coarse for the noise: means of still poses sit on steps"
-    experiment = "choose a finer range, or add a little motion or noise (dither) while averaging"
     is_proof = True
 
     def find(self, context: Context) -> Evidence | None:
@@ -152,15 +150,13 @@ class Quantisation(DirectEffect):
         strength = float(sum((one.step / one.sigma) ** 2 for one in found) * obs.n_holds)
         grid = worst.step**2 / 12.0  # variance of the staircase, beside that of the noise in front of it
         names = tuple(CHANNELS[one.channel] for one in found)
-        what = (
-            f"do not move within {worst.dead:.4g} raw units of zero"
-            if worst.dead
-            else f"move in steps of {worst.step:.4g} raw units, {worst.step / worst.sigma:.2g} times their noise"
-        )
+        told = self.told(
+            "steps", channels=names, is_dead=bool(worst.dead), dead=worst.dead, step=worst.step,
+            times=worst.step / worst.sigma,
+        )  # fmt: skip
         return Evidence(
-            1e-300, strength, _parameters(context, found),
-            f"Readings of {', '.join(names)} {what}: averaging does not resolve between steps.",
-            "within-static", Where(names), reweigh=reweigh, share=grid / (grid + worst.sigma**2),
+            1e-300, strength, _parameters(context, found), told, "within-static", Where(names),
+            reweigh=reweigh, share=grid / (grid + worst.sigma**2),
             restate=lambda later: _parameters(later, found),  # the staircase had bent the scale factors
         )  # fmt: skip
 
@@ -222,6 +218,10 @@ def _scale_of(context: Context, channel: int) -> tuple[float, float]:
     return float(scale), sigma / abs(float(S[k, k]))
 
 
+LEAST_LEFT = 0.01
+"""Share of a mean's variance that stays, at least, once its codes are resolved."""
+
+
 def _resolved(obs: Observations, one: Lattice) -> Observations:
     """Observations with one channel's hold means and noise as the codes truly tell them."""
     is_accel = one.channel < 3
@@ -234,5 +234,11 @@ def _resolved(obs: Observations, one: Lattice) -> Observations:
     # In motion the staircase is crossed all the time: its error is white, a twelfth of a step squared per reading.
     density[k] = np.sqrt((one.sigma**2 + one.step**2 / 12.0) / obs.recording.rate_hz)
     if is_accel:
-        return replace(obs, hold_force=mean, hold_force_sigma=sigma, force_density=density)
+        along = obs.force_up
+        if along is not None:
+            # The vertical's share of what the codes change.
+            up, error = along
+            changed = up[:, k] ** 2 * (sigma[:, k] ** 2 - obs.hold_force_sigma[:, k] ** 2)
+            along = up, np.sqrt(np.maximum(error**2 + changed, LEAST_LEFT * error**2))
+        return replace(obs, hold_force=mean, hold_force_sigma=sigma, force_density=density, force_up=along)
     return replace(obs, hold_rate=mean, hold_rate_sigma=sigma, rate_density=density)

@@ -38,7 +38,6 @@ class _Saturation(DirectEffect):
     sensor: ClassVar[str]
     is_proof = True
     precedence = -1
-    experiment = "repeat the moves more slowly, or choose a wider range"
 
     def find(self, context: Context) -> Evidence | None:
         obs = context.obs
@@ -82,10 +81,7 @@ class _Saturation(DirectEffect):
 
         prefix = "g" if is_gyro else "a"
         channels = tuple(sorted({prefix + AXES[r.axis] for r in runs}))
-        statement = (
-            f"The {self.sensor} reaches the end of its range: {len(runs)} plateaus, {n} samples, in "
-            f"{len(touched)} of {obs.n_moves} moves; what those moves read is false and is left out of the fit."
-        )
+        statement = self.told("plateaus", plateaus=len(runs), samples=n, touched=len(touched), moves=obs.n_moves)
         # Chance that smooth peaks of different moves end within one noise band of each other, times the chance that
         # sound moves disagree so much more than the others.
         p = (2 * BAND_SIGMA * float(np.min(sigma / np.ptp(raw, axis=0)))) ** (len(runs) - 1)
@@ -143,7 +139,6 @@ class GyroSaturation(_Saturation):
 
     id = "gyro-saturation"
     sensor = "gyro"
-    mechanism = "the gyro reaches the end of its range"
 
 
 class AccelSaturation(_Saturation):
@@ -151,4 +146,3 @@ class AccelSaturation(_Saturation):
 
     id = "accel-saturation"
     sensor = "accelerometer"
-    mechanism = "the accelerometer reaches the end of its range"

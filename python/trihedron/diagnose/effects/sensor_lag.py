@@ -8,6 +8,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
 from trihedron.diagnose.effects.late_readings import NEAR_ONE, by_low_pass, times_for
+from trihedron.records.words import why_not
 
 SIGMAS = 3.0
 """How far below zero a lag may come out by chance; a filter that answers before it is asked does not exist."""
@@ -17,13 +18,9 @@ class SensorLag(Effect):
     """Lag of one sensor, first order (per axis too) or second: its reading trails the motion by τ."""
 
     id = "sensor-lag"
-    mechanism = "one sensor follows the motion through a low-pass filter"
-    experiment = (
-        "shake the sensor about one axis at several frequencies: a delay grows with frequency, a low-pass saturates"
-    )
 
     def unavailable(self, context: Context) -> str | None:
-        return "the log has no moves with a gyro" if not context.moves else None
+        return why_not("no-moves") if not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:
         unit = FIRST_ORDER_S

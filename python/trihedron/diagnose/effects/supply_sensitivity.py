@@ -6,21 +6,20 @@ import numpy as np
 
 from trihedron.diagnose.context import LEAST_SWING_V, Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
+from trihedron.records.words import why_not
 
 
 class SupplySensitivity(Effect):
     """Scale and offset that follow the logged supply voltage."""
 
     id = "supply-sensitivity"
-    mechanism = "readings follow the supply voltage"
-    experiment = "repeat one pose at two supply voltages"
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:
         if context.supply is None:
-            return "the log has no supply voltage"
+            return why_not("no-supply")
         if np.ptp(context.supply) < LEAST_SWING_V:
-            return "the supply voltage does not change"
+            return why_not("steady-supply")
         return None
 
     def variants(self, context: Context) -> list[Variant]:

@@ -11,6 +11,7 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.table_turns import meant_as_multiples, table_turns
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
+from trihedron.records.words import why_not
 
 FEWEST_TO_SCATTER = 3
 """Turns from which their own scatter says anything."""
@@ -43,12 +44,10 @@ class TableTilt(DirectEffect):
 
     id = "table-tilt"
     is_of_session = True
-    mechanism = "the table is not level"
-    experiment = "level the table, or hold every face in two headings 180° apart and average"
 
     def unavailable(self, context: Context) -> str | None:
         if not context.moves or not meant_as_multiples(table_turns(context)):
-            return "the session has no turns on a table against a wall"
+            return why_not("no-table-turns")
         return None
 
     def find(self, context: Context) -> Evidence | None:
@@ -80,6 +79,5 @@ class TableTilt(DirectEffect):
             return None
         return Evidence(
             max(p, 1e-300), chi2, (EffectParameter("tilt", tilt, max(scatter, 1e-4), "deg"),),
-            f"The table is tilted by {tilt:.2f}°: turning the sensor on it moves the vertical in the body.",
-            "static-accel", Where(("ax", "ay", "az")),
+            self.told("tilt", tilt_deg=tilt), "static-accel", Where(("ax", "ay", "az")),
         )  # fmt: skip

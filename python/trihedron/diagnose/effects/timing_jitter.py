@@ -13,6 +13,7 @@ from trihedron.diagnose.effects.sample_steps import StepErrors, step_errors
 from trihedron.diagnose.effects.stamp_errors import CLEAR, stamp_errors
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.words import why_not
 
 STEP_FACTOR = 5.0
 """A jitter of σ_t moves a step error by (1.5² + 1.5² + 0.5² + 0.5²) σ_t²."""
@@ -55,11 +56,9 @@ class TimingJitter(DirectEffect):
 
     id = "timing-jitter"
     is_sought_again = True
-    mechanism = "samples are taken at other instants than their time stamps say"
-    experiment = "let the sensor's own clock trigger the sampling, or log its data-ready times"
 
     def unavailable(self, context: Context) -> str | None:
-        return "the log has no moves with a gyro" if not context.moves else None
+        return why_not("no-moves") if not context.moves else None
 
     def find(self, context: Context) -> Evidence | None:
         return self._wrong_stamps(context) or self._uneven_samples(context)
@@ -87,8 +86,7 @@ class TimingJitter(DirectEffect):
         return Evidence(
             float(max(ndtr((stamps.followed - 1.0) / max(stamps.sigma, 1e-3)), 1e-300)), max(stamps.gain, 1.0),
             (EffectParameter("stamp_error", stamps.rms_s, stamps.rms_s * max(stamps.sigma, 1e-3), "s"),),
-            f"The time stamps scatter by {1e3 * stamps.rms_s:.2g} ms about an even clock, but the readings do not "
-            f"follow them (share {stamps.followed:.2f} ± {stamps.sigma:.1g}): the samples were taken evenly.",
+            self.told("stamps", rms_s=stamps.rms_s, followed=stamps.followed, sigma=stamps.sigma),
             "timing", reweigh=reweigh,
         )  # fmt: skip
 
@@ -108,7 +106,5 @@ class TimingJitter(DirectEffect):
         return Evidence(
             float(max(ndtr(-z), 1e-300)), float(z**2),
             (EffectParameter("jitter", jitter, float(0.5 * spread / value * jitter), "s"),),
-            f"Every sample is off its time stamp by about {1e3 * jitter:.2g} ms: both sensors' steps scatter together, "
-            "with the slope of the signal.",
-            "timing", reweigh=reweigh,
+            self.told("samples", jitter_s=jitter), "timing", reweigh=reweigh,
         )  # fmt: skip

@@ -11,6 +11,7 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.table_turns import NEAR_DEG, TableTurn, meant_as_multiples, table_turns
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.domains import Where
+from trihedron.records.words import why_not
 
 OFF_SIGMA = 4.0
 """A turn is named that is off by so much: one right turn of 16 000 is."""
@@ -23,12 +24,10 @@ class TurnAngleError(DirectEffect):
 
     id = "turn-angle-error"
     is_of_session = True
-    mechanism = "a turn meant to be a multiple of 90° was not"
-    experiment = "repeat the turns against a stop; turn back by the same angle"
 
     def unavailable(self, context: Context) -> str | None:
         if not context.moves or not meant_as_multiples(table_turns(context)):
-            return "the session has no turns on a table against a wall"
+            return why_not("no-table-turns")
         return None
 
     def find(self, context: Context) -> Evidence | None:
@@ -50,8 +49,9 @@ class TurnAngleError(DirectEffect):
         spans = tuple((float(t[a]), float(t[b - 1])) for a, b in (context.obs.move_ranges[turns[k].move] for k in bad))
         return Evidence(
             max(p, 1e-300), chi2, parameters,
-            f"{len(bad)} of {len(turns)} table turns miss their multiple of 90° (up to "
-            f"{max(abs(np.degrees(errors[k])) for k in bad):.1f}°, others within {NEAR_DEG:.0f}°).",
+            self.told(
+                "turns", wrong=len(bad), turns=len(turns), most_rad=max(abs(errors[k]) for k in bad), near_deg=NEAR_DEG
+            ),
             "moves", Where(("gx", "gy", "gz"), tuple(f"move {turns[k].move}" for k in bad), spans),
         )  # fmt: skip
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
+from trihedron.records.words import why_not
 
 STANDS_OUT = 1.5
 """Power of a pose over the median pose: the variance of 300 white readings is known to 8 %; the most in 48
@@ -16,14 +17,12 @@ class VibrationRectification(Effect):
     """Bias proportional to vibration power above the quiet floor, per axis."""
 
     id = "vibration-rectification"
-    mechanism = "bias follows the power of vibration"
-    experiment = "hold one pose with the vibration on and off"
     accounts_for = ("within-static",)  # the shaking that it follows
 
     def unavailable(self, context: Context) -> str | None:
         power = context.hold_power.sum(axis=1)
         if power.max() < STANDS_OUT * np.median(power):
-            return "no pose vibrates more than the others"
+            return why_not("even-vibration")
         return None
 
     def variants(self, context: Context) -> list[Variant]:

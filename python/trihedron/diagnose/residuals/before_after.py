@@ -56,7 +56,7 @@ def _shown(fitted: Fit) -> dict[str, _Shown]:
         force = force - line.distortion.force[:h] @ twin.effect
     size = np.linalg.norm(force, axis=1)
     along = (force / size[:, None]) @ twin.accel_S
-    sigma = np.sqrt(((along * obs.hold_force_spread) ** 2).sum(axis=1))
+    sigma = obs.norm_spread(along)
     out["static-accel"] = _Shown(obs.hold_time_s, (size - twin.gravity)[:, None], sigma)
     if obs.hold_rate is not None and obs.hold_rate_spread is not None:
         rate = obs.hold_rate @ twin.gyro_S.T

@@ -60,7 +60,8 @@ def settling(context: Context) -> Settling:
     ``s`` and ``k`` are drawn anew in every pose, the same on all axes; the accelerometer shows what of ``k`` lies
     across the vertical, the shape in time all of it. One zero ``z`` for the session, restricted likelihood.
     """
-    tables = [table for tau in SETTLES_S if (table := _table(context, tau)) is not None]
+    directions = _directions(context)
+    tables = [table for tau in SETTLES_S if (table := _table(directions, tau)) is not None]
     if not tables:
         return Settling(0.0, 0.0, 0.0)
     scale = tables[0].unit
@@ -132,13 +133,29 @@ class _Table:
         return np.asarray(-0.5 * (np.log(det).sum(axis=1) + yy.sum(axis=1) - fitted + log_n))
 
 
-def _table(context: Context, tau: float) -> _Table | None:
+CONTRASTS = np.linalg.qr(np.column_stack([np.ones(N_BLOCKS), np.eye(N_BLOCKS)[:, 1:]]))[0][:, 1:].T
+"""(5, 6) what the means of stretches differ by."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Direction:
+    """One direction ``axis`` of a pose, whatever fades: readings ``y`` in units of their ``error``, rates first; the
+    stretches of the pose from ``begins`` to ``ends``, s; ``tilt`` the noise of a level axis, zero for the others."""
+
+    axis: FloatArray
+    y: FloatArray
+    error: float
+    tilt: float
+    begins: FloatArray
+    ends: FloatArray
+
+
+def _directions(context: Context) -> list[_Direction]:
     obs, twin = context.obs, context.fitted.twin
     noise = obs.hold_rate_noise
     if obs.raw_rate is None or noise is None:
-        return None
-    contrasts = np.linalg.qr(np.column_stack([np.ones(N_BLOCKS), np.eye(N_BLOCKS)[:, 1:]]))[0][:, 1:].T
-    sums, axes, errors = [], [], []
+        return []
+    out = []
     for i, hold in enumerate(obs.segments.holds):
         n = (hold.stop - hold.start) // N_BLOCKS
         if n < 2:
@@ -151,23 +168,29 @@ def _table(context: Context, tau: float) -> _Table | None:
         angle = np.cross(force - force.mean(axis=0), up)
         begins = np.arange(N_BLOCKS) * n / obs.recording.rate_hz
         ends = begins + n / obs.recording.rate_hz
-        fades = tau * (np.exp(-begins / tau) - np.exp(-ends / tau)) / (ends - begins)
-        turned = contrasts @ (tau * (1.0 - fades))
         for axis in np.linalg.svd(up[None])[2]:
-            is_level = abs(float(axis @ up)) < LEVEL
             own = float(np.sqrt(((axis @ twin.gyro_S) ** 2 * noise[i] ** 2).sum() * N_BLOCKS))
-            y, a, b = rate @ axis / own, np.ones(N_BLOCKS) / own, fades / own
-            if is_level:
+            y, tilt = rate @ axis / own, 0.0
+            if abs(float(axis @ up)) < LEVEL:
                 # Turned force reads along the other level axis; its white noise is that of the quiet floor.
                 across = np.cross(axis, up) @ twin.accel_S
                 tilt = float(np.sqrt((across**2 * obs.hold_force_sigma[i] ** 2).sum() * N_BLOCKS)) / twin.gravity
-                y = np.concatenate([y, contrasts @ angle @ axis / tilt])
-                a = np.concatenate([a, np.zeros(N_BLOCKS - 1)])
-                b = np.concatenate([b, turned / tilt])
-            sums.append([a @ a, a @ b, b @ b, a @ y, b @ y, y @ y])
-            axes.append(axis)
-            errors.append(own / np.sqrt(N_BLOCKS))
-    if len(axes) < 3 * FEWEST_POSES:
+                y = np.concatenate([y, CONTRASTS @ angle @ axis / tilt])
+            out.append(_Direction(axis, y, own, tilt, begins, ends))
+    return out
+
+
+def _table(directions: list[_Direction], tau: float) -> _Table | None:
+    if len(directions) < 3 * FEWEST_POSES:
         return None
+    sums = []
+    for one in directions:
+        fades = tau * (np.exp(-one.begins / tau) - np.exp(-one.ends / tau)) / (one.ends - one.begins)
+        y, a, b = one.y, np.ones(N_BLOCKS) / one.error, fades / one.error
+        if len(y) > N_BLOCKS:
+            a = np.concatenate([a, np.zeros(N_BLOCKS - 1)])
+            b = np.concatenate([b, CONTRASTS @ (tau * (1.0 - fades)) / one.tilt])
+        sums.append([a @ a, a @ b, b @ b, a @ y, b @ y, y @ y])
     aa, ab, bb, ay, by, yy = np.array(sums).T
-    return _Table(aa, ab, bb, ay, by, yy, np.array(axes), float(np.median(errors)))
+    unit = float(np.median([one.error / np.sqrt(N_BLOCKS) for one in directions]))
+    return _Table(aa, ab, bb, ay, by, yy, np.array([one.axis for one in directions]), unit)

@@ -40,7 +40,7 @@ _CHANNELS = {
 
 
 def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
-    """Chi-square of every row domain against its degrees of freedom (eq. 8.9).
+    """Chi-square of every row domain against its degrees of freedom (eq. 8.7).
 
     ``alpha`` is the chance that a healthy recording disagrees in any domain; it is shared by six domains.
     """
@@ -139,17 +139,21 @@ def hidden_zeros(fitted: Fit) -> tuple[HiddenZero, HiddenZero | None]:
     twin, obs = fitted.twin, fitted.line.obs
     edge = fitted.line.core.is_walk_at_edge
     out: list[HiddenZero | None] = []
+    rates = obs.hold_rate_spread
     sides = (
-        (twin.accel_bias, twin.accel_S, obs.hold_force_spread, edge[0]),
-        (twin.gyro_bias, twin.gyro_S, obs.hold_rate_spread, edge[1]),
+        (twin.accel_bias, obs.norm_spread(twin.up @ twin.accel_S), edge[0]),
+        (
+            twin.gyro_bias,
+            None if rates is None else rates / np.linalg.norm(np.linalg.inv(twin.gyro_S), axis=1),
+            edge[1],
+        ),
     )
-    for zero, S, sigma, is_at_edge in sides:
-        if sigma is None:
+    for zero, noise, is_at_edge in sides:
+        if noise is None:
             out.append(None)
             continue
-        size = 1.0 / np.linalg.norm(np.linalg.inv(S), axis=1)
         rms = float(np.sqrt(np.mean((zero - zero.mean(axis=0)) ** 2)))
-        out.append(HiddenZero(rms, float(np.median(sigma * size)), bool(is_at_edge)))
+        out.append(HiddenZero(rms, float(np.median(noise)), bool(is_at_edge)))
     assert out[0] is not None
     return out[0], out[1]
 
@@ -213,7 +217,7 @@ def weighted_rms(fitted: Fit, rows_residual: FloatArray, base: Fit) -> dict[int,
     rows = np.flatnonzero((system.domain == STATIC_ACCEL) & direct)
     error = np.linalg.solve(line.accel_white, rows_residual[rows].reshape(h, 3, 1))[:, :, 0]
     along = np.einsum("ni,ni->n", error, line.twin.up)
-    weight = 1.0 / ((twin.up @ twin.accel_S) ** 2 * obs.hold_force_spread**2).sum(axis=1)
+    weight = 1.0 / obs.norm_spread(twin.up @ twin.accel_S) ** 2
     out = {STATIC_ACCEL: float(np.sqrt((weight * along**2).sum() / weight.sum()))}
     spread = obs.hold_rate_spread
     if line.gyro_white is not None and spread is not None:

@@ -2,31 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.special import ndtr
 
-from trihedron.diagnose.context import Context
-from trihedron.diagnose.effects.dropped_samples import DroppedSamples
-from trihedron.diagnose.effects.sample_steps import step_errors
-from trihedron.diagnose.effects.timing_jitter import FEWEST_SHARP, TimingJitter, common_time_error
 from trihedron.diagnose.residuals.goodness_of_fit import N_DOMAINS_TESTED
 from trihedron.records.domains import DomainTest, Where
 
 
-def judge_timing(context: Context, alpha: float, refused: Collection[str]) -> DomainTest:
+class Seen(Protocol):
+    """What a sharper look at the sampling found: lost samples, instants that are not those of the stamps."""
+
+    @property
+    def p_value(self) -> float:
+        """Before payment for the search."""
+
+    @property
+    def strength(self) -> float:
+        """Gain in 2 log-likelihood."""
+
+    @property
+    def where(self) -> Where:
+        """Moves and times that show it."""
+
+    @property
+    def reweigh(self) -> Callable[[Any], Any] | None:
+        """What it changes in the observations."""
+
+
+def judge_timing(common: tuple[float, float, int], found: Sequence[Seen], alpha: float) -> DomainTest:
     """Chi-square: squared z of the common time error, plus what lost samples explain; p of the sharper look.
 
-    ``refused`` are ids of effects that did not predict held-out moves any better: jolts look like lost samples.
+    ``common`` is the covariance of the times that the two sensors see, its standard error [s²] (infinite where too few
+    intervals show it) and the number of intervals.
     """
-    step_s = 1.0 / context.obs.recording.rate_hz
-    value, spread, n = common_time_error(step_errors(context), step_s)
-    if n < FEWEST_SHARP:
+    value, spread, n = common
+    if not np.isfinite(spread):
         return DomainTest("timing", 1.0, float(n), 1.0, False, rms=0.0, unit="s")
     z = value / spread
-    looks = [effect for effect in (DroppedSamples(), TimingJitter()) if effect.id not in refused]
-    found = [e for e in (look.find(context) for look in looks) if e is not None]
     p = min([min(1.0, 2.0 * e.p_value) for e in found], default=float(min(1.0, max(2.0 * ndtr(-z), 0.05))))
     where = Where()
     for evidence in found:

@@ -31,6 +31,8 @@ SHORTEST = 32
 """Readings of a piece of a hold: twice as many have 33 frequencies, two windows of the median."""
 ENOUGH_STRETCHES = 6
 """Spectra in the average before longer ones are preferred: it is then known to 40 %."""
+PARTS = 8
+"""Parts of a pose, every other one of which predicts those between."""
 COHERENT = 4.0
 """Standard errors of an amplitude that keeps its phase through the recording: by noise alone once in 3000 lines."""
 
@@ -56,6 +58,11 @@ class Line:
     def share(self) -> float:
         """Variance of the line over that of the readings at rest."""
         return 0.5 * self.amplitude**2 / max(self.rms_before, 1e-300) ** 2
+
+    @property
+    def has_size(self) -> bool:
+        """Whether it carries a share of the readings that is worth a word; its domain and its effect ask the same."""
+        return self.share > MIN_LINE_SHARE
 
 
 def hold_pieces(obs: Observations) -> list[tuple[int, FloatArray]]:
@@ -173,8 +180,8 @@ def _refine(
     sigma = float(noise * np.sqrt(2.0 / len(t)))
     if amplitude < COHERENT * sigma:
         # Not coherent through the recording: the line is real, its amplitude is that of single holds.
-        powers = [project_piece(obs.time_s[a : a + len(part)], part[:, c], f0) for a, part in pieces]
-        amplitude = float(np.sqrt(np.mean(np.square(powers))))
+        stretches = [(obs.time_s[a : a + len(part)], part[:, c]) for a, part in pieces]
+        return _wandering(stretches, c, f0, resolution, p, noise)
     train, _ = project(best_f, early)
     rest = ~early
     model = np.column_stack([np.cos(2 * np.pi * best_f * t[rest]), np.sin(2 * np.pi * best_f * t[rest])]) @ train
@@ -183,6 +190,42 @@ def _refine(
     return Line(
         CHANNELS[c], c % 3, best_f, frequency_sigma, resolution, amplitude, sigma, max(p, 1e-300),
         (before / noise) ** 2, (after / noise) ** 2, before, after,
+    )  # fmt: skip
+
+
+def _wandering(
+    stretches: list[tuple[FloatArray, FloatArray]], c: int, f0: float, resolution: float, p: float, noise: float
+) -> Line:
+    """A line that keeps its phase in a pose only: every other part of a pose predicts the parts between.
+
+    Its amplitude is that of single poses less what noise alone would show there (2σ²·2/n).
+    """
+    tried = f0 + np.linspace(-resolution, resolution, GRID)
+    step = float(tried[1] - tried[0])
+    power = np.zeros(GRID)
+    for t, x in stretches:
+        at = np.ascontiguousarray(t), np.ascontiguousarray(x)
+        power += len(x) * _core.sinusoid_power(*at, start_hz=float(tried[0]), step_hz=step, count=GRID)
+    f = float(tried[np.argmax(power)])
+    lengths = np.array([len(x) for _, x in stretches], dtype=np.float64)
+    squares = np.array([project_piece(t, x, f) ** 2 for t, x in stretches])
+    own = np.average(squares - 4.0 * noise**2 / lengths, weights=lengths)
+    amplitude = float(np.sqrt(max(own, 0.0)))
+    sums, n = np.zeros(2), 0
+    for t, x in stretches:
+        basis = np.column_stack([np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)])
+        part = (np.arange(len(x)) * PARTS // len(x)) % 2
+        for kept in (0, 1):
+            coefficient, *_ = np.linalg.lstsq(basis[part == kept], x[part == kept], rcond=None)
+            rest = part != kept
+            sums += [float((x[rest] ** 2).sum()), float(((x - basis @ coefficient)[rest] ** 2).sum())]
+            n += int(rest.sum())
+    before, after = np.sqrt(sums / max(n, 1))
+    sigma = noise * float(np.sqrt(2.0 / lengths.sum()))
+    of_frequency = float(resolution / max(np.sqrt(lengths.sum() / lengths.mean()), 1.0))
+    return Line(
+        CHANNELS[c], c % 3, f, of_frequency, resolution, amplitude, sigma, max(p, 1e-300), float((before / noise) ** 2),
+        float((after / noise) ** 2), float(before), float(after),
     )  # fmt: skip
 
 
@@ -227,9 +270,11 @@ def judge_within_holds(obs: Observations, alpha: float) -> DomainTest:
     """Lines and noisy poses, as one domain; the p-value is the smallest, paid for by the number of looks."""
     scatter = hold_scatter(obs)
     n_looks = scatter.p_value.size
-    loud = np.where(scatter.ratio > LOUD, scatter.p_value, 1.0)
+    # A pose that was found shaking is said to, and weighed by its own scatter: nothing is left to explain.
+    steady = np.array([not hold.is_unsteady for hold in obs.segments.holds])
+    loud = np.where(steady[:, None] & (scatter.ratio > LOUD), scatter.p_value, 1.0)
     p_scatter = float(min(1.0, loud.min() * n_looks)) if n_looks else 1.0
-    lines = [line for line in find_lines(obs) if line.share > MIN_LINE_SHARE]
+    lines = [line for line in find_lines(obs) if line.has_size]
     p_line = min((line.p_value for line in lines), default=1.0)
     p = min(1.0, 2.0 * min(p_scatter, p_line))
     dof = float(scatter.dof.sum() * scatter.ratio.shape[1])

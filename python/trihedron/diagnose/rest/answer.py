@@ -25,12 +25,13 @@ from trihedron.diagnose.zeros.process import ZeroReadings
 from trihedron.records import Hold, Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainTest, HeldOut, Where
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, rate_to_si
+from trihedron.records.words import effect_words, experiment_for, why_not
+from trihedron.units import rate_to_si
 
 Sensor = Literal["accelerometer", "gyroscope"]
 AXES = ("x", "y", "z")
+PREFIX: dict[Sensor, str] = {"accelerometer": "accel", "gyroscope": "gyro"}
 DOMAIN: dict[Sensor, Domain] = {"accelerometer": "static-accel", "gyroscope": "static-gyro"}
-NOT_HERE = "the log holds too few orientations"
 BEYOND_NOISE = 3.0
 """Rms of a drift over the error of one mean; of a walk, over what noise that turns into one after 20 s (K = √3 N/τ)
 could walk: as among poses."""
@@ -61,7 +62,8 @@ def diagnose_rest(recording: Recording, model: LinearModel, gravity_m_s2: float,
     domains: list[DomainTest] = []
     remaining: list[DomainTest] = []
     effects: list[AcceptedEffect] = []
-    tried = {effect.id: Candidate(effect.id, None, False, NOT_HERE) for effect in catalogue()}
+    not_here = why_not("few-orientations")
+    tried = {effect.id: Candidate(effect.id, None, False, not_here) for effect in catalogue()}
     if pieces is not None:
         sensors: list[Sensor] = ["gyroscope", "accelerometer"] if pieces.rate is not None else ["accelerometer"]
         for sensor in sensors:
@@ -128,7 +130,7 @@ def _zeros(
     pieces: RestPieces, sensor: Sensor, size: FloatArray, unit: str, alpha: float
 ) -> tuple[DomainTest, DomainTest, list[AcceptedEffect], list[Candidate]]:
     """One sensor's zeros: as they run, what temperature or a smooth drift takes of them, what stays."""
-    prefix = "accel" if sensor == "accelerometer" else "gyro"
+    prefix = PREFIX[sensor]
     sigma = pieces.force_sigma if sensor == "accelerometer" else pieces.rate_sigma
     assert sigma is not None
     n_effects = len(catalogue())
@@ -137,7 +139,7 @@ def _zeros(
     curve = thermal_curve(pieces, sensor)
     effect: AcceptedEffect | None = None
     if pieces.temperature is None:
-        candidates.append(Candidate(f"{prefix}-thermal-bias", None, False, "the log has no temperature"))
+        candidates.append(Candidate(f"{prefix}-thermal-bias", None, False, why_not("no-temperature")))
     else:
         candidates.append(Candidate(f"{prefix}-thermal-bias", 1.0 if curve is None else curve.p_value, True))
     raw = _about_poses(pieces, sensor) * size
@@ -182,13 +184,9 @@ def _domain(domain: Domain, x: FloatArray, own: FloatArray, unit: str, *, is_nam
     return DomainTest(domain, chi2, dof, p, p < alpha / N_DOMAINS_TESTED, where, float(np.sqrt(np.mean(x**2))), unit)
 
 
-def _words(unit: str, values: FloatArray) -> str:
-    """Sizes in the unit that people use; counts of an unknown scale stay counts."""
-    if unit == "rad/s":
-        return ", ".join(f"{degrees_from_radians(v):.2g}" for v in values) + " °/s"
-    if unit == "m/s^2":
-        return ", ".join(f"{mm_s2_from_m_s2(v):.3g}" for v in values) + " mm/s²"
-    return ", ".join(f"{v:.3g}" for v in values) + " counts"
+def _case(unit: str) -> str:
+    """Sizes are told in the unit that people use; counts of an unknown scale stay counts."""
+    return "at-rest" if unit in ("rad/s", "m/s^2") else "at-rest-counts"
 
 
 def _thermal(
@@ -205,42 +203,34 @@ def _thermal(
     ]  # fmt: skip
     raw, rest = curve.raw * size, curve.rest * size
     low, high = curve.range_degc
-    name = "gyro" if sensor == "gyroscope" else "accelerometer"
+    effect_id = f"{PREFIX[sensor]}-thermal-bias"
     order = sum("kelvin_per_s" not in n and n != "half_gap" for n in curve.names)
-    shape = {1: "a straight line", 2: "a parabola", 3: "a curve of third order"}[order]
-    statement = (
-        f"The {name}'s zero follows the temperature from {low:.0f} to {high:.0f} °C by {shape}"
-        + (", and its rate of change" if "bias_per_kelvin_per_s" in curve.names else "")
-        + (", on two branches" if "half_gap" in curve.names else "")
-        + f": it runs through {_words(unit, curve.swing * size)} (x, y, z); "
-        f"{_words(unit, rest.std(axis=0))} rms stay of {_words(unit, raw.std(axis=0))}."
-    )
     gap = branch_gap(pieces, rest)
     if gap is not None:
-        statement += (
-            f" At one temperature heating and cooling differ by {_words(unit, gap[0])}: hysteresis, or a drift in "
-            "time, which one cycle does not tell."
-        )
         parameters += [
             EffectParameter(f"branch_difference_{axis}", float(g), float(s), unit)
             for axis, g, s in zip(AXES, *gap, strict=True)
         ]
     confounded = ("accel-thermal-scale",) if sensor == "accelerometer" else ()
-    if confounded and pieces.n_poses == 1:
-        statement += " One orientation does not tell zero from scale, nor the fixture's own tilt across gravity."
+    statement = effect_words(
+        effect_id, _case(unit), low_degc=low, high_degc=high, is_straight=order == 1, is_parabola=order == 2,
+        has_rate="bias_per_kelvin_per_s" in curve.names, has_branches="half_gap" in curve.names,
+        swing=curve.swing * size, left=rest.std(axis=0), raw=raw.std(axis=0), has_gap=gap is not None,
+        gap=() if gap is None else gap[0], is_one_pose=bool(confounded) and pieces.n_poses == 1,
+    )  # fmt: skip
     share = float(np.clip(1.0 - (rest**2).sum() / (raw**2).sum(), 0.0, 1.0))
     mean_size = float(np.sqrt(np.mean(size**2)))
     held = HeldOut(DOMAIN[sensor], 1.0, (curve.held_after / curve.held_before) ** 2, curve.held_before * mean_size,
                    curve.held_after * mean_size, unit)  # fmt: skip
     return AcceptedEffect(
-        id=f"{'gyro' if sensor == 'gyroscope' else 'accel'}-thermal-bias",
+        id=effect_id,
         statement=statement,
         parameters=tuple(parameters),
         p_adjusted=float(min(1.0, max(curve.p_value, 1e-300) * n_effects)),
         delta_bic=curve.gain - curve.cost,
         held_out=(held,),
         confounded_with=confounded,
-        separating_experiment="repeat the cycle with the sensor turned over" if confounded else "",
+        separating_experiment=experiment_for(effect_id, at_rest=True) if confounded else "",
         model=_model("rest-curve", _series(pieces, sensor, size, unit)),
         share=share,
     )
@@ -283,18 +273,13 @@ def _drifting(
 ) -> AcceptedEffect:
     spans = curve.range * size
     errors = [float(np.hypot(s[v.argmax()], s[v.argmin()])) for v, s in zip(curve.values, curve.sigma, strict=True)]
-    name = "gyro" if sensor == "gyroscope" else "accelerometer"
-    statement = (
-        f"The {name}'s zero drifts smoothly through {_words(unit, spans)} (x, y, z); no logged channel explains it."
-    )
-    if sensor == "accelerometer":
-        statement += " A support that settles does the same across gravity."
+    effect_id = f"{PREFIX[sensor]}-hidden-drift"
     share = float(np.clip(((curve.rms * size) ** 2).sum() / max(float(raw.var(axis=0).sum()), 1e-300), 0.0, 1.0))
     series = {"time_s": curve.time_s.tolist(), "value": (curve.values * size[:, None]).tolist(),
               "sigma": (curve.sigma * size[:, None]).tolist(), "unit": unit}  # fmt: skip
     return AcceptedEffect(
-        id=f"{'gyro' if sensor == 'gyroscope' else 'accel'}-hidden-drift",
-        statement=statement,
+        id=effect_id,
+        statement=effect_words(effect_id, _case(unit), range=spans),
         parameters=tuple(
             EffectParameter(f"range_{axis}", float(r), e * float(s), unit)
             for axis, r, e, s in zip(AXES, spans, errors, size, strict=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.selection.compare import excess
+from trihedron.diagnose.selection.excess import excess
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records.diagnosis import AcceptedEffect, EffectParameter
@@ -87,10 +87,8 @@ def _accepted(
 ) -> AcceptedEffect:
     shape = {} if found.variant is None else {name: v for name, (v, _) in found.variant.shape.items()}
     by_id = {effect.id: effect for effect in catalogue()}
-    experiment = by_id[found.rivals[0]].experiment if found.rivals else ""
-    experiment = " / ".join(
-        dict.fromkeys(e for e in (found.effect.experiment if found.rivals else "", experiment) if e)
-    )
+    either = (found.effect, by_id[found.rivals[0]]) if found.rivals else ()
+    experiment = " / ".join(dict.fromkeys(e for one in either if (e := one.separating_experiment())))
     return AcceptedEffect(
         id=found.effect.id,
         statement=statement,

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import chdtri, fdtrc
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms, weighted_rms
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms, weighted_rms
 from trihedron.diagnose.selection.model import StepwiseModel, held_out
 from trihedron.diagnose.selection.score import Scored, dispersion
 from trihedron.diagnose.session.solve import (
@@ -34,6 +35,7 @@ from trihedron.diagnose.session.twin import (
 )
 from trihedron.records.domains import HeldOut
 
+LEAST_P = 1e-300
 VISIBLE = 0.98
 """An effect must lower the held-out misfit of some domain by at least this factor to be worth a name."""
 OF_ACCELEROMETER = (STATIC_ACCEL, DYNAMICS)
@@ -139,8 +141,32 @@ class Comparison:
         return self.gain_at(stays) - self.cost
 
     def gain_at(self, stays: FloatArray) -> float:
-        """Likelihood gain with each domain's drop of chi-square over the dispersion ``stays``."""
-        return min(self.likelihood_gain, self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum()))
+        """Likelihood gain with each domain's drop of chi-square over the dispersion ``stays``, poses' lengths by F."""
+        gain = self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum())
+        if self.variant.distortion.rate is None:
+            # What the accelerometer's walk gains, tuned anew, is of the poses' lengths and counts by their dispersion.
+            gain -= max(self.likelihood_gain - float(self.drop.sum()), 0.0) * (1.0 - 1.0 / float(stays[STATIC_ACCEL]))
+        return min(self.likelihood_gain, gain) - self._of_few(max(float((self.drop / stays)[STATIC_ACCEL]), 0.0))
+
+    def _of_few(self, drop: float) -> float:
+        """What a fall of chi-square of the poses' lengths is not worth, their scatter being known from few.
+
+        A zero that is another in every pose explains any lengths with one number, its size. Against that rival a fall
+        is a ratio of variances: F with the degrees of freedom that stay, and counts as the chi-square that is as rare.
+        """
+        if self.variant.distortion.force is None or drop <= 0.0:
+            return 0.0
+        k, dof = float(self.n_new), float(self.dof[STATIC_ACCEL])
+        if dof <= 0.0:
+            return drop
+        rare = float(fdtrc(k, dof, drop / k))
+        return max(drop - float(chdtri(k, max(rare, LEAST_P))), 0.0)
+
+    @cached_property
+    def dof(self) -> FloatArray:
+        """(domains,) degrees of freedom that stay with the effect."""
+        free = 1.0 - leverage(self.fitted)
+        return np.array([float(free[self.fitted.system.domain == d].sum()) for d in range(N_DOMAINS)])
 
     @property
     def predicts(self) -> bool:
@@ -276,44 +302,6 @@ def profile(fitted: Fit) -> float:
     Marginal likelihoods over everything differ by the flat prior of the new parameters; theirs is left out.
     """
     return fitted.log_profile
-
-
-def domain_chi2(fitted: Fit) -> dict[int, tuple[float, float]]:
-    """Chi-square and degrees of freedom of every row domain, in the noise that was predicted.
-
-    Where noise was widened for what nothing explained, the widening is taken out.
-    """
-    used = leverage(fitted)
-    obs = fitted.line.obs
-    out = {}
-    for d in ROW_DOMAINS:
-        rows = fitted.system.domain == d
-        widened = {MOVES: obs.moves_inflation, DYNAMICS: obs.dynamics_inflation}.get(d, 1.0)
-        out[d] = (
-            float((fitted.system.residual[rows] ** 2).sum()) * float(widened) ** 2,
-            float((1.0 - used[rows]).sum()),
-        )
-    return out
-
-
-def excess(fitted: Fit) -> float:
-    """Chi-square beyond its degrees of freedom, over the domains that have more than they should."""
-    return sum(max(chi2 - dof, 0.0) for chi2, dof in domain_chi2(fitted).values())
-
-
-def explained(before: Fit, after: Fit) -> float:
-    """How much excess is gone, over as many rows as there were before.
-
-    Moves that an effect leaves out take their excess with them: that explains something only so far as they disagreed
-    more than those that stay.
-    """
-    left = domain_chi2(after)
-    gone = 0.0
-    for domain, (chi2, dof) in domain_chi2(before).items():
-        still, rows = left.get(domain, (0.0, 0.0))
-        rest = max(still - rows, 0.0) * (dof / rows if rows >= LEAST_DOF else 0.0)
-        gone += max(chi2 - dof, 0.0) - rest
-    return max(gone, 0.0)
 
 
 def held_out_records(before_fit: Fit, before: Prediction, after_fit: Fit, after: Prediction) -> tuple[HeldOut, ...]:

@@ -9,7 +9,8 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
-from trihedron.diagnose.selection.compare import explained, held_out_records, mends
+from trihedron.diagnose.selection.compare import held_out_records, mends
+from trihedron.diagnose.selection.excess import explained
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel, held_out, observed_with, on_observations
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import tune_noise

@@ -39,14 +39,16 @@ def final_numbers(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> Fi
         assert accel is not None
         obs = with_accel_scatter(obs, float(accel.evidence.scatter[0]), context.si_per_raw("accelerometer"))
     elif "static-accel" in left:
-        obs = replace(obs, hold_force_sigma=obs.hold_force_sigma * np.sqrt(max(left["static-accel"], 1.0)))
+        wider = float(np.sqrt(max(left["static-accel"], 1.0)))
+        along = None if obs.force_up is None else (obs.force_up[0], obs.force_up[1] * wider)
+        obs = replace(obs, hold_force_sigma=obs.hold_force_sigma * wider, force_up=along)
     gyro = None if "gyro-zero-scatter" in named else gyro_evidence(context)
     if _scatters(gyro):
         assert gyro is not None
         obs = with_gyro_scatter(obs, gyro.evidence.scatter, context.si_per_raw("gyroscope"))
     elif "static-gyro" in left and obs.hold_rate_sigma is not None and obs.hold_creep is None:
-        wider: FloatArray = obs.hold_rate_sigma * np.sqrt(max(left["static-gyro"], 1.0))
-        obs = replace(obs, hold_rate_sigma=wider)
+        rates: FloatArray = obs.hold_rate_sigma * np.sqrt(max(left["static-gyro"], 1.0))
+        obs = replace(obs, hold_rate_sigma=rates)
     obs = replace(
         obs,
         moves_inflation=max(obs.moves_inflation, float(np.sqrt(max(left.get("moves", 1.0), 1.0)))),

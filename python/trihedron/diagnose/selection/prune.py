@@ -7,12 +7,11 @@ from dataclasses import replace
 from trihedron.diagnose.selection.compare import (
     Comparison,
     cost_of,
-    domain_chi2,
-    explained,
     held_out_records,
     mends,
     own_domains,
 )
+from trihedron.diagnose.selection.excess import domain_chi2, explained
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel, with_only
 from trihedron.diagnose.selection.stepwise import is_demanded
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO, Distortion

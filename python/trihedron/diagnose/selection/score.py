@@ -1,4 +1,4 @@
-"""Rao's score test of every candidate against the model as it stands (eq. 8.7)."""
+"""Rao's score test of every candidate against the model as it stands (eq. 8.8)."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from trihedron.diagnose.effects import Effect, catalogue
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.session.solve import N_DOMAINS, Fit, leverage, reduce, score
 from trihedron.diagnose.session.twin import PRIOR
+from trihedron.records.words import why_not
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +111,7 @@ def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored],
             if best is None or merit > best.merit:
                 best = scored
         if best is None:
-            missing.append((effect.id, "the calibration itself imitates it in this recording"))
+            missing.append((effect.id, why_not("imitated")))
         else:
             out.append(replace(best, merits=tuple(merits)))
     out.sort(key=lambda s: -s.merit)

@@ -1,4 +1,4 @@
-"""Forward selection: every effect of the catalogue competes, the best one joins, and again (eq. 8.7-8.10)."""
+"""Forward selection: every effect of the catalogue competes, the best one joins, and again (eq. 8.8-8.10)."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from trihedron.arrays import FloatArray
 from trihedron.records import Recording, Segments
 from trihedron.refused import RefusedError
 from trihedron.session.lines_at_rest import means_beside_lines
-from trihedron.session.noise import measure_noise
+from trihedron.session.noise import Along, along_gradient, measure_noise
 
 UNSTEADY = 2.0
 """Error of a pose's mean over that of the session's usual pose, from which the pose itself was not still: errors of
@@ -40,6 +40,7 @@ class Observations:
     ``zero_scatter`` (2, 3), once a diagnosis has found it: how far zeros scatter from hold to hold beside their walk,
     accelerometer and gyro, raw units. ``hold_creep`` (h, 3), once it was seen: by how much (one sigma,
     raw units) poses turn that settle; it is in ``hold_rate_sigma``.
+    ``force_up`` are verticals (h, 3), raw unit vectors, and the errors (h,) of the means along them.
     The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
     """
 
@@ -67,6 +68,7 @@ class Observations:
     dynamics_inflation: float = 1.0
     zero_scatter: FloatArray | None = None
     hold_creep: FloatArray | None = None
+    force_up: Along | None = None
 
     @property
     def n_holds(self) -> int:
@@ -86,13 +88,33 @@ class Observations:
         out: FloatArray = np.sqrt(self.hold_rate_sigma**2 - self.hold_creep**2)
         return out
 
-    @property
-    def hold_force_spread(self) -> FloatArray:
-        """(h, 3) what the means at rest may differ by: noise and scatter of the zeros, accelerometer."""
+    def norm_sigma(self, gradient: FloatArray) -> FloatArray:
+        """(h,) standard errors of the length of gravity, SI, that grows with the raw means by ``gradient`` (h, 3)."""
+        return along_gradient(self.hold_force_sigma, self.force_up, gradient)
+
+    def norm_spread(self, gradient: FloatArray) -> FloatArray:
+        """(h,) what that length may differ by: its noise and scatter of the zeros."""
+        noise = self.norm_sigma(gradient)
         if self.zero_scatter is None:
-            return self.hold_force_sigma
-        out: FloatArray = np.hypot(self.hold_force_sigma, self.zero_scatter[0])
-        return out
+            return noise
+        return np.asarray(np.sqrt(noise**2 + (gradient**2 * self.zero_scatter[0] ** 2).sum(axis=1)))
+
+    @cached_property
+    def hold_force_white(self) -> FloatArray:
+        """(h, 3, 3) from an error of the accelerometer's means, raw, to the rows of the core."""
+        sigma = self.hold_force_sigma
+        out = np.eye(3) / sigma[:, :, None]
+        if self.force_up is None:
+            return out
+        up, error = self.force_up
+        known = np.isfinite(error)
+        across = np.eye(3) - up[:, :, None] * up[:, None, :]
+        covariance = (across * sigma[:, None, :] ** 2) @ across + (
+            up[:, :, None] * up[:, None, :] * np.where(known, error, 1.0)[:, None, None] ** 2
+        )
+        value, vector = np.linalg.eigh(covariance)
+        white: FloatArray = (vector / np.sqrt(value)[:, None, :]) @ vector.transpose(0, 2, 1)
+        return np.where(known[:, None, None], white, out)
 
     @property
     def hold_rate_spread(self) -> FloatArray | None:
@@ -220,6 +242,7 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         force_density=noise.force_density,
         rate_density=noise.rate_density,
         bumped_s=bumped,
+        force_up=noise.force_up,
         unresolved=dict(zip(holds, unresolved, strict=True)),
     )
 

@@ -187,7 +187,7 @@ class Score:
 
 
 def score(reduced: Reduced, columns: FloatArray) -> Score:
-    """Rao's score test of effect columns against the fitted twin (eq. 8.7).
+    """Rao's score test of effect columns against the fitted twin (eq. 8.8).
 
     Directions whose projection keeps less than ``SEEN`` of their squared length are imitated by the calibration itself
     and are not counted: they cannot be seen in this recording.

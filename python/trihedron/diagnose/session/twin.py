@@ -161,7 +161,7 @@ class Linearisation:
     def accel_white(self) -> FloatArray:
         """(holds, 3, 3) from an error in SI to a whitened row of the accelerometer at rest."""
         inverse = np.linalg.inv(self.twin.accel_S)
-        white: FloatArray = inverse / self.obs.hold_force_sigma[:, :, None]
+        white: FloatArray = self.obs.hold_force_white @ inverse
         return white
 
     @cached_property
@@ -203,10 +203,11 @@ def core_model(
         rate=contiguous(obs.hold_rate) if has_rate else None,
         rate_sigma=contiguous(obs.hold_rate_sigma) if has_rate else None,
         rate_density=contiguous(obs.rate_density) if has_rate else None,
+        force_along=obs.force_up,
     )
     scatter = None
     if is_scatter_free or obs.zero_scatter is not None:
-        unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma)
+        unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma, obs.force_up)
         scatter = (unit, False)
         if obs.zero_scatter is not None and is_scatter_free:
             unit[1] = np.maximum(obs.zero_scatter[1], START_STRENGTHS[1][0] * unit[1])

@@ -1,4 +1,4 @@
-"""Zeros that take two values: a trap in a readout, a play; no zero that is drawn anew in every pose (eq. Z.9)."""
+"""Zeros that take two values: a trap in a readout, a play; no zero that is drawn anew in every pose (eq. 8.7e)."""
 
 from __future__ import annotations
 

@@ -114,7 +114,7 @@ def accel_zeros(context: Context) -> SessionZeros | None:
         force = force - (line.distortion.force[: obs.n_holds] @ twin.effect)[halves.pose]
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
     values = np.linalg.norm(force, axis=1) - twin.gravity
-    sigma = np.sqrt(2.0 * ((up @ twin.accel_S) ** 2 * obs.hold_force_sigma[halves.pose] ** 2).sum(axis=1))
+    sigma = np.sqrt(2.0) * obs.norm_sigma(twin.up @ twin.accel_S)[halves.pose]
     a = halves.force / np.abs(halves.force).max()
     columns = [up[:, i] * a[:, j] for i in range(3) for j in range(i + 1)] + list(up.T)
     thermal: tuple[int, ...] = ()

@@ -51,7 +51,7 @@ def pose_readings(recording: Recording, segments: Segments, table: PoseTable | N
         raise RefusedError(f"{recording.source}: there is no accelerometer to calibrate in this log")
     if table is not None and table.start_s is not None and table.stop_s is not None:
         return _timed_means(recording, segments, a, table.start_s, table.stop_s)
-    mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma_mean
+    mean, sigma = segments.accelerometer_mean, segments.norm_sigma
     if mean is None or sigma is None or segments.n_holds == 0:
         raise RefusedError(f"{recording.source}: no still pose was found, so there is nothing to calibrate from")
     step = 1.0 / recording.rate_hz

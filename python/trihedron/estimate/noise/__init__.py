@@ -6,6 +6,7 @@ from trihedron.estimate.noise.from_curve import identify_curve
 from trihedron.estimate.noise.hold_statistics import ratio_of
 from trihedron.estimate.noise.holds import noise_of_holds
 from trihedron.estimate.noise.identify import identify_noise
+from trihedron.estimate.noise.low_pass import gain_of
 from trihedron.estimate.noise.planning import recording_length_s, relative_sigma
 from trihedron.estimate.noise.streamed import stream_noise
 
@@ -13,6 +14,7 @@ __all__ = [
     "allan_deviation",
     "default_clusters",
     "degrees_of_freedom",
+    "gain_of",
     "identify_curve",
     "identify_noise",
     "noise_of_holds",

@@ -1,6 +1,6 @@
 """The time in which a sensor's coloured noise forgets: a first-order Gauss-Markov process in the octaves of its holds.
 
-    S(f) = N² + q / (1 + (2πfτ)²)                                                             (docs/noise.md, eq. 8.1)
+    S(f) = N² + q / (1 + (2πfτ)²)                                                             (docs/noise.md, eq. N.1)
 
 with one τ for the axes of a sensor, N and q of each its own. It is stated only where such a corner explains the octaves
 better than any straight slope (1/f, a walk), and where it lies among them.

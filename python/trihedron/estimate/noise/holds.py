@@ -101,6 +101,7 @@ def noise_of_holds(
             corner_hz=one.corner_hz,
             corner_above_hz=one.above_hz,
             scatter=axis.pooled.scatter,
+            corner_shape=one.shape,
         )
         for axis, one, density, name, unit in zip(axes, filters, white, names, units, strict=True)
     )
@@ -135,7 +136,8 @@ class _Axis:
         power = _Power.of(parts)
         pooled = pooled_logarithm(power.variance, power.dof)
         whole = Spectrum(*_segments(parts, rate_hz, most=True), step**2 / 12.0 / rate_hz, pooled.scatter)
-        return cls(parts, step, lines, pooled, undisturbed(whole, rate_hz))
+        beside = whole.beside([line.frequency_hz for line in lines])
+        return cls(parts, step, lines, pooled, undisturbed(beside, rate_hz))
 
     @property
     def rounding(self) -> float:

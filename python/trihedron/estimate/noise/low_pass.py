@@ -35,6 +35,8 @@ SHAPE_ERROR = 0.01
 """What is left of that, of the density's power."""
 LEAST_GAIN = 1e-9
 """A Gaussian far above its corner is nothing that numbers hold."""
+HUMP = 0.25
+"""In the logarithm, on either side of a line: a resonance of quality 2 has fallen to its half there."""
 SCORING_STEPS = 30
 HIGHEST_FLOOR = 0.125
 """Of the rate: a quarter of the spectrum below Nyquist may be taken for disturbance, no more."""
@@ -76,6 +78,16 @@ class Spectrum:
             return self
         high = self.frequency_hz >= lowest_hz
         return replace(self, frequency_hz=self.frequency_hz[high], power=self.power[high], slow=LEAKAGE)
+
+    def beside(self, lines_hz: Sequence[float]) -> Spectrum:
+        """Without what lies near a line: the hump of a stand or a hand that rings there is no floor of a sensor."""
+        near = np.zeros(len(self.frequency_hz), dtype=bool)
+        for line in lines_hz:
+            near |= np.abs(np.log(self.frequency_hz / line)) < HUMP
+        # Lines everywhere leave no other floor to be seen.
+        if 2 * np.count_nonzero(near) > len(near):
+            return self
+        return replace(self, frequency_hz=self.frequency_hz[~near], power=self.power[~near])
 
     def beneath(self, frequency_hz: FloatArray) -> FloatArray:
         """(k, m) shapes of slow noise, one at the lowest frequency."""

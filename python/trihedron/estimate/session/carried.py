@@ -59,16 +59,15 @@ def carried(
     skew[:, [1, 2, 0], [0, 1, 2]] = start[:, [2, 0, 1]]
     turn = rotation @ skew
 
-    def spread(part: FloatArray, covariance: FloatArray) -> FloatArray:
-        out: FloatArray = part @ covariance @ np.swapaxes(part, 1, 2)
-        return out
-
-    of_force = np.einsum("ij,nj,kj->nik", S_a, measured.var_reading, S_a)
-    of_zero = np.einsum("ij,nj,kj->nik", S_w, measured.var_zero, S_w)
-    covariance = spread(turn, cov_rate) + spread(rotation, of_force[before]) + of_force[after]
-    covariance = covariance + spread(turn @ wrt_before, of_zero[before]) + spread(turn @ wrt_after, of_zero[after])
+    of_force = S_a * np.sqrt(measured.var_reading)[:, None, :]
+    of_zero = S_w * np.sqrt(measured.var_zero)[:, None, :]
+    # Roots of covariances side by side: sums of squares do not go negative by rounding, as turns of gravity about
+    # itself make differences of large parts do.
+    roots = [turn @ _root(cov_rate), rotation @ of_force[before], of_force[after],
+             turn @ wrt_before @ of_zero[before], turn @ wrt_after @ of_zero[after]]  # fmt: skip
+    root = np.concatenate(roots, axis=2)
     across = np.eye(3) - unit_end[:, :, None] * unit_end[:, None, :]
-    floor2 = np.einsum("mii->m", across @ covariance @ across)
+    floor2 = np.sum((across @ root) ** 2, axis=(1, 2))
     model2 = np.zeros(len(angle))
     if covariance_S_w is not None:
         # Zero readings are subtracted: S enters through the rate and through the biases -S z.
@@ -78,6 +77,12 @@ def carried(
                 wrt_before[:, :, i : i + 1] * measured.zero[before][:, None, :]
                 + wrt_after[:, :, i : i + 1] * measured.zero[after][:, None, :]
             )
-        by_model = spread(turn @ wrt_S, np.broadcast_to(covariance_S_w, (len(angle), 9, 9)))
-        model2 = np.einsum("mii->m", across @ by_model @ across)
-    return Carried(residual, np.sqrt(np.einsum("mii->mi", covariance)), angle, floor2, model2)
+        model2 = np.sum((across @ turn @ wrt_S @ _root(covariance_S_w)) ** 2, axis=(1, 2))
+    return Carried(residual, np.sqrt(np.sum(root**2, axis=2)), angle, floor2, model2)
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """L of L Lᵀ for covariances (..., n, n) that are positive semidefinite but for rounding."""
+    values, vectors = np.linalg.eigh(covariance)
+    out: FloatArray = vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
+    return out

@@ -15,6 +15,7 @@ from trihedron.estimate.session.carried import Carried, carried
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, SessionSolution
 from trihedron.estimate.session.observed import Observed
 from trihedron.records.calibration import FitQuality
+from trihedron.session.noise import along_gradient
 
 N_ACCELEROMETER, N_GYROSCOPE = 9, 9
 
@@ -48,7 +49,7 @@ def norm_errors(observed: Observed, S_a: FloatArray, b_a: FloatArray) -> tuple[F
     force = (observed.hold_force + observed.force_origin) @ S_a.T + b_a
     norm = np.linalg.norm(force, axis=1)
     gain = (force / norm[:, None]) @ S_a
-    return norm - observed.gravity_m_s2, np.sqrt(np.sum(gain**2 * observed.hold_force_sigma**2, axis=1))
+    return norm - observed.gravity_m_s2, along_gradient(observed.hold_force_sigma, observed.force_up, gain)
 
 
 @dataclass(frozen=True, eq=False)

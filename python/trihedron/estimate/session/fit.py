@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.session.observed import Observed
-from trihedron.probability import fdtrc
+from trihedron.probability import chdtri, fdtrc
 from trihedron.records.words import words
 from trihedron.session.noise import START_STRENGTHS
 
@@ -20,6 +20,10 @@ NOISE_DOF = 100.0
 DEAF = 1e3
 """Widening at which a row no longer says anything beside the others."""
 MOST_WIDENINGS = 8
+SETTLED = 1.05
+"""χ² per degree of freedom at which moves that were widened are as uncertain as they miss."""
+MEDIAN_CHI2_2 = 1.386
+LEAST_SHRINK = 0.1
 STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 """Labels of rows: accelerometer at rest, gravity after a move, velocity over it."""
 
@@ -92,6 +96,21 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     )
 
 
+def far_moves(solution: SessionSolution, n_moves: int) -> BoolArray:
+    """Moves (m,) whose gravity misses as none of so many does by chance, in units of the usual miss where that is above
+    the noise: the rule of the moves alone (:mod:`trihedron.estimate.gyroscope.alignment`), at this fit.
+    """
+    labels = solution.core.labels
+    of_gravity = labels[:, 0] == MOVES
+    squared = (solution.core.residual[of_gravity] * solution.inflation[0]) ** 2
+    distance = np.bincount(labels[of_gravity, 1], squared, n_moves)
+    # Residuals of fitted parameters are smaller.
+    shrink = max(solution.moves_dof / (2.0 * n_moves), LEAST_SHRINK)
+    typical = max(1.0, float(np.median(distance)) / (MEDIAN_CHI2_2 * shrink))
+    out: BoolArray = distance > float(chdtri(2, FALSE_ALARM / n_moves)) * typical
+    return out
+
+
 def fitted(
     observed: Observed,
     S_a: FloatArray,
@@ -140,6 +159,8 @@ def _inflation(core: _core.SessionFit, now: tuple[float, float]) -> tuple[float,
     if dynamics < DEAF and dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
         return moves, DEAF  # and gravity after the moves is judged once it no longer bends the fit
     chi2, dof = float(every_chi2[MOVES]), float(every_dof[MOVES])
-    if dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM:
-        moves *= float(np.sqrt(chi2 / dof))
-    return moves, dynamics
+    if dof < 1.0:
+        return moves, dynamics
+    # Once widened, poses bend less towards the moves: what they then miss is again above its noise.
+    is_short = chi2 / dof > SETTLED if moves > 1.0 else fdtrc(dof, NOISE_DOF, chi2 / dof) < FALSE_ALARM
+    return (moves * float(np.sqrt(chi2 / dof)) if is_short else moves), dynamics

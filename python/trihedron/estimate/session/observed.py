@@ -12,7 +12,7 @@ from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
-from trihedron.session.noise import measure_noise, scatter_unit
+from trihedron.session.noise import Along, measure_noise, scatter_unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class Observed:
 
     Hold means and standard errors (n, 3), densities (3,) raw · √s, the samples of the ``moves`` with the holds
     ``before`` (m,) they begin in; ``inflation`` on the standard errors of gravity after a move and of the velocity over
-    it.
+    it; ``force_up`` as in :class:`SessionNoise`.
     """
 
     gravity_m_s2: float
@@ -39,6 +39,7 @@ class Observed:
     sigma_time_s: float
     nominal_step_s: float
     inflation: tuple[float, float] = (1.0, 1.0)
+    force_up: Along | None = None
 
     def model(self) -> _core.SessionModel:
         """The Rust model; zeros may scatter from pose to pose as far as the evidence goes."""
@@ -50,6 +51,7 @@ class Observed:
             rate=self.hold_rate,
             rate_sigma=self.hold_rate_sigma,
             rate_density=self.rate_density,
+            force_along=self.force_up,
         )
         return _core.SessionModel(
             gravity_m_s2=self.gravity_m_s2,
@@ -57,7 +59,7 @@ class Observed:
             moves=self.moves,
             noise=(self.sigma_time_s, self.nominal_step_s, self.inflation),
             prior=None,
-            scatter=(scatter_unit(self.hold_force_sigma, self.hold_rate_sigma), False),
+            scatter=(scatter_unit(self.hold_force_sigma, self.hold_rate_sigma, self.force_up), False),
         )
 
 
@@ -112,4 +114,5 @@ def arranged(
         before=np.array(before, dtype=np.int64),
         sigma_time_s=measured.sigma_time_s,
         nominal_step_s=measured.nominal_step_s,
+        force_up=noise.force_up,
     )

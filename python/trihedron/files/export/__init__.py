@@ -17,6 +17,7 @@ from trihedron.files.export.others import to_imu_tk, to_pyins, to_xio
 from trihedron.files.export.vio import to_basalt, to_kalibr, to_openvins, to_ros, to_vins_fusion
 from trihedron.files.plausible import require_plausible
 from trihedron.records import Calibration
+from trihedron.refused import RefusedError
 
 __all__ = [
     "TARGETS",
@@ -56,7 +57,7 @@ def export_files(calibration: Calibration, target: str, options: ExportOptions |
         When there is no such target, the calibration is no sensor's, or cannot be expressed in that convention.
     """
     if target not in TARGETS:
-        raise ValueError(f"there is no export to {target!r}; there are {', '.join(TARGETS)}.")
+        raise RefusedError(f"there is no export to {target!r}; there are {', '.join(TARGETS)}.")
     made = TARGETS[target](require_plausible(calibration), options or ExportOptions())
     return {"": made} if isinstance(made, str) else made
 

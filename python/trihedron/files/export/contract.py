@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from trihedron.files.plausible import has_one_handedness, named_sensors
 from trihedron.records import Calibration, SensorCalibration
+from trihedron.refused import RefusedError
 from trihedron.units import (
     AccelerationUnit,
     RateUnit,
@@ -80,7 +81,7 @@ def of_si_readings(calibration: Calibration, target: str, options: ExportOptions
 
 def _known(unit: float | None, target: str, sensor: str, option: str, example: str) -> None:
     if unit is None:
-        raise ValueError(
+        raise RefusedError(
             f"{target} expects {sensor} readings in SI and this calibration maps counts: say the size of a count that "
             f"its driver assumes with {option} '{example}', or export to c, rust or python."
         )

@@ -24,6 +24,7 @@ from trihedron.files.export.contract import (
 )
 from trihedron.files.export.matrices import lower_orthogonal
 from trihedron.records import Calibration
+from trihedron.refused import RefusedError
 from trihedron.sensor_model import in_frame, other_form
 
 _AXES = ("x", "y", "z")
@@ -122,7 +123,9 @@ def to_ros(calibration: Calibration, options: ExportOptions) -> str:
     """
     known = of_si_readings(calibration, "ROS", options)
     if options.rate_hz is None or options.accelerometer_noise is None:
-        raise ValueError("the covariance of a message needs the noise and the rate: add --noise ALLAN.json --rate HZ.")
+        raise RefusedError(
+            "the covariance of a message needs the noise and the rate: add --noise ALLAN.json --rate HZ."
+        )
     equation = "sensor_msgs/Imu: variance of one message = N^2 * rate, in SI; apply S and b before publishing."
     lines = [f"# {line}" for line in (*heading(known, equation), *_lost_without_intrinsics(known))]
     pairs = (("linear_acceleration", options.accelerometer_noise), ("angular_velocity", options.gyroscope_noise))

@@ -9,6 +9,7 @@ import lzma
 import re
 import zlib
 from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -93,6 +94,25 @@ def blocks(
         raise from_os_error(path, error) from None
 
 
+def beginning(path: Path, compression: str | None, n: int, content: bytes | None = None) -> bytes:
+    """The first ``n`` bytes of the text.
+
+    Raises
+    ------
+    ReadError
+        As :func:`blocks`.
+    """
+    if content is not None:
+        return content[:n]
+    try:
+        with open_binary(path, compression) as stream:
+            return stream.read(n)
+    except (EOFError, zlib.error, lzma.LZMAError, OSError):
+        # Said with the line that the damage is behind.
+        with closing(blocks(path, compression, Cursor())) as parts:
+            return next(parts, b"")[:n]
+
+
 _MINUS = "\u2212".encode()
 """What typesetting programs and some spreadsheets write for ``-``."""
 _SEMICOLON = re.compile(rb"(?m)^;")
@@ -116,7 +136,10 @@ def as_utf8(path: Path, data: bytes, first_line: int) -> bytes:
     byte."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return data.decode("utf-16", errors="replace").encode().replace(_MINUS, b"-")
-    data = data.removeprefix(b"\xef\xbb\xbf").replace(_MINUS, b"-")
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    # A search for one byte is ten times faster than one for three, and nearly all logs are ASCII.
+    if _MINUS[:1] in data:
+        data = data.replace(_MINUS, b"-")
     zero = data.find(b"\x00")
     if zero >= 0:
         line = first_line + data.count(b"\n", 0, zero)

@@ -9,7 +9,7 @@ from pathlib import Path
 from trihedron.read.errors import ReadError, refuse_after_fork
 from trihedron.read.room import check_memory
 from trihedron.read.table import Table
-from trihedron.read.text.blocks import Cursor, as_utf8, blocks
+from trihedron.read.text.blocks import Cursor, as_utf8, beginning, blocks
 from trihedron.read.text.dialect import Rewritten, rewrite
 from trihedron.read.text.reader import TextReader
 from trihedron.read.text.records import split_records
@@ -37,9 +37,8 @@ def read_text(
         As :class:`TextReader`.
     """
     refuse_after_fork(path)
-    cursor = Cursor()
-    with closing(blocks(path, compression, cursor, content)) as parts:
-        first = next(parts, b"")
+    # In UTF-16 a sample is twice as long.
+    first = beginning(path, compression, 2 * _SAMPLE_BYTES, content)
     # A zero byte is complained about by the reader, with its line.
     sample = first[:_SAMPLE_BYTES] if b"\x00" in first else as_utf8(path, first, 1)[:_SAMPLE_BYTES]
     head = sample.decode("utf-8", errors="replace")

@@ -128,7 +128,7 @@ class TextReader:
         layout = detect(sample.decode("utf-8", errors="replace"))
         if layout is None:
             raise ReadError(
-                f"{self.path}: no line of numbers in the first {sample.count(10) or 1} lines; "
+                f"{self.path}: no line of numbers (lines looked at: {sample.count(10) or 1}); "
                 "a log needs rows of time, acceleration and angular rate."
             )
         if layout.header_ignored:

@@ -164,7 +164,7 @@ _MOVES = (
         "possible",
         SERIOUS,
         "Gravity after the moves is missed by more than noise, and the stamps are so even that they may have been "
-        "made anew: {lost_share:.2g !%} of the samples could be missing without a trace. Every turn, and the gyro's "
+        "made anew: {lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
         "scale factors, would be wrong by as much; its standard error without that is {sigma_scale:.2g %}.",
         "A link or a logger that drops samples and stamps, or numbers, what is left anew; or another cause of "
         "the misses.",

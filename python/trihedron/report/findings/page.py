@@ -38,15 +38,15 @@ def page() -> str:
 
 def _told(entry: Entry) -> str:
     severity = entry.severity.value + (f" or {entry.or_severity.value}" if entry.or_severity else "")
-    lines = [f"\n**{severity}**: {_shown(entry.seen)}"]
+    lines = [f"\n**{severity}**: {shown(entry.seen)}"]
     if entry.cause:
-        lines.append(f"*Likely:* {_shown(entry.cause)}")
+        lines.append(f"*Likely:* {shown(entry.cause)}")
     if entry.action:
-        lines.append(f"*Do:* {_shown(entry.action)}")
+        lines.append(f"*Do:* {shown(entry.action)}")
     return "<br>\n".join(lines) + "\n"
 
 
-def _shown(template: str) -> str:
+def shown(template: str) -> str:
     """A sentence with the names of its values in their places, and both branches where it has two."""
     words = []
     for text, name, how, _ in Formatter().parse(template):
@@ -54,11 +54,12 @@ def _shown(template: str) -> str:
         if not name:
             continue
         if how and how[0] in BRANCHES:
-            words.append("/".join(_shown(branch) for branch in branches(how) if branch))
+            words.append("/".join(shown(branch) for branch in branches(how) if branch))
         elif how and how.startswith("# "):
             words.append(f"*n* {how[2:]}(s)")
         else:
-            unit = how.partition(" ")[2] if how and how[0] in ".+" else ""
+            number = how.removeprefix("all ").removeprefix("abs ") if how else ""
+            unit = number.partition(" ")[2] if number[:1] in {".", "+"} else ""
             words.append(f"*{name.replace('_', ' ')}*" + (f" {unit}" if unit and unit[0] != "!" else ""))
     return "".join(words)
 

@@ -4,6 +4,7 @@ A place is a name and, after the colon, how its value becomes words:
 
 ``.3g`` · ``.3g mm/s²``  a number, in the unit named there (values are SI); ``abs .3g %`` without its sign;
                          ``.3g !%`` without the unit's name
+``all .2g °/s``          several numbers in one unit, which is named once: ``0.1, 0.2 °/s``
 ``# hold``               ``1 hold``, ``3 holds``
 ``?drifts|drift``        the first words where the value is 1 or true, else the second; they may hold places
 ``<below|above``         the first words where the value is negative, else the second; they may hold places
@@ -23,12 +24,13 @@ from string import Formatter
 from typing import Any
 
 from trihedron.report.numbers import listed
-from trihedron.units import degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, ms_from_s
+from trihedron.units import cm_from_m, degrees_from_radians, mg_from_m_s2, mm_s2_from_m_s2, ms_from_s
 
 UNITS: Mapping[str, Callable[[float], float]] = {
     "mm/s²": mm_s2_from_m_s2,
     "mg": mg_from_m_s2,
     "ms": ms_from_s,
+    "cm": cm_from_m,
     "deg": degrees_from_radians,
     "deg/s": degrees_from_radians,
     "°/s": degrees_from_radians,
@@ -86,6 +88,10 @@ def branches(how: str) -> tuple[str, str]:
 def _in_words(value: Any, how: str, line: str) -> str:
     if how.startswith("each"):
         return (how[4:] or ", ").join(filled(line, {f"v{i}": v for i, v in enumerate(group)}, {}) for group in value)
+    if how.startswith("all "):
+        digits, _, unit = how[4:].partition(" ")
+        alike = f"{digits} !{unit}" if unit else digits
+        return ", ".join(_number(number, alike) for number in value) + (f" {unit}" if unit else "")
     if how == "and":
         return listed([str(word) for word in value])
     if how == "together":

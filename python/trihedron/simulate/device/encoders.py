@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from trihedron.records.frame_declaration import SIZES, FrameDeclaration
+from trihedron.refused import RefusedError
 
 Reading = Sequence[float]
 Encoder = Callable[[int, float, Reading, Reading], bytes]
@@ -128,7 +129,7 @@ def encoder_for(protocol: str | FrameDeclaration, scales: Scales | None = None) 
     if isinstance(protocol, FrameDeclaration):
         return declared(protocol)
     if protocol not in ENCODERS:
-        raise ValueError(f"no simulated board speaks {protocol!r}; choose {', '.join(ENCODERS)}, or a .toml file.")
+        raise RefusedError(f"no simulated board speaks {protocol!r}; choose {', '.join(ENCODERS)}, or a .toml file.")
     if protocol.startswith("lines"):
         return _lines(protocol.partition("-")[2] or "comma")
     if protocol.startswith("sparkfun"):

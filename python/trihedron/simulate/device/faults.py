@@ -5,6 +5,8 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field, fields
 
+from trihedron.refused import RefusedError
+
 KINDS = ("missing", "cut", "flipped", "garbage", "byte_lost", "byte_doubled", "twice")
 
 
@@ -64,11 +66,11 @@ def parse_faults(text: str) -> Faults:
             chosen[key] = _size(value, part)
         else:
             known = ", ".join((*KINDS, "drift", "disconnect", "away", "text"))
-            raise ValueError(f"--faults: there is no fault '{key}'; there are {known}.")
+            raise RefusedError(f"--faults: there is no fault '{key}'; there are {known}.")
     made = Faults(**chosen)  # type: ignore[arg-type]
     for kind in KINDS:
         if not 0.0 <= getattr(made, kind) < 1.0:
-            raise ValueError(f"--faults: {kind} is a chance per frame, between 0 and 100 %.")
+            raise RefusedError(f"--faults: {kind} is a chance per frame, between 0 and 100 %.")
     return made
 
 
@@ -84,7 +86,7 @@ def _size(text: str, whole: str) -> float:
     try:
         return float(number) * scale
     except ValueError:
-        raise ValueError(f"--faults: '{whole}' has no size; write for example cut=1%.") from None
+        raise RefusedError(f"--faults: '{whole}' has no size; write for example cut=1%.") from None
 
 
 @dataclass

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from trihedron.refused import RefusedError
 from trihedron.simulate.effects import experiment, sensor
 from trihedron.simulate.effects.sizes import Change
 from trihedron.simulate.effects.truth import effects_of
@@ -61,8 +62,8 @@ def with_effect(scenario: Scenario, effect_id: str, **size: Any) -> Scenario:
         When the id is unknown or its parameters are not what the effect takes.
     """
     if effect_id not in _EFFECTS:
-        raise ValueError(f"no effect is called {effect_id!r}; there are {', '.join(_EFFECTS)}")
+        raise RefusedError(f"no effect is called {effect_id!r}; there are {', '.join(_EFFECTS)}")
     try:
         return _EFFECTS[effect_id](scenario, **size)
     except TypeError as error:
-        raise ValueError(f"effect {effect_id}: {str(error).split('() ', 1)[-1]}") from None
+        raise RefusedError(f"effect {effect_id}: {str(error).split('() ', 1)[-1]}") from None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from trihedron.refused import RefusedError
 from trihedron.simulate.effects.sizes import Sensor, Values, checked, triple
 from trihedron.simulate.motion import Disturb, Hold, Motion, Step, Turn, Vibrate
 from trihedron.simulate.scenario import Loss, Scenario
@@ -78,7 +79,7 @@ def disturbed(scenario: Scenario, poses: Sequence[int], tilt_deg: float = 0.5, s
         else:
             steps.append(step)
     if any(not 0 <= p < count for p in poses):
-        raise ValueError(f"the motion has holds 0 to {count - 1}, got {list(poses)}")
+        raise RefusedError(f"the motion has holds 0 to {count - 1}, got {list(poses)}")
     return replace(scenario, motion=replace(scenario.motion, steps=tuple(steps)))
 
 
@@ -91,7 +92,7 @@ def turn_errors(scenario: Scenario, errors_deg: Sequence[float]) -> Scenario:
             count += 1
         steps.append(step)
     if count == 0:
-        raise ValueError("turn-angle-error needs a motion with turns of stated angles, for instance table-turns")
+        raise RefusedError("turn-angle-error needs a motion with turns of stated angles, for instance table-turns")
     return replace(scenario, motion=replace(scenario.motion, steps=tuple(steps)))
 
 

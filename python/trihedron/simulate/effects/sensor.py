@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from trihedron.refused import RefusedError
 from trihedron.simulate.effects.response import mass_response, suspension, with_response
 from trihedron.simulate.effects.sizes import Change, Sensor, Values, checked, electronics, matrix3, triple
 from trihedron.simulate.readout import Adc, Drift, Interference
@@ -160,7 +161,7 @@ def supply(
 def handedness(scenario: Scenario, sensor: Sensor, axis: int) -> Scenario:
     """``axis`` 1, 2 or 3 points against its documentation."""
     if axis not in (1, 2, 3):
-        raise ValueError(f"axis is 1, 2 or 3, got {axis}")
+        raise RefusedError(f"axis is 1, 2 or 3, got {axis}")
     part = getattr(scenario, checked(sensor))
     S = np.array(part.S)
     S[:, axis - 1] *= -1.0

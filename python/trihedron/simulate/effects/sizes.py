@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Literal, TypeAlias
 
+from trihedron.refused import RefusedError
 from trihedron.simulate.readout import Matrix, Triple
 from trihedron.simulate.scenario import Scenario
 
@@ -18,13 +19,13 @@ def triple(value: Values) -> Triple:
     if isinstance(value, (int, float)):
         return (float(value), float(value), float(value))
     if len(value) != 3:
-        raise ValueError(f"three numbers, one per axis, are wanted, got {list(value)}")
+        raise RefusedError(f"three numbers, one per axis, are wanted, got {list(value)}")
     return (float(value[0]), float(value[1]), float(value[2]))
 
 
 def matrix3(rows: Sequence[Values]) -> Matrix:
     if len(rows) != 3:
-        raise ValueError(f"three rows are wanted, got {len(rows)}")
+        raise RefusedError(f"three rows are wanted, got {len(rows)}")
     return (triple(rows[0]), triple(rows[1]), triple(rows[2]))
 
 
@@ -35,5 +36,5 @@ def electronics(scenario: Scenario, sensor: Sensor, **changes: Any) -> Scenario:
 
 def checked(sensor: str) -> str:
     if sensor not in ("accelerometer", "gyroscope"):
-        raise ValueError(f"sensor is 'accelerometer' or 'gyroscope', got {sensor!r}")
+        raise RefusedError(f"sensor is 'accelerometer' or 'gyroscope', got {sensor!r}")
     return sensor

@@ -10,6 +10,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.records.truth import SegmentKind
+from trihedron.refused import RefusedError
 from trihedron.simulate.motion.attitude import (
     quaternion_from_vector,
     quaternion_product,
@@ -107,7 +108,7 @@ class _Planner:
         stated_rad: float | None = None,
     ) -> int:
         if not (math.isfinite(duration_s) and duration_s > 0.0):
-            raise ValueError(f"step {len(self.rows)} ({kind} {name}) must last a positive time, got {duration_s} s")
+            raise RefusedError(f"step {len(self.rows)} ({kind} {name}) must last a positive time, got {duration_s} s")
         vector = np.zeros(3) if rotation is None else rotation
         angle = float(np.linalg.norm(vector))
         axis = vector / angle if angle > 0.0 else np.array([1.0, 0.0, 0.0])
@@ -205,7 +206,7 @@ def plan_motion(motion: Motion, rng: np.random.Generator) -> Plan:
         Without steps, with a duration that is not positive, or a direction of zero length.
     """
     if not motion.steps:
-        raise ValueError("a motion needs at least one step, for instance a Hold")
+        raise RefusedError("a motion needs at least one step, for instance a Hold")
     planner = _Planner(motion, rng)
     for step in motion.steps:
         planner.step(step)

@@ -1,0 +1,214 @@
+"""Which stops of a log are poses: a hand that pauses inside a move, short poses, poses on something that shakes.
+
+    python benches/hand_stops.py --sessions 40 --seed 5                  # true poses lost, pauses taken for poses
+    python benches/hand_stops.py --sessions 10 --seed 5 --kind pauses
+
+Poses rest on a support; between them a hand carries the sensor along bowed paths. ``pauses``: it stops on the way for
+0.4 to 1 s, nearly still, in the air. ``waits``: for 1 to 2.5 s. ``short``: poses of 1.0 to 1.3 s among longer ones.
+``shaken``: a line of 3 mm/s² to 3 m/s² (a motor, a table) through some poses or all, with sidebands, not quite steady;
+in half of the sessions it turns the sensor too. ``plain``: none of these.
+``all``: together.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
+
+from trihedron.records import Recording
+from trihedron.segment import resegment, segment_recording
+
+KINDS = ("plain", "pauses", "waits", "short", "shaken", "all")
+DEGREE = np.pi / 180.0
+G = 9.81
+RATES_HZ = (25.0, 50.0, 50.0, 100.0, 100.0, 208.0, 400.0)
+FOUND = 0.5
+"""Share of a pose, of a pause or of a found hold that has to overlap for the two to be one."""
+
+
+@dataclass(frozen=True)
+class Stops:
+    """A recording and what it is made of: (first, last) rows of true poses and of the hand's pauses."""
+
+    recording: Recording
+    poses: list[tuple[int, int]]
+    pauses: list[tuple[int, int]]
+    still: np.ndarray
+    """(N, 6) what noiseless sensors would read if the body stood still where it is."""
+
+
+def _smooth(x):
+    x = np.clip(x, 0.0, 1.0)
+    return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+
+
+def _tremor(rng, n, rate, low, high):
+    """(n, 3) noise of the hand of unit rms between these frequencies (Hz)."""
+    high = min(high, 0.45 * rate)
+    out = sosfiltfilt(butter(2, [low, high], "band", fs=rate, output="sos"), rng.normal(size=(n, 3)), axis=0)
+    return out / out.std(axis=0)
+
+
+def _timetable(rng, n_poses, kind):
+    """Parts (name, seconds) in turn: pose, then strokes with or without pauses between, then a pose."""
+    usual = rng.uniform(1.6, 5.0)
+    parts = [("pose", usual + rng.uniform(1.0, 3.0))]
+    for _ in range(n_poses - 1):
+        strokes = 1
+        if kind in ("pauses", "waits", "all") and rng.random() < 0.4:
+            strokes += int(rng.integers(1, 3))
+        for k in range(strokes):
+            parts.append(("stroke", rng.uniform(0.7, 2.0)))
+            if k < strokes - 1:
+                parts.append(("pause", rng.uniform(1.0, 2.5) if kind == "waits" else rng.uniform(0.4, 1.0)))
+        is_short = kind in ("short", "all") and rng.random() < 0.4
+        parts.append(("pose", rng.uniform(1.0, 1.3) if is_short else usual * rng.uniform(0.8, 1.3)))
+    return parts
+
+
+def _shaking(rng, t, rate, poses):
+    """(n, 3) m/s² and rad/s of what the support does, gone within a tenth of a second in the moves before and after; in
+    half of the sessions it turns the sensor a little as well.
+    """
+    out, turning = np.zeros((len(t), 3)), np.zeros((len(t), 3))
+    radius = rng.uniform(0.02, 0.3) if rng.random() < 0.5 else np.inf
+    hz, size = rng.uniform(0.08, 0.47) * rate, 10.0 ** rng.uniform(-2.5, 0.5)
+    share = rng.choice([0.3, 0.5, 1.0])
+    for first, last in poses:
+        if rng.random() > share:
+            continue
+        here = slice(first, last)
+        wander = 2 * np.pi * np.cumsum(rng.normal(size=last - first)) * 0.02 / np.sqrt(rate)
+        beat = 1.0 + 0.2 * np.sin(2 * np.pi * rng.uniform(0.3, 1.5) * t[here] + rng.uniform(0, 6))
+        wave = np.sin(2 * np.pi * hz * rng.uniform(0.99, 1.01) * t[here] + wander)
+        edge = _smooth((t[here] - t[first]) / 0.1) * _smooth((t[last - 1] - t[here]) / 0.1)
+        out[here] = size * rng.uniform(0.5, 1.5) * (edge * beat * wave)[:, None] * rng.normal(size=3) / np.sqrt(3.0)
+        about = np.linalg.norm(rng.normal(size=3)) * rng.normal(size=3)
+        turning[here] = size / radius / (2 * np.pi * hz) * (edge * beat * np.roll(wave, 1))[:, None] * about / 3.0
+    return out, turning
+
+
+def _path(rng, parts, edges, rate):
+    """Attitude body to room and (N, 3) place in m."""
+    n = int(edges[-1])
+    spans = list(zip(parts, edges[:-1], edges[1:], strict=True))
+    turn, place, held = np.zeros((n, 4)), np.zeros((n, 3)), np.zeros(n)
+    attitude, at = Rotation.random(random_state=int(rng.integers(2**31))), np.zeros(3)
+    tremor_deg, drift_deg_s = 10.0 ** rng.uniform(-2.0, -0.8), 10.0 ** rng.uniform(-1.3, 0.3)
+    for (name, seconds), first, last in spans:
+        x = np.arange(last - first) / max(last - first - 1, 1)
+        turned, place[first:last] = attitude, at
+        if name == "stroke":
+            way = Rotation.random(random_state=int(rng.integers(2**31))).as_rotvec() * rng.uniform(0.3, 1.0)
+            bow = rng.normal(size=3) * 0.3
+            path = Rotation.from_rotvec(np.outer(np.sin(np.pi * _smooth(x)) ** 2, bow))
+            turned = attitude * path * Rotation.from_rotvec(np.outer(_smooth(x), way))
+            step = rng.normal(size=3) * 0.15
+            place[first:last] += np.outer(_smooth(x), step)
+            at = at + step
+        elif name == "pause":
+            # The hand sags while it waits.
+            sag = rng.normal(size=3) * drift_deg_s * DEGREE / np.sqrt(3.0)
+            turned = attitude * Rotation.from_rotvec(np.outer(x * seconds, sag))
+        turn[first:last], held[first:last] = turned.as_quat(), name != "pose"
+        attitude = turned if turned is attitude else turned[-1]
+    # The hand's tremor fades within the move's first and last tenth of a second: what is set down is still.
+    width, is_move = max(int(0.1 * rate), 1), held > 0.0
+    held = np.convolve(np.pad(held, width, mode="edge"), np.hanning(2 * width + 1) / width, mode="valid") * is_move
+    shake = _tremor(rng, n, rate, 4.0, 11.0) * (held * tremor_deg * DEGREE)[:, None]
+    place = place + _tremor(rng, n, rate, 3.0, 9.0) * (held * tremor_deg * DEGREE * 0.1)[:, None]
+    return Rotation.from_quat(turn) * Rotation.from_rotvec(shake), place
+
+
+def session(seed, kind):
+    """One session of this kind: (N, 3) m/s² and rad/s of a part with data-sheet noise and errors of a few per cent."""
+    rng = np.random.default_rng(seed)
+    rate = float(rng.choice(RATES_HZ))
+    parts = _timetable(rng, int(rng.integers(10, 22)), kind)
+    edges = np.round(np.cumsum([0.0, *(s for _, s in parts)]) * rate).astype(int)
+    n = int(edges[-1])
+    t = np.arange(n) / rate
+    rotation, place = _path(rng, parts, edges, rate)
+    lever = rng.normal(size=3) * 0.02
+    rates = np.gradient(np.unwrap(np.zeros((n, 3)), axis=0), axis=0)
+    rates[1:-1] = (rotation[:-2].inv() * rotation[2:]).as_rotvec() * rate / 2.0
+    force = np.gradient(np.gradient(place + rotation.apply(lever), axis=0), axis=0) * rate**2 + [0.0, 0.0, G]
+    poses = [(int(a), int(b)) for (name, _), a, b in zip(parts, edges[:-1], edges[1:], strict=True) if name == "pose"]
+    pauses = [(int(a), int(b)) for (name, _), a, b in zip(parts, edges[:-1], edges[1:], strict=True) if name == "pause"]
+    accel = rotation.inv().apply(force)
+    still = np.hstack([rotation.inv().apply([0.0, 0.0, G]), np.zeros((n, 3))])
+    if kind in ("shaken", "all"):
+        force, turning = _shaking(rng, t, rate, poses)
+        accel, rates = accel + force, rates + turning
+    noise_a, noise_w = rng.uniform(80, 300) * 1e-6 * G * np.sqrt(rate / 2), rng.uniform(0.004, 0.02) * DEGREE
+    M, zero = np.zeros((6, 6)), np.concatenate([0.3 * rng.normal(size=3), DEGREE * rng.normal(size=3)])
+    M[:3, :3], M[3:, 3:] = np.eye(3) + 0.01 * rng.normal(size=(2, 3, 3))
+    accel, gyro = accel @ M[:3, :3] + zero[:3], rates @ M[3:, 3:] + zero[3:]
+    accel += noise_a * rng.normal(size=(n, 3))
+    gyro += noise_w * np.sqrt(rate / 2) * rng.normal(size=(n, 3))
+    return Stops(
+        Recording(time_s=t, accelerometer=accel, gyroscope=gyro, rate_hz=rate), poses, pauses, still @ M + zero
+    )
+
+
+def _overlap(a, b):
+    return max(0, min(a[1], b[1]) - max(a[0], b[0]))
+
+
+def score(made, segments):
+    """Poses lost, holds that are pauses or nothing (with whether they are called unsteady), poses in two."""
+    holds = [(h.start, h.stop) for h in segments.holds]
+    lost = [p for p in made.poses if not any(_overlap(p, h) > FOUND * min(h[1] - h[0], p[1] - p[0]) for h in holds)]
+    false = [h for h in holds if not any(_overlap(p, h) > FOUND * (h[1] - h[0]) for p in made.poses)]
+    in_two = [p for p in made.poses if sum(_overlap(p, h) > 0 for h in holds) > 1]
+    return lost, false, in_two
+
+
+def errors(made, segments):
+    """(whether called unsteady, (6,) error of the mean over its standard error) of every hold."""
+    mean = np.hstack([segments.accelerometer_mean, segments.gyroscope_mean])
+    sigma = np.hstack([segments.accelerometer_sigma_mean, segments.gyroscope_sigma_mean])
+    for k, hold in enumerate(segments.holds):
+        yield hold.is_unsteady, (mean[k] - made.still[hold.start : hold.stop].mean(axis=0)) / sigma[k]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sessions", type=int, default=20, help="of every kind")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kind", choices=KINDS, action="append")
+    parser.add_argument("--diagnosis", action="store_true", help="the poses as the diagnosis takes them")
+    parser.add_argument("--each", action="store_true", help="print what is wrong in each session")
+    asked = parser.parse_args()
+    print("| kind | poses | lost | of them under 1.4 s | in two | pauses | taken for poses | sessions with a fault "
+          "| rms z of means, calm poses | loud ones | how many |\n" + "|---" * 11 + "|")  # fmt: skip
+    for kind in asked.kind or KINDS:
+        total, bad = np.zeros(6, dtype=int), 0
+        z: dict[bool, list[np.ndarray]] = {False: [], True: []}
+        for k in range(asked.sessions):
+            made = session(asked.seed * 1000 + k, kind)
+            segments = segment_recording(made.recording)
+            if asked.diagnosis:
+                segments = resegment(made.recording, segments)
+            lost, false, in_two = score(made, segments)
+            rate = made.recording.rate_hz
+            short = [p for p in lost if p[1] - p[0] < 1.4 * rate]
+            total += [len(made.poses), len(lost), len(short), len(in_two), len(made.pauses), len(false)]
+            bad += bool(lost or false or in_two)
+            for is_loud, row in errors(made, segments):
+                z[is_loud].append(row)
+            if asked.each and (lost or false or in_two):
+                said = {"lost": lost, "false": false, "in two": in_two}
+                words = [f"{name} {(np.array(what) / rate).round(1).tolist()}" for name, what in said.items() if what]
+                print(f"{kind} seed {asked.seed * 1000 + k} {rate:g} Hz {len(made.poses)} poses:", *words)
+        rms = [f"{np.sqrt(np.mean(np.square(z[loud]))):.2f}" if z[loud] else "" for loud in (False, True)]
+        print(f"| {kind} | {' | '.join(str(v) for v in total)} | {bad} of {asked.sessions} | {rms[0]} | {rms[1]} "
+              f"| {len(z[True])} |", flush=True)  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,45 @@
+"""How much misfit a fit holds beyond its noise, and how much of that another has no more."""
+
+from __future__ import annotations
+
+from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS
+from trihedron.diagnose.session.solve import Fit, leverage
+from trihedron.diagnose.session.twin import DYNAMICS, MOVES
+
+
+def domain_chi2(fitted: Fit) -> dict[int, tuple[float, float]]:
+    """Chi-square and degrees of freedom of every row domain, in the noise that was predicted.
+
+    Where noise was widened for what nothing explained, the widening is taken out.
+    """
+    used = leverage(fitted)
+    obs = fitted.line.obs
+    out = {}
+    for d in ROW_DOMAINS:
+        rows = fitted.system.domain == d
+        widened = {MOVES: obs.moves_inflation, DYNAMICS: obs.dynamics_inflation}.get(d, 1.0)
+        out[d] = (
+            float((fitted.system.residual[rows] ** 2).sum()) * float(widened) ** 2,
+            float((1.0 - used[rows]).sum()),
+        )
+    return out
+
+
+def excess(fitted: Fit) -> float:
+    """Chi-square beyond its degrees of freedom, over the domains that have more than they should."""
+    return sum(max(chi2 - dof, 0.0) for chi2, dof in domain_chi2(fitted).values())
+
+
+def explained(before: Fit, after: Fit) -> float:
+    """How much excess is gone, over as many rows as there were before.
+
+    Moves that an effect leaves out take their excess with them: that explains something only so far as they disagreed
+    more than those that stay.
+    """
+    left = domain_chi2(after)
+    gone = 0.0
+    for domain, (chi2, dof) in domain_chi2(before).items():
+        still, rows = left.get(domain, (0.0, 0.0))
+        rest = max(still - rows, 0.0) * (dof / rows if rows >= LEAST_DOF else 0.0)
+        gone += max(chi2 - dof, 0.0) - rest
+    return max(gone, 0.0)

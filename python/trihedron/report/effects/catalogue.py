@@ -1,0 +1,57 @@
+"""The closed catalogue of what is said of effects, by effect and case."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from trihedron.report.effects import accelerometer, gyroscope, session
+from trihedron.report.effects.entry import EffectWords
+from trihedron.report.effects.reasons import REASONS
+from trihedron.report.findings.wording import filled
+
+ENTRIES: tuple[EffectWords, ...] = (*accelerometer.ENTRIES, *gyroscope.ENTRIES, *session.ENTRIES)
+CATALOGUE: Mapping[str, EffectWords] = MappingProxyType({entry.id: entry for entry in ENTRIES})
+OF_ANY: Mapping[str, str] = MappingProxyType(
+    {
+        "strongest": "{mechanism} (strongest term {name}: {value:.3g} ± {std:.1g} {unit}).",
+        "only-model": "Only the model has it: {statement}{has_reason:? Of the recording {reason}, and nothing in it "
+        "drifts by as much.|}",
+    }
+)
+"""Sentences that every effect may be told in."""
+
+
+def effect_words(effect_id: str, case: str, values: Mapping[str, Any]) -> str:
+    """What is said of an effect; one that came from outside the package has the sentences of any.
+
+    Raises
+    ------
+    KeyError
+        When the catalogue has no such case, or a place of it has no value.
+    """
+    entry = CATALOGUE.get(effect_id)
+    if case in OF_ANY:
+        known = {} if entry is None else {"mechanism": entry.mechanism}
+        return filled(OF_ANY[case], {**values, **known}, {})
+    if entry is None:
+        raise KeyError(effect_id)
+    return filled(entry.said[case], values, entry.lines)
+
+
+def experiment(effect_id: str, *, at_rest: bool) -> str:
+    """What to record so that the effect cannot be mistaken for another; empty for one from outside the package."""
+    entry = CATALOGUE.get(effect_id)
+    return "" if entry is None else entry.experiment_at_rest if at_rest else entry.experiment
+
+
+def why_not(name: str, values: Mapping[str, Any]) -> str:
+    """Why a recording cannot show an effect.
+
+    Raises
+    ------
+    KeyError
+        When there is no such reason, or a place of it has no value.
+    """
+    return filled(REASONS[name], values, {})

@@ -1,0 +1,36 @@
+"""The catalogue as a page of the documents: ``python -m trihedron.report.effects.page > docs/effects.md``."""
+
+from __future__ import annotations
+
+from trihedron.report.effects.catalogue import ENTRIES
+from trihedron.report.effects.entry import EffectWords
+from trihedron.report.findings.page import shown
+
+_HEAD = """# Effects
+
+What a diagnosis can name is a closed list of mechanisms, each with an id that keeps its meaning. What it says of one is
+its mechanism with the strongest term, or the sentence that stands here, with values of the recording in *italics*; *to
+tell it apart* is printed where a recording cannot tell two effects from each other.
+[A new effect](adding-an-effect.md) is one file.
+
+Stages make ids and values only; this page is made from the catalogue (`python/trihedron/report/effects/`) by
+`python -m trihedron.report.effects.page`.
+"""
+
+
+def page() -> str:
+    """Markdown, by id in alphabetical order."""
+    return _HEAD + "".join(_told(entry) for entry in sorted(ENTRIES, key=lambda entry: entry.id))
+
+
+def _told(entry: EffectWords) -> str:
+    lines = [f"\n## {entry.id}\n\n{entry.mechanism[:1].upper()}{entry.mechanism[1:]}."]
+    lines += [f"*Said:* {shown(text)}" for text in entry.said.values()]
+    lines.append(f"*To tell it apart:* {entry.experiment}.")
+    if entry.experiment_at_rest:
+        lines.append(f"*In a log of one or two orientations:* {entry.experiment_at_rest}.")
+    return "<br>\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    print(page(), end="")

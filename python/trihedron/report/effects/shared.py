@@ -1,0 +1,71 @@
+"""Sentences that effects of both sensors share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from trihedron.report.effects.entry import EffectWords
+
+LOG_TEMPERATURE = "log the temperature, or let the sensor warm up and repeat the first poses at the end"
+UP_AND_DOWN = "repeat one pose while the temperature both rises and falls: drift in time does not turn back, this does"
+TWO_TEMPERATURES = "repeat the same faces and turns at two temperatures"
+COME_BACK = "hold one pose, turn away and come back to it ten times: what differs is scatter, what repeats is not"
+BOTH_SIDES_OF_LEVEL = (
+    "add tilts of 30°, 45° and 60° on both sides of level: a square and a modulus differ between the faces"
+)
+SHAKE = "shake the sensor about one axis at several frequencies: a delay grows with frequency, a low-pass saturates"
+
+
+def drifts(sensor: str, unit: str, walk: str, at_rest: str = "") -> Mapping[str, str]:
+    """A zero that drifts from pose to pose, by its kind; in a log of one orientation ``at_rest`` is said beside it."""
+    whole = f"The {sensor}'s zero drifts {{how}} through {{sizes}} (x, y, z); no logged channel explains it."
+    sizes = f"{{range:all .2g {unit}}}"
+    said = {kind: (how, sizes) for kind, how in (("drift", "smoothly"), ("walk", walk), ("slow", "slowly"))}
+    rest = {case: whole.format(how="smoothly", sizes=_at_rest("range", own)) + at_rest for case, own in _units(unit)}
+    return MappingProxyType({kind: whole.format(how=how, sizes=own) for kind, (how, own) in said.items()} | rest)
+
+
+def follows_temperature(sensor: str, unit: str) -> Mapping[str, str]:
+    """A zero in a log of one or two orientations that the temperature explains, and how one would tell it apart."""
+    return MappingProxyType({case: _thermal(sensor, own) for case, own in _units(unit)})
+
+
+def _units(unit: str) -> tuple[tuple[str, str], ...]:
+    """Cases of a log at rest, with their unit: readings of unknown scale stay counts."""
+    return (("at-rest", unit), ("at-rest-counts", "counts"))
+
+
+def _at_rest(place: str, unit: str) -> str:
+    if unit == "counts":
+        return f"{{{place}:all .3g}} counts"
+    return f"{{{place}:all {'.2g' if unit == '°/s' else '.3g'} {unit}}}"
+
+
+def _thermal(sensor: str, unit: str) -> str:
+    swing, left, raw, gap = (_at_rest(place, unit) for place in ("swing", "left", "raw", "gap"))
+    return (
+        f"The {sensor}'s zero follows the temperature from {{low_degc:.0f}} to {{high_degc:.0f}} °C by "
+        "{is_straight:?a straight line|{is_parabola:?a parabola|a curve of third order}}"
+        "{has_rate:?, and its rate of change|}{has_branches:?, on two branches|}: it runs through "
+        f"{swing} (x, y, z); {left} rms stay of {raw}."
+        f"{{has_gap:? At one temperature heating and cooling differ by {gap}: hysteresis, or a drift in time, which "
+        "one cycle does not tell.|}{is_one_pose:? One orientation does not tell zero from scale, nor the fixture's own "
+        "tilt across gravity.|}"
+    )
+
+
+def saturates(effect_id: str, sensor: str) -> EffectWords:
+    """A range that ends."""
+    end = f"the {sensor} reaches the end of its range"
+    return EffectWords(
+        effect_id,
+        end,
+        "repeat the moves more slowly, or choose a wider range",
+        MappingProxyType(
+            {
+                "plateaus": f"T{end[1:]}: {{plateaus}} plateaus, {{samples}} samples, in {{touched}} of {{moves}} "
+                "moves; what those moves read is false and is left out of the fit."
+            }
+        ),
+    )

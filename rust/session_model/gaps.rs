@@ -1,0 +1,158 @@
+//! What the samples that a log lost would have added to an integral, as far as their neighbours do not tell.
+
+use nalgebra::Vector3;
+
+use crate::poisson::StepWeights;
+
+/// A step longer than this many usual ones has lost samples.
+pub const GAP: f64 = 1.5;
+/// Samples lost together beyond which a straight line crosses the gap, and no cubic (`poisson::UNEVEN_STEPS`).
+const CROSSED_BY_CUBIC: usize = 2;
+/// Places in the move at which as many samples are there: fewer do not tell how its motion bends.
+const FEWEST: usize = 12;
+
+/// A step over lost samples.
+#[derive(Debug, Clone)]
+pub struct Gap {
+    /// Which step of the move.
+    pub step: usize,
+    /// Mean square of what the same step misses elsewhere in the move where nothing was lost: integrals of force and
+    /// rate, (raw unit · s)². `None` where the move is too short to tell.
+    pub square: Option<[Vector3<f64>; 2]>,
+    /// Part of the variance of one sample's noise in it, s².
+    pub noise: f64,
+}
+
+impl Gap {
+    /// What it misses beyond noise of these densities (force, rate), (raw unit · s)²; `None` as in `square`.
+    #[must_use]
+    pub fn variance(&self, density: [&Vector3<f64>; 2], step_s: f64) -> Option<[Vector3<f64>; 2]> {
+        let square = self.square.as_ref()?;
+        let excess = |k: usize| {
+            let noise = density[k].component_mul(density[k]) * (self.noise / step_s);
+            (square[k] - noise).map(|v| v.max(0.0))
+        };
+        Some([excess(0), excess(1)])
+    }
+}
+
+/// The gaps of a move, found by its own usual step (stamps of bursts lie further apart than samples, all of them).
+#[must_use]
+pub fn gaps(steps: &[StepWeights], force: &[Vector3<f64>], rate: &[Vector3<f64>]) -> Vec<Gap> {
+    let mut lengths: Vec<f64> = steps.iter().map(|step| step.h).collect();
+    if lengths.is_empty() {
+        return Vec::new();
+    }
+    let middle = lengths.len() / 2;
+    let usual = *lengths.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let is_gap = |step: &StepWeights| step.h > GAP * usual;
+    let mut known: Vec<(usize, Gap)> = Vec::new();
+    let mut out = Vec::new();
+    for (k, step) in steps.iter().enumerate().filter(|(_, step)| is_gap(step)) {
+        let lost = ((step.h / usual).round() as usize).max(2) - 1;
+        let one = match known.iter().find(|(n, _)| *n == lost) {
+            Some((_, one)) => one.clone(),
+            None => {
+                let one = measured(steps, &is_gap, lost, usual, [force, rate]);
+                known.push((lost, one.clone()));
+                one
+            }
+        };
+        out.push(Gap { step: k, ..one });
+    }
+    out
+}
+
+/// Weights of the samples from one before the gap to one behind it, in the integral that is missed, in steps: those lost
+/// count one each, and what is put in their place is taken off.
+fn contrast(lost: usize) -> Vec<f64> {
+    let mut weights = vec![1.0; lost + 4];
+    let end = lost as f64 + 1.0;
+    let known = [-1.0, 0.0, end, end + 1.0];
+    for (j, &at) in known.iter().enumerate() {
+        let share = |x: f64| -> f64 {
+            if lost > CROSSED_BY_CUBIC {
+                return match j {
+                    1 => 1.0 - x / end,
+                    2 => x / end,
+                    _ => 0.0,
+                };
+            }
+            (0..4)
+                .filter(|&i| i != j)
+                .map(|i| (x - known[i]) / (at - known[i]))
+                .product()
+        };
+        weights[(at + 1.0) as usize] = -(1..=lost).map(|i| share(i as f64)).sum::<f64>();
+    }
+    weights
+}
+
+/// What a step over `lost` samples misses where none were lost.
+fn measured(
+    steps: &[StepWeights],
+    is_gap: &impl Fn(&StepWeights) -> bool,
+    lost: usize,
+    usual: f64,
+    signals: [&[Vector3<f64>]; 2],
+) -> Gap {
+    let weights = contrast(lost);
+    let mut sum = [Vector3::zeros(); 2];
+    let mut n = 0;
+    for window in steps.windows(lost + 3) {
+        if window.iter().any(is_gap) {
+            continue;
+        }
+        n += 1;
+        let at = |j: usize| {
+            if j == 0 {
+                window[0].from
+            } else {
+                window[j - 1].to
+            }
+        };
+        for (sum, signal) in sum.iter_mut().zip(signals) {
+            let mut missed = Vector3::zeros();
+            for (j, weight) in weights.iter().enumerate() {
+                missed += signal[at(j)] * (*weight * usual);
+            }
+            *sum += missed.component_mul(&missed);
+        }
+    }
+    Gap {
+        step: 0,
+        square: (n >= FEWEST).then(|| sum.map(|s| s / n as f64)),
+        noise: usual * usual * weights.iter().map(|w| w * w).sum::<f64>(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::contrast;
+
+    #[test]
+    fn a_cubic_hides_nothing_in_one_or_two_lost_samples_and_a_line_nothing_in_more() {
+        for (lost, degree) in [(1, 3), (2, 3), (3, 1), (7, 1)] {
+            let weights = contrast(lost);
+            for power in 0..=degree {
+                let missed: f64 = weights
+                    .iter()
+                    .enumerate()
+                    .map(|(j, w)| w * (j as f64 - 1.0).powi(power))
+                    .sum();
+                assert!(
+                    missed.abs() < 1e-9 * (lost as f64 + 3.0).powi(power),
+                    "{lost} {power}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn one_lost_sample_is_put_in_as_the_cubic_through_its_neighbours() {
+        let expected = [1.0 / 6.0, -4.0 / 6.0, 1.0, -4.0 / 6.0, 1.0 / 6.0];
+        for (weight, wanted) in contrast(1).iter().zip(expected) {
+            assert!((weight - wanted).abs() < 1e-12);
+        }
+    }
+}
