@@ -135,6 +135,17 @@ def test_a_healthy_log_carried_by_an_arm_has_lost_nothing(move_s):
         assert FindingCode.SAMPLES_LOST not in {finding.code for finding in result.findings}
 
 
+@pytest.mark.parametrize("seed", [43, 44, 45, 46])
+def test_quick_moves_through_hundreds_of_degrees_need_no_nominal_scale(seed):
+    # Pulled by several g on their arm, they tell the linear start nothing; moves of 105 to 450°.
+    f, w, rate, truth, _ = carried(seed, n_poses=12, move_s=0.5)
+    result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
+    assert result.is_trustworthy
+    z, relative = gyro_z(result, lower(truth))
+    assert np.abs(z).max() < 4.0
+    assert relative < 0.01
+
+
 def test_faces_hold_their_bars_on_a_table_that_leans_with_headings_that_come_back():
     accelerometer, gyro = [], []
     for seed in range(60, 66):

@@ -49,15 +49,18 @@ pub fn gaps(steps: &[StepWeights], force: &[Vector3<f64>], rate: &[Vector3<f64>]
     let mut known: Vec<(usize, Gap)> = Vec::new();
     let mut out = Vec::new();
     for (k, step) in steps.iter().enumerate().filter(|(_, step)| is_gap(step)) {
-        let lost = ((step.h / usual).round() as usize).max(2) - 1;
-        let one = match known.iter().find(|(n, _)| *n == lost) {
-            Some((_, one)) => one.clone(),
-            None => {
-                let one = measured(steps, &is_gap, lost, usual, [force, rate]);
-                known.push((lost, one.clone()));
-                one
-            }
-        };
+        // Of more than the move itself holds nothing can be measured, however long the pause.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let lost = ((step.h / usual).round() as usize).min(steps.len()).max(2) - 1;
+        let seen = known
+            .iter()
+            .find(|(n, _)| *n == lost)
+            .map(|(_, one)| one.clone());
+        let one = seen.unwrap_or_else(|| {
+            let one = measured(steps, &is_gap, lost, usual, [force, rate]);
+            known.push((lost, one.clone()));
+            one
+        });
         out.push(Gap { step: k, ..one });
     }
     out
@@ -69,7 +72,8 @@ fn contrast(lost: usize) -> Vec<f64> {
     let mut weights = vec![1.0; lost + 4];
     let end = lost as f64 + 1.0;
     let known = [-1.0, 0.0, end, end + 1.0];
-    for (j, &at) in known.iter().enumerate() {
+    let places = [0, 1, lost + 2, lost + 3];
+    for (j, (&at, place)) in known.iter().zip(places).enumerate() {
         let share = |x: f64| -> f64 {
             if lost > CROSSED_BY_CUBIC {
                 return match j {
@@ -83,7 +87,7 @@ fn contrast(lost: usize) -> Vec<f64> {
                 .map(|i| (x - known[i]) / (at - known[i]))
                 .product()
         };
-        weights[(at + 1.0) as usize] = -(1..=lost).map(|i| share(i as f64)).sum::<f64>();
+        weights[place] = -(1..=lost).map(|i| share(i as f64)).sum::<f64>();
     }
     weights
 }

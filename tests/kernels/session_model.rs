@@ -93,10 +93,9 @@ fn made(scatter: bool) -> (Session, State) {
     }
     let noise_force = Vector3::new(1e-3, 1.2e-3, 0.9e-3);
     let noise_rate = Vector3::new(0.02, 0.03, 0.025);
-    let at_rest = |mean: Vec<Vector3<f64>>, density: Vector3<f64>| AtRest {
-        sigma: vec![density / 2.0; mean.len()],
-        mean,
-        density,
+    let at_rest = |mean: Vec<Vector3<f64>>, density: Vector3<f64>| {
+        let sigma = vec![density / 2.0; mean.len()];
+        AtRest::of(mean, sigma, density, None).expect("means without verticals")
     };
     let force_mean = (0..N_POSES)
         .map(|i| inverse_force * (up[i] * G - force_bias) + slow[i])

@@ -43,9 +43,9 @@ def find_shaken(
 ) -> list[Run]:
     """Stretches beside the ``taken`` ones in which the body keeps its place while the accelerometer shakes.
 
-    Either the gyro is at its noise floor; or, averaged over half a second, it stands still, and what either sensor
-    reads above its noise is a line, which a machine makes and a hand does not. In both cases the way turned by the
-    gyro and the smoothed attitude of the accelerometer stay where they are.
+    Either the gyro is at its noise floor and the accelerometer above its own; or, averaged over half a second, the gyro
+    stands still, and what either sensor reads above its noise is a line, which a machine makes and a hand does not. In
+    both cases the way turned by the gyro and the smoothed attitude of the accelerometer stay where they are.
 
     ``scales`` are the reading of |g| and radians per second per reading of the gyro, to a factor of two; without
     either, or without a steady hold that tells the gyro's zero, none is found. ``free`` (m,) are blocks to look in.
@@ -61,7 +61,7 @@ def find_shaken(
     seen = _Seen(_smoothed(force, channels) / gravity, rate * channels.step_s, steady)
     quiet = widen(close_gaps(quiet_channels(channels, activity, gyro), channels.is_valid), channels.is_valid)
     calm = np.linalg.norm(rolling_mean(rate, WINDOW_BLOCKS), axis=1) < CALM_RAD_S
-    found = _poses(channels, seen, quiet & free, taken, SEEN_S)
+    found = [run for run in _poses(channels, seen, quiet & free, taken, SEEN_S) if _shakes(channels, activity, run)]
     for run in _poses(channels, seen, calm & free & channels.is_valid, [*taken, *found], LINE_S):
         rows = slice(run.first * channels.length, run.last * channels.length)
         sensors = ((recording.accelerometer, ~gyro), (recording.gyroscope, gyro))
@@ -111,6 +111,13 @@ def _smoothed(values: FloatArray, channels: Channels) -> FloatArray:
     weight = np.hanning(width)[1:-1]
     inside = np.convolve(np.ones(len(values)), weight, mode="same")
     return np.column_stack([np.convolve(column, weight, mode="same") / inside for column in values.T])
+
+
+def _shakes(channels: Channels, activity: Activity, run: Run) -> bool:
+    """Whether the accelerometer is loud inside blocks: what only its block means show is a body that slowly turns."""
+    force = ~channels.is_gyroscope
+    inside = channels.variance[run.first : run.last, force].mean(axis=0)
+    return bool(np.any(inside > ABOVE_NOISE * activity.white_variance[force]))
 
 
 def _stays(seen: _Seen, stretch: Range) -> bool:

@@ -6,10 +6,11 @@ import numpy as np
 
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align_screened
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
-from trihedron.estimate.gyroscope.start import starts
-from trihedron.estimate.gyroscope.verification import predict
+from trihedron.estimate.gyroscope.start import starts, turned_starts
+from trihedron.estimate.gyroscope.verification import is_astray, missed_deg, predict
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.units import rate_to_si
 
 DENIED = 0.1
 """Part of what peaks that were cut would be short of by which gravity is missed, and they were not."""
@@ -59,4 +60,12 @@ def _aligned(
 ) -> Aligned:
     options = options.suited_to(measured)
     first = starts(recording, measured, part.model, options.nominal())
-    return align_screened(measured, part, gravity_m_s2, first, options)
+    found = align_screened(measured, part, gravity_m_s2, first, options)
+    is_known = options.nominal() is not None or rate_to_si(recording.gyroscope_unit) is not None
+    if is_known or not is_astray(found, measured):
+        return found
+    again = turned_starts(recording, measured, part.model, first[0])
+    if again is None:
+        return found
+    other = align_screened(measured, part, gravity_m_s2, again, options)
+    return other if missed_deg(other, measured) < missed_deg(found, measured) else found

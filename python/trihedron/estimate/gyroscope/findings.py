@@ -8,7 +8,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.alignment import FALSE_ALARM, Aligned
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, audit_moves
 from trihedron.estimate.gyroscope.observability import describe, observability_findings
-from trihedron.estimate.gyroscope.verification import Prediction
+from trihedron.estimate.gyroscope.verification import Prediction, is_astray
 from trihedron.probability import chdtrc
 from trihedron.records.finding import Finding, FindingCode, Severity
 from trihedron.records.words import words
@@ -30,7 +30,17 @@ def findings_of(aligned: Aligned, measured: MoveMeasurements, held: Prediction |
         found.append(Finding.of(FindingCode.NOT_CONVERGED, "gyro", stopped_because=words(fit.stopped_because)))
     found += _outlier_findings(aligned, measured)
     if aligned.inflation > 1.0:
-        found.append(Finding.of(FindingCode.RESIDUAL_ABOVE_NOISE, "moves", chi2_per_dof=aligned.inflation, dof=fit.dof))
+        # Bars that are widened in proportion say nothing about a minimum elsewhere.
+        severity = Severity.SERIOUS if is_astray(aligned, measured) else Severity.WARNING
+        found.append(
+            Finding.of(
+                FindingCode.RESIDUAL_ABOVE_NOISE,
+                "moves",
+                severity=severity,
+                chi2_per_dof=aligned.inflation,
+                dof=fit.dof,
+            )
+        )
     found += _held_out_findings(held, aligned)
     found += _attitude_findings(measured, S)
     found += _drift_findings(measured, S)

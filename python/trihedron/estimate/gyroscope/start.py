@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.recording import Recording
 from trihedron.refused import RefusedError
 from trihedron.units import rate_to_si
+
+FEWEST_MOVES = 3
+"""Nine numbers of a scale, three of each move at most."""
 
 
 def integral_start(
@@ -38,7 +42,7 @@ def integral_start(
         moment = (inside * _trapezoid_weights(time)[:, None]).T @ rate
         rows.append(np.moveaxis(_ACROSS @ moment, 0, 1).reshape(3, 9))
         sides.append(force[:, after] - force[:, before])
-    if len(rows) < 3:
+    if len(rows) < FEWEST_MOVES:
         return None
     matrix, side = np.concatenate(rows), np.concatenate(sides)
     size = np.linalg.norm(matrix, axis=0)
@@ -76,6 +80,51 @@ def starts(
             "give nominal_scale (3, 3) in rad/s per count, or add moves about all three axes"
         )
     return np.ascontiguousarray(np.stack(found))
+
+
+LARGEST_TURN_RAD, STEP_RAD = 6.0 * np.pi, np.pi / 12.0
+"""Turn of the move that turns most, up to which scales are tried, and the distance of two of them there: a fit finds
+its way from half a right angle off."""
+MOST_TRIED = 6
+
+
+def turned_starts(
+    recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration, linear: FloatArray | None
+) -> FloatArray | None:
+    """Starts (k, 3, 3) that carry gravity best among scales of one size on all axes, or ``None`` without whole moves.
+
+    Moves of tenths of a second pull harder than gravity does, and through hundreds of degrees: the linear start then
+    tells nothing. Axes are tried as the accelerometer's, and turned as the ``linear`` start has them.
+    """
+    force = measured.reading @ accelerometer.S.T + accelerometer.b
+    up = force / np.linalg.norm(force, axis=1, keepdims=True)
+    courses = []
+    for (a, b), (before, after), lost in zip(measured.edges, measured.links, measured.is_lost, strict=True):
+        rate = measured.rate[a:b] - 0.5 * (measured.zero[before] + measured.zero[after])
+        if not lost and b - a > 1 and np.isfinite(rate).all():
+            courses.append((recording.time_s[a:b], rate, up[before], up[after]))
+    if len(courses) < FEWEST_MOVES:
+        return None
+    most = max(float(np.linalg.norm(rate, axis=1) @ _trapezoid_weights(time)) for time, rate, _, _ in courses)
+    if not most > 0.0:
+        return None
+    turns = [np.eye(3)]
+    if linear is not None:
+        left, _, right = np.linalg.svd(linear)
+        turns.append(left @ right)
+    tried = [
+        (angle / most) * turn for turn in turns for angle in np.arange(STEP_RAD, LARGEST_TURN_RAD + STEP_RAD, STEP_RAD)
+    ]
+    missed = [
+        np.median([_missed_rad(time, rate @ S.T, before, after) for time, rate, before, after in courses])
+        for S in tried
+    ]
+    return np.ascontiguousarray(np.stack([tried[k] for k in np.argsort(missed)[:MOST_TRIED]]))
+
+
+def _missed_rad(time: FloatArray, rate: FloatArray, before: FloatArray, after: FloatArray) -> float:
+    turned = integrate_rate(time, rate, last_only=True).T @ before
+    return float(np.arccos(np.clip(turned @ after, -1.0, 1.0)))
 
 
 def _trapezoid_weights(time: FloatArray) -> FloatArray:

@@ -13,6 +13,10 @@ from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.calibration import FitQuality
 from trihedron.records.words import words
 
+ASTRAY_DEG = 5.0
+"""Nine numbers bend to a dozen moves in a wrong minimum until half of them miss by 10°; of the real recordings none
+misses by 2° in the median."""
+
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
@@ -59,8 +63,19 @@ def predict(aligned: Aligned, measured: MoveMeasurements, is_held_out: bool) -> 
         sigma=np.sqrt(np.maximum(np.einsum("mii->mi", covariance), 0.0)),
         angle_deg=angle,
         z2=z2,
-        floor2=np.einsum("mii->m", noise),
+        # Turns of gravity about itself make differences of large parts, which rounding may leave below zero.
+        floor2=np.maximum(np.einsum("mii->m", noise), 0.0),
     )
+
+
+def missed_deg(aligned: Aligned, measured: MoveMeasurements) -> float:
+    """Median angle between gravity carried through a move and gravity behind it, of all moves that tell."""
+    return float(np.median(predict(aligned, measured, is_held_out=False).angle_deg[~measured.is_lost]))
+
+
+def is_astray(aligned: Aligned, measured: MoveMeasurements) -> bool:
+    """Whether most moves turn gravity elsewhere: a minimum of the fit that is none of the motion."""
+    return missed_deg(aligned, measured) > ASTRAY_DEG
 
 
 def held_out(
