@@ -31,12 +31,11 @@ def findings_of(aligned: Aligned, measured: MoveMeasurements, held: Prediction |
     found += _outlier_findings(aligned, measured)
     if aligned.inflation > 1.0:
         # Bars that are widened in proportion say nothing about a minimum elsewhere.
-        severity = Severity.SERIOUS if is_astray(aligned, measured) else Severity.WARNING
         found.append(
             Finding.of(
                 FindingCode.RESIDUAL_ABOVE_NOISE,
                 "moves",
-                severity=severity,
+                severity=Severity.SERIOUS if is_astray(aligned, measured) else Severity.WARNING,
                 chi2_per_dof=aligned.inflation,
                 dof=fit.dof,
             )

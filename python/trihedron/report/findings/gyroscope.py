@@ -40,6 +40,7 @@ _MOVES = (
         "degrees of freedom; the error bars are widened by its root.",
         _OUTSIDE_THE_MODEL,
         "Run trihedron diagnose to see which.",
+        or_severity=SERIOUS,
     ),
     Entry(
         Code.RESIDUAL_ABOVE_NOISE,
