@@ -65,8 +65,10 @@ def find_shaken(
     for run in _poses(channels, seen, calm & free & channels.is_valid, [*taken, *found], LINE_S):
         rows = slice(run.first * channels.length, run.last * channels.length)
         sensors = ((recording.accelerometer, ~gyro), (recording.gyroscope, gyro))
-        if all(readings is None or _is_line(readings[rows], activity.white_variance[which])
-               for readings, which in sensors):  # fmt: skip
+        seen_of = [_is_line(readings[rows], activity.white_variance[which])
+                   for readings, which in sensors if readings is not None]  # fmt: skip
+        # Where nothing shakes the stillness of the log has spoken: such a stretch slowly turns.
+        if True in seen_of and False not in seen_of:
             found.append(run)
     return found
 
@@ -128,8 +130,8 @@ def _stays(seen: _Seen, stretch: Range) -> bool:
     return max(sway, float(np.linalg.norm(angle.std(axis=0)))) < SUPPORT_RAD
 
 
-def _is_line(readings: FloatArray, white_variance: FloatArray) -> bool:
-    """What (n, 3) readings show above white noise is one line and its harmonics, or nothing."""
+def _is_line(readings: FloatArray, white_variance: FloatArray) -> bool | None:
+    """Whether what (n, 3) readings show above white noise is one line and its harmonics; ``None`` for nothing."""
     part = np.asarray(readings)[np.isfinite(readings).all(axis=1)]
     weight = np.hanning(len(part))
     # A straight line in time is drift of the zero.
@@ -139,7 +141,7 @@ def _is_line(readings: FloatArray, white_variance: FloatArray) -> bool:
     power = (np.abs(np.fft.rfft(weight[:, None] * part, axis=0)) ** 2).sum(axis=1)
     noise = float(white_variance.sum() * (weight @ weight))
     if power.mean() < ABOVE_NOISE * noise:
-        return True
+        return None
     peak = int(power.argmax())
     line = np.zeros(len(power), dtype=bool)
     for times in HARMONICS:
