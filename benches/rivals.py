@@ -114,7 +114,7 @@ def subjects(rows: int) -> list[Subject]:
         ),
         Subject(
             "read",
-            f"Reading {rows:,} × 7 numbers of CSV, two cores".replace(",", " "),
+            f"Reading {rows:_} × 7 numbers of CSV, two cores".replace("10_000_000", "10⁷"),
             "reading",
             "READ",
             rows,
