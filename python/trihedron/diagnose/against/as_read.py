@@ -24,7 +24,9 @@ def as_read(given: Calibration, recording: FittedModel) -> Calibration:
     if g is None or recording.gyro_S is None:
         return replace(given, accelerometer=accelerometer)
     units = rate_to_si(RateUnit(g.raw_unit)), rate_to_si(RateUnit(recording.gyro_unit))
-    return replace(given, accelerometer=accelerometer, gyroscope=_scaled(g, recording.gyro_S, recording.gyro_unit, units))
+    return replace(
+        given, accelerometer=accelerometer, gyroscope=_scaled(g, recording.gyro_S, recording.gyro_unit, units)
+    )
 
 
 def _scaled(
