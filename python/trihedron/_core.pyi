@@ -553,6 +553,7 @@ class SessionPoses:
         rate_density: FloatArray | None,
         force_along: tuple[FloatArray, FloatArray] | None = None,
     ) -> SessionPoses: ...
+    def force_white(self) -> FloatArray: ...
 
 @final
 class SessionMoves:

@@ -8,8 +8,9 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.estimate.gyroscope.alignment import are_far
 from trihedron.estimate.session.observed import Observed
-from trihedron.probability import chdtri, fdtrc
+from trihedron.probability import fdtrc
 from trihedron.records.words import words
 from trihedron.session.noise import START_STRENGTHS
 
@@ -22,8 +23,6 @@ DEAF = 1e3
 MOST_WIDENINGS = 8
 SETTLED = 1.05
 """χ² per degree of freedom at which moves that were widened are as uncertain as they miss."""
-MEDIAN_CHI2_2 = 1.386
-LEAST_SHRINK = 0.1
 STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 """Labels of rows: accelerometer at rest, gravity after a move, velocity over it."""
 
@@ -94,18 +93,12 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
 
 
 def far_moves(solution: SessionSolution, n_moves: int) -> BoolArray:
-    """Moves (m,) whose gravity misses as none of so many does by chance, in units of the usual miss where that is above
-    the noise: the rule of the moves alone (:mod:`trihedron.estimate.gyroscope.alignment`), at this fit.
-    """
+    """Moves (m,) whose gravity misses as none of so many does by chance: the rule of the moves alone, at this fit."""
     labels = solution.core.labels
     of_gravity = labels[:, 0] == MOVES
     squared = (solution.core.residual[of_gravity] * solution.inflation[0]) ** 2
-    distance = np.bincount(labels[of_gravity, 1], squared, n_moves)
-    # Residuals of fitted parameters are smaller.
-    shrink = max(solution.moves_dof / (2.0 * n_moves), LEAST_SHRINK)
-    typical = max(1.0, float(np.median(distance)) / (MEDIAN_CHI2_2 * shrink))
-    out: BoolArray = distance > float(chdtri(2, FALSE_ALARM / n_moves)) * typical
-    return out
+    distance = np.bincount(labels[of_gravity, 1], squared, n_moves).astype(np.float64)
+    return are_far(distance, solution.moves_dof)
 
 
 def fitted(
