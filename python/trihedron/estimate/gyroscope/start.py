@@ -38,11 +38,11 @@ def integral_start(
         time = recording.time_s[start:stop]
         rate = measured.rate[start:stop] - 0.5 * (measured.zero[before] + measured.zero[after])
         inside = recording.accelerometer[start:stop] @ accelerometer.S.T + accelerometer.b
-        keep = np.all(np.isfinite(rate) & np.isfinite(inside), axis=1)
-        if clipped or np.count_nonzero(keep) < 2:
-            continue
-        if not keep.all():
+        if not (np.isfinite(rate).all() and np.isfinite(inside).all()):
+            keep = np.all(np.isfinite(rate) & np.isfinite(inside), axis=1)
             time, inside, rate = time[keep], inside[keep], rate[keep]
+        if clipped or len(time) < 2:
+            continue
         # ∂([f]× S w)/∂S_ij = f × e_i w_j, integrated by trapezoids.
         moment = (inside * _trapezoid_weights(time)[:, None]).T @ rate
         rows.append(np.moveaxis(_ACROSS @ moment, 0, 1).reshape(3, 9))

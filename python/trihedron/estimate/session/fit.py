@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -61,17 +61,14 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     Moves that miss by more than their samples' noise explains count with the noise that they show, and a velocity that
     does is left out: what the linear model lacks there must not be spread over the accelerometer.
     """
-    core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w, None)
+    core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w)
     inflation = (1.0, 1.0)
     for _ in range(MOST_WIDENINGS):
         wider = _inflation(core, inflation)
         if wider == inflation:
             break
         inflation = wider
-        core = fitted(
-            replace(observed, inflation=inflation), core.force_scale, core.force_bias, core.rate_scale, core,
-            is_tuned=False,
-        )  # fmt: skip
+        core = core.widened(inflation)
     chi2, dof = (float(of_domains[MOVES]) for of_domains in _misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
@@ -109,27 +106,24 @@ def fitted(
     S_a: FloatArray,
     b_a: FloatArray,
     S_w: FloatArray,
-    at: _core.SessionFit | None,
-    *,
-    is_tuned: bool = True,
 ) -> _core.SessionFit:
-    """One fit on centred readings; ``at`` gives verticals and strengths to begin with."""
+    """One fit on centred readings, its strengths chosen."""
     force = observed.hold_force @ S_a.T + b_a
     state = _core.SessionState(
         force_scale=np.ascontiguousarray(S_a),
         force_bias=np.ascontiguousarray(b_a),
         rate_scale=np.ascontiguousarray(S_w),
-        up=np.ascontiguousarray(force / np.linalg.norm(force, axis=1, keepdims=True) if at is None else at.up),
+        up=np.ascontiguousarray(force / np.linalg.norm(force, axis=1, keepdims=True)),
         rate_zero=np.ascontiguousarray(observed.hold_rate),
         force_zero=np.zeros((len(force), 3)),
         effect=np.zeros(0),
     )
     return observed.model().fit(
         state=state,
-        strengths=START_STRENGTHS if at is None else at.strengths,
+        strengths=START_STRENGTHS,
         force_effect=None,
         rate_effect=None,
-        is_tuned=is_tuned,
+        is_tuned=True,
     )
 
 
