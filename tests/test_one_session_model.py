@@ -83,6 +83,6 @@ def test_a_zero_that_drifts_is_named_and_the_table_shows_what_the_calibration_le
     assert next(one for one in diagnosis.domains if one.domain == "static-accel").disagrees
     shown = next(one for one in diagnosis.residuals if one.domain == "static-accel")
     rms = np.sqrt(np.mean(shown.before**2))
-    # One zero for a session that has none: each estimate of it leaves no less than the calibration's, the least there is.
+    # A session that drifts has no zero: each estimate of it leaves at least what the calibration does.
     assert rms > 0.95 * published_figures(result.calibration)["gravity_at_rest"]["rms"]
     assert np.sqrt(np.mean(shown.after**2)) < 0.5 * rms
