@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.ranges import Range, ranges_of
+from trihedron.ranges import Range, grown, ranges_of
 from trihedron.records import Recording
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.floor import Activity, quiet_channels
@@ -114,12 +114,7 @@ def _poses(channels: Channels, seen: _Seen, calm: BoolArray, taken: list[Run], s
     calm = calm.copy()
     for run in taken:
         # A calm fringe of a hold is its settling, not another pose.
-        first, last = run.outer_first, run.outer_last
-        while first > 0 and calm[first - 1]:
-            first -= 1
-        while last < len(calm) and calm[last]:
-            last += 1
-        calm[first:last] = False
+        calm[slice(*grown(calm, (run.outer_first, run.outer_last)))] = False
     found: list[Run] = []
     shortest = max(channels.blocks(shortest_s), WINDOW_BLOCKS)
     for first, last in ranges_of(calm):

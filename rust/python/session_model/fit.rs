@@ -1,6 +1,6 @@
 //! A fitted session across the seam.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::DMatrix;
 use numpy::{
@@ -15,7 +15,7 @@ use super::{Corners, distortion};
 use crate::python::arrays::{dmatrix, matrix, of3, vector3, vectors};
 use crate::python::{run, run_long};
 use crate::session_model::Session;
-use crate::session_model::fit::Fit;
+use crate::session_model::fit::{Fit, widened};
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
@@ -25,6 +25,18 @@ type Array3<'py> = PyReadonlyArray3<'py, f64>;
 pub(super) struct SessionFit {
     pub session: Arc<Session>,
     pub fit: Arc<Fit>,
+    /// Share of every row that the fit used up, once asked for.
+    leverage: OnceLock<Vec<f64>>,
+}
+
+impl SessionFit {
+    pub fn new(session: Arc<Session>, fit: Fit) -> Self {
+        Self {
+            session,
+            fit: Arc::new(fit),
+            leverage: OnceLock::new(),
+        }
+    }
 }
 
 #[pymethods]
@@ -215,8 +227,16 @@ impl SessionFit {
 
     /// `(rows,)` share of every row that the fit used up.
     fn leverage<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let fit = Arc::clone(&self.fit);
-        Ok(run(py, || Ok(fit.leverage()))?.to_pyarray(py))
+        let (fit, known) = (&self.fit, &self.leverage);
+        Ok(run(py, || Ok(known.get_or_init(|| fit.leverage())))?.to_pyarray(py))
+    }
+
+    /// The fit with other factors on the standard errors of gravity after moves and of the velocity over them, from here.
+    fn widened(&self, py: Python<'_>, inflation: Corners) -> PyResult<Self> {
+        let (fit, session) = (Arc::clone(&self.fit), Arc::clone(&self.session));
+        let (session, found) =
+            run_long(py, || widened(&session, &fit, [inflation.0, inflation.1]))?;
+        Ok(Self::new(Arc::new(session), found))
     }
 
     /// Held-out prediction of folds of rows, `(folds, rows)` flags: χ² `(folds, 4)`, log-determinants `(folds,)`,
