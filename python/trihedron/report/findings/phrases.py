@@ -53,6 +53,11 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "too-many-iterations": "stopped: iteration limit reached before convergence",
         "closed-form": "closed form",
         "linear-least-squares": "linear least squares",
+        # residuals of a domain
+        "length-at-rest": "|f| − |g| at rest",
+        "rate-at-rest": "rate at rest, minus its mean",
+        "gravity-missed": "gravity missed after the move",
+        "velocity-over-move": "velocity over the move",
         # places in a file, amounts
         "line": "line {line}",
         "row": "row {row}",
