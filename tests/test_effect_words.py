@@ -74,7 +74,7 @@ def test_every_reason_is_given_somewhere_and_with_its_places():
 
 
 def written(path):
-    """(line, text) of every string of a file that is no docstring or refusal; of one with places, the text between them."""
+    """(line, text) of every string of a file that is no docstring or refusal; of one with places, the text between."""
     tree = ast.parse(path.read_text())
     skipped = set()
     for node in ast.walk(tree):
