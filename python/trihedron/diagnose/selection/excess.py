@@ -30,8 +30,8 @@ def domain_chi2(fitted: Fit) -> dict[int, tuple[float, float]]:
 def in_the_scatter_of(before: Fit, after: Fit) -> Fit:
     """A model fitted with zeros that scatter as they do in another of the same observations.
 
-    Either model chose the size of a named scatter for itself, and what one lacks it called scatter: how much it does not
-    explain shows in the scatter of the one that explains it.
+    Either model chose the size of a named scatter for itself, and what one lacks it called scatter: how much it does
+    not explain shows in the scatter of the one that explains it.
     """
     line, scatter = before.line, after.twin.scatter
     if line.obs is not after.line.obs or line.obs.zero_scatter is None or before.twin.scatter == scatter:
