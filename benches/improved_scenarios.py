@@ -53,7 +53,7 @@ SETS = {
 
 def logs(folder, chosen):
     for name, (where, gravity) in SETS.items():
-        if chosen and name.split()[0] not in chosen:
+        if chosen and name not in chosen and name.split()[0] not in chosen:
             continue
         paths = {key: folder / value if isinstance(value, str) else value for key, value in where.items()}
         yield name, paths, gravity

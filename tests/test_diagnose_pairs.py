@@ -170,7 +170,7 @@ def test_a_headline_counts_what_it_does_not_say_and_leads_with_the_most_certain(
     )
     said = verdict_in_words(found)
     assert len(said) < 300
-    assert said.index("accelerometer zeros (up to 100 %)") < said.index("accelerometer scales")
+    assert said.index("accelerometer zeros by up to 100 %") < said.index("accelerometer scales")
     assert "and 40 more differences" in said  # two groups and 38 octaves
 
 

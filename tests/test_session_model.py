@@ -15,6 +15,7 @@ from trihedron.diagnose.session.twin import DYNAMICS, MOVES, NO_DISTORTION
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
+from trihedron.records.published import published_figures
 from trihedron.records.recording import spread_stamps
 from trihedron.segment import segment_recording
 from trihedron.simulate import hand_session, simulate
@@ -73,6 +74,11 @@ def test_gravity_is_carried_through_moves_where_zeros_differ_between_poses(real_
     assert fitted.twin.gyro_S[0, 0] == pytest.approx(1.0, abs=0.01)
     missed = np.linalg.norm(fitted.line.move_errors[0][:, :2], axis=1)
     assert np.degrees(np.sqrt(np.mean(np.square(missed))) / 9.803) < 0.35
+    # The calibration is the same estimator's, and publishes what its own moves miss.
+    result = calibrate(recording, gravity_m_s2=9.803)
+    assert result.calibration.gyroscope is not None
+    assert result.calibration.gyroscope.S[0, 0] == pytest.approx(1.0, abs=0.01)
+    assert published_figures(result.calibration)["gravity_after_moves"]["rms"] < 0.35
 
 
 def test_samples_that_share_a_stamp_are_spread_to_the_next():

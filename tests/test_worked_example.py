@@ -7,7 +7,11 @@ import runpy
 import shlex
 from pathlib import Path
 
+import pytest
+
 from trihedron.cli import main
+from trihedron.report import diagnosis_report
+from trihedron.report.page import to_html
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -39,9 +43,25 @@ def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_pa
     assert Path("extended.json").is_file()
 
 
-def test_the_same_in_python_ends_the_same_way(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with contextlib.redirect_stdout(io.StringIO()):
-        names = runpy.run_path(str(DOCS / "tutorials" / "simulation_against_recording.py"))
+@pytest.fixture(scope="module")
+def names(tmp_path_factory):
+    with contextlib.chdir(tmp_path_factory.mktemp("tutorial")), contextlib.redirect_stdout(io.StringIO()):
+        return runpy.run_path(str(DOCS / "tutorials" / "simulation_against_recording.py"))
+
+
+def test_the_same_in_python_ends_the_same_way(names):
     assert [e.id for e in names["found"].effects] == ["gyro-g-sensitivity"]
     assert names["again"].verdict == "consistent"
+
+
+def test_an_ideal_sensor_in_si_is_held_against_counts_at_their_own_mean_scale(names):
+    found = names["found"]
+    as_given = {seen.domain: seen.rms for seen in found.stages[0].domains}
+    # Zeros of 0.35 m/s² and scales 1.4 % apart; counts taken for m/s² would be 16000 m/s² wrong.
+    assert 0.05 < as_given["static-accel"] < 0.5
+    assert as_given["moves"] < 10.0
+    page = to_html(diagnosis_report(found))
+    low = [float(v) for v in re.findall(r'data-y="(\S+) \S+" data-ux="m/s²" data-uy="°/s"', page)]
+    # 0.3 · 10⁻³ (rad/s)/(m/s²) times 10.6 m/s² is 0.18 °/s.
+    assert len(low) == 3
+    assert 0.1 < -min(low) < 0.3

@@ -18,6 +18,10 @@ def chdtri(dof: float, above: float) -> float:
     return _core.chi_square_upper(above, dof)
 
 
+MEDIAN_CHI2 = {dof: chdtri(dof, 0.5) for dof in (1, 2)}
+"""Median of a chi-square variate, for robust scales of one number and of a pair."""
+
+
 def fdtrc(top: float, bottom: float, value: float) -> float:
     """Probability that an F variate exceeds ``value``."""
     return _core.f_above(value, top, bottom)

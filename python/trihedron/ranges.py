@@ -18,3 +18,13 @@ def edges_of(mask: BoolArray) -> IntArray:
 def ranges_of(mask: BoolArray) -> list[Range]:
     """The same as a list, for loops over few runs."""
     return [(first, last) for first, last in edges_of(mask).tolist()]
+
+
+def grown(mask: BoolArray, part: Range) -> Range:
+    """``part`` widened on both sides over true values of ``mask`` (n,) that touch it."""
+    first, last = part
+    while first > 0 and mask[first - 1]:
+        first -= 1
+    while last < len(mask) and mask[last]:
+        last += 1
+    return first, last

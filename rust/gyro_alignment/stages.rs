@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 pub struct Settings {
     /// What a move costs whose residual is far beyond its noise; scales in standard errors.
     pub loss: Loss,
-    /// Times the covariance is computed anew.
+    /// Times the covariance is computed anew; between the first and the last of them a step or two are taken each.
     pub max_rounds: usize,
     /// The first start is a solution of nearly the same problem: it is not approached, but weighed at once.
     pub is_near: bool,
@@ -22,7 +22,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             loss: Loss::Linear,
-            max_rounds: 12,
+            max_rounds: 40,
             is_near: false,
         }
     }
@@ -68,6 +68,10 @@ pub struct Fit {
 
 /// Angle, rad, beyond which the robust approach stops believing a move.
 const DOUBTFUL_ANGLE: f64 = 0.05;
+/// Linearisations of a round whose covariance or weights are still to change: a fit to the end would be for nothing.
+const STEPS: usize = 1;
+/// Relative step at which the approach has come near enough to be weighed.
+const NEAR: f64 = 1e-4;
 /// Standard errors by which the parameters together may still move.
 const SETTLED: f64 = 1e-3;
 
@@ -93,7 +97,9 @@ pub fn fit(
     let mut iterations = 0;
     let mut settled = false;
     let mut last: Option<Solution> = None;
-    for _ in 0..settings.max_rounds.max(1) {
+    let max_rounds = settings.max_rounds.max(1);
+    let mut is_last = max_rounds == 1;
+    for round in 0..max_rounds {
         let at = problem.evaluate(base.clone(), &turns);
         let layout = Layout::new(problem, &at);
         let (factor, mahalanobis) = layout.covariance(problem, &at, &weights)?;
@@ -116,18 +122,26 @@ pub fn fit(
             factor
         };
         weights = next_weights;
-        let solution = weigh(problem, &base, &layout, &factor, &turns)?;
+        let steps = if is_last {
+            Options::default().max_iterations
+        } else {
+            STEPS
+        };
+        let solution = weigh(problem, &base, &layout, &factor, &turns, steps)?;
         iterations += solution.iterations;
         let start = problem.pack(&base);
         let moved = &solution.parameters - start;
         // In standard errors: the covariance of the residuals follows the parameters far more slowly than this.
         let distance = (&solution.r_factor * &moved).norm();
         base = problem.unpack(&base, &solution.parameters);
+        let is_near = distance < SETTLED && change_of_weights < 1e-3;
         last = Some(solution);
-        if distance < SETTLED && change_of_weights < 1e-3 {
+        if is_near && is_last {
             settled = true;
             break;
         }
+        // Once there, to the end; and so if the rounds run out.
+        is_last = is_last || is_near || round + 2 == max_rounds;
     }
     let solution = last.ok_or_else(|| Error::bad_input("a fit needs at least one round"))?;
     let at = problem.evaluate(base, &turns);
@@ -151,7 +165,7 @@ fn approach(problem: &Alignment, starts: &[Model], turns: &LastTurns) -> Result<
     let options = Options {
         loss: Loss::SoftL1 { scale: 1.0 },
         block: 3,
-        step_tolerance: 1e-6,
+        step_tolerance: NEAR,
         max_iterations: 60,
         ..Options::default()
     };
@@ -197,6 +211,7 @@ fn weigh(
     layout: &Layout,
     factor: &BandedCholesky,
     turns: &LastTurns,
+    steps: usize,
 ) -> Result<Solution> {
     let whitened = |x: &DVector<f64>| {
         let at = problem.evaluate(problem.unpack(base, x), turns);
@@ -213,7 +228,10 @@ fn weigh(
         },
         |x| Ok(whitened(x).column(0).into_owned()),
         problem.pack(base),
-        &Options::default(),
+        &Options {
+            max_iterations: steps,
+            ..Options::default()
+        },
     )
 }
 

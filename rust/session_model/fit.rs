@@ -1,23 +1,29 @@
 //! The fit of a session, and the strengths of the processes behind its zeros (docs/model-session.md, 11.9-11.12).
 
-use std::cell::{OnceCell, RefCell};
+use std::cell::RefCell;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 use super::chain::{Chain, Layout};
 use super::factor::Factor;
+use super::held::Held;
 use super::move_rows::{Passed, Weights};
-use super::moves::Carried;
+use super::moves::Move;
 use super::rows::Group;
 use super::strengths::CORNER_GRID_S;
 use super::{Distortion, Session, State, Strengths};
 use crate::error::Result;
-use crate::gauss_newton::{Descent, Local, Options, Stop, descend};
+use crate::gauss_newton::{Options, Stop, descend};
 
 /// Added to the diagonal of the scaled normal equations: directions that nothing sees stay finite.
 pub const RIDGE: f64 = 1e-12;
 /// The undamped step moves all whitened rows together by less than this many standard errors: converged.
 const STEP_TOLERANCE: f64 = 1e-3;
+/// The same of a descent whose weights are to be renewed: they change by far less on the rest of the way.
+const ROUGH_TOLERANCE: f64 = 0.1;
+/// Angle, rad, between a vertical and the plane it was compared in, below which moves carried there count as they are:
+/// residual and noise shrink together, in second order.
+const SAME_PLANE: f64 = 1e-2;
 /// Renewals of the moves' weights; they follow the state in second order and settle in two.
 const RENEWALS: usize = 6;
 
@@ -109,147 +115,14 @@ pub fn gradient<'a>(layout: Layout, groups: impl IntoIterator<Item = &'a Group>)
     out
 }
 
-/// A session with its weights held: what one descent works on.
-struct Held<'a> {
-    session: &'a Session,
-    distortion: &'a Distortion,
-    strengths: Strengths,
-    weights: &'a Weights,
-    /// The moves at the state that the descent begins at, already carried.
-    first: RefCell<Option<Vec<Passed>>>,
-    /// The state whose cost was asked for last, and the moves carried there.
-    tried: RefCell<Option<(State, Vec<Carried>)>>,
-}
-
-/// The linear problem of a state.
-struct Here {
-    groups: Vec<Group>,
-    passed: Vec<Passed>,
-    chain: Chain,
-    /// Its factors without damping, made when first asked for.
-    factor: OnceCell<Factor>,
-    gradient: DMatrix<f64>,
-    cost: f64,
-    n: usize,
-}
-
-impl Descent for Held<'_> {
-    type Point = State;
-    type Local = Here;
-
-    fn linearise(&self, state: &State, _previous: Option<&Here>) -> Result<Here> {
-        let known = self.first.borrow_mut().take();
-        let passed = known.unwrap_or_else(|| {
-            let carried = match self.tried.borrow_mut().take() {
-                Some((at, carried)) if at == *state => carried.into_iter().map(Some).collect(),
-                _ => vec![None; self.session.moves.len()],
-            };
-            self.session
-                .pass_carried(state, self.distortion, &self.weights.plane, carried)
-        });
-        let groups = self.session.groups(
-            state,
-            &self.strengths,
-            self.distortion,
-            self.weights,
-            &passed,
-        )?;
-        let layout = self.session.layout(self.distortion.k);
-        let chain = Chain::of(layout, groups.iter().map(|group| &group.rows));
-        Ok(Here {
-            gradient: gradient(layout, &groups),
-            cost: 0.5 * chi2_of(&groups),
-            n: groups.iter().map(|group| group.rows.len()).sum(),
-            groups,
-            passed,
-            chain,
-            factor: OnceCell::new(),
-        })
-    }
-
-    fn cost(&self, state: &State) -> Result<f64> {
-        let chi2 = self
-            .session
-            .chi2(state, &self.strengths, self.distortion, self.weights);
-        // A triad that collapsed on the way is a wall, not an end.
-        Ok(chi2.map_or(f64::INFINITY, |(value, carried)| {
-            if value.is_finite() {
-                *self.tried.borrow_mut() = Some((state.clone(), carried));
-                0.5 * value
-            } else {
-                f64::INFINITY
-            }
-        }))
-    }
-
-    fn moved(&self, state: &State, step: &DVector<f64>) -> State {
-        state.moved(step, self.session.layout(self.distortion.k))
-    }
-}
-
-impl Here {
-    fn image(&self, step: &DVector<f64>) -> impl Iterator<Item = (&Group, DVector<f64>)> {
-        self.groups
+impl Session {
+    /// Whether the planes that moves were compared in lie across the verticals of a state.
+    fn compares_in(&self, passed: &[Passed], state: &State) -> bool {
+        let tilt = |(one, known): (&Move, &Passed)| known.plane.tr_mul(&state.up[one.before + 1]);
+        self.moves
             .iter()
-            .map(|group| (group, group.rows.image(self.chain.layout, step)))
-    }
-
-    fn undamped(&self) -> Result<&Factor> {
-        if let Some(factor) = self.factor.get() {
-            return Ok(factor);
-        }
-        let made = self.chain.factor(RIDGE, None)?;
-        Ok(self.factor.get_or_init(|| made))
-    }
-}
-
-impl Local for Here {
-    fn cost(&self) -> f64 {
-        self.cost
-    }
-
-    fn n_residuals(&self) -> usize {
-        self.n
-    }
-
-    fn is_finite(&self) -> bool {
-        self.gradient.iter().all(|value| value.is_finite())
-    }
-
-    fn gradient_cosine(&self) -> f64 {
-        let size = (2.0 * self.cost).sqrt().max(f64::MIN_POSITIVE);
-        self.chain
-            .diagonal()
-            .iter()
-            .zip(self.gradient.iter())
-            .filter(|(d, _)| **d > 0.0)
-            .map(|(d, g)| g.abs() / d.sqrt() / size)
-            .fold(0.0, f64::max)
-    }
-
-    fn step(&self, lambda: f64) -> Result<DVector<f64>> {
-        let x = if lambda == 0.0 {
-            self.undamped()?.solve(&self.gradient)
-        } else {
-            let factor = self.chain.factor(RIDGE + lambda, None)?;
-            factor.solve(&self.gradient)
-        };
-        Ok(-x.column(0).into_owned())
-    }
-
-    fn predicted(&self, step: &DVector<f64>) -> f64 {
-        let after: f64 = self
-            .image(step)
-            .map(|(group, image)| (image + &group.rows.residual).norm_squared())
-            .sum();
-        self.cost - 0.5 * after
-    }
-
-    fn length(&self, step: &DVector<f64>) -> f64 {
-        self.image(step)
-            .map(|(_, image)| image.norm_squared())
-            .sum::<f64>()
-            .sqrt()
+            .zip(passed)
+            .all(|pair| tilt(pair).norm() < SAME_PLANE)
     }
 }
 
@@ -263,7 +136,37 @@ pub fn fit(
     strengths: Strengths,
     distortion: &Distortion,
 ) -> Result<Fit> {
-    let options = Options {
+    fit_from(session, start, None, strengths, distortion)
+}
+
+/// The same with other factors on the standard errors of the moves, from where the session was fitted.
+///
+/// # Errors
+/// As [`fit`].
+pub fn widened(session: &Session, found: &Fit, inflation: [f64; 2]) -> Result<(Session, Fit)> {
+    let mut session = session.clone();
+    session.noise.inflation = inflation;
+    let passed = found.passed.iter().cloned();
+    let passed = passed.map(|one| Passed { inflation, ..one }).collect();
+    let again = fit_from(
+        &session,
+        found.state.clone(),
+        Some(passed),
+        found.strengths,
+        &found.distortion,
+    )?;
+    Ok((session, again))
+}
+
+/// [`fit`], with the moves as they were carried at the start where that is known.
+pub(super) fn fit_from(
+    session: &Session,
+    start: State,
+    known: Option<Vec<Passed>>,
+    strengths: Strengths,
+    distortion: &Distortion,
+) -> Result<Fit> {
+    let mut options = Options {
         step_tolerance: STEP_TOLERANCE,
         gradient_tolerance: 1e-14,
         max_iterations: 50,
@@ -271,9 +174,17 @@ pub fn fit(
     };
     let mut state = start;
     let mut iterations = 0;
-    let planes = session.planes(&state);
-    let mut passed = session.pass(&state, distortion, &planes);
+    let mut passed = match known {
+        Some(known) if session.compares_in(&known, &state) => known,
+        _ => session.pass(&state, distortion, &session.planes(&state)),
+    };
     for renewal in 0.. {
+        let is_rough = renewal == 0 && !session.moves.is_empty();
+        options.step_tolerance = if is_rough {
+            ROUGH_TOLERANCE
+        } else {
+            STEP_TOLERANCE
+        };
         let weights = Weights::of(&passed, &strengths)?;
         let held = Held {
             session,
@@ -288,7 +199,8 @@ pub fn fit(
         state = ended.point;
         let local = ended.local;
         passed = local.passed;
-        let is_settled = ended.iterations == 1 || session.moves.is_empty();
+        let is_there = ended.stop != Stop::SmallStep || ended.step <= STEP_TOLERANCE;
+        let is_settled = (ended.iterations == 1 && is_there) || session.moves.is_empty();
         if is_settled || renewal >= RENEWALS {
             let factor = match local.factor.into_inner() {
                 Some(factor) => factor,

@@ -13,6 +13,7 @@ mod evidence;
 pub mod factor;
 pub mod fit;
 mod gaps;
+mod held;
 pub mod held_out;
 mod lanes;
 pub mod move_rows;

@@ -1,11 +1,13 @@
 //! Rows of the moves (docs/model-session.md, 11.3-11.7).
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, Matrix3x2, SMatrix, Vector3};
 use rayon::prelude::*;
 
 use super::chain::{Layout, Rows};
 use super::moves::{Carried, MoveCovariance, N_MOVE, Sees, carry};
-use super::response::{Response, Sums, effect_columns, loosened, respond, sums};
+use super::response::{Response, Sums, effect_columns, loosened, respond, sums, widen};
 use super::rows::{Domain, Group, Kind};
 use super::{Distortion, LOWER, N_MODEL, Session, State, Strengths, tangent_plane};
 use crate::error::{Error, Result};
@@ -54,15 +56,17 @@ impl Weights {
 #[derive(Debug, Clone)]
 pub struct Passed {
     /// Forward.
-    pub carried: Carried,
+    pub carried: Arc<Carried>,
     /// Backward.
-    pub response: Response,
+    pub response: Arc<Response>,
     /// Products with the readings.
     pub sums: Sums,
     /// Plane of comparison.
     pub plane: Matrix3x2<f64>,
     /// What zeros of unit scatter (accelerometer, gyro) add to the covariance by leaving the line between the poses.
     pub loose: Option<[MoveCovariance; 2]>,
+    /// Factors on the standard errors by noise of the samples: gravity after the move, velocity over it.
+    pub inflation: [f64; 2],
 }
 
 impl Passed {
@@ -70,6 +74,7 @@ impl Passed {
     #[must_use]
     pub fn covariance(&self, strengths: &Strengths) -> MoveCovariance {
         let mut out = self.response.covariance;
+        widen(&mut out, self.inflation);
         if let Some(loose) = &self.loose {
             for s in 0..2 {
                 out += loose[s] * (strengths.scatter[s] * strengths.between[s]).powi(2);
@@ -148,11 +153,12 @@ impl Session {
                     .as_ref()
                     .map(|scatter| loosened(one, &sees, &response, scatter));
                 Passed {
-                    carried,
-                    response,
+                    carried: Arc::new(carried),
+                    response: Arc::new(response),
                     sums,
                     plane: planes[m],
                     loose,
+                    inflation: self.noise.inflation,
                 }
             })
             .collect()

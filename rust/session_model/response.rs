@@ -14,7 +14,7 @@ pub struct Response {
     pub by_rate: Vec<SMatrix<f64, N_MOVE, 3>>,
     /// `(3, 3)` a sample: the velocity alone answers to the force.
     pub by_force: Vec<Matrix3<f64>>,
-    /// Covariance of the residuals by noise of the samples.
+    /// Covariance of the residuals by noise of the samples, not widened.
     pub covariance: MoveCovariance,
     /// `g Tᵀ C` at the end.
     pub lever: Matrix2x3<f64>,
@@ -84,7 +84,6 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
         }
     }
     add_white(one, sees, noise, &by_rate, &by_force, &mut covariance);
-    widen(&mut covariance, noise.inflation);
     Response {
         by_rate,
         by_force,
@@ -95,7 +94,7 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
 
 /// Widens gravity and velocity, each by its own factor. What they miss beyond the noise of the samples is not known to be
 /// common to both: widened along, their correlation would make a velocity that is not heard tell gravity's noise.
-fn widen(covariance: &mut MoveCovariance, inflation: [f64; 2]) {
+pub(super) fn widen(covariance: &mut MoveCovariance, inflation: [f64; 2]) {
     let mut gravity = covariance.fixed_view_mut::<2, 2>(0, 0);
     gravity *= inflation[0] * inflation[0];
     let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::chain::Chain;
 use super::evidence::{Evidence, Part};
-use super::fit::{Fit, chi2_of, fit, gradient};
+use super::fit::{Fit, chi2_of, fit, fit_from, gradient};
 use super::move_rows::{Weights, Whitening};
 use super::moves::N_MOVE;
 use super::rows::Domain;
@@ -55,7 +55,7 @@ pub fn tune(
     let likely = evidence.search(session);
     let best = evidence.without_small_scatter(&likely, session);
     if best != found.strengths {
-        found = fit(session, found.state, best, distortion)?;
+        found = fit_from(session, found.state, Some(found.passed), best, distortion)?;
     }
     found.likely_scatter = likely.scatter;
     if session.scatter.is_none() || best.scatter == [NO_SCATTER; 2] || session.moves.is_empty() {
@@ -70,7 +70,7 @@ pub fn tune(
         return Ok(found);
     }
     let likely_scatter = found.likely_scatter;
-    let found = fit(session, found.state, best, distortion)?;
+    let found = fit_from(session, found.state, Some(found.passed), best, distortion)?;
     Ok(Fit {
         likely_scatter,
         ..found

@@ -15,6 +15,7 @@ from trihedron.arrays import FloatArray
 
 WINDOW_S = 0.5
 MAX_WINDOWS = 2000
+_FIRST_ROWS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,5 +91,9 @@ def look(sensors: dict[str, FloatArray], rate_hz: float) -> Windows | None:
 def is_integer(array: FloatArray) -> bool:
     """All readings (of a sample of up to about 20000 rows) are whole numbers."""
     probe = array[:: max(1, len(array) // 20000)]
-    probe = probe[np.isfinite(probe)]
-    return bool(len(probe)) and bool(np.all(probe == np.rint(probe)))
+    # Most logs show in their first rows that they are none.
+    return all(_is_whole(part) for part in (probe[:_FIRST_ROWS], probe)) and bool(np.isfinite(probe).any())
+
+
+def _is_whole(probe: FloatArray) -> bool:
+    return bool(np.all((probe == np.rint(probe)) | ~np.isfinite(probe)))

@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron.diagnose.against import (
     FREE_CURVES,
+    as_read,
     compare_effects,
     compare_numbers,
     left_open_by,
@@ -44,6 +45,7 @@ def compared(
     ``simulated`` is the user's simulated log with its free diagnosis, where that is the model; else ``given`` is.
     ``noise`` is what was compared of noise and sampling beside it.
     """
+    own = model_of_diagnosis(found)
     model = model_of_calibration(given) if simulated is None else model_of_diagnosis(simulated[0])
     given_effects = () if simulated is None else _without_walk(simulated[0].effects, noise)
     unexplained = {test.domain for test in found.remaining if test.disagrees}
@@ -55,7 +57,7 @@ def compared(
     )  # fmt: skip
     numbers = compare_numbers(
         model,
-        model_of_diagnosis(found),
+        own,
         alpha=alpha,
         # A linear calibration was fitted beside effects that it does not know: it is also held against such a fit.
         linear=model_of_diagnosis(found, with_effects=False) if simulated is None and found.effects else None,
@@ -79,7 +81,7 @@ def compared(
         effects=effects.in_order,
         parameters=parameters,
         noise_compared=noise,
-        stages=(_as_given(given, recording, segments), *found.stages),
+        stages=(_as_given(as_read(given, own), recording, segments), *found.stages),
     )
 
 

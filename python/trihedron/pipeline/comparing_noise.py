@@ -328,7 +328,8 @@ def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
         f"The model samples at {model.rate_hz:.5g} Hz, the recording at {recording.rate_hz:.5g} Hz." if is_far else ""
     )
     yield NoiseDifference("both", "", "rate", model.rate_hz, recording.rate_hz, ratio, None, "Hz", None, is_far, remark)
-    m, r = model.jitter_steps / model.rate_hz, recording.jitter_steps / recording.rate_hz
+    # Stamps on an even grid scatter by their rounding only.
+    m, r = (0.0 if one.jitter_steps < PERFECT_CLOCK else one.jitter_steps / one.rate_hz for one in (model, recording))
     larger, smaller = max(model.jitter_steps, recording.jitter_steps), min(model.jitter_steps, recording.jitter_steps)
     is_far = larger > LEAST_JITTER and larger > 2.0 * smaller
     which = "model" if m > r else "recording"

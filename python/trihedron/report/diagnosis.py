@@ -125,7 +125,12 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     if not diagnosis.effects:
         head, rows = head[:-1], tuple(row[:-1] for row in rows)
     blocks: list[Block] = [Table(head, rows)]
-    places = tuple((d.domain, place) for d in diagnosis.domains if d.disagrees and (place := where_in_words(d)))
+    # Which numbers differ has a section of its own.
+    places = tuple(
+        (d.domain, place)
+        for d in diagnosis.domains
+        if d.disagrees and d.domain != "numbers" and (place := where_in_words(d))
+    )
     if places:
         blocks.append(Facts(places))
     own = getattr(diagnosis, "calibration", None)
@@ -269,7 +274,9 @@ def _pictures(diagnosis: Diagnosis) -> list[Picture]:
 
 def _physics(diagnosis: Diagnosis) -> list[Picture]:
     """One picture per effect, where the recording is at hand and the effect acts on poses or moves one by one."""
-    made = [getattr(diagnosis, name, None) for name in ("recording", "segments", "calibration")]
+    # A given model's numbers, and its unit, are those of another sensor: forces are read with the recording's own.
+    own = getattr(diagnosis, "updated", None) or getattr(diagnosis, "calibration", None)
+    made = [getattr(diagnosis, "recording", None), getattr(diagnosis, "segments", None), own]
     if any(one is None for one in made):
         return []
     out = []

@@ -40,7 +40,7 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         if density is not None:
             unit = str(diagnosis.noise.get(f"{name}_unit", ""))
             words = ", ".join(plain_number(float(d)) for d in density)
-            words += f" {unit_in_print(unit).replace('sqrt(Hz)', '√Hz')}"
+            words += f" {unit_in_print(unit)}"
             corner = diagnosis.noise[f"{name}_corner_s"]
             if corner is not None:
                 words += f"; bias walk from {plain_number(float(corner))} s on"

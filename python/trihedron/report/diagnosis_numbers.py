@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference, ParameterDifference, Stage
 from trihedron.report.document import Block, Facts, Paragraph, Table
-from trihedron.report.numbers import MINUS, plain_number, unit_in_print, with_sigma
+from trihedron.report.numbers import MINUS, decimals_of, plain_number, unit_in_print, with_sigma
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_radians
 
 NAMED_SIGMAS = 3.0
@@ -93,7 +93,7 @@ def _groups_in_short(diagnosis: Diagnosis) -> list[str]:
         largest = max(
             (p for p in members if _in_sigmas(p) >= min(NAMED_SIGMAS, clear)), key=lambda p: abs(p.difference)
         )
-        said.append(f"{_GROUPS.get(name, name)} (up to {_size(largest)})")
+        said.append(f"{_GROUPS.get(name, name)} by up to {_size(largest)}")
     return said
 
 
@@ -138,7 +138,7 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             _plain(n.model),
             _plain(n.recording),
             _ratio(n),
-            unit_in_print(n.unit).replace("sqrt(Hz)", "√Hz"),
+            unit_in_print(n.unit),
             "differs" if n.significant else "",
         )
         for n in diagnosis.noise_compared
@@ -199,7 +199,16 @@ def _size(p: ParameterDifference) -> str:
 
 def _value(p: ParameterDifference, value: float) -> str:
     scale, unit = _unit(p, is_difference=False)
-    return f"{plain_number(scale * value, 6)}{' ' + unit if unit else ''}"
+    return f"{_as_known(scale * value, scale * p.std)}{' ' + unit if unit else ''}"
+
+
+def _as_known(value: float, sigma: float) -> str:
+    """As many decimals as the difference is known to; six digits where it is exact."""
+    if not 0.0 < sigma < float("inf"):
+        return plain_number(value, 6)
+    places = decimals_of(sigma)
+    # Adding zero takes the sign off what rounds to zero.
+    return f"{round(value, places) + 0.0:.{places}f}".replace("-", MINUS)
 
 
 def _unit(p: ParameterDifference, *, is_difference: bool) -> tuple[float, str]:

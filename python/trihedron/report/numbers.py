@@ -63,8 +63,8 @@ def power_of_ten(exponent: int) -> str:
 
 
 def unit_in_print(unit: str) -> str:
-    """``m/s^2`` as people print it."""
-    return unit.replace("^2", "²")
+    """``m/s^2`` and ``sqrt(Hz)`` as people print them."""
+    return unit.replace("^2", "²").replace("sqrt(Hz)", "√Hz").replace("sqrt(s)", "√s")
 
 
 def how_many(n: int, noun: str) -> str:

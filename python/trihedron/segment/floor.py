@@ -67,10 +67,9 @@ def measure_activity(channels: Channels, ends: Sequence[RangeEnd] = ()) -> Activ
     rounding = channels.quantisation_variance
     centre = np.nanmean(channels.mean[channels.is_valid], axis=0)
     mean = np.where(channels.is_valid[:, None], channels.mean - centre, 0.0)
-    variance = np.where(channels.is_valid[:, None], channels.variance, 0.0)
     whole = rolling_mean((~channels.is_valid)[:, None].astype(np.float64), width)[:, 0] == 0.0
-    inside = np.maximum(rolling_mean(variance, width), rounding)
-    between = (rolling_mean(mean**2, width) - rolling_mean(mean, width) ** 2) * (width / max(width - 1, 1))
+    inside, between = _scatter(channels, mean, channels.variance)
+    inside = np.maximum(inside, rounding)
     between = np.maximum(between, rounding / channels.length)
     alive = (np.median(inside[whole], axis=0) > 0.0) & (np.median(between[whole], axis=0) > 0.0)
     if not alive.any():
@@ -113,20 +112,27 @@ def quiet_channels(channels: Channels, activity: Activity, which: BoolArray) -> 
     if not alive.any() or not activity.is_quiet.any():
         return activity.is_quiet.copy()
     is_valid = channels.is_valid[:, None]
-    mean = np.where(
-        is_valid, channels.mean[:, alive] - np.mean(channels.mean[activity.is_quiet][:, alive], axis=0), 0.0
-    )
-    variance = np.where(is_valid, channels.variance[:, alive], 0.0)
-    whole: BoolArray = rolling_mean((~is_valid).astype(np.float64), width)[:, 0] == 0.0
-    between = (rolling_mean(mean**2, width) - rolling_mean(mean, width) ** 2) * (width / max(width - 1, 1))
-    out = whole
-    levels = ((rolling_mean(variance, width), activity.white_variance), (between, activity.slow_variance))
+    usual = np.mean(channels.mean[activity.is_quiet][:, alive], axis=0)
+    levels = _scatter(channels, np.where(is_valid, channels.mean[:, alive] - usual, 0.0), channels.variance[:, alive])
+    out: BoolArray = rolling_mean((~is_valid).astype(np.float64), width)[:, 0] == 0.0
     n = int(alive.sum())
     freedoms = (width * (channels.length - 1) * n, max(width - 1, 1) * n)
-    for (level, floor), freedom in zip(levels, freedoms, strict=True):
+    floors = (activity.white_variance, activity.slow_variance)
+    for level, floor, freedom in zip(levels, floors, freedoms, strict=True):
         ratio = np.log(np.maximum((level / floor[alive]).mean(axis=1), ROUNDING))
         out = np.asarray(out & (ratio <= _limit(ratio[activity.is_quiet], freedom)))
     return out
+
+
+def _scatter(channels: Channels, mean: FloatArray, variance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Variance inside the blocks and of block means about their own, over windows (m, c).
+
+    ``mean`` (m, c) are counted from near their own, for running sums round, and nothing where blocks are invalid.
+    """
+    width = min(WINDOW_BLOCKS, channels.n_blocks)
+    inside = rolling_mean(np.where(channels.is_valid[:, None], variance, 0.0), width)
+    between = (rolling_mean(mean**2, width) - rolling_mean(mean, width) ** 2) * (width / max(width - 1, 1))
+    return inside, between
 
 
 def _usual(power: FloatArray, tells: BoolArray) -> FloatArray:

@@ -14,12 +14,10 @@ from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise, split_by_halves
 from trihedron.segment.runs import Run
 from trihedron.segment.vertical import along, noise_along, upright
-from trihedron.units import AccelerationUnit
+from trihedron.units import acceleration_to_si
 
 PIECE = 1 << 18
 """Rows of a hold that are read at a time."""
-SIZED = (AccelerationUnit.M_S2, AccelerationUnit.G)
-"""Units of readings whose zero is small beside gravity."""
 OCTAVES = 4
 """A hold's own excess noise is judged on stretches from a half down to a sixteenth of it: the four octaves that weigh
 in the error of its mean."""
@@ -65,7 +63,7 @@ def average_holds(
     variance = noise.variance(duration[:, None]) * shrunk + rounding
     out = HoldMeans(mean, np.sqrt(variance), n_averaged)
     up = (
-        upright(mean[:, :3], has_unit=recording.accelerometer_unit in SIZED)
+        upright(mean[:, :3], has_unit=acceleration_to_si(recording.accelerometer_unit) is not None)
         if recording.accelerometer is not None and runs
         else None
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.ranges import Range, ranges_of
+from trihedron.ranges import Range, grown, ranges_of
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels
 from trihedron.segment.floor import Activity
 from trihedron.segment.noise import MeanNoise
@@ -145,11 +145,7 @@ def set_down(channels: Channels, runs: list[Run], loose: BoolArray, taken: list[
     for run in long_enough(channels, runs, SEEN_S):
         if run.last - run.first < FAR_SHORTER * usual:
             continue
-        first, last = run.first, run.last
-        while first > 0 and loose[first - 1]:
-            first -= 1
-        while last < len(loose) and loose[last]:
-            last += 1
+        first, last = grown(loose, (run.first, run.last))
         is_free = all(other.outer_last <= first or other.outer_first >= last for other in taken)
         if is_free and first > 0 and last < len(loose) and max(run.first - first, last - run.last) <= most:
             found.append(run)
@@ -206,12 +202,7 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
     free = loose.copy()
     for run in steady:
         # A calm fringe of a steady hold is its settling, not another pose.
-        a, b = run.first, run.last
-        while a > 0 and free[a - 1]:
-            a -= 1
-        while b < len(free) and free[b]:
-            b += 1
-        free[a:b] = False
+        free[slice(*grown(free, (run.first, run.last)))] = False
     attitude = channels.mean[:, accelerometer] / gravity
     zero = (
         np.median(np.vstack([channels.mean[a:b] for run in steady for a, b in run.quiet_ranges()]), axis=0)

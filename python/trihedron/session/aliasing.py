@@ -29,7 +29,7 @@ at a tenth of it."""
 LENGTH = 5
 """Of both filters, samples."""
 GAP = 1.5
-"""A step longer than this many usual ones has lost samples."""
+"""A step longer than this many usual ones has lost samples, as the session model counts them (its ``gaps``)."""
 MARGIN = 3.0
 """Standard deviations of the noise's own power that are not yet motion."""
 
@@ -64,7 +64,7 @@ def unresolved_variance(
     moves = np.array(move_ranges, dtype=np.int64).reshape(-1, 2)
     holds = np.array([(a, b) for a, b in hold_ranges if b - a > 8], dtype=np.int64).reshape(-1, 2)
     n_whole = np.maximum(moves[:, 1] - moves[:, 0] - (LENGTH - 1), 0)[:, None]
-    n_holds = (holds[:, 1] - holds[:, 0] - 4)[:, None]
+    n_holds = (holds[:, 1] - holds[:, 0] - (LENGTH - 1))[:, None]
     pieces, of_move = _between_gaps(moves, time_s, step_s)
     n_moves = np.bincount(of_move, pieces[:, 1] - pieces[:, 0] - (LENGTH - 1), len(moves))[:, None]
 

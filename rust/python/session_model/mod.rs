@@ -176,10 +176,7 @@ impl SessionModel {
                 fit(&session, start, strengths, &effects)
             }
         })?;
-        Ok(SessionFit {
-            session: Arc::clone(&self.session),
-            fit: Arc::new(found),
-        })
+        Ok(SessionFit::new(Arc::clone(&self.session), found))
     }
 
     /// `(moves, 5)` whitened residuals of the moves at a state, nothing fitted.

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use nalgebra::{DVector, Vector3};
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{
+    PyArray3, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::python::arrays::{matrix3, rows3, samples, vector3};
+use crate::python::arrays::{matrix3, rows3, samples, stack3, vector3};
 use crate::session_model::moves::Move;
 use crate::session_model::{AtRest, State};
 
@@ -64,6 +66,11 @@ impl SessionPoses {
                 _ => None,
             },
         })
+    }
+
+    /// `(h, 3, 3)` from an error of the accelerometer's means, raw, to whitened rows.
+    fn force_white<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        stack3(py, self.force.white.iter().copied())
     }
 }
 

@@ -9,11 +9,11 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from scipy.stats import f as f_distribution
 from scipy.stats import norm
 
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.selection.accepted import HEADLINE
+from trihedron.probability import f_upper
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.records.domains import Domain
 from trihedron.records.words import effect_words
@@ -204,7 +204,7 @@ def _beyond_chance(
 ) -> dict[Domain, float]:
     """What a scatter as large as the recording's comes to, in one draw of many, beside another draw of it."""
     return {
-        domain: rms * (math.sqrt(float(f_distribution.isf(alpha, dof, dof))) if dof >= 1.0 else 1.0)
+        domain: rms * (math.sqrt(f_upper(dof, dof, alpha)) if dof >= 1.0 else 1.0)
         for domain, rms in misses.items()
         for dof in (freedom.get(domain, 0.0),)
     }

@@ -37,6 +37,7 @@ from trihedron.diagnose.session.twin import (
 from trihedron.records.domains import HeldOut
 
 LEAST_P = 1e-300
+"""The rarest chance that a double holds with all its digits."""
 VISIBLE = 0.98
 """An effect must lower the held-out misfit of some domain by at least this factor to be worth a name."""
 OF_ACCELEROMETER = (STATIC_ACCEL, DYNAMICS)

@@ -99,23 +99,6 @@ class Observations:
             return noise
         return np.asarray(np.sqrt(noise**2 + (gradient**2 * self.zero_scatter[0] ** 2).sum(axis=1)))
 
-    @cached_property
-    def hold_force_white(self) -> FloatArray:
-        """(h, 3, 3) from an error of the accelerometer's means, raw, to the rows of the core."""
-        sigma = self.hold_force_sigma
-        out = np.eye(3) / sigma[:, :, None]
-        if self.force_up is None:
-            return out
-        up, error = self.force_up
-        known = np.isfinite(error)
-        across = np.eye(3) - up[:, :, None] * up[:, None, :]
-        covariance = (across * sigma[:, None, :] ** 2) @ across + (
-            up[:, :, None] * up[:, None, :] * np.where(known, error, 1.0)[:, None, None] ** 2
-        )
-        value, vector = np.linalg.eigh(covariance)
-        white: FloatArray = (vector / np.sqrt(value)[:, None, :]) @ vector.transpose(0, 2, 1)
-        return np.where(known[:, None, None], white, out)
-
     @property
     def hold_rate_spread(self) -> FloatArray | None:
         """(h, 3) the same of the gyro."""

@@ -174,7 +174,7 @@ class Linearisation:
     def accel_white(self) -> FloatArray:
         """(holds, 3, 3) from an error in SI to a whitened row of the accelerometer at rest."""
         inverse = np.linalg.inv(self.twin.accel_S)
-        white: FloatArray = self.obs.hold_force_white @ inverse
+        white: FloatArray = core_poses(self.obs).force_white() @ inverse
         return white
 
     @cached_property
@@ -202,13 +202,10 @@ def contiguous(values: FloatArray | None) -> FloatArray | None:
     return None if values is None else np.ascontiguousarray(values, dtype=np.float64)
 
 
-def core_model(
-    obs: Observations, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False
-) -> _core.SessionModel:
-    """The Rust model of some observations; with ``is_scatter_free`` zeros may scatter though no diagnosis says so
-    (a gyro's named scatter is its unit then)."""
+def core_poses(obs: Observations) -> _core.SessionPoses:
+    """The poses of some observations, in the core."""
     has_rate = obs.hold_rate is not None and obs.hold_rate_sigma is not None and obs.rate_density is not None
-    poses = _core.SessionPoses(
+    return _core.SessionPoses(
         time_s=np.ascontiguousarray(obs.hold_time_s, dtype=np.float64),
         force=np.ascontiguousarray(obs.hold_force),
         force_sigma=np.ascontiguousarray(obs.hold_force_sigma),
@@ -218,6 +215,13 @@ def core_model(
         rate_density=contiguous(obs.rate_density) if has_rate else None,
         force_along=obs.force_up,
     )
+
+
+def core_model(
+    obs: Observations, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False
+) -> _core.SessionModel:
+    """The Rust model of some observations; with ``is_scatter_free`` zeros may scatter though no diagnosis says so
+    (a gyro's named scatter is its unit then)."""
     scatter = None
     if is_scatter_free or obs.zero_scatter is not None:
         unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma, obs.force_up)
@@ -231,7 +235,7 @@ def core_model(
             scatter = (np.where(named, np.maximum(obs.zero_scatter, floor), unit), True)
     return _core.SessionModel(
         gravity_m_s2=gravity_m_s2,
-        poses=poses,
+        poses=core_poses(obs),
         moves=obs.core_moves,
         noise=(
             float(obs.jitter_s),

@@ -11,7 +11,7 @@ from trihedron import _core
 from trihedron._core import AlignmentFit
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.probability import chdtrc, chdtri
+from trihedron.probability import MEDIAN_CHI2, chdtrc, chdtri
 from trihedron.records.calibration import SensorCalibration
 from trihedron.refused import RefusedError
 
@@ -23,6 +23,9 @@ CAUCHY_SCALE = 3.0
 
 FALSE_ALARM = 1e-3
 """Chance that a sound recording raises a statistical finding of one kind."""
+
+LEAST_SHRINK = 0.1
+"""Of residuals by what was fitted to them: hardly any freedom is left, and a ratio of noise says no more."""
 
 AT_LEAST = 0.84
 """One standard error: as much of the rounding charged as misses with this chance would be larger than those seen."""
@@ -149,11 +152,8 @@ def align_screened(
     if options.is_robust and 2 * int(np.count_nonzero(used)) > n_parameters + 2:
         screen = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, CAUCHY_SCALE)
         distance = np.asarray(screen.mahalanobis)
-        # The median of χ²(2) is 1.386; residuals of p fitted parameters are smaller by 1 − p/n.
-        shrink = max(1.0 - screen.rank / (2.0 * np.count_nonzero(used)), 0.1)
-        typical = max(1.0, float(np.median(distance[used])) / (1.386 * shrink))
-        limit = float(chdtri(2, FALSE_ALARM / np.count_nonzero(used))) * typical
-        far = used & (distance > limit)
+        far = used.copy()
+        far[used] = are_far(distance[used], 2.0 * np.count_nonzero(used) - screen.rank)
         # Screening may not decide the fit: enough moves must remain.
         if np.any(far) and 2 * np.count_nonzero(used & ~far) > n_parameters + 2:
             outliers = tuple(int(i) for i in np.flatnonzero(far))
@@ -165,6 +165,20 @@ def align_screened(
     if fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM:
         inflation = fit.chi2 / fit.dof
     return assemble(fit, measured, accelerometer, used, outliers, inflation)
+
+
+def are_far(distance: FloatArray, dof: float) -> BoolArray:
+    """Moves (n,) whose gravity misses as none of so many does by chance, in units of the usual miss where that is above
+    the noise.
+
+    ``distance`` (n,) are squared Mahalanobis distances of two components each, with ``dof`` degrees of freedom in all.
+    """
+    n = len(distance)
+    # Residuals of fitted parameters are smaller.
+    shrink = max(dof / (2.0 * n), LEAST_SHRINK)
+    typical = max(1.0, float(np.median(distance)) / (MEDIAN_CHI2[2] * shrink))
+    far: BoolArray = distance > chdtri(2, FALSE_ALARM / n) * typical
+    return far
 
 
 def _core_align(

@@ -58,9 +58,11 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     step_s = 1.0 / recording.rate_hz
     # A step that the stamps show to be long is a gap, known and reported; no curve is laid across it.
     is_gap = ~(np.abs(np.diff(recording.time_s) - step_s) < 0.4 * step_s)
-    is_gap |= ~np.isfinite(readings[1:]).all(axis=1) | ~np.isfinite(readings[:-1]).all(axis=1)
-    is_cut = np.convolve(is_gap, np.ones(2 * HALF_WINDOW + 1), mode="same") > 0.5
-    readings = np.nan_to_num(readings)
+    if not np.isfinite(readings).all():
+        is_missing: npt.NDArray[np.bool_] = ~np.all(np.isfinite(readings), axis=1)
+        is_gap |= is_missing[1:] | is_missing[:-1]
+        readings = np.nan_to_num(readings)
+    is_cut = np.convolve(is_gap, np.ones(2 * HALF_WINDOW + 1), mode="same") > 0.5 if is_gap.any() else is_gap
     n, n_short, long_steps = 0, 0, []
     for move in segments.moves:
         first = max(move.start, HALF_WINDOW)

@@ -14,6 +14,11 @@ from trihedron.units import rate_to_si
 
 FEWEST_MOVES = 3
 """Nine numbers of a scale, three of each move at most."""
+LARGEST_TURN_RAD, STEP_RAD = 6.0 * np.pi, np.pi / 12.0
+"""Turn of the move that turns most, up to which scales are tried, and the distance of two of them there: a fit finds
+its way from half a right angle off."""
+MOST_TRIED = 6
+"""Scales from which fits are begun: neighbours of the best one, and its likes a turn further."""
 
 
 def integral_start(
@@ -33,11 +38,11 @@ def integral_start(
         time = recording.time_s[start:stop]
         rate = measured.rate[start:stop] - 0.5 * (measured.zero[before] + measured.zero[after])
         inside = recording.accelerometer[start:stop] @ accelerometer.S.T + accelerometer.b
-        keep = np.all(np.isfinite(rate) & np.isfinite(inside), axis=1)
-        if clipped or np.count_nonzero(keep) < 2:
-            continue
-        if not keep.all():
+        if not (np.isfinite(rate).all() and np.isfinite(inside).all()):
+            keep = np.all(np.isfinite(rate) & np.isfinite(inside), axis=1)
             time, inside, rate = time[keep], inside[keep], rate[keep]
+        if clipped or len(time) < 2:
+            continue
         # ∂([f]× S w)/∂S_ij = f × e_i w_j, integrated by trapezoids.
         moment = (inside * _trapezoid_weights(time)[:, None]).T @ rate
         rows.append(np.moveaxis(_ACROSS @ moment, 0, 1).reshape(3, 9))
@@ -82,14 +87,8 @@ def starts(
     return np.ascontiguousarray(np.stack(found))
 
 
-LARGEST_TURN_RAD, STEP_RAD = 6.0 * np.pi, np.pi / 12.0
-"""Turn of the move that turns most, up to which scales are tried, and the distance of two of them there: a fit finds
-its way from half a right angle off."""
-MOST_TRIED = 6
-
-
 def turned_starts(
-    recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration, linear: FloatArray | None
+    recording: Recording, measured: MoveMeasurements, accelerometer: SensorCalibration, linear: FloatArray
 ) -> FloatArray | None:
     """Starts (k, 3, 3) that carry gravity best among scales of one size on all axes, or ``None`` without whole moves.
 
@@ -108,10 +107,8 @@ def turned_starts(
     most = max(float(np.linalg.norm(rate, axis=1) @ _trapezoid_weights(time)) for time, rate, _, _ in courses)
     if not most > 0.0:
         return None
-    turns = [np.eye(3)]
-    if linear is not None:
-        left, _, right = np.linalg.svd(linear)
-        turns.append(left @ right)
+    left, _, right = np.linalg.svd(linear)
+    turns = [np.eye(3), left @ right]
     tried = [
         (angle / most) * turn for turn in turns for angle in np.arange(STEP_RAD, LARGEST_TURN_RAD + STEP_RAD, STEP_RAD)
     ]

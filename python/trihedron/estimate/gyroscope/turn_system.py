@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
-from trihedron.probability import chdtrc, chdtri
+from trihedron.probability import MEDIAN_CHI2, chdtrc, chdtri
 
 FALSE_ALARM = 1e-3
 """Chance that sound turns raise a statistical finding of one kind."""
@@ -243,8 +243,8 @@ def _with_scatter(system: TurnSystem, used: BoolArray, sigma_turn_rad: float | N
             return system
         system = replace(
             system,
-            sigma_turn=_beyond(float(np.median(along2[known])) / MEDIAN_1, noise2),
-            sigma_tilt=_beyond(float(np.median(across2[known])) / MEDIAN_2, noise2),
+            sigma_turn=_beyond(float(np.median(along2[known])) / MEDIAN_CHI2[1], noise2),
+            sigma_tilt=_beyond(float(np.median(across2[known])) / MEDIAN_CHI2[2], noise2),
         )
     return system
 
@@ -282,9 +282,6 @@ def _turns_a_placement(angles: FloatArray) -> float:
     """How many turns follow each other about one axis, on the average."""
     axis = np.argmax(np.abs(angles), axis=1)
     return len(axis) / (1.0 + float(np.count_nonzero(np.diff(axis))))
-
-
-MEDIAN_1, MEDIAN_2 = (float(chdtri(n, 0.5)) for n in (1, 2))
 
 
 def _components(system: TurnSystem, raw: FloatArray) -> tuple[FloatArray, FloatArray, float]:

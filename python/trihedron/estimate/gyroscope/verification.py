@@ -15,7 +15,7 @@ from trihedron.records.words import words
 
 ASTRAY_DEG = 5.0
 """Nine numbers bend to a dozen moves in a wrong minimum until half of them miss by 10°; of the real recordings none
-misses by 2° in the median."""
+misses by 2° in the median (`benches/recordings.py`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +40,8 @@ def predict(aligned: Aligned, measured: MoveMeasurements, is_held_out: bool) -> 
     vertical only, where a gyro can err.
     """
     fit = aligned.fit
-    forces = measured.reading @ np.asarray(fit.accelerometer_scale).T + np.asarray(fit.accelerometer_bias)
-    after = forces[measured.links[:, 1]]
-    norm_after = np.linalg.norm(after, axis=1, keepdims=True)
-    to = after / norm_after
-    predicted = np.asarray(fit.predicted)
-    predicted = predicted / np.linalg.norm(predicted, axis=1, keepdims=True)
+    to, angle = _behind(aligned, measured)
     residual = np.asarray(fit.residuals)
-    angle = np.degrees(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(predicted - to, axis=1), 1.0)))
     across = np.eye(3)[None] - to[:, :, None] * to[:, None, :]
     covariance = np.asarray(fit.cov_residuals).copy()
     noise = across @ covariance @ across
@@ -55,9 +49,8 @@ def predict(aligned: Aligned, measured: MoveMeasurements, is_held_out: bool) -> 
         jacobian = np.asarray(fit.jacobians)
         covariance += jacobian @ aligned.parameters_covariance @ np.swapaxes(jacobian, 1, 2)
     flat = across @ covariance @ across
-    z2 = np.array(
-        [float(r @ np.linalg.pinv(c, rcond=1e-9, hermitian=True) @ r) for r, c in zip(residual, flat, strict=True)]
-    )
+    inverse = np.linalg.pinv(flat, rcond=1e-9, hermitian=True)
+    z2: FloatArray = np.einsum("mi,mij,mj->m", residual, inverse, residual)
     return Prediction(
         residual=residual,
         sigma=np.sqrt(np.maximum(np.einsum("mii->mi", covariance), 0.0)),
@@ -68,9 +61,20 @@ def predict(aligned: Aligned, measured: MoveMeasurements, is_held_out: bool) -> 
     )
 
 
+def _behind(aligned: Aligned, measured: MoveMeasurements) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors (m, 3) of gravity as measured after every move, and the angles (m,), deg, by which it is missed."""
+    fit = aligned.fit
+    forces = measured.reading @ np.asarray(fit.accelerometer_scale).T + np.asarray(fit.accelerometer_bias)
+    after = forces[measured.links[:, 1]]
+    to = after / np.linalg.norm(after, axis=1, keepdims=True)
+    predicted = np.asarray(fit.predicted)
+    predicted = predicted / np.linalg.norm(predicted, axis=1, keepdims=True)
+    return to, np.degrees(2.0 * np.arcsin(np.minimum(0.5 * np.linalg.norm(predicted - to, axis=1), 1.0)))
+
+
 def missed_deg(aligned: Aligned, measured: MoveMeasurements) -> float:
     """Median angle between gravity carried through a move and gravity behind it, of all moves that tell."""
-    return float(np.median(predict(aligned, measured, is_held_out=False).angle_deg[~measured.is_lost]))
+    return float(np.median(_behind(aligned, measured)[1][~measured.is_lost]))
 
 
 def is_astray(aligned: Aligned, measured: MoveMeasurements) -> bool:

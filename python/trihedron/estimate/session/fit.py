@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.estimate.gyroscope.alignment import are_far
 from trihedron.estimate.session.observed import Observed
-from trihedron.probability import chdtri, fdtrc
+from trihedron.probability import fdtrc
 from trihedron.records.words import words
 from trihedron.session.noise import START_STRENGTHS
 
@@ -22,8 +23,6 @@ DEAF = 1e3
 MOST_WIDENINGS = 8
 SETTLED = 1.05
 """χ² per degree of freedom at which moves that were widened are as uncertain as they miss."""
-MEDIAN_CHI2_2 = 1.386
-LEAST_SHRINK = 0.1
 STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 """Labels of rows: accelerometer at rest, gravity after a move, velocity over it."""
 
@@ -62,17 +61,14 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     Moves that miss by more than their samples' noise explains count with the noise that they show, and a velocity that
     does is left out: what the linear model lacks there must not be spread over the accelerometer.
     """
-    core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w, None)
+    core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w)
     inflation = (1.0, 1.0)
     for _ in range(MOST_WIDENINGS):
         wider = _inflation(core, inflation)
         if wider == inflation:
             break
         inflation = wider
-        core = fitted(
-            replace(observed, inflation=inflation), core.force_scale, core.force_bias, core.rate_scale, core,
-            is_tuned=False,
-        )  # fmt: skip
+        core = core.widened(inflation)
     chi2, dof = (float(of_domains[MOVES]) for of_domains in _misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
@@ -97,18 +93,12 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
 
 
 def far_moves(solution: SessionSolution, n_moves: int) -> BoolArray:
-    """Moves (m,) whose gravity misses as none of so many does by chance, in units of the usual miss where that is above
-    the noise: the rule of the moves alone (:mod:`trihedron.estimate.gyroscope.alignment`), at this fit.
-    """
+    """Moves (m,) whose gravity misses as none of so many does by chance: the rule of the moves alone, at this fit."""
     labels = solution.core.labels
     of_gravity = labels[:, 0] == MOVES
     squared = (solution.core.residual[of_gravity] * solution.inflation[0]) ** 2
-    distance = np.bincount(labels[of_gravity, 1], squared, n_moves)
-    # Residuals of fitted parameters are smaller.
-    shrink = max(solution.moves_dof / (2.0 * n_moves), LEAST_SHRINK)
-    typical = max(1.0, float(np.median(distance)) / (MEDIAN_CHI2_2 * shrink))
-    out: BoolArray = distance > float(chdtri(2, FALSE_ALARM / n_moves)) * typical
-    return out
+    distance = np.bincount(labels[of_gravity, 1], squared, n_moves).astype(np.float64)
+    return are_far(distance, solution.moves_dof)
 
 
 def fitted(
@@ -116,27 +106,24 @@ def fitted(
     S_a: FloatArray,
     b_a: FloatArray,
     S_w: FloatArray,
-    at: _core.SessionFit | None,
-    *,
-    is_tuned: bool = True,
 ) -> _core.SessionFit:
-    """One fit on centred readings; ``at`` gives verticals and strengths to begin with."""
+    """One fit on centred readings, its strengths chosen."""
     force = observed.hold_force @ S_a.T + b_a
     state = _core.SessionState(
         force_scale=np.ascontiguousarray(S_a),
         force_bias=np.ascontiguousarray(b_a),
         rate_scale=np.ascontiguousarray(S_w),
-        up=np.ascontiguousarray(force / np.linalg.norm(force, axis=1, keepdims=True) if at is None else at.up),
+        up=np.ascontiguousarray(force / np.linalg.norm(force, axis=1, keepdims=True)),
         rate_zero=np.ascontiguousarray(observed.hold_rate),
         force_zero=np.zeros((len(force), 3)),
         effect=np.zeros(0),
     )
     return observed.model().fit(
         state=state,
-        strengths=START_STRENGTHS if at is None else at.strengths,
+        strengths=START_STRENGTHS,
         force_effect=None,
         rate_effect=None,
-        is_tuned=is_tuned,
+        is_tuned=True,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -91,7 +92,7 @@ class _Spectrum:
     lobe: int
     threshold: float
 
-    @property
+    @cached_property
     def per_step(self) -> FloatArray:
         """Frequency of every point."""
         return np.asarray(self.width * np.arange(len(self.power)))
@@ -119,13 +120,19 @@ def _first_line(windows: list[FloatArray], mean_step: float, spectrum: _Spectrum
         f = _summit(spectrum.power, k) * spectrum.width
         # The multiple of a rough frequency misses by as many times: its own neighbourhood is looked through.
         fine = f + spectrum.width * np.linspace(-0.5, 0.5, 41)
-        first, eighth = (np.mean([_direct(w, m * fine / mean_step) for w in windows], axis=0) for m in (1, 8))
-        if first.max() > LINE and eighth.max() > LINE_HELD:
-            return float(fine[int(np.argmax(eighth))])
+        if _mean_power(windows, fine / mean_step).max() > LINE:
+            eighth = _mean_power(windows, 8 * fine / mean_step)
+            if eighth.max() > LINE_HELD:
+                return float(fine[int(np.argmax(eighth))])
         high = high[high > group[-1] + spectrum.lobe]
         if len(high) > 400:
             return 0.0
     return 0.0
+
+
+def _mean_power(windows: list[FloatArray], frequency_hz: FloatArray) -> FloatArray:
+    mean: FloatArray = np.mean([_direct(w, frequency_hz) for w in windows], axis=0)
+    return mean
 
 
 def _direct(time_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
