@@ -14,6 +14,7 @@ pub mod error;
 pub mod first_look;
 pub mod gauss_newton;
 pub mod gyro_alignment;
+pub mod halves;
 pub mod interrupt;
 pub mod joints;
 pub mod kalman;

@@ -13,6 +13,7 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words, effect_words, why_not
+from trihedron.report.effects import laws
 from trihedron.report.effects.catalogue import CATALOGUE, ENTRIES, OF_ANY
 from trihedron.report.effects.page import page
 from trihedron.report.effects.reasons import REASONS
@@ -22,7 +23,7 @@ ROOT = Path(__file__).parents[1]
 DIAGNOSE = ROOT / "python" / "trihedron" / "diagnose"
 AT_REST = {"at-rest", "at-rest-counts"}
 # Names of variants, which are data: they stand in a diagnosis for machines.
-NAMES = re.compile(r"[, ]+ms|(accelerometer|gyro), per axis|second order")
+NAMES = re.compile(r"[, ]+ms|(accelerometer|gyro), per axis|second order|common scale")
 
 
 def ours():
@@ -73,12 +74,14 @@ def test_every_reason_is_given_somewhere_and_with_its_places():
 
 
 def written(path):
-    """(line, text) of every string of a file that is no docstring; of one with places, the text between them."""
+    """(line, text) of every string of a file that is no docstring or refusal; of one with places, the text between."""
     tree = ast.parse(path.read_text())
     skipped = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             skipped.add(id(node.value))
+        if isinstance(node, ast.Raise):  # a refusal speaks for itself
+            skipped |= {id(part) for part in ast.walk(node)}
         if isinstance(node, ast.JoinedStr):
             skipped |= {id(part) for part in ast.walk(node) if part is not node}
             texts = [part.value for part in node.values if isinstance(part, ast.Constant)]
@@ -88,7 +91,7 @@ def written(path):
             yield node.lineno, node.value
 
 
-@pytest.mark.parametrize("room", ["effects", "rest"])
+@pytest.mark.parametrize("room", ["effects", "rest", "against", "residuals"])
 def test_an_effect_writes_no_sentence(room):
     files = sorted((DIAGNOSE / room).glob("*.py"))
     assert files
@@ -220,3 +223,28 @@ def test_a_case_or_a_reason_that_is_not_there_is_refused():
 def test_the_documents_list_the_effects_as_the_catalogue_has_them():
     documented = (ROOT / "docs" / "effects.md").read_text()
     assert documented == page(), "python -m trihedron.report.effects.page > docs/effects.md"
+
+
+def test_laws_write_no_sentence_and_their_sentences_have_their_places():
+    asked = {}
+    for path in sorted((DIAGNOSE / "laws").glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "law_words":
+                asked[node.args[0].value] = {keyword.arg for keyword in node.keywords}
+        if path.name != "written.py":  # it writes a file of Python
+            said = [text for _, text in written(path) if re.search(r"[a-z] (follows|grows|hold|reach) ", text)]
+            assert said == [], path.name
+    assert {case: set(places(sentence)) for case, sentence in laws.SENTENCES.items()} == asked
+
+
+def test_every_family_of_a_law_has_an_experiment():
+    asked = set()
+    for path in (DIAGNOSE / "laws" / "signals.py", DIAGNOSE / "laws" / "moves.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            is_signal = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Signal"
+            parts = node.args if is_signal else node.elts if isinstance(node, ast.Tuple) and len(node.elts) == 4 else []
+            if parts and isinstance(parts[0], ast.Constant):
+                asked.add(parts[0].value)
+    assert asked | {"room", "earth"} == set(laws.FAMILIES)
+    assert all(one.experiment for one in laws.FAMILIES.values())
+    assert laws.family_words("no such family") == laws.FamilyWords("")

@@ -21,6 +21,9 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(robust_line, module)?)?;
     module.add_function(wrap_pyfunction!(phase_power, module)?)?;
     module.add_function(wrap_pyfunction!(direct_power, module)?)?;
+    module.add_function(wrap_pyfunction!(stamp_errors, module)?)?;
+    module.add_function(wrap_pyfunction!(errors_deviation, module)?)?;
+    module.add_function(wrap_pyfunction!(errors_falls, module)?)?;
     module.add_function(wrap_pyfunction!(lay_even_clock, module)?)
 }
 
@@ -244,7 +247,7 @@ fn phase_power<'py>(
     let length = phase_sum::next_fast_length(least);
     let windows: Vec<_> = windows.iter().map(flat1).collect();
     let lent: Vec<&[f64]> = windows.iter().map(AsRef::as_ref).collect();
-    let power = super::run(py, || phase_sum::phase_power(&lent, cell, length))?;
+    let power = super::run_long(py, || phase_sum::phase_power(&lent, cell, length))?;
     Ok((PyArray1::from_vec(py, power), length))
 }
 
@@ -262,4 +265,36 @@ fn direct_power<'py>(
         Ok(phase_sum::direct_power(&stamps, first, step, count))
     })?;
     Ok(PyArray1::from_vec(py, power))
+}
+
+/// `time - even` `(n,)` in the place of `even`.
+#[pyfunction]
+fn stamp_errors(
+    py: Python<'_>,
+    time: PyReadonlyArray1<'_, f64>,
+    mut even: PyReadwriteArray1<'_, f64>,
+) -> PyResult<()> {
+    same_length("even", time.len(), even.len())?;
+    let time = flat1(&time);
+    let even = even
+        .as_slice_mut()
+        .map_err(|_| PyValueError::new_err("even must be a contiguous array"))?;
+    super::run(py, || {
+        stamps::less(&time, even);
+        Ok(())
+    })
+}
+
+/// Root mean square of errors `(n,)` about their mean.
+#[pyfunction]
+fn errors_deviation(py: Python<'_>, errors: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
+    let errors = flat1(&errors);
+    super::run(py, || Ok(stamps::deviation(&errors)))
+}
+
+/// How many errors `(n,)` are less than the one before by more than `fall`.
+#[pyfunction]
+fn errors_falls(py: Python<'_>, errors: PyReadonlyArray1<'_, f64>, fall: f64) -> PyResult<usize> {
+    let errors = flat1(&errors);
+    super::run(py, || Ok(stamps::falls(&errors, fall)))
 }

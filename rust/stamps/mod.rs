@@ -4,12 +4,14 @@
 //! number of threads.
 
 mod blocks;
+mod errors;
 mod line;
 mod median;
 pub mod phase_sum;
 mod steps;
 
 pub use blocks::{block_means, block_medians, earliest};
+pub use errors::{deviation, falls, less};
 pub use line::robust_line;
 pub use median::{median, usual_step};
 pub use steps::{Inside, Steps, inside, steps, steps_above};

@@ -39,6 +39,7 @@ from trihedron.cli.speech import spell_out
 from trihedron.cli.verify import verify
 from trihedron.interruption import SENTENCE, Interrupted, status_of
 from trihedron.printable import printable
+from trihedron.refused import RefusedError
 
 # In the order in which they are used.
 COMMANDS = (
@@ -136,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             silence_stdout()
             return _refuse(f"standard output could not be written ({error.strerror}).")
         return _refuse(str(error))
-    except ValueError as error:
+    except RefusedError as error:
         if os.environ.get("TRIHEDRON_TRACEBACK"):
             raise
         return _refuse(str(error))

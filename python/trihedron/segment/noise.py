@@ -50,30 +50,7 @@ class HalvesDifferences:
 
 def split_by_halves(mean: FloatArray, ranges: list[Range]) -> HalvesDifferences:
     """Differences of the halves of every stretch of blocks ``mean`` (m, c), of their halves, and so on to one block."""
-    total = np.vstack([np.zeros(mean.shape[1]), np.cumsum(mean - mean.mean(axis=0), axis=0)])
-    first, last = np.array(ranges, dtype=np.int64).reshape(-1, 2).T
-    stretch = np.arange(len(first))
-    squares, sizes, depths, owners = [np.zeros((0, mean.shape[1]))], [np.zeros(0)], [], []
-    depth = 0
-    while True:
-        whole = last - first >= 2
-        first, last, stretch = first[whole], last[whole], stretch[whole]
-        if not len(first):
-            break
-        middle = (first + last) // 2
-        before, after = (middle - first)[:, None], (last - middle)[:, None]
-        difference = (total[last] - total[middle]) / after - (total[middle] - total[first]) / before
-        squares.append(difference**2 / 2.0)
-        sizes.append((2.0 / (1.0 / before + 1.0 / after))[:, 0])
-        depths.append(np.full(len(first), depth))
-        owners.append(stretch)
-        first, last = np.concatenate([first, middle]), np.concatenate([middle, last])
-        stretch = np.concatenate([stretch, stretch])
-        depth += 1
-    empty = np.zeros(0, dtype=np.int64)
-    return HalvesDifferences(
-        np.vstack(squares), np.concatenate(sizes), np.concatenate([empty, *depths]), np.concatenate([empty, *owners])
-    )
+    return HalvesDifferences(*_core.halves_of(mean, np.array(ranges, dtype=np.int64).reshape(-1, 2)))
 
 
 def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = False) -> MeanNoise:

@@ -109,7 +109,7 @@ def segment_blocks(
         )
     loose = loose_blocks(activity, channels.is_valid) & ~turning
     found = _find_runs(recording, channels, quiet, loose)
-    found += find_shaken(recording, channels, activity, found, ~turning, (gravity, scale))
+    found = find_shaken(recording, channels, activity, found, ~turning, (gravity, scale))
     found.sort(key=lambda run: run.first)
     runs, said = without_cut(recording, channels, found, ends)
     report(0.7, "means and their errors")

@@ -10,6 +10,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.ranges import ranges_of
 from trihedron.records import Hold, Move, Recording, Segments
+from trihedron.segment.shaken import is_shaken_by_a_support
 
 RESTING = 1e-3
 """A mean rate of a thousandth of the moves' rms, five times over, is rest: below 1 °/s after moves of 3 rad/s."""
@@ -177,6 +178,7 @@ def _shaken(
     moving = np.concatenate([recording.gyroscope[m.start : m.stop] for m in segments.moves] or [np.zeros((1, 3))])
     spread = np.maximum(spread, RESTING * float(np.sqrt(np.nanmean((moving - zero) ** 2))))
     fastest = float(np.nanmax(np.abs(recording.gyroscope - zero)))
+    white = (segments.accelerometer_sigma**2, segments.gyroscope_sigma**2)
     out: list[tuple[int, int]] = []
     for move in segments.moves:
         a, b = move.start, move.stop
@@ -199,6 +201,7 @@ def _shaken(
         good = still & calm & shaking & ~turning
         for first, last in ranges_of(good):
             start, stop = a + first * block + block, a + last * block - block
-            if stop - start >= shortest_s * recording.rate_hz:
+            is_long = stop - start >= shortest_s * recording.rate_hz
+            if is_long and is_shaken_by_a_support(recording, (start, stop), white):
                 out.append((start, stop))
     return out

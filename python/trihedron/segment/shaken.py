@@ -28,7 +28,13 @@ LINE_BINS = 3
 """On either side of a line: the main lobe of the raised cosine is two wide, and a motor is not quite steady."""
 HARMONICS = (1, 2, 3)
 LINE_S = 2.0
-"""The shortest stretch whose spectrum tells: in half of it a hand's tremor fills no more bins than a line."""
+"""The shortest stretch whose spectrum tells so: in half of it a hand's tremor fills no more bins than a line."""
+HAND_HZ = 15.0
+"""A hand's tremor is slower, a rattling support is not."""
+LOBE_BINS = 2
+"""The main lobe itself: so little time leaves a motor none to be unsteady in."""
+LOBE_SHARE = 0.96
+"""In shorter stretches, of the power above the noise, in one oscillation of the main lobe."""
 ABOVE_NOISE = 2.0
 """Times the noise's power from which on a sensor shows what shakes it."""
 
@@ -41,36 +47,57 @@ def find_shaken(
     free: BoolArray,
     scales: tuple[float | None, float | None],
 ) -> list[Run]:
-    """Stretches beside the ``taken`` ones in which the body keeps its place while the accelerometer shakes.
+    """The ``taken`` runs, and stretches beside them in which the body keeps its place while the accelerometer shakes.
 
     Either the gyro is at its noise floor and the accelerometer above its own; or, averaged over half a second, the gyro
     stands still, and what either sensor reads above its noise is a line, which a machine makes and a hand does not. In
     both cases the way turned by the gyro and the smoothed attitude of the accelerometer stay where they are.
 
     ``scales`` are the reading of |g| and radians per second per reading of the gyro, to a factor of two; without
-    either, or without a steady hold that tells the gyro's zero, none is found. ``free`` (m,) are blocks to look in.
+    either, or without a steady hold that tells the gyro's zero, none is added. ``free`` (m,) are blocks to look in.
     """
     gyro = channels.is_gyroscope
     steady = [part for run in taken if not run.is_unsteady for part in run.quiet_ranges()]
     gravity, radians_per_reading = scales
     if gravity is None or radians_per_reading is None or not steady or gyro.all() or not gyro.any():
-        return []
+        return taken
     zero = np.median(np.vstack([channels.mean[a:b] for a, b in steady])[:, gyro], axis=0)
     rate = np.where(channels.is_valid[:, None], channels.mean[:, gyro] - zero, 0.0) * radians_per_reading
     force = np.where(channels.is_valid[:, None], channels.mean[:, ~gyro], 0.0)
     seen = _Seen(_smoothed(force, channels) / gravity, rate * channels.step_s, steady)
     quiet = widen(close_gaps(quiet_channels(channels, activity, gyro), channels.is_valid), channels.is_valid)
     calm = np.linalg.norm(rolling_mean(rate, WINDOW_BLOCKS), axis=1) < CALM_RAD_S
-    found = [run for run in _poses(channels, seen, quiet & free, taken, SEEN_S) if _shakes(channels, activity, run)]
-    for run in _poses(channels, seen, calm & free & channels.is_valid, [*taken, *found], LINE_S):
-        rows = slice(run.first * channels.length, run.last * channels.length)
-        sensors = ((recording.accelerometer, ~gyro), (recording.gyroscope, gyro))
-        seen_of = [_is_line(readings[rows], activity.white_variance[which])
-                   for readings, which in sensors if readings is not None]  # fmt: skip
-        # Where nothing shakes the stillness of the log has spoken: such a stretch slowly turns.
-        if True in seen_of and False not in seen_of:
-            found.append(run)
-    return found
+    white = (activity.white_variance[~gyro], activity.white_variance[gyro])
+    settled = [run for run in taken if not run.is_unsteady]
+    seen_calm = _poses(channels, seen, calm & free & channels.is_valid, settled, SEEN_S)
+    spans = [(run.first * channels.length, run.last * channels.length) for run in seen_calm]
+    lines = [run for run, span in zip(seen_calm, spans, strict=True) if is_shaken_by_a_support(recording, span, white)]
+    # Where a line beats, a part of the pose is calm enough to be an unsteady hold of its own.
+    parts = [run for run in taken if any(_is_part(run, whole) for whole in lines)]
+    kept = [run for run in taken if run not in parts]
+    lines = [run for run in lines if not any(run.first < one.last and one.first < run.last for one in kept)]
+    still = _poses(channels, seen, quiet & free, [*kept, *lines], SEEN_S)
+    return [*kept, *lines, *(run for run in still if _shakes(channels, activity, run))]
+
+
+def _is_part(run: Run, whole: Run) -> bool:
+    """Whether an unsteady ``run`` lies, but for a window at its ends, inside another that is longer by a window."""
+    inside = min(run.last, whole.last) - max(run.first, whole.first)
+    length = run.last - run.first
+    return run.is_unsteady and inside >= length - WINDOW_BLOCKS and length + WINDOW_BLOCKS <= whole.last - whole.first
+
+
+def is_shaken_by_a_support(recording: Recording, stretch: Range, white_variance: tuple[FloatArray, FloatArray]) -> bool:
+    """Whether one sensor at least reads more than its white noise (3,), (3,) in these rows, and none what a hand makes.
+
+    Where nothing shakes the stillness of the log has spoken: such a stretch slowly turns.
+    """
+    rows = slice(*stretch)
+    is_short = stretch[1] - stretch[0] < LINE_S * recording.rate_hz
+    sensors = zip((recording.accelerometer, recording.gyroscope), white_variance, strict=True)
+    hand = HAND_HZ * (stretch[1] - stretch[0]) / recording.rate_hz
+    seen = [_is_no_hand(readings[rows], white, hand, is_short) for readings, white in sensors if readings is not None]
+    return True in seen and False not in seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,23 +152,34 @@ def _stays(seen: _Seen, stretch: Range) -> bool:
     return max(sway, float(np.linalg.norm(angle.std(axis=0)))) < SUPPORT_RAD
 
 
-def _is_line(readings: FloatArray, white_variance: FloatArray) -> bool | None:
-    """Whether what (n, 3) readings show above white noise is one line and its harmonics; ``None`` for nothing."""
+def _is_no_hand(readings: FloatArray, white_variance: FloatArray, hand: float, is_short: bool) -> bool | None:
+    """Whether what (n, 3) readings show above white noise is one line and its harmonics, or faster than a ``hand``
+    (bins); ``None`` for nothing.
+
+    In a short stretch a tremor is nearly as narrow as a line, but the axes tremble each on its own: there one
+    oscillation that all axes share has to hold nearly all.
+    """
     part = np.asarray(readings)[np.isfinite(readings).all(axis=1)]
     weight = np.hanning(len(part))
     # A straight line in time is drift of the zero.
     time = np.linspace(-1.0, 1.0, len(part))
     part = part - part.mean(axis=0)
     part = part - np.outer(time, time @ part / (time @ time))
-    power = (np.abs(np.fft.rfft(weight[:, None] * part, axis=0)) ** 2).sum(axis=1)
+    amplitude = np.fft.rfft(weight[:, None] * part, axis=0)
+    power = (np.abs(amplitude) ** 2).sum(axis=1)
     noise = float(white_variance.sum() * (weight @ weight))
     if power.mean() < ABOVE_NOISE * noise:
         return None
-    peak = int(power.argmax())
+    peak, above = int(power.argmax()), float((power - noise).sum())
+    if float((power[int(hand) + 1 :] - noise).sum()) > LINE_SHARE * above:
+        return True
+    if is_short:
+        lobe = amplitude[max(peak - LOBE_BINS, 0) : peak + LOBE_BINS + 1]
+        return float(np.linalg.norm(lobe, 2) ** 2) - noise > LOBE_SHARE * above
     line = np.zeros(len(power), dtype=bool)
     for times in HARMONICS:
         line[max(times * peak - LINE_BINS, 0) : times * peak + LINE_BINS + 1] = True
-    return float((power[line] - noise).sum()) > LINE_SHARE * float((power - noise).sum())
+    return float((power[line] - noise).sum()) > LINE_SHARE * above
 
 
 def _is_one_pose(channels: Channels, attitude: FloatArray, run: Run, near: Run) -> bool:

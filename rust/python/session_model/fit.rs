@@ -9,9 +9,11 @@ use numpy::{
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
-use super::read_out::{Blocks, Rows, labels, moves, path};
+use super::read_out::{Blocks, Rows, flagged, labels, moves, path};
 use super::{Corners, distortion};
+use crate::error::Result;
 use crate::python::arrays::{dmatrix, matrix, of3, vector3, vectors};
 use crate::python::{run, run_long};
 use crate::session_model::Session;
@@ -19,6 +21,13 @@ use crate::session_model::fit::{Fit, widened};
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
+/// `S_a`, `b_a`, `S_w`, covariance.
+type Rest<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+);
 
 /// A session at its optimum.
 #[pyclass(frozen, module = "trihedron._core")]
@@ -253,18 +262,7 @@ impl SessionFit {
         Bound<'py, PyArray1<f64>>,
         Bound<'py, PyArray1<f64>>,
     )> {
-        if folds.shape()[1] != self.fit.n_rows() {
-            return Err(PyValueError::new_err(
-                "folds must have one flag for every row",
-            ));
-        }
-        let view = folds.as_array();
-        let firsts = self.fit.first_rows();
-        let lists: Vec<Vec<usize>> = view
-            .rows()
-            .into_iter()
-            .map(|row| (0..firsts.len()).filter(|&g| row[firsts[g]]).collect())
-            .collect();
+        let lists = flagged(&self.fit, &folds)?;
         let fit = Arc::clone(&self.fit);
         let out = run_long(py, || fit.held_out(&lists))?;
         let flat: Vec<f64> = out.chi2.iter().flatten().copied().collect();
@@ -296,41 +294,34 @@ impl SessionFit {
             vector3("rate_origin", &rate_origin)?,
         ];
         let (fit, session) = (Arc::clone(&self.fit), Arc::clone(&self.session));
-        let (covariance, bias) = run(py, || fit.linear_covariance(&session, &origins))?;
+        let (covariance, bias) = run_long(py, || fit.linear_covariance(&session, &origins))?;
         Ok((matrix(py, &covariance)?, bias.as_slice().to_pyarray(py)))
     }
 
-    /// What the other rows say without those flagged `(rows,)`: `S_a`, `b_a`, `S_w` on centred readings, and the `(12, 12)`
-    /// covariance of `(S_a, b_a)` on raw ones.
-    #[allow(clippy::type_complexity)]
+    /// What the other rows say without those flagged, of every fold `(folds, rows)`: `S_a`, `b_a`, `S_w` on centred readings,
+    /// and the `(12, 12)` covariance of `(S_a, b_a)` on raw ones.
     fn without<'py>(
         &self,
         py: Python<'py>,
-        rows: PyReadonlyArray1<'py, bool>,
+        folds: PyReadonlyArray2<'py, bool>,
         force_origin: PyReadonlyArray1<'py, f64>,
-    ) -> PyResult<(
-        Bound<'py, PyArray2<f64>>,
-        Bound<'py, PyArray1<f64>>,
-        Bound<'py, PyArray2<f64>>,
-        Bound<'py, PyArray2<f64>>,
-    )> {
-        if rows.shape()[0] != self.fit.n_rows() {
-            return Err(PyValueError::new_err(
-                "there must be one flag for every row",
-            ));
-        }
-        let flags = rows.as_array();
-        let firsts = self.fit.first_rows();
-        let groups: Vec<usize> = (0..firsts.len()).filter(|&g| flags[firsts[g]]).collect();
+    ) -> PyResult<Vec<Rest<'py>>> {
+        let lists = flagged(&self.fit, &folds)?;
         let origin = vector3("force_origin", &force_origin)?;
         let fit = Arc::clone(&self.fit);
-        let (state, covariance) = run(py, || fit.without(&groups, &origin))?;
-        Ok((
-            of3(py, &state.force_scale)?,
-            state.force_bias.as_slice().to_pyarray(py),
-            of3(py, &state.rate_scale)?,
-            matrix(py, &covariance)?,
-        ))
+        let found = run_long(py, || {
+            let each = lists.par_iter().map(|groups| fit.without(groups, &origin));
+            each.collect::<Result<Vec<_>>>()
+        })?;
+        let lent = found.iter().map(|(state, covariance)| {
+            Ok((
+                of3(py, &state.force_scale)?,
+                state.force_bias.as_slice().to_pyarray(py),
+                of3(py, &state.rate_scale)?,
+                matrix(py, covariance)?,
+            ))
+        });
+        lent.collect()
     }
 
     /// `(rows, unknowns)` the Jacobian in full: border, then pose after pose. For tests and small sessions.

@@ -1,7 +1,10 @@
 //! Rows and motion of a fitted session as arrays.
 
 use nalgebra::Vector3;
-use numpy::{PyArray2, PyArray3, PyArrayMethods, ToPyArray};
+use numpy::{
+    PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
+};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::python::arrays::vectors;
@@ -77,4 +80,20 @@ pub(super) fn moves<'py>(py: Python<'py>, fit: &Fit) -> PyResult<(Rows<'py>, Blo
         residual.to_pyarray(py).reshape([m, 5])?,
         covariance.to_pyarray(py).reshape([m, 5, 5])?,
     ))
+}
+
+/// The groups of rows flagged in every fold `(folds, rows)`.
+pub(super) fn flagged(fit: &Fit, folds: &PyReadonlyArray2<'_, bool>) -> PyResult<Vec<Vec<usize>>> {
+    if folds.shape()[1] != fit.n_rows() {
+        return Err(PyValueError::new_err(
+            "folds must have one flag for every row",
+        ));
+    }
+    let firsts = fit.first_rows();
+    let rows = folds.as_array();
+    let groups = rows
+        .rows()
+        .into_iter()
+        .map(|row| (0..firsts.len()).filter(|&g| row[firsts[g]]).collect());
+    Ok(groups.collect())
 }

@@ -25,6 +25,7 @@ from trihedron.invariants import (
     triad_rotation,
 )
 from trihedron.records.diagnosis import ParameterDifference
+from trihedron.records.words import words
 from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
 
 Sensor = Literal["accelerometer", "gyroscope", "both"]
@@ -262,20 +263,16 @@ def _never_added(
     if not (is_none and would_show):
         return ""
     name = "accelerometer" if prefix == "accel" else "gyro"
-    return f"All zeros of the model's {name} are none: a bias was drawn and never added, or there is none."
+    return words("zeros-never-added", sensor=name)
 
 
 def _relative_to(prefix: str, a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> str:
     """That scales of counts and of SI have no common part to compare, and how large a count is."""
     counts, side = (r, "recording") if units[1] is None else (a, "model")
     per_si = math.exp(float(counts.log_scale.mean()))
-    name, per = ("accelerometer", f"{per_si * STANDARD_GRAVITY_M_S2:.5g} per g")
     if prefix == "gyro":
-        name, per = "gyro", f"{per_si * math.radians(1.0):.4g} per °/s"
-    return (
-        f"Scales of the {name} are relative to the mean of its three axes: the {side} is in counts ({per}), whose "
-        "nominal size is not known."
-    )
+        return words("gyro-scales-relative", side=side, per_deg_s=per_si * math.radians(1.0))
+    return words("accelerometer-scales-relative", side=side, per_g=per_si * STANDARD_GRAVITY_M_S2)
 
 
 def _sizes_in_si(a: Invariants, r: Invariants, units: tuple[float | None, float | None]) -> tuple[float, float] | None:

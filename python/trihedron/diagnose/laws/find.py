@@ -18,36 +18,11 @@ from trihedron.diagnose.laws.search import Accepted, search
 from trihedron.diagnose.zeros.of_session import accel_evidence, gyro_evidence
 from trihedron.records.diagnosis import EffectParameter, Law
 from trihedron.records.domains import Domain, DomainTest, HeldOut
+from trihedron.records.words import law_experiment, law_resembles, law_words
 
 Sensor = Literal["accelerometer", "gyroscope"]
 OUT: dict[Sensor, str] = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
 ZERO_WORD: dict[Sensor, str] = {"gyroscope": "gyro", "accelerometer": "accelerometer"}
-EXPERIMENTS = {
-    "room": "hold the same poses with the table turned by 90° about the vertical, and once more with a magnet near by",
-    "force": "hold poses on edges and corners as well as on faces, each twice",
-    "previous pose": "reach one pose from six different ones, twice each",
-    "last turn": "reach one pose by turns of either sign, small and large, waiting unlike times",
-    "temperature": "repeat a few poses while the temperature takes another course: up, down, and held",
-    "supply": "repeat one pose at three supply voltages",
-    "vibration": "hold one pose with the shaking on and off",
-    "rate products": "turn about one axis at a time, then about two at once, at three rates; pivot about a fixed point",
-    "rate": "turn about each axis at three rates, both ways",
-    "rate times force": "turn about a level and about a vertical axis at the same rate",
-    "angular acceleration": "pivot about a fixed point, starting and stopping briskly, then smoothly",
-    "force rate": "shake along one axis without turning",
-}
-RESEMBLES = {
-    "room": ("a magnetic field",),
-    "previous pose": ("hysteresis", "creep after a turn"),
-    "last turn": ("play or slip in a mounting", "memory of the readout"),
-    "rate products": ("coupled drive modes", "displaced accelerometers"),
-    "rate times force": ("a drive frame bent by weight",),
-    "vibration": ("rectification",),
-    "supply": ("a ratiometric readout",),
-    "temperature": ("a thermal bias of another shape",),
-    "angular acceleration": ("a lever arm",),
-    "force": ("unequal stiffness",),
-}
 ROOM_VECTOR = "vector fixed in the room"
 EARTH_RATE_RAD_S = 7.292115e-5
 """WGS 84."""
@@ -148,16 +123,17 @@ def _laws_of(sensor: Sensor, domain: Domain, found: list[Accepted], before: floa
             for name, v, s in zip(names, value, sigma, strict=True)
         )
         depends = tuple(dict.fromkeys(name for _, names, *_ in terms for name in names))
-        axes = ", ".join(dict.fromkeys(t[0] for t in terms))
+        axes = tuple(dict.fromkeys(t[0] for t in terms))
+        said = law_words(
+            "follows", sensor=ZERO_WORD[sensor], is_at_rest=domain.startswith("static"), axes=axes, depends=depends,
+            share=share,
+        )  # fmt: skip
         rms = [float(np.sqrt(sum(getattr(j, side) for j in judged))) for side in ("held_before", "held_after")]
         held = HeldOut(domain, 1.0, (rms[1] / max(rms[0], 1e-300)) ** 2, rms[0], rms[1], _unit_of_misfit(domain))
-        what = "zero" if domain.startswith("static") else "reading in motion"
         out.append(
             Law(
-                sensor, depends, _form(axes, depends), coefficients, share, held, RESEMBLES.get(family, ()),
-                EXPERIMENTS.get(family, ""),
-                f"The {ZERO_WORD[sensor]}'s {what} ({axes}) follows {_listed(depends)}: {100.0 * share:.0f} % of the "
-                "held-out misfit.",
+                sensor, depends, _form(axes, depends), coefficients, share, held, law_resembles(family),
+                law_experiment(family), said,
             )
         )  # fmt: skip
     return tuple(out)
@@ -167,18 +143,14 @@ def _unit_of_misfit(domain: Domain) -> str:
     return {"static-gyro": "rad/s", "static-accel": "m/s^2"}.get(domain, "sigma")
 
 
-def _form(axes: str, depends: tuple[str, ...]) -> str:
-    return f"reading of {axes} grows by " + " + ".join(f"c{k + 1}·({name})" for k, name in enumerate(depends))
+def _form(axes: tuple[str, ...], depends: tuple[str, ...]) -> str:
+    return law_words("form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(depends)])
 
 
 def _unit_of(sensor: Sensor, unit: str, name: str) -> str:
     if name.endswith("^2") and unit == "K":
         unit = "K^2"
     return OUT[sensor] if unit == "1" else f"({OUT[sensor]})/({unit})"
-
-
-def _listed(words: tuple[str, ...]) -> str:
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
 
 
 def _room_law(room: RoomLaw) -> Law:
@@ -189,19 +161,19 @@ def _room_law(room: RoomLaw) -> Law:
         for k in range(3)
     ]
     coefficients.append(
-        EffectParameter("angle to the vertical", room.inclination_deg, room.inclination_sigma_deg, "deg")
+        EffectParameter(law_words("angle-to-vertical"), room.inclination_deg, room.inclination_sigma_deg, "deg")
     )
     before = sum(j.held_before for j in room.judged)
     after = sum(j.held_after for j in room.judged)
     held = HeldOut("static-gyro", 1.0, after / before, before**0.5, after**0.5, "rad/s")
-    words: tuple[str, ...] = ("a magnetic field",)
-    if _is_rotation(room):
-        words = ("the Earth's turn",)
+    family = "earth" if _is_rotation(room) else "room"
     return Law(
-        "gyroscope", (ROOM_VECTOR,), "zero = K Rᵀ m, m a unit vector fixed in the room",
-        tuple(coefficients), room.share, held, words, EXPERIMENTS["room"],
-        f"The gyro's zero follows a vector fixed in the room, {room.inclination_deg:.0f}° ± "
-        f"{room.inclination_sigma_deg:.0f}° from the vertical: {100.0 * room.share:.0f} % of the held-out misfit.",
+        "gyroscope", (ROOM_VECTOR,), law_words("form-room"),
+        tuple(coefficients), room.share, held, law_resembles(family), law_experiment(family),
+        law_words(
+            "follows-room", inclination_deg=room.inclination_deg, inclination_sigma_deg=room.inclination_sigma_deg,
+            share=room.share,
+        ),
     )  # fmt: skip
 
 

@@ -10,12 +10,13 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.solve import Fit
 from trihedron.records.diagnosis import LinearModel
 from trihedron.records.domains import DomainResiduals
+from trihedron.records.words import words
 
 _ROWS: tuple[tuple[str, str, str, str, tuple[str, ...]], ...] = (
-    ("static-accel", "|f| − |g| at rest", "m/s^2", "hold", ("norm",)),
-    ("static-gyro", "rate at rest, minus its mean", "rad/s", "hold", ("gx", "gy", "gz")),
-    ("moves", "gravity missed after the move", "deg", "move", ("angle",)),
-    ("dynamics", "velocity over the move", "m/s", "move", ("vx", "vy", "vz")),
+    ("static-accel", "length-at-rest", "m/s^2", "hold", ("norm",)),
+    ("static-gyro", "rate-at-rest", "rad/s", "hold", ("gx", "gy", "gz")),
+    ("moves", "gravity-missed", "deg", "move", ("angle",)),
+    ("dynamics", "velocity-over-move", "m/s", "move", ("vx", "vy", "vz")),
 )
 
 
@@ -40,7 +41,7 @@ def residuals_before_after(before: Fit, after: Fit) -> tuple[DomainResiduals, ..
             x, y = a[domain], b[domain]
             out.append(
                 DomainResiduals(
-                    domain, quantity, unit, kind, channels,  # type: ignore[arg-type]
+                    domain, words(quantity), unit, kind, channels,  # type: ignore[arg-type]
                     x.time_s, x.value, x.sigma, y.time_s, y.value, y.sigma,
                 )
             )  # fmt: skip

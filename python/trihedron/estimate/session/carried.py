@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron import _core
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 
 
@@ -25,6 +25,16 @@ class Carried:
     floor2: FloatArray
     model2: FloatArray
 
+    def spread(self, which: IntArray, n_moves: int) -> Carried:
+        """The same as those ``which`` (m,) of more moves; the others are NaN."""
+
+        def filled(values: FloatArray) -> FloatArray:
+            out = np.full((n_moves, *values.shape[1:]), np.nan)
+            out[which] = values
+            return out
+
+        return Carried(*map(filled, (self.residual, self.sigma, self.angle_deg, self.floor2, self.model2)))
+
 
 def carried(
     time_s: FloatArray,
@@ -40,15 +50,43 @@ def carried(
     The one definition of gravity after moves: in sample, held out, and of a calibration held against another session.
     ``covariance_S_w`` (9, 9) is that of S_w row by row.
     """
-    zero = -measured.zero @ S_w.T
+    model = Linear(np.arange(len(measured.links)), S_a, b_a, S_w)
+    return carried_each(time_s, measured, anchors_s, [model], covariance_S_w)
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """The linear models ``S_a``, ``b_a``, ``S_w`` by which some ``moves`` (k,) are carried."""
+
+    moves: IntArray
+    S_a: FloatArray
+    b_a: FloatArray
+    S_w: FloatArray
+
+
+def carried_each(
+    time_s: FloatArray,
+    measured: MoveMeasurements,
+    anchors_s: FloatArray,
+    models: list[Linear],
+    covariance_S_w: FloatArray | None = None,
+) -> Carried:
+    """:func:`carried` of every move by the model that names it."""
     before, after = measured.links[:, 0], measured.links[:, 1]
-    rotation, wrt_scale, wrt_before, wrt_after, cov_rate = _core.integrate_moves(
-        time_s, measured.rate, measured.edges, np.ascontiguousarray(anchors_s), np.ascontiguousarray(S_w),
-        np.ascontiguousarray(zero[before]), np.ascontiguousarray(zero[after]), 3,
-        _core.RateNoise(measured.noise_density, measured.sigma_time_s, measured.nominal_step_s),
-    )  # fmt: skip
-    force = measured.reading @ S_a.T + b_a
-    start, end = force[before], force[after]
+    m = len(before)
+    rotation, wrt_before, wrt_after, cov_rate = np.zeros((4, m, 3, 3))
+    wrt_scale = np.zeros((m, 3, 9))
+    S_a, S_w, b_a = np.zeros((m, 3, 3)), np.zeros((m, 3, 3)), np.zeros((m, 3))
+    noise = _core.RateNoise(measured.noise_density, measured.sigma_time_s, measured.nominal_step_s)
+    for one in models:
+        at, zero = one.moves, -measured.zero @ one.S_w.T
+        S_a[at], b_a[at], S_w[at] = one.S_a, one.b_a, one.S_w
+        rotation[at], wrt_scale[at], wrt_before[at], wrt_after[at], cov_rate[at] = _core.integrate_moves(
+            time_s, measured.rate, measured.edges[at], np.ascontiguousarray(anchors_s[at]),
+            np.ascontiguousarray(one.S_w), zero[before[at]], zero[after[at]], 3, noise,
+        )  # fmt: skip
+    start = np.einsum("mij,mj->mi", S_a, measured.reading[before]) + b_a
+    end = np.einsum("mij,mj->mi", S_a, measured.reading[after]) + b_a
     moved = np.einsum("mij,mj->mi", rotation, start)
     residual = moved - end
     unit_moved = moved / np.linalg.norm(moved, axis=1, keepdims=True)
@@ -59,19 +97,18 @@ def carried(
     skew[:, [1, 2, 0], [0, 1, 2]] = start[:, [2, 0, 1]]
     turn = rotation @ skew
 
-    of_force = S_a * np.sqrt(measured.var_reading)[:, None, :]
-    of_zero = S_w * np.sqrt(measured.var_zero)[:, None, :]
+    sigma_force, sigma_zero = (np.sqrt(variance)[:, None, :] for variance in (measured.var_reading, measured.var_zero))
     # Roots of covariances side by side: sums of squares do not go negative by rounding, as turns of gravity about
     # itself make differences of large parts do.
-    roots = [turn @ _root(cov_rate), rotation @ of_force[before], of_force[after],
-             turn @ wrt_before @ of_zero[before], turn @ wrt_after @ of_zero[after]]  # fmt: skip
+    roots = [turn @ _root(cov_rate), rotation @ (S_a * sigma_force[before]), S_a * sigma_force[after],
+             turn @ wrt_before @ (S_w * sigma_zero[before]), turn @ wrt_after @ (S_w * sigma_zero[after])]  # fmt: skip
     root = np.concatenate(roots, axis=2)
     across = np.eye(3) - unit_end[:, :, None] * unit_end[:, None, :]
     floor2 = np.sum((across @ root) ** 2, axis=(1, 2))
     model2 = np.zeros(len(angle))
     if covariance_S_w is not None:
         # Zero readings are subtracted: S enters through the rate and through the biases -S z.
-        wrt_S = np.asarray(wrt_scale).copy()
+        wrt_S = wrt_scale.copy()
         for i in range(3):
             wrt_S[:, :, 3 * i : 3 * i + 3] -= (
                 wrt_before[:, :, i : i + 1] * measured.zero[before][:, None, :]

@@ -11,7 +11,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
-from trihedron.estimate.session.carried import Carried, carried
+from trihedron.estimate.session.carried import Carried, Linear, carried_each
 from trihedron.estimate.session.fit import DYNAMICS, MOVES, STATIC_FORCE, SessionSolution
 from trihedron.estimate.session.observed import Observed
 from trihedron.records.calibration import FitQuality
@@ -80,28 +80,25 @@ def held_out(
     core = solution.core
     labels = core.labels
     is_reading = labels[:, 3] == 0
+    is_hold = is_reading & (labels[:, 0] == STATIC_FORCE)
+    is_move = is_reading & ((labels[:, 0] == MOVES) | (labels[:, 0] == DYNAMICS))
+    is_of_fold = labels[:, 1] % n_folds == np.arange(n_folds)[:, None]
+    rests = core.without(np.concatenate([is_hold & is_of_fold, is_move & is_of_fold]), observed.force_origin)
     norm, norm_sigma = np.full(n, np.nan), np.full(n, np.nan)
-    empty = np.full((measured.n_moves, 3), np.nan)
-    parts = Carried(empty.copy(), empty.copy(), *(empty[:, 0].copy() for _ in range(3)))
-    number = {int(hold): k for k, hold in enumerate(measured.links[:, 0])}
-    for fold in range(n_folds):
+    for fold, (S, b, _, covariance) in enumerate(rests[:n_folds]):
         holds = np.arange(n) % n_folds == fold
-        rows = is_reading & (labels[:, 0] == STATIC_FORCE) & holds[labels[:, 1]]
-        S, b, _, covariance = core.without(rows, observed.force_origin)
         residual, noise = norm_errors(observed, S, b - S @ observed.force_origin)
         norm[holds] = residual[holds]
         norm_sigma[holds] = np.sqrt(noise**2 + _of_model(observed, S, b, covariance))[holds]
-        moves = np.arange(m) % n_folds == fold
-        is_held = np.isin(labels[:, 0], (MOVES, DYNAMICS)) & is_reading
-        is_held[is_held] = moves[labels[is_held, 1]]
-        S, b, S_w, _ = core.without(is_held, observed.force_origin)
-        which = [number[int(hold)] for hold in observed.before[moves]]
-        part = replace(measured, links=measured.links[which], edges=measured.edges[which])
-        seen = carried(time_s, part, anchors_s[which], S, b - S @ observed.force_origin, S_w)
-        for mine, theirs in ((parts.residual, seen.residual), (parts.sigma, seen.sigma),
-                             (parts.angle_deg, seen.angle_deg), (parts.floor2, seen.floor2)):  # fmt: skip
-            mine[which] = theirs
-    return HeldOut(norm, norm_sigma, parts)
+    number = {int(hold): k for k, hold in enumerate(measured.links[:, 0])}
+    which = np.array([number[int(hold)] for hold in observed.before], dtype=np.int64)
+    models = [
+        Linear(np.flatnonzero(np.arange(m) % n_folds == fold), S, b - S @ observed.force_origin, S_w)
+        for fold, (S, b, S_w, _) in enumerate(rests[n_folds:])
+    ]
+    part = replace(measured, links=measured.links[which], edges=measured.edges[which])
+    seen = carried_each(time_s, part, anchors_s[which], models)
+    return HeldOut(norm, norm_sigma, seen.spread(which, measured.n_moves))
 
 
 def _of_model(observed: Observed, S: FloatArray, b_centred: FloatArray, covariance: FloatArray) -> FloatArray:

@@ -115,16 +115,15 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         del error
         even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, True, CLOSE_PIECES)
         error = _error(time_s, even)
-    middle = error.mean()
-    rms = float(np.sqrt(sum(float(np.sum((error[p] - middle) ** 2)) for p in _parts(0, n)) / n))
-    return EvenClock(
-        kind, mean_period, sigma, tick, np.subtract(time_s, error, out=error), rms, sees, pauses, found.grid_s, wanders
-    )
+    rms = _core.errors_deviation(error)
+    even = _error(time_s, error)
+    return EvenClock(kind, mean_period, sigma, tick, even, rms, sees, pauses, found.grid_s, wanders)
 
 
 def _error(time_s: FloatArray, even: FloatArray) -> FloatArray:
     """``time_s - even`` in the place of ``even``, which is the stamps less their error again when it is wanted."""
-    return np.subtract(time_s, even, out=even)
+    _core.stamp_errors(time_s, even)
+    return even
 
 
 def _long_run(time_s: FloatArray, tick: IntArray) -> float:
@@ -235,8 +234,7 @@ def _kind(error: FloatArray, period: float, grid: float) -> StampKind:
     if 0.0 < grid < 1.3 * period and _range(error) < 1.3 * grid:
         return StampKind.ROUNDED
     # One-sided: the early edge is sharp, the late one runs out; or samples come in packets.
-    falls = sum(np.count_nonzero(np.diff(error[p.start : p.stop + 1]) < -0.7 * period) for p in _parts(0, len(error)))
-    together = falls / max(len(error) - 1, 1)
+    together = _core.errors_falls(error, 0.7 * period) / max(len(error) - 1, 1)
     if high - middle > 2.0 * (middle - low) or together > 0.02 or high - low > 1.0 * period:
         return StampKind.LATE
     return StampKind.SCATTERED

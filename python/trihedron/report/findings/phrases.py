@@ -53,6 +53,18 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "too-many-iterations": "stopped: iteration limit reached before convergence",
         "closed-form": "closed form",
         "linear-least-squares": "linear least squares",
+        # what a model's numbers resemble
+        "zeros-never-added": "All zeros of the model's {sensor} are none: a bias was drawn and never added, or there "
+        "is none.",
+        "accelerometer-scales-relative": "Scales of the accelerometer are relative to the mean of its three axes: the "
+        "{side} is in counts ({per_g:.5g} per g), whose nominal size is not known.",
+        "gyro-scales-relative": "Scales of the gyro are relative to the mean of its three axes: the {side} is in "
+        "counts ({per_deg_s:.4g} per °/s), whose nominal size is not known.",
+        # residuals of a domain
+        "length-at-rest": "|f| − |g| at rest",
+        "rate-at-rest": "rate at rest, minus its mean",
+        "gravity-missed": "gravity missed after the move",
+        "velocity-over-move": "velocity over the move",
         # places in a file, amounts
         "line": "line {line}",
         "row": "row {row}",

@@ -1,0 +1,82 @@
+//! Stretches halved again and again: how the means of two halves differ (an unbalanced Haar transform).
+
+/// Differences of halves, every stretch as a whole first, then all halves, and so on to one block.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Halves {
+    /// `(k, channels)` halved squared difference of the means of two halves, row by row.
+    pub square: Vec<f64>,
+    /// Blocks in a half: the harmonic mean where the halves differ by one.
+    pub size: Vec<f64>,
+    /// 0 for a stretch as a whole.
+    pub depth: Vec<i64>,
+    /// Which stretch each came from.
+    pub stretch: Vec<i64>,
+}
+
+/// Of `blocks` `(m, channels)` row by row, in stretches from a first block to the one behind the last.
+#[must_use]
+pub fn halves(blocks: &[f64], channels: usize, stretches: &[(usize, usize)]) -> Halves {
+    let total = running_total(blocks, channels);
+    let mut out = Halves {
+        square: Vec::new(),
+        size: Vec::new(),
+        depth: Vec::new(),
+        stretch: Vec::new(),
+    };
+    let is_whole = |&(_, (first, last)): &(i64, (usize, usize))| last >= first + 2;
+    let mut parts: Vec<(i64, (usize, usize))> = (0_i64..).zip(stretches.iter().copied()).collect();
+    for depth in 0.. {
+        parts.retain(is_whole);
+        if parts.is_empty() {
+            break;
+        }
+        for &(stretch, (first, last)) in &parts {
+            let middle = usize::midpoint(first, last);
+            let (before, after) = ((middle - first) as f64, (last - middle) as f64);
+            let at = |block: usize| &total[block * channels..][..channels];
+            for ((low, mid), high) in at(first).iter().zip(at(middle)).zip(at(last)) {
+                let difference = (high - mid) / after - (mid - low) / before;
+                out.square.push(difference * difference / 2.0);
+            }
+            out.size.push(2.0 / (1.0 / before + 1.0 / after));
+            out.depth.push(depth);
+            out.stretch.push(stretch);
+        }
+        let split = |late: bool| {
+            parts.iter().map(move |&(stretch, (first, last))| {
+                let middle = usize::midpoint(first, last);
+                (
+                    stretch,
+                    if late {
+                        (middle, last)
+                    } else {
+                        (first, middle)
+                    },
+                )
+            })
+        };
+        parts = split(false).chain(split(true)).collect();
+    }
+    out
+}
+
+/// `(m + 1, channels)` sums of the blocks before each, about their mean: long logs with a large offset lose no digits.
+fn running_total(blocks: &[f64], channels: usize) -> Vec<f64> {
+    let n = blocks.len() / channels.max(1);
+    let mut mean = vec![0.0; channels];
+    for row in blocks.chunks_exact(channels.max(1)) {
+        for (mean, value) in mean.iter_mut().zip(row) {
+            *mean += value / n as f64;
+        }
+    }
+    let mut total = Vec::with_capacity((n + 1) * channels);
+    let mut sum = vec![0.0; channels];
+    total.extend_from_slice(&sum);
+    for row in blocks.chunks_exact(channels.max(1)) {
+        for ((sum, value), mean) in sum.iter_mut().zip(row).zip(&mean) {
+            *sum += value - mean;
+        }
+        total.extend_from_slice(&sum);
+    }
+    total
+}
