@@ -88,7 +88,7 @@ def noise_of_octaves(
         for k, known in enumerate(white):
             rows, seen, error = design[bands], density[bands, k], relative[bands, k]
             if known is not None:
-                rows = np.vstack([design, [1.0, 0.0]])
+                rows = np.vstack([rows, [1.0, 0.0]])
                 seen, error = np.append(seen, known[0] ** 2), np.append(error, 2.0 * known[1])
             variances, own = _earned(rows, seen, error)
             terms.append(np.sqrt(variances))
