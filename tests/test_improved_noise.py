@@ -56,6 +56,21 @@ def test_white_noise_flicker_and_a_low_pass_are_recovered_from_octaves(N, B, low
     assert found.corner_hz == pytest.approx(low_pass.corner_hz, rel=0.25)
 
 
+def test_what_rounding_leaves_above_a_corner_is_no_flicker():
+    low_pass = Smoother(10.0, 2)
+    bands = np.array([(2.0**k, min(2.0 ** (k + 1), 50.0)) for k in range(-1, 6)])
+    frequency_hz = np.linspace(0.01, 49.99, 4999)
+    a = low_pass.feedback(1.0 / RATE)
+    gain = np.abs(a.sum() / np.polyval(a[::-1], np.exp(-2j * np.pi * frequency_hz / RATE))) ** 2
+    # Half of the white density stays where the filter lets a hundredth through; the uppermost octaves are known best.
+    density = [1e-6 * (gain + 0.25)[(low <= frequency_hz) & (frequency_hz < high)].mean() for low, high in bands]
+    relative = np.repeat([[0.5], [0.4], [0.4], [0.3], [0.3], [0.15], [0.07]], 3, axis=1)
+    known = [(1.1e-3, 0.1)] * 3
+    noise, _ = noise_of_octaves(bands, np.repeat(np.c_[density], 3, axis=1), relative, 1.0 / RATE, low_pass, known)
+    assert noise.B == (0.0, 0.0, 0.0)
+    assert pytest.approx((1.1e-3,) * 3, rel=0.1) == noise.N
+
+
 @pytest.mark.parametrize(("corner_hz", "shape"), [(20.0, 2), (12.0, 1), (40.0, 1), (25.0, 0), (34.0, 4)])
 def test_a_low_pass_that_was_seen_is_seen_again_in_the_noise_of_its_simulation(corner_hz, shape):
     frequency_hz = np.linspace(0.5, 49.5, 99)

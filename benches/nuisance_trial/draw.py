@@ -217,8 +217,11 @@ def draw(flaw, seed, size=1.0, nuisances=True, weak_1_over_f=False, without=()):
         columns[f"gyro_{axis} [rad/s]"] = gyro[:, k]
     if temperature is not None:
         columns["temperature [degC]"] = np.round(temperature[when], 2)[: len(stamps)]
+    if flaw == "accel-hysteresis":
+        # S and b are those of a pose that has lasted: the memory has then followed and is part of the scale.
+        A = A @ (np.eye(3) + np.diag(values["memory"]))
     truth |= {"flaw": flaw, "seed": seed, "values": {k: np.asarray(v).tolist() for k, v in values.items()},
-              "A": A.tolist(), "W": W.tolist()}  # fmt: skip
+              "A": A.tolist(), "W": W.tolist(), "zero_a": zero_a.tolist(), "zero_g": zero_g.tolist()}  # fmt: skip
     return columns, truth
 
 

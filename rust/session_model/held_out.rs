@@ -10,9 +10,11 @@ use super::predict::{N_DOMAINS, domain_of};
 use crate::error::Result;
 
 /// Ridge of the training rows: the held-out pose's own unknowns keep a weak prior, the same for every model compared.
-const TRAINING_RIDGE: f64 = 1e-6;
+const TRAINING_RIDGE: f64 = 1e-9;
 /// Directions of a fold whose predicted variance is above this many noise variances were left open by the training rows.
-const OPEN: f64 = 1e4;
+/// Zeros that scatter by a thousand times the error of a pose's mean are predicted still, however badly: a model that
+/// needs so much scatter pays for it.
+const OPEN: f64 = 1e7;
 
 /// Held-out prediction of blocks of rows.
 #[derive(Debug, Clone)]

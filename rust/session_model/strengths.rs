@@ -88,6 +88,13 @@ impl Evidence {
         }
         self.search_corners(&mut best, has_rate);
         if !is_free {
+            // A scatter that was named is known beside what the model held then: another effect may leave less of it.
+            for sensor in (0..2).filter(|&sensor| self.at.scatter[sensor] > NO_SCATTER) {
+                for _ in 0..2 {
+                    self.search_scatter(&mut best, sensor);
+                    self.search_corners(&mut best, has_rate);
+                }
+            }
             return best;
         }
         let none = self.at(&best);

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.limits import find_limits
+from trihedron.channel_facts.limits import Extremes, find_limits
 from trihedron.channel_facts.quiet import Windows, look
 from trihedron.channel_facts.step import converter_steps
 from trihedron.records.channel_facts import ChannelFacts, RecordingFacts
@@ -22,11 +22,13 @@ def facts_of(accelerometer: FloatArray | None, gyroscope: FloatArray | None, rat
 
 # Absurd readings (1e300) overflow squares; the noise they are told is infinite then.
 @np.errstate(over="ignore", invalid="ignore")
-def facts_in(sensors: dict[str, FloatArray], windows: Windows | None) -> RecordingFacts:
-    """The same of sensors (n, 3) by name whose quiet windows are known."""
+def facts_in(
+    sensors: dict[str, FloatArray], windows: Windows | None, extremes: dict[str, Extremes] | None = None
+) -> RecordingFacts:
+    """The same of sensors (n, 3) by name whose quiet windows, and perhaps extremes, are known."""
     facts: dict[str, ChannelFacts] = {}
     for name, readings in sensors.items():
         step = converter_steps(readings)
         noise = np.zeros(3) if windows is None else windows.quiet_noise(name)
-        facts[name] = ChannelFacts(step, noise, find_limits(readings, noise, step))
+        facts[name] = ChannelFacts(step, noise, find_limits(readings, noise, step, (extremes or {}).get(name)))
     return RecordingFacts(facts.get("accelerometer"), facts.get("gyroscope"))

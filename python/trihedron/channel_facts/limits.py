@@ -28,13 +28,21 @@ SHORTEST_WORD = 128.0
 """Codes of a word of seven bits and a sign, the shortest: smaller powers of two are met by chance."""
 
 
-def find_limits(readings: FloatArray, noise: FloatArray, step: FloatArray) -> tuple[Limit, ...]:
-    """Limits of a triad (n, 3) with ``noise`` (3,) of one sample at rest and ``step`` (3,) of the converter."""
+Extremes = list[tuple[float, int, float, int]]
+"""Of every axis: the lowest reading, how often it was read, the highest, how often."""
+
+
+def find_limits(
+    readings: FloatArray, noise: FloatArray, step: FloatArray, extremes: Extremes | None = None
+) -> tuple[Limit, ...]:
+    """Limits of a triad (n, 3) with ``noise`` (3,) of one sample at rest and ``step`` (3,) of the converter; its
+    ``extremes`` where they are known.
+    """
     if len(readings) < FEWEST:
         return ()
     ends = [
         End(readings, axis, value, is_high, count, high - low, float(noise[axis]), step)
-        for axis, (low, n_low, high, n_high) in enumerate(_core.triad_extremes(readings))
+        for axis, (low, n_low, high, n_high) in enumerate(extremes or _core.triad_extremes(readings))
         if low < high and not math.isinf(low) and not math.isinf(high)
         for value, count, is_high in ((high, n_high, True), (low, n_low, False))
     ]

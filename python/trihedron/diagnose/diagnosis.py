@@ -21,7 +21,7 @@ from trihedron.diagnose.residuals.goodness_of_fit import hidden_zeros, judge_row
 from trihedron.diagnose.residuals.timing import judge_timing
 from trihedron.diagnose.residuals.within_holds import judge_within_holds
 from trihedron.diagnose.selection.accepted import accepted_effects
-from trihedron.diagnose.selection.evidence import with_evidence
+from trihedron.diagnose.selection.evidence import spread_anew, with_evidence
 from trihedron.diagnose.selection.model import StepwiseModel, begin
 from trihedron.diagnose.selection.numbers import final_numbers
 from trihedron.diagnose.selection.prune import judged_again
@@ -87,12 +87,12 @@ def diagnose_recording(
     laws = laws_of_rest(run.model.context, run.remaining)
     model, base = run.model, run.bare.fitted
     twin = model.fitted.twin
-    final = final_numbers(model, run.remaining)
+    numbered, final = final_numbers(model, run.remaining)
     accel_hidden, gyro_hidden = hidden_zeros(model.fitted)
     result = Diagnosis(
         verdict=verdict_of(model, run.domains, run.remaining, has_laws=bool(laws)),
         domains=run.domains,
-        effects=accepted_effects(model, final),
+        effects=accepted_effects(numbered, final),
         remaining=run.remaining,
         candidates=tuple(run.candidates[key] for key in sorted(run.candidates)),
         baseline=with_covariance(linear_model(base), base),
@@ -192,7 +192,8 @@ def _with_late(
     # What was needless, or too little, in the noise of a model without them may stand beside them.
     late = replace(late, refused=frozenset(one for one in late.refused if not _competes(one)))
     scored, _ = scores(late, exclude=late.refused)
-    return judged_again(_grown(late, scored, alpha, lambda _part: None)), candidates
+    grown = _grown(late, scored, alpha, lambda _part: None)
+    return judged_again(grown if grown is late else spread_anew(grown)), candidates
 
 
 def _competes(effect_id: str) -> bool:

@@ -190,8 +190,8 @@ def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisR
                     values[axis] = n.recording
             elif n.term == "resolution" and n.recording is not None:
                 tables[name].setdefault("adc", {})["lsb"] = n.recording
-        has_shape = any(n.term in ("octave", "bandwidth") for n in differing) or not any(had.N)
-        if name in holds and has_shape and differing:
+        # A scenario without noise is wrong where the recording shows some, however its poses happen to be found.
+        if name in holds and (not any(had.N) or any(n.term in ("octave", "bandwidth") for n in differing)):
             noise, low_pass = holds[name]
             terms["N"] = list(noise.N)
             if low_pass.corner_hz > 0.0:

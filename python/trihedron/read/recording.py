@@ -13,6 +13,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts import facts_in
+from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import look
 from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
 from trihedron.read.clock import mean_rate_hz
@@ -173,9 +174,7 @@ def audited(
         for name, triad in (("accelerometer", sensors.accelerometer), ("gyroscope", sensors.gyroscope))
         if triad is not None
     }
-    for triad in present.values():
-        if any(np.isinf(value) for low, _, high, _ in _core.triad_extremes(triad) for value in (low, high)):
-            triad[np.isinf(triad)] = np.nan
+    extremes = {name: _finite_extremes(triad) for name, triad in present.items()}
     windows = look(present, rate)
     acc_unit, gyr_unit = AccelerationUnit.M_S2, RateUnit.RAD_S
     if sensors.accelerometer is not None:
@@ -198,7 +197,7 @@ def audited(
         findings += judged.findings
     if sensors.has_clock:
         findings += audit_timing(time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.stamps_s)
-    facts = facts_in(present, windows)
+    facts = facts_in(present, windows, extremes)
     counter = sensors.columns.counter
     if counter is not None:
         findings += audit_counter(_kept(sensors, counter, n), table.label(counter), sensors.place)
@@ -233,6 +232,15 @@ def audited(
         rows_in_file=sensors.rows_in_file,
         rows_read=sensors.rows_read,
     ).knowing(facts)
+
+
+def _finite_extremes(triad: FloatArray) -> Extremes:
+    """Extremes of a triad (n, 3), in which infinite readings become missing ones."""
+    extremes = _core.triad_extremes(triad)
+    if any(np.isinf(value) for low, _, high, _ in extremes for value in (low, high)):
+        triad[np.isinf(triad)] = np.nan
+        return _core.triad_extremes(triad)
+    return extremes
 
 
 def _rate_hz(sensors: Sensors) -> float:

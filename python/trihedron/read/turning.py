@@ -50,10 +50,10 @@ def unit_by_turning(
             scale = rate_to_si(unit) or 0.0
             if _RATIO_LOW * scale <= ratio <= _RATIO_HIGH * scale:
                 return Turning(unit, by_path=True, n_turns=n_turns)
+    slopes = turn_slopes(accelerometer, gyroscope, rate_hz, [rate_to_si(unit) or 0.0 for unit in CANDIDATES])
     agreeing = [
         (unit, slope, correlation)
-        for unit in CANDIDATES
-        for slope, correlation, n in [turn_slope(accelerometer, gyroscope, rate_hz, rate_to_si(unit) or 0.0)]
+        for unit, (slope, correlation, n) in zip(CANDIDATES, slopes, strict=True)
         # Five deviations of a correlation of n independent pairs, and a share of the motion worth calling rotation.
         if _SLOPE_LOW <= slope <= _SLOPE_HIGH and correlation > max(_MIN_CORRELATION, 5.0 / math.sqrt(max(n, 1)))
     ]
@@ -85,33 +85,40 @@ def turn_ratio(gyroscope: FloatArray, time_s: FloatArray, windows: Windows) -> t
     return (float(np.percentile(ratios, 80.0)), len(ratios)) if ratios else (math.nan, 0)
 
 
-def turn_slope(
-    accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float, scale: float
-) -> tuple[float, float, int]:
-    """Least-squares slope of ``Δa`` over ``-(ω × a) Δt`` with ω = ``scale`` * gyro, their correlation, and block pairs.
+UNSEEN = math.nan, 0.0, 0
+
+
+def turn_slopes(
+    accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float, scales: list[float]
+) -> list[tuple[float, float, int]]:
+    """Least-squares slope of ``Δa`` over ``-(ω × a) Δt`` with ω = scale * gyro, their correlation, and block pairs, for
+    every one of ``scales``.
 
     Over blocks of 0.1 s in which the body turns faster than usual but by less than 0.7 rad.
     """
     length = max(1, round(_BLOCK_S * rate_hz))
     n = min(len(accelerometer) // length, _MAX_BLOCKS)
     if n < 3:
-        return math.nan, 0.0, 0
+        return [UNSEEN] * len(scales)
     a = accelerometer[: n * length].reshape(n, length, 3).mean(axis=1)
     w = gyroscope[: n * length].reshape(n, length, 3).mean(axis=1)
     finite = np.isfinite(w).all(axis=1)
     if not finite.any():
-        return math.nan, 0.0, 0
-    w = scale * (w - np.median(w[finite], axis=0))
-    step_s = length / rate_hz
+        return [UNSEEN] * len(scales)
+    w -= np.median(w[finite], axis=0)
+    return [_slope(a, scale * w, length / rate_hz) for scale in scales]
+
+
+def _slope(a: FloatArray, w: FloatArray, step_s: float) -> tuple[float, float, int]:
     mean_a, mean_w = 0.5 * (a[1:] + a[:-1]), 0.5 * (w[1:] + w[:-1])
     speed = np.linalg.norm(mean_w, axis=1)
     usable = np.isfinite(mean_a).all(axis=1) & np.isfinite(speed)
     if not usable.any():
-        return math.nan, 0.0, 0
+        return UNSEEN
     usable &= (speed > np.median(speed[usable])) & (speed * step_s < 0.7)
     predicted = -np.cross(mean_w[usable], mean_a[usable]) * step_s
     seen = np.diff(a, axis=0)[usable]
     pp, ps, ss = float((predicted**2).sum()), float((predicted * seen).sum()), float((seen**2).sum())
     if pp <= 0.0 or ss <= 0.0:
-        return math.nan, 0.0, 0
+        return UNSEEN
     return ps / pp, ps / math.sqrt(pp * ss), int(usable.sum())

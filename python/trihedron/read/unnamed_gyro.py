@@ -7,7 +7,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.read.columns import Triad
 from trihedron.read.sensors import Sensors
-from trihedron.read.turning import CANDIDATES, turn_slope
+from trihedron.read.turning import CANDIDATES, turn_slopes
 from trihedron.records import Finding, FindingCode
 from trihedron.units import rate_to_si
 
@@ -21,7 +21,7 @@ FEWEST_PAIRS = 50
 def unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
     """A warning for each triad of columns without a known name that turns with the accelerometer's gravity.
 
-    Only where no gyro was recognised; gravity's change in blocks against ``-ω × a`` (``turn_slope``).
+    Only where no gyro was recognised; gravity's change in blocks against ``-ω × a`` (``turn_slopes``).
     """
     accelerometer, table, columns = sensors.accelerometer, sensors.table, sensors.columns
     if accelerometer is None or sensors.gyroscope is not None or columns.accelerometer is None or table.names is None:
@@ -30,7 +30,7 @@ def unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
     n = len(accelerometer)
     for triad in _triads(table.names, {i for i, c in enumerate(table.columns) if not len(c)} | columns.used()):
         rates = np.stack([_kept(sensors, column, n) for column in triad], axis=1)
-        tried = (turn_slope(accelerometer, rates, rate_hz, rate_to_si(unit) or 0.0) for unit in CANDIDATES)
+        tried = turn_slopes(accelerometer, rates, rate_hz, [rate_to_si(unit) or 0.0 for unit in CANDIDATES])
         if not any(correlation > CLEAR_CORRELATION and pairs >= FEWEST_PAIRS for _, correlation, pairs in tried):
             continue
         roles = zip(("ax", "ay", "az", "gx", "gy", "gz"), (*columns.accelerometer, *triad), strict=True)

@@ -57,6 +57,10 @@ def noise_of_holds(
     return NoiseTerms(N=triple(0), B=triple(1)), filters[best]
 
 
+FEWEST_BELOW = 4
+"""Octaves that begin below a corner from which on they alone tell white noise from flicker."""
+
+
 def noise_of_octaves(
     bands_hz: FloatArray,
     density: FloatArray,
@@ -74,16 +78,17 @@ def noise_of_octaves(
     """
     frequency_hz = _FREQUENCIES / (2.0 * np.pi * dt)
     inside = [(low <= frequency_hz) & (frequency_hz < high) for low, high in bands_hz]
-    flicker = np.array([float(np.mean(1.0 / (2.0 * np.pi * frequency_hz[one]))) for one in inside])
 
-    def fitted(low_pass: Smoother) -> tuple[list[FloatArray], float]:
+    def fitted(low_pass: Smoother, bands: slice = slice(None)) -> tuple[list[FloatArray], float]:
         power = _power(low_pass, dt)
-        design = np.column_stack([[float(power[one].mean()) for one in inside], flicker])
+        # Both pass the low-pass, as they do in the simulated sensor.
+        flicker = power / (2.0 * np.pi * frequency_hz)
+        design = np.array([[float(column[one].mean()) for column in (power, flicker)] for one in inside])
         terms, misfit = [], 0.0
         for k, known in enumerate(white):
-            rows, seen, error = design, density[:, k], relative[:, k]
+            rows, seen, error = design[bands], density[bands, k], relative[bands, k]
             if known is not None:
-                rows = np.vstack([design, [1.0, 0.0]])
+                rows = np.vstack([rows, [1.0, 0.0]])
                 seen, error = np.append(seen, known[0] ** 2), np.append(error, 2.0 * known[1])
             variances, own = _earned(rows, seen, error)
             terms.append(np.sqrt(variances))
@@ -97,7 +102,10 @@ def noise_of_octaves(
         near = [k for k in range(1, len(filters)) if corner_hz and abs(np.log(filters[k].corner_hz / corner_hz)) < NEAR]
         best = min(near or range(len(filters)), key=lambda k: misfits[k])
         low_pass = filters[best if near or misfits[0] - misfits[best] > FILTER_EARNS else 0]
-    N, B = ((float(x), float(y), float(z)) for x, y, z in np.array(fitted(low_pass)[0]).T)
+    # Above a corner rounding and the filter's own shape are left: no octave there tells white noise from flicker.
+    n_below = int(np.count_nonzero(bands_hz[:, 0] < low_pass.corner_hz))
+    below = slice(n_below if low_pass.corner_hz > 0.0 and n_below >= FEWEST_BELOW else None)
+    N, B = ((float(x), float(y), float(z)) for x, y, z in np.array(fitted(low_pass, below)[0]).T)
     return NoiseTerms(N=N, B=B), low_pass
 
 

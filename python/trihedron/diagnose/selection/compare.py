@@ -12,6 +12,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms, weighted_rms
+from trihedron.diagnose.selection.excess import in_the_scatter_of
 from trihedron.diagnose.selection.model import StepwiseModel, held_out
 from trihedron.diagnose.selection.score import Scored, dispersion
 from trihedron.diagnose.session.solve import (
@@ -143,11 +144,23 @@ class Comparison:
 
     def gain_at(self, stays: FloatArray) -> float:
         """Likelihood gain with each domain's drop of chi-square over the dispersion ``stays``, poses' lengths by F."""
+        of_lengths = max(float((self.drop / stays)[STATIC_ACCEL]), 0.0)
+        return self._over(stays) - self._of_few(of_lengths)
+
+    def equals(self, other: Comparison, stays: FloatArray, margin: float) -> bool:
+        """Whether this explains as much as another within a margin, whatever the zeros would explain by themselves.
+
+        That poses' lengths are few is said of either sensor's effects alike here: a clock that is late and a filter of
+        the other sensor make one and the same misfit.
+        """
+        return self._over(stays) - self.cost > other._over(stays) - other.cost - margin
+
+    def _over(self, stays: FloatArray) -> float:
         gain = self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum())
         if self.variant.distortion.rate is None:
             # What the accelerometer's walk gains, tuned anew, is of the poses' lengths and counts by their dispersion.
             gain -= max(self.likelihood_gain - float(self.drop.sum()), 0.0) * (1.0 - 1.0 / float(stays[STATIC_ACCEL]))
-        return min(self.likelihood_gain, gain) - self._of_few(max(float((self.drop / stays)[STATIC_ACCEL]), 0.0))
+        return min(self.likelihood_gain, gain)
 
     def _of_few(self, drop: float) -> float:
         """What a fall of chi-square of the poses' lengths is not worth, their scatter being known from few.
@@ -306,7 +319,13 @@ def profile(fitted: Fit) -> float:
 
 
 def held_out_records(before_fit: Fit, before: Prediction, after_fit: Fit, after: Prediction) -> tuple[HeldOut, ...]:
-    """Held-out chi-square and physical rms per domain of two models, the largest gain first."""
+    """Held-out chi-square and physical rms per domain of two models, the largest gain first.
+
+    Over one noise: that of a scatter which an effect's lack made larger would hide the fall.
+    """
+    same = in_the_scatter_of(before_fit, after_fit)
+    if same is not before_fit:
+        before_fit, before = same, held_out(same)
     rms_before, unit = physical_rms(before_fit, before.innovation)
     rms_after, _ = physical_rms(after_fit, after.innovation)
     out = []

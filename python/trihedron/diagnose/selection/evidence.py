@@ -11,7 +11,14 @@ from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.selection.compare import held_out_records, mends
 from trihedron.diagnose.selection.excess import explained
-from trihedron.diagnose.selection.model import Accepted, StepwiseModel, held_out, observed_with, on_observations
+from trihedron.diagnose.selection.model import (
+    Accepted,
+    StepwiseModel,
+    held_out,
+    observed_with,
+    on_observations,
+    with_only,
+)
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.twin import stacked
@@ -32,6 +39,23 @@ def with_evidence(
     for effect, evidence in found:
         model = _with_one(model, effect, evidence)
     return model, candidates
+
+
+def spread_anew(model: StepwiseModel) -> StepwiseModel:
+    """The model with zeros that scatter by what they do beside everything in it, and not by what was left before.
+
+    Scatter was found in the rest of a model without what joined since; beside that it may be less, or nothing.
+    """
+    kept = []
+    for one in model.accepted:
+        if one.effect.is_spread and isinstance(one.effect, DirectEffect) and one.evidence is not None:
+            evidence = one.effect.find(model.context)
+            if evidence is None:
+                continue
+            kept.append(replace(one, evidence=evidence))
+        else:
+            kept.append(one)
+    return with_only(model, tuple(kept))
 
 
 def _looked_for(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS
-from trihedron.diagnose.session.solve import Fit, leverage
+from trihedron.diagnose.session.solve import Fit, fit, leverage
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES
 
 
@@ -25,6 +27,18 @@ def domain_chi2(fitted: Fit) -> dict[int, tuple[float, float]]:
     return out
 
 
+def in_the_scatter_of(before: Fit, after: Fit) -> Fit:
+    """A model fitted with zeros that scatter as they do in another of the same observations.
+
+    Either model chose the size of a named scatter for itself, and what one lacks it called scatter: how much it does
+    not explain shows in the scatter of the one that explains it.
+    """
+    line, scatter = before.line, after.twin.scatter
+    if line.obs is not after.line.obs or line.obs.zero_scatter is None or before.twin.scatter == scatter:
+        return before
+    return fit(line.obs, replace(before.twin, scatter=scatter), line.distortion, line.prior)
+
+
 def excess(fitted: Fit) -> float:
     """Chi-square beyond its degrees of freedom, over the domains that have more than they should."""
     return sum(max(chi2 - dof, 0.0) for chi2, dof in domain_chi2(fitted).values())
@@ -38,7 +52,7 @@ def explained(before: Fit, after: Fit) -> float:
     """
     left = domain_chi2(after)
     gone = 0.0
-    for domain, (chi2, dof) in domain_chi2(before).items():
+    for domain, (chi2, dof) in domain_chi2(in_the_scatter_of(before, after)).items():
         still, rows = left.get(domain, (0.0, 0.0))
         rest = max(still - rows, 0.0) * (dof / rows if rows >= LEAST_DOF else 0.0)
         gone += max(chi2 - dof, 0.0) - rest

@@ -8,6 +8,8 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.selection.model import StepwiseModel
+from trihedron.diagnose.selection.shapes import with_shapes
+from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.twin import stacked
 from trihedron.diagnose.zeros.of_session import (
@@ -24,12 +26,23 @@ SCATTERS = 0.01
 WEIGHTS = ("hold_force_sigma", "hold_rate_sigma", "zero_scatter")
 
 
-def final_numbers(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> Fit:
+def final_numbers(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> tuple[StepwiseModel, Fit]:
     """The model fitted once more, poses as uncertain as their zeros scatter, moves as they miss (eq. 8.19).
 
     What nothing explains counts with the size it shows: else the fit bends S and b to it and says small errors of both.
-    A healthy recording keeps its fit.
+    Shape numbers (time constants, widths) are fitted along, so that every error bar allows for theirs; the model that
+    comes back has them. A healthy recording keeps its fit.
     """
+    obs = _as_it_shows(model, remaining)
+    same = all(getattr(obs, name) is getattr(model.obs, name) for name in WEIGHTS) and (
+        obs.moves_inflation == model.obs.moves_inflation and obs.dynamics_inflation == model.obs.dynamics_inflation
+    )
+    plain = model.fitted if same else tune_noise(obs, model.fitted.twin, stacked(model.distortions), model.prior)
+    return with_shapes(model, plain)
+
+
+def _as_it_shows(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> Observations:
+    """The observations as uncertain as what remains shows them to be."""
     obs = model.obs
     context = model.context
     named = {one.effect.id for one in model.accepted}
@@ -49,16 +62,11 @@ def final_numbers(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> Fi
     elif "static-gyro" in left and obs.hold_rate_sigma is not None and obs.hold_creep is None:
         rates: FloatArray = obs.hold_rate_sigma * np.sqrt(max(left["static-gyro"], 1.0))
         obs = replace(obs, hold_rate_sigma=rates)
-    obs = replace(
+    return replace(
         obs,
         moves_inflation=max(obs.moves_inflation, float(np.sqrt(max(left.get("moves", 1.0), 1.0)))),
         dynamics_inflation=max(obs.dynamics_inflation, float(np.sqrt(max(left.get("dynamics", 1.0), 1.0)))),
     )
-    if all(getattr(obs, name) is getattr(model.obs, name) for name in WEIGHTS) and (
-        obs.moves_inflation == model.obs.moves_inflation and obs.dynamics_inflation == model.obs.dynamics_inflation
-    ):
-        return model.fitted
-    return tune_noise(obs, model.fitted.twin, stacked(model.distortions), model.prior)
 
 
 def _scatters(found: SessionEvidence | None) -> bool:

@@ -11,7 +11,7 @@ from trihedron.diagnose.selection.compare import (
     mends,
     own_domains,
 )
-from trihedron.diagnose.selection.excess import domain_chi2, explained
+from trihedron.diagnose.selection.excess import domain_chi2, explained, in_the_scatter_of
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel, with_only
 from trihedron.diagnose.selection.stepwise import is_demanded
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO, Distortion
@@ -81,7 +81,8 @@ def explains(against: Comparison) -> bool:
 
     Not of all domains together: another fault may spoil the others, and that is not this effect's to explain.
     """
-    before, after = domain_chi2(against.base), domain_chi2(against.fitted)
+    base = in_the_scatter_of(against.base, against.fitted)
+    before, after = domain_chi2(base), domain_chi2(against.fitted)
     own = own_domains(against.variant.distortion)
     most = max(before[d][0] - after[d][0] for d in own)
     agrees = {DYNAMICS: AGREES * _other_sensor(against.variant.distortion, after)}

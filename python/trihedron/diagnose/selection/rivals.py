@@ -53,7 +53,9 @@ def _best_in_place(model: StepwiseModel, k: int) -> StepwiseModel:
             if ahead < CONFOUNDED_DELTA_BIC:
                 rivals.append(held)
             best = swapped, there
-        elif ahead > -CONFOUNDED_DELTA_BIC:
+        elif ahead > -CONFOUNDED_DELTA_BIC or (
+            there.equals(best[1], rest, CONFOUNDED_DELTA_BIC) and _is_sound(there, other, without.context)
+        ):
             rivals.append(its)
     final, against = best
     chosen = final.accepted[k]

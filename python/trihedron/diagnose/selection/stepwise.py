@@ -43,8 +43,9 @@ def scores(model: StepwiseModel, exclude: Collection[str] = ()) -> tuple[list[Sc
     scored, missing = score_all(model.context, taken)
     plain = _without_walk(model)
     if plain is not None:
-        # A walk at the end of its range takes up whatever is there, and no score test sees through it. Which of the two
-        # it is their joint fits decide, with the walk as strong as it likes on either side.
+        # A walk at the end of its range takes up whatever is there, and so does scatter that is larger than what was
+        # named beside drift, temperature and gravity: no score test sees through them. Which of the two it is their
+        # joint fits decide, with either as strong as it likes on both sides.
         seen, _ = score_all(plain, taken)
         best = {(one.effect.id, one.variant.label, tuple(one.variant.shape.values())): one for one in scored}
         for one in seen:
@@ -56,15 +57,18 @@ def scores(model: StepwiseModel, exclude: Collection[str] = ()) -> tuple[list[Sc
 
 
 def _without_walk(model: StepwiseModel) -> Context | None:
-    """The session with a walk no stronger than the quietest of parts, where the fit ran it to the end of its range."""
+    """The session with a walk no stronger than the quietest of parts, where the fit ran it to the end of its range, and
+    with scatter no larger than the one that was named."""
     accel, gyro = strayed(model.fitted)
-    if not (accel or gyro):
-        return None
     twin = model.fitted.twin
+    scatter = min(twin.scatter[0], 1.0), min(twin.scatter[1], 1.0)
+    if not (accel or gyro or scatter != twin.scatter):
+        return None
     quiet = replace(
         twin,
         accel_corner_s=CORNER_GRID_S[-1] if accel else twin.accel_corner_s,
         gyro_corner_s=CORNER_GRID_S[-1] if gyro else twin.gyro_corner_s,
+        scatter=scatter,
     )
     return Context(model.obs, fit(model.obs, quiet, stacked(model.distortions), model.prior))
 
@@ -104,7 +108,12 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     # What another mechanism explains as well: by its joint fit, or, for all of its shapes, by the score test.
     enough = best.against.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
     others = [r for r in refits if r.scored.effect is not best.scored.effect]
-    close = [r.scored.effect.id for r in others if r.against.bic_gain_at(rest) > enough]
+    close = [
+        r.scored.effect.id
+        for r in others
+        if r.against.bic_gain_at(rest) > enough
+        or (r in sound and r.against.equals(best.against, rest, CONFOUNDED_DELTA_BIC))
+    ]
     close += [
         s.effect.id
         for s in scored

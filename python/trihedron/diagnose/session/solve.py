@@ -94,7 +94,7 @@ class Fit:
         obs, core = self.line.obs, self.line.core
         if obs.zero_scatter is None or not obs.zero_scatter[0].any():
             # A gyro whose zeros scatter says nothing of the accelerometer's.
-            gyro = START_STRENGTHS[1][1] if obs.zero_scatter is None else 1.0
+            gyro = START_STRENGTHS[1][1] if obs.zero_scatter is None else core.strengths[1][1]
             between = START_STRENGTHS[2] if obs.zero_scatter is None else core.strengths[2]
             core = core_model(obs, self.twin.gravity, self.line.prior, is_scatter_free=True).fit(
                 state=core_state(self.twin), strengths=(core.strengths[0], (START_STRENGTHS[1][0], gyro), between),
@@ -108,10 +108,9 @@ def _fitted(obs: Observations, start: Twin, distortion: Distortion, prior: Prior
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
     corners = (float(start.accel_corner_s), float(start.gyro_corner_s))
-    scatter = START_STRENGTHS[1] if obs.zero_scatter is None else (1.0, 1.0)
     core = core_model(obs, start.gravity, prior).fit(
         state=core_state(start),
-        strengths=(corners, scatter, start.between),
+        strengths=(corners, start.scatter_on(obs), start.between),
         force_effect=contiguous(distortion.force),
         rate_effect=contiguous(distortion.rate),
         is_tuned=is_tuned,

@@ -43,7 +43,7 @@ class Twin:
     """State of the model. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per hold.
 
     Biases are in SI; ``between`` is how far those that scatter leave, during a move, the line from hold to hold, in
-    units of their scatter (accelerometer, gyro).
+    units of their scatter (accelerometer, gyro), ``scatter`` how strong that is in units of the one that was named.
     """
 
     gravity: float
@@ -57,6 +57,19 @@ class Twin:
     accel_corner_s: float
     effect: FloatArray
     between: tuple[float, float] = START_STRENGTHS[2]
+    scatter: tuple[float, float] = START_STRENGTHS[1]
+
+    def scatter_on(self, obs: Observations) -> tuple[float, float]:
+        """Strength of either sensor's scatter in units of what was named, 1 where that is new; of none what counts as
+        none."""
+        none = START_STRENGTHS[1][0]
+        if obs.zero_scatter is None:
+            return START_STRENGTHS[1]
+        known = [self.scatter[k] if self.scatter[k] > none else 1.0 for k in range(2)]
+        return (
+            known[0] if obs.zero_scatter[0].any() else none,
+            known[1] if obs.zero_scatter[1].any() else none,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,8 +229,10 @@ def core_model(
         if obs.zero_scatter is not None and is_scatter_free:
             unit[1] = np.maximum(obs.zero_scatter[1], START_STRENGTHS[1][0] * unit[1])
         elif obs.zero_scatter is not None:
-            # A sensor that does not scatter has a scatter that counts as none.
-            scatter = (np.maximum(obs.zero_scatter, START_STRENGTHS[1][0] * unit), True)
+            # A sensor that does not scatter has any unit, and a strength that counts as none.
+            named = obs.zero_scatter.any(axis=1, keepdims=True)
+            floor = START_STRENGTHS[1][0] * unit
+            scatter = (np.where(named, np.maximum(obs.zero_scatter, floor), unit), True)
     return _core.SessionModel(
         gravity_m_s2=gravity_m_s2,
         poses=core_poses(obs),
@@ -255,5 +270,5 @@ def twin_of(core: _core.SessionFit, gravity_m_s2: float) -> Twin:
         gravity=gravity_m_s2, accel_S=accel_S, accel_b=np.asarray(core.force_bias), gyro_S=gyro_S,
         up=np.asarray(core.up), gyro_bias=core.rate_zero @ gyro_S.T, accel_bias=core.force_zero @ accel_S.T,
         gyro_corner_s=gyro_corner, accel_corner_s=accel_corner, effect=np.asarray(core.effect),
-        between=core.strengths[2],
+        between=core.strengths[2], scatter=core.strengths[1],
     )  # fmt: skip

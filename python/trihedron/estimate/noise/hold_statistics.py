@@ -14,6 +14,8 @@ from trihedron.refused import RefusedError
 
 MOST_LEFT_OUT = 0.25
 """Share of holds that may be left out for noise far above the rest's: a disturbed hold, not another sensor."""
+UNKNOWN = 50.0
+"""Logarithm beyond which an interval says no more: 21 decades either way."""
 FAR = 5.0
 """Robust standard deviations beyond which a hold is disturbed: one clean hold in a million."""
 
@@ -74,7 +76,7 @@ def pooled_logarithm(values: FloatArray, dof: FloatArray) -> Pooled:
 
 def as_measured(value: float, sigma_log: float, dof: float) -> Measured:
     """A positive value with the 95 % interval of its logarithm."""
-    reach = _quantile(dof) * sigma_log
+    reach = min(_quantile(dof) * sigma_log, UNKNOWN)
     return Measured(value, value * math.exp(-reach), value * math.exp(reach), sigma_log, dof)
 
 

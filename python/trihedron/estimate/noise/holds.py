@@ -35,6 +35,8 @@ FEWER = 4.0 / 3.0
 """So many more readings are worth half the resolution at low frequencies."""
 FEWEST_HOLDS = 3
 """Holds that must show an octave, where there are as many: the scatter of one is not known."""
+LEVEL_KNOWN = 1.0
+"""Standard error of the logarithm of a density below a corner, from which on the differences of readings say more."""
 
 
 def noise_of_holds(
@@ -165,16 +167,25 @@ class _Axis:
         sensor = as_measured(self.total - self.rounding, share * self.pooled.sigma, self.pooled.dof)
         return root_of(sensor, 1.0 / rate_hz)
 
-    def of_level(self, density: float, sigma_log: float, corner_hz: float) -> Measured | None:
-        """White density below a filter's corner, of a typical hold: levels of holds differ as their differences do."""
+    def of_level(self, density: float, sigma_log: float, corner_hz: float, rate_hz: float) -> Measured | None:
+        """White density below a filter's corner, of a typical hold.
+
+        ``density`` is that of the mean over holds, which loud ones fill: how far a typical one lies beneath it is read
+        off the same band, for holds differ there by a hand's tremor too, and by less in their differences.
+        """
         if not (density > 0.0 and self._dithers(2.0 * corner_hz * density)):
             return None
-        holds, scatter = len(self.parts), self.pooled.scatter
-        own = scatter**2 / max(holds, 1)
+        lowest = float(self.spectrum.frequency_hz[0])
+        power, ordinates = _band_power(self.parts, rate_hz, lowest, corner_hz)
+        pooled = pooled_logarithm(power, ordinates)
+        typical = 1.0
+        if pooled.scatter > 0.0:
+            typical = min(math.exp(pooled.mean) * float(ordinates.sum()) / float(power @ ordinates), 1.0)
+        own = pooled.scatter**2 / max(len(power), 1)
         sigma = math.sqrt(sigma_log**2 + own)
         share = own / sigma**2
-        dof = max(holds - 1, 1) / share**2 if share > 0.0 else math.inf
-        return root_of(as_measured(density * math.exp(-0.5 * scatter**2), sigma, dof), 1.0)
+        dof = max(len(power) - 1, 1) / share**2 if share > 0.0 else math.inf
+        return root_of(as_measured(density * typical, sigma, dof), 1.0)
 
 
 def _white(axes: Sequence[_Axis], filters: Sequence[LowPass], rate_hz: float) -> list[Measured | None]:
@@ -186,7 +197,9 @@ def _white(axes: Sequence[_Axis], filters: Sequence[LowPass], rate_hz: float) ->
         sharing = [k for k, f in enumerate(filters) if f == one]
         levels = densities_below([axes[k].spectrum for k in sharing], one, rate_hz)
         for k, level in zip(sharing, levels, strict=True):
-            out[k] = axes[k].of_level(*level, one.corner_hz.value)
+            if not level[1] < LEVEL_KNOWN:
+                continue  # the band below the corner is too narrow, or too uneven, to say
+            out[k] = axes[k].of_level(*level, one.corner_hz.value, rate_hz)
     return out
 
 
@@ -216,6 +229,20 @@ class _Power:
         # White noise: 2 (1 + 2/4) = 3 per difference, two thirds of a degree of freedom each.
         per_difference = max(float(spread[0] + 2.0 * spread[1:].sum()), 0.5 * float(spread[0]), 1e-12)
         return cls(0.5 * mean, 2.0 * count / per_difference)
+
+
+def _band_power(
+    parts: Sequence[FloatArray], rate_hz: float, low_hz: float, high_hz: float
+) -> tuple[FloatArray, FloatArray]:
+    """(k,) mean power of each hold between two frequencies, and its number of ordinates; holds too short left out."""
+    power, ordinates = [], []
+    for part in parts:
+        first, last = (math.ceil(f * 2.0 * len(part) / rate_hz) for f in (low_hz, high_hz))
+        inside = cosine_transform(part - part.mean())[max(first, 1) : max(last, 2)] ** 2 / rate_hz
+        if len(inside):
+            power.append(float(inside.mean()))
+            ordinates.append(float(len(inside)))
+    return np.array(power), np.array(ordinates)
 
 
 def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, ...]:

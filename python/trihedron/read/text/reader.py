@@ -108,13 +108,14 @@ class TextReader:
             self.semicolons = has_semicolon_remarks(data)
         if self.semicolons:
             data = with_hash_remarks(data)
+        start = 0
         if layout is None:
             layout = self._layout(data)
             start = offset_of_line(data, layout.first_line)
             self.cursor.lines = layout.first_line - 1
             self._first_block(data, layout)
-            data = data[start:]
-        self._block(data, layout)
+        if not self._plain(np.frombuffer(data, dtype=np.uint8)[start:], layout):
+            self._block(data[start:], layout)
         return layout
 
     def line(self, number: int) -> int:
@@ -165,14 +166,13 @@ class TextReader:
 
     def _first_block(self, data: bytes, layout: Layout) -> None:
         """Which columns hold words instead of numbers (labels, dates), judged on the first lines."""
-        head = data[offset_of_line(data, layout.first_line) :][: 1 << 16].decode("utf-8", errors="replace")
+        start = offset_of_line(data, layout.first_line)
+        head = data[start : start + (1 << 16)].decode("utf-8", errors="replace")
         lines = (split(line, layout.separator) for line in head.split("\n")[:-1] or [head] if line.strip())
         rows = (r[: layout.n_fields] for r in lines if len(r) >= layout.n_fields and not is_comment(r[0]))
         self.text_columns = find_text_columns(list(islice(rows, 200)), layout)
 
     def _block(self, data: bytes, layout: Layout) -> None:
-        if self._plain(data, layout):
-            return
         # One odd block may be the last, cut off; where there are two, looking for more costs time for nothing.
         self.may_be_plain = self.n_odd_blocks == 0
         self.n_odd_blocks += 1
