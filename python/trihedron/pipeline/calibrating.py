@@ -12,6 +12,7 @@ import numpy as np
 from trihedron import probability
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm
 from trihedron.estimate.accelerometer.face_poses import identify
+from trihedron.estimate.accelerometer.shapes import shape_findings
 from trihedron.estimate.gyroscope import (
     MoveOptions,
     Turn,
@@ -137,13 +138,13 @@ def calibrate(
 
 
 def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) -> Found:
-    """Findings of the fit, a gyro's scale that its unit does not explain, and samples that its log lost."""
-    gyro = calibration.gyroscope
+    """Findings of the fit, its poses, a gyro's scale that its unit does not explain, and samples that its log lost."""
+    gyro, fitted = calibration.gyroscope, (*calibration.findings, *shape_findings(calibration, segments))
     if gyro is None:
-        return calibration.findings
+        return fitted
     relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
     missing = tuple(missing_samples(recording, segments, float(np.median(relative))))
-    return (*unless_seen(calibration.findings, missing), *scale_findings(gyro.S, recording.gyroscope_unit), *missing)
+    return (*unless_seen(fitted, missing), *scale_findings(gyro.S, recording.gyroscope_unit), *missing)
 
 
 def _as_they_weigh(segments: Segments) -> Found:

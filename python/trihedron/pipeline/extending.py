@@ -109,6 +109,7 @@ def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Cali
 _OF_THE_LINEAR_FIT = (
     FindingCode.RESIDUAL_ABOVE_NOISE,
     FindingCode.HELD_OUT_WORSE,
+    FindingCode.NONLINEAR_RESIDUAL,
     FindingCode.JOINT_FIT_LEFT,
     FindingCode.GYRO_G_SENSITIVITY,
     FindingCode.GYRO_BIAS_DRIFT,
@@ -116,10 +117,11 @@ _OF_THE_LINEAR_FIT = (
 
 
 def _still_true(base: Calibration, diagnosis: Diagnosis) -> tuple[Finding, ...]:
-    """Findings without those about the linear fit's residuals, where the effects account for all of them."""
-    if any(d.disagrees for d in diagnosis.remaining):
-        return base.findings
-    return tuple(f for f in base.findings if f.code not in _OF_THE_LINEAR_FIT)
+    """Findings without those about the linear fit's residuals, where the effects account for all of them; of the poses'
+    shape, where they account for that of the poses."""
+    left = {d.domain for d in diagnosis.remaining if d.disagrees}
+    gone = _OF_THE_LINEAR_FIT if not left else () if "static-accel" in left else (FindingCode.NONLINEAR_RESIDUAL,)
+    return tuple(f for f in base.findings if f.code not in gone)
 
 
 def _sensor(base: SensorCalibration, model: Mapping[str, Any], covariance: np.ndarray) -> SensorCalibration:

@@ -79,6 +79,7 @@ class FindingCode(str, Enum):
     WEAKLY_OBSERVABLE = "weakly-observable"
     RESIDUAL_ABOVE_NOISE = "residual-above-noise"
     HELD_OUT_WORSE = "held-out-worse"
+    NONLINEAR_RESIDUAL = "nonlinear-residual"
     OUTLIER_POSE = "outlier-pose"
     OUTLIER_MOVE = "outlier-move"
     TABLE_TILT = "table-tilt"

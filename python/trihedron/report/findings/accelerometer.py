@@ -79,6 +79,17 @@ ENTRIES = (
         "Record more poses; see `trihedron diagnose`.",
     ),
     Entry(
+        Code.NONLINEAR_RESIDUAL,
+        "poses",
+        SERIOUS,
+        "What the still poses miss of |g| has the shape of {is_cubic:?an axis whose reading bends with the cube of the "
+        "force|{is_quadratic:?an axis whose reading bends with the square of the force|an axis with another scale in "
+        "each direction}} (p = {p:.1g} by chance): S and b are off by up to {shift_m_s2:.2g mm/s²} at 1 g from it, "
+        "{shift_sigma:.2g} of their standard errors.",
+        "An accelerometer that is not linear, or one driven near the end of its range.",
+        "Run `trihedron diagnose`: it says which, and calibrates without it.",
+    ),
+    Entry(
         Code.LEFT_HANDED,
         "accelerometer",
         WARNING,

@@ -1,0 +1,78 @@
+"""Poses that bend: a shape in the residual of |g| is said, and what it has done to S and b."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from trihedron import calibrate
+from trihedron.estimate.accelerometer import shapes
+from trihedron.records import FindingCode
+from trihedron.simulate import hand_session, scenario_by_name, simulate
+from trihedron.simulate.effects import with_effect
+
+G = 9.81
+
+
+def linear_fit(up, bent, sigma):
+    """(residual, parameters) of the nine numbers that |f| of a pose is linear in, by plain least squares."""
+    pairs = [(j, k) for j in range(3) for k in range(j + 1)]
+    design = G * np.column_stack([up[:, j] * up[:, k] for j, k in pairs] + [up[:, j] for j in range(3)])
+    found, *_ = np.linalg.lstsq(design / sigma[:, None], bent / sigma, rcond=None)
+    return bent - design @ found, found
+
+
+def drawn(rng, n):
+    up = rng.normal(size=(n, 3))
+    return up / np.linalg.norm(up, axis=1, keepdims=True), rng.uniform(1e-3, 3e-3, n)
+
+
+def test_sound_poses_have_a_shape_as_often_as_chance_says(monkeypatch):
+    monkeypatch.setattr(shapes, "CHANCE", 0.05)
+    monkeypatch.setattr(shapes, "MATTERS", 0.0)
+    rng, said, n_trials = np.random.default_rng(3), 0, 600
+    for _ in range(n_trials):
+        up, sigma = drawn(rng, int(rng.integers(16, 45)))
+        # Noise twice as large as stated: an F needs no size of it.
+        residual, _ = linear_fit(up, 2.0 * sigma * rng.normal(size=len(up)), sigma)
+        said += shapes.shape_of(up, residual, sigma, G, 4.0) is not None
+    # Bonferroni over three shapes that are much alike: at most the stated rate.
+    assert said <= binom.ppf(0.999, n_trials, 0.05)
+    assert said >= binom.ppf(0.001, n_trials, 0.05 / 3.0)
+
+
+@pytest.mark.parametrize(("name", "power"), [("quadratic", 3), ("cubic", 4)])
+def test_a_shape_is_named_with_what_the_fit_took_up_of_it(name, power):
+    rng = np.random.default_rng(5)
+    up, sigma = drawn(rng, 36)
+    size = np.array([0.05, -0.03, 0.04])
+    bent = up**power @ size + sigma * rng.normal(size=len(up))
+    residual, found = linear_fit(up, bent, sigma)
+    _, clean = linear_fit(up, bent - up**power @ size, sigma)
+    shape = shapes.shape_of(up, residual, sigma, G, 1.0)
+    assert shape is not None
+    assert shape.name == name
+    assert shape.p < 1e-6
+    assert shape.shift_m_s2 == pytest.approx(G * np.abs(found - clean).max(), rel=0.2)
+
+
+def test_few_poses_and_poses_alike_say_nothing():
+    rng = np.random.default_rng(7)
+    up, sigma = drawn(rng, 14)
+    assert shapes.shape_of(up, 0.1 * up[:, 0] ** 4, sigma, G, 1.0) is None  # two degrees of freedom beside a shape
+    alike = np.repeat(up[:5], 8, axis=0)
+    assert shapes.shape_of(alike, rng.normal(size=40), np.ones(40), G, 1.0) is None
+
+
+def test_a_calibration_of_a_bent_accelerometer_is_not_to_be_trusted_and_a_sound_one_is():
+    scenario = replace(scenario_by_name("hand-session"), motion=hand_session(30, layout=12))
+    for sized, is_bent in ((None, False), ((9e-5, -7e-5, 8e-5), True)):
+        made = scenario if sized is None else with_effect(scenario, "accel-cubic", k3=sized)
+        recording, truth = simulate(made, 12)
+        result = calibrate(recording, gravity_m_s2=truth.gravity_m_s2)
+        said = [one for one in result.findings if one.code is FindingCode.NONLINEAR_RESIDUAL]
+        assert bool(said) == is_bent
+        assert result.calibration.is_trustworthy != is_bent
+        if said:
+            assert said[0].numbers["shift_sigma"] > 10.0
