@@ -85,9 +85,13 @@ def diagnose_recording(
         # Moves that nothing explains would bend everything beside them: once more, with their noise as it is.
         run = _run(widened, start, prior, alpha, lambda done, text: tell(0.6 + 0.4 * done, text))
     laws = laws_of_rest(run.model.context, run.remaining)
-    model, base = run.model, run.bare.fitted
+    model = run.model
     twin = model.fitted.twin
     numbered, final = final_numbers(model, run.remaining)
+    base = run.bare.fitted
+    if any(one.disagrees for one in run.domains):
+        # What the linear model alone says of S and b allows for what disagrees with it, as a calibration does.
+        _, base = final_numbers(run.bare, run.domains)
     accel_hidden, gyro_hidden = hidden_zeros(model.fitted)
     result = Diagnosis(
         verdict=verdict_of(model, run.domains, run.remaining, has_laws=bool(laws)),
@@ -116,7 +120,7 @@ def diagnose_recording(
         recording_source=recording.source,
         recording_sha256=recording.sha256,
         references=MappingProxyType(model.context.references),
-        residuals=residuals_before_after(base, model.fitted),
+        residuals=residuals_before_after(run.bare.fitted, model.fitted),
         laws=laws,
         stages=held_out_stages(run.bare, model),
     )
