@@ -23,7 +23,7 @@ from trihedron.diagnose.residuals.within_holds import judge_within_holds
 from trihedron.diagnose.selection.accepted import accepted_effects
 from trihedron.diagnose.selection.evidence import spread_anew, with_evidence
 from trihedron.diagnose.selection.model import StepwiseModel, begin
-from trihedron.diagnose.selection.numbers import final_numbers
+from trihedron.diagnose.selection.numbers import final_numbers, linear_numbers
 from trihedron.diagnose.selection.prune import judged_again
 from trihedron.diagnose.selection.rivals import chosen_again
 from trihedron.diagnose.selection.score import Scored
@@ -88,10 +88,7 @@ def diagnose_recording(
     model = run.model
     twin = model.fitted.twin
     numbered, final = final_numbers(model, run.remaining)
-    base = run.bare.fitted
-    if any(one.disagrees for one in run.domains):
-        # What the linear model alone says of S and b allows for what disagrees with it, as a calibration does.
-        _, base = final_numbers(run.bare, run.domains)
+    base = linear_numbers(run.bare, run.domains)
     accel_hidden, gyro_hidden = hidden_zeros(model.fitted)
     result = Diagnosis(
         verdict=verdict_of(model, run.domains, run.remaining, has_laws=bool(laws)),

@@ -41,6 +41,11 @@ def final_numbers(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> tu
     return with_shapes(model, plain)
 
 
+def linear_numbers(bare: StepwiseModel, domains: tuple[DomainTest, ...]) -> Fit:
+    """The linear model alone, as uncertain as what disagrees with it shows, as a calibration is."""
+    return final_numbers(bare, domains)[1] if any(one.disagrees for one in domains) else bare.fitted
+
+
 def _as_it_shows(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> Observations:
     """The observations as uncertain as what remains shows them to be."""
     obs = model.obs
