@@ -87,8 +87,7 @@ def diagnose_recording(
     laws = laws_of_rest(run.model.context, run.remaining)
     model = run.model
     twin = model.fitted.twin
-    numbered, final = final_numbers(model, run.remaining)
-    base = linear_numbers(run.bare, run.domains)
+    (numbered, final), base = final_numbers(model, run.remaining), linear_numbers(run.bare, run.domains)
     accel_hidden, gyro_hidden = hidden_zeros(model.fitted)
     result = Diagnosis(
         verdict=verdict_of(model, run.domains, run.remaining, has_laws=bool(laws)),
