@@ -27,7 +27,7 @@ def long_log(tmp_path_factory):
 
     path = tmp_path_factory.mktemp("long") / "long.csv"
     rng = np.random.default_rng(1)
-    n = 3_000_000
+    n = 6_000_000
     columns = {"t": np.arange(n) / 1000.0}
     columns |= {name: np.round(rng.normal(0, 0.01, n) + 9.8 * (name == "az"), 4) for name in ("ax", "ay", "az")}
     columns |= {name: np.round(rng.normal(0, 0.01, n), 4) for name in ("gx", "gy", "gz")}

@@ -13,17 +13,21 @@ use super::rows::Group;
 use super::strengths::CORNER_GRID_S;
 use super::{Distortion, Session, State, Strengths};
 use crate::error::Result;
-use crate::gauss_newton::{Options, Stop, descend};
+use crate::gauss_newton::{Local, Options, Stop, descend};
 
 /// Added to the diagonal of the scaled normal equations: directions that nothing sees stay finite.
 pub const RIDGE: f64 = 1e-12;
-/// The undamped step moves all whitened rows together by less than this many standard errors: converged.
+/// The undamped step moves all whitened rows together by less than this many standard errors, as large as the rows show
+/// them to be: converged.
 const STEP_TOLERANCE: f64 = 1e-3;
 /// The same of a descent whose weights are to be renewed: they change by far less on the rest of the way.
 const ROUGH_TOLERANCE: f64 = 0.1;
 /// Angle, rad, between a vertical and the plane it was compared in, below which moves carried there count as they are:
 /// residual and noise shrink together, in second order.
 const SAME_PLANE: f64 = 1e-2;
+/// Iterations of such a descent, and of any.
+const ROUGH_ITERATIONS: usize = 12;
+const MOST_ITERATIONS: usize = 50;
 /// Renewals of the moves' weights; they follow the state in second order and settle in two.
 const RENEWALS: usize = 6;
 
@@ -169,21 +173,22 @@ pub(super) fn fit_from(
     let mut options = Options {
         step_tolerance: STEP_TOLERANCE,
         gradient_tolerance: 1e-14,
-        max_iterations: 50,
+        max_iterations: MOST_ITERATIONS,
         ..Options::default()
     };
     let mut state = start;
     let mut iterations = 0;
+    let mut spread = 1.0_f64;
     let mut passed = match known {
         Some(known) if session.compares_in(&known, &state) => known,
         _ => session.pass(&state, distortion, &session.planes(&state)),
     };
     for renewal in 0.. {
         let is_rough = renewal == 0 && !session.moves.is_empty();
-        options.step_tolerance = if is_rough {
-            ROUGH_TOLERANCE
+        (options.step_tolerance, options.max_iterations) = if is_rough {
+            (ROUGH_TOLERANCE, ROUGH_ITERATIONS)
         } else {
-            STEP_TOLERANCE
+            (STEP_TOLERANCE * spread, MOST_ITERATIONS)
         };
         let weights = Weights::of(&passed, &strengths)?;
         let held = Held {
@@ -198,10 +203,16 @@ pub(super) fn fit_from(
         iterations += ended.iterations;
         state = ended.point;
         let local = ended.local;
+        let shown = (2.0 * local.cost() / local.n_residuals().max(1) as f64)
+            .sqrt()
+            .max(1.0);
         passed = local.passed;
-        let is_there = ended.stop != Stop::SmallStep || ended.step <= STEP_TOLERANCE;
+        let is_there = ended.stop != Stop::SmallStep || ended.step <= STEP_TOLERANCE * spread;
         let is_settled = (ended.iterations == 1 && is_there) || session.moves.is_empty();
-        if is_settled || renewal >= RENEWALS {
+        // Where rows miss by far more than their noise a descent ends late, and renewed weights would begin it again.
+        let is_endless = !is_rough && ended.stop == Stop::TooManyIterations;
+        spread = shown;
+        if is_settled || is_endless || renewal >= RENEWALS {
             let factor = match local.factor.into_inner() {
                 Some(factor) => factor,
                 None => local.chain.factor(RIDGE, None)?,

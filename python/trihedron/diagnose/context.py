@@ -7,12 +7,13 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import convolve1d, gaussian_filter1d, uniform_filter1d
+from scipy.ndimage import convolve1d, uniform_filter1d
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit
+from trihedron.diagnose.slopes import smoothed_slope
 
 TEMPERATURE_WINDOW_S = 10.0
 """Over which a logged temperature is smoothed before its rate of change is taken: its steps are a tenth of a kelvin."""
@@ -169,8 +170,8 @@ class Context:
         if logged is None or not np.isfinite(logged).any():
             return None
         filled = np.where(np.isfinite(logged), logged, np.nanmean(logged))
-        smooth = gaussian_filter1d(filled, max(TEMPERATURE_WINDOW_S * recording.rate_hz, 1.0), mode="nearest")
-        return self.at_points(np.gradient(smooth, recording.time_s))
+        slope = smoothed_slope(filled, recording.time_s, TEMPERATURE_WINDOW_S * recording.rate_hz)
+        return self.at_points(slope)
 
     @cached_property
     def supply(self) -> FloatArray | None:

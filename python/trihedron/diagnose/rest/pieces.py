@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter1d
 
 from trihedron.arrays import FloatArray
+from trihedron.diagnose.slopes import smoothed_slope
 from trihedron.diagnose.zeros.process import ZeroReadings
 from trihedron.records import Recording
 from trihedron.records.channel_facts import ChannelFacts
@@ -132,7 +132,7 @@ def _logged(recording: Recording, starts: npt.NDArray[np.int64], half: int) -> t
     filled = np.interp(t, t[good], logged[good])
     # Its rate over a piece: steps of a tenth of a kelvin are gone, the branches are not.
     width = max(TEMPERATURE_WINDOW_S * recording.rate_hz, float(half))
-    speed = np.gradient(gaussian_filter1d(filled, width, mode="nearest"), t)
+    speed = smoothed_slope(filled, t, width)
     spans = [(a + k * half, a + (k + 1) * half) for a in starts for k in (0, 1)]
     return np.array([filled[a:b].mean() for a, b in spans]), np.array([speed[a:b].mean() for a, b in spans])
 
