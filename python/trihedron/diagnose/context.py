@@ -12,8 +12,8 @@ from scipy.ndimage import convolve1d, uniform_filter1d
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
+from trihedron.diagnose.session.slopes import smoothed_slope
 from trihedron.diagnose.session.solve import Fit
-from trihedron.diagnose.slopes import smoothed_slope
 
 TEMPERATURE_WINDOW_S = 10.0
 """Over which a logged temperature is smoothed before its rate of change is taken: its steps are a tenth of a kelvin."""

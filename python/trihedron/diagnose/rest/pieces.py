@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.slopes import smoothed_slope
+from trihedron.diagnose.session.slopes import smoothed_slope
 from trihedron.diagnose.zeros.process import ZeroReadings
 from trihedron.records import Recording
 from trihedron.records.channel_facts import ChannelFacts
