@@ -74,7 +74,7 @@ def test_a_long_log_is_looked_at_in_stretches_spread_over_it():
     assert found["accelerometer"][0].corner_hz.value == pytest.approx(20.0, rel=0.1)
 
 
-def test_check_says_what_the_channels_are(tmp_path):
+def test_check_says_what_the_channels_are():
     recording = log(3, (0.2, 0.0), step=0.004)
     table = channels_table(recording)
     rows = {row[0]: row[1:] for row in table.rows}
@@ -84,4 +84,5 @@ def test_check_says_what_the_channels_are(tmp_path):
     record = json.loads(json.dumps(trihedron.check(recording).to_dict()))["channels"]
     assert record["accelerometer"]["low_pass"][0]["corner_hz"] == pytest.approx(20.0, rel=0.15)
     assert record["accelerometer"]["step"] == pytest.approx([0.004] * 3)
-    assert channels_record(recording)["gyroscope"]["low_pass"] is None or len(record["gyroscope"]["low_pass"]) == 3
+    # Half of the gyro's channels are hidden by their rounding: what is said is said of three axes.
+    assert len(channels_record(recording)["gyroscope"]["low_pass"]) == len(record["gyroscope"]["low_pass"]) == 3
