@@ -153,7 +153,11 @@ class Comparison:
         That poses' lengths are few is said of either sensor's effects alike here: a clock that is late and a filter of
         the other sensor make one and the same misfit.
         """
-        return self._over(stays) - self.cost > other._over(stays) - other.cost - margin
+        return self.worth(stays) > other.worth(stays) - margin
+
+    def worth(self, stays: FloatArray) -> float:
+        """ΔBIC by likelihood alone: which of several, not whether any (eq. 8.11e)."""
+        return self._over(stays) - self.cost
 
     def _over(self, stays: FloatArray) -> float:
         gain = self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum())
@@ -260,11 +264,7 @@ def refined(model: StepwiseModel, best: Refit) -> Refit:
     A parabola through log-spaced values around the grid's best; done again so that a far optimum is reached.
     """
     context: Context = model.context
-    for _ in range(N_RESCALED):
-        again = best.scored.effect.rescaled(context, best.scored.variant, best.against.value)
-        if again is None:
-            break
-        best = refit(model, replace(best.scored, variant=again))
+    best = rescaled(model, best)
     variant = best.scored.variant
     if len(variant.shape) != 1:
         return best
@@ -297,6 +297,16 @@ def refined(model: StepwiseModel, best: Refit) -> Refit:
     final = replace(made, shape={name: (value, unit)}, shape_sigma=float(value * min(sigma_log, 10.0)))
     finer = refit(model, replace(best.scored, variant=final))
     return finer if finer.against.bic_gain >= best.against.bic_gain else best
+
+
+def rescaled(model: StepwiseModel, best: Refit) -> Refit:
+    """An effect whose columns are made for one size (a time), with those of the size that it comes out with."""
+    for _ in range(N_RESCALED):
+        again = best.scored.effect.rescaled(model.context, best.scored.variant, best.against.value)
+        if again is None:
+            break
+        best = refit(model, replace(best.scored, variant=again))
+    return best
 
 
 N_RESCALED = 2

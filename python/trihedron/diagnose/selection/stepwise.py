@@ -13,7 +13,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.residuals.goodness_of_fit import strayed
-from trihedron.diagnose.selection.compare import Comparison, Refit, refined, refit
+from trihedron.diagnose.selection.compare import Comparison, Refit, refined, refit, rescaled
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel
 from trihedron.diagnose.selection.score import Scored, score_all
 from trihedron.diagnose.session.solve import CORNER_GRID_S, fit
@@ -104,7 +104,7 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     # Rivals are compared against one rest, that of the best explained: else its small differences weigh large gains.
     rest = np.min([r.against.stays for r in sound], axis=0)
     best = max(sound, key=lambda r: r.against.bic_gain_at(rest))
-    best = _logged_first(best, sound, rest)
+    best = _logged_first(_likeliest(model, best, sound, rest), sound, rest)
     # What another mechanism explains as well: by its joint fit, or, for all of its shapes, by the score test.
     enough = best.against.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
     others = [r for r in refits if r.scored.effect is not best.scored.effect]
@@ -136,6 +136,20 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
         prediction=best.against.prediction,
         accepted=(*model.accepted, one),
     )
+
+
+def _likeliest(model: StepwiseModel, best: Refit, sound: list[Refit], rest: FloatArray) -> Refit:
+    """Of sound candidates that explain as much by likelihood, each with its own size, the one that explains most.
+
+    A late clock and the other sensor's filter make one misfit: columns made for 16 ms are no match for a filter that may
+    be of any length, and what they win in poses' lengths does not say which of the two it is.
+    """
+    peers = [r for r in sound if r is not best and r.against.equals(best.against, rest, CONFOUNDED_DELTA_BIC)]
+    if not peers:
+        return best
+    own = [rescaled(model, r) for r in (best, *peers)]
+    least = np.min([r.against.stays for r in own], axis=0)
+    return max(own, key=lambda r: r.against.worth(least))
 
 
 def set_apart(model: StepwiseModel, before: list[Scored], after: list[Scored]) -> StepwiseModel:
