@@ -31,7 +31,11 @@ class AccelZeroScatter(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         found = accel_evidence(context)
-        if found is None or not exceeds_noise(found) or accel_zero_laws(context).share > MOST_FOLLOWS:
+        if (
+            found is None
+            or not exceeds_noise(found, context, "static-accel")
+            or accel_zero_laws(context).share > MOST_FOLLOWS
+        ):
             return None  # what follows something is a law, not scatter
         if jumps_in_poses(context.obs).p_value[0] < JUMPS:
             return None  # a zero that changes inside poses is not drawn anew in each

@@ -36,7 +36,11 @@ class GyroZeroScatter(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         found = gyro_evidence(context)
-        if found is None or not exceeds_noise(found) or gyro_zero_laws(context).share > MOST_FOLLOWS:
+        if (
+            found is None
+            or not exceeds_noise(found, context, "static-gyro")
+            or gyro_zero_laws(context).share > MOST_FOLLOWS
+        ):
             return None  # what follows something is a law, not scatter
         if jumps_in_poses(context.obs).p_value[1] < JUMPS:
             return None  # a zero that changes inside poses is not drawn anew in each

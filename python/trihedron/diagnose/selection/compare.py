@@ -159,6 +159,12 @@ class Comparison:
         """ΔBIC by likelihood alone: which of several, not whether any (eq. 8.11e)."""
         return self._over(stays) - self.cost
 
+    def ahead_of(self, other: Comparison, stays: FloatArray) -> float:
+        """ΔBIC between two that are both demanded, by likelihood where poses' lengths concern but one of them."""
+        if (self.variant.distortion.force is None) == (other.variant.distortion.force is None):
+            return self.bic_gain_at(stays) - other.bic_gain_at(stays)
+        return self.worth(stays) - other.worth(stays)
+
     def _over(self, stays: FloatArray) -> float:
         gain = self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum())
         if self.variant.distortion.rate is None:

@@ -46,7 +46,7 @@ def _best_in_place(model: StepwiseModel, k: int) -> StepwiseModel:
         there = _against(without, swapped, swapped.accepted[k], first)
         # Compared over one rest, the smaller of each domain, as when they first competed.
         rest = np.minimum(best[1].stays, there.stays)
-        ahead = there.bic_gain_at(rest) - best[1].bic_gain_at(rest)
+        ahead = there.ahead_of(best[1], rest)
         held, its = best[0].accepted[k].effect.id, other.effect.id
         needed = CONFOUNDED_DELTA_BIC * (gives_way(its, held) - gives_way(held, its))
         if ahead > needed and _is_sound(there, other, without.context):

@@ -96,15 +96,18 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     for s in leaders:
         if any(r.scored.merit > FAR_AHEAD * s.merit for r in sound):
             break
-        refits.append(refit(model, s))
-        if is_sound(refits[-1], context) and s.effect.withstands(context):
-            sound.append(refits[-1])
+        one = refit(model, s)
+        if is_sound(one, context) and s.effect.withstands(context):
+            # Columns made for 32 ms are no match for a filter that may be of any length: each by its own size.
+            one = rescaled(model, one)
+            sound.append(one)
+        refits.append(one)
     if not sound:
         return None
     # Rivals are compared against one rest, that of the best explained: else its small differences weigh large gains.
     rest = np.min([r.against.stays for r in sound], axis=0)
     best = max(sound, key=lambda r: r.against.bic_gain_at(rest))
-    best = _logged_first(_likeliest(model, best, sound, rest), sound, rest)
+    best = _logged_first(_likeliest(best, sound, rest), sound, rest)
     # What another mechanism explains as well: by its joint fit, or, for all of its shapes, by the score test.
     enough = best.against.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
     others = [r for r in refits if r.scored.effect is not best.scored.effect]
@@ -138,18 +141,16 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     )
 
 
-def _likeliest(model: StepwiseModel, best: Refit, sound: list[Refit], rest: FloatArray) -> Refit:
-    """Of sound candidates that explain as much by likelihood, each with its own size, the one that explains most.
+def _likeliest(best: Refit, sound: list[Refit], rest: FloatArray) -> Refit:
+    """The candidate that no other is ahead of.
 
-    A late clock and the other sensor's filter make one misfit: columns made for 16 ms are no match for a filter that may
-    be of any length, and what they win in poses' lengths does not say which of the two it is.
+    A late clock and the other sensor's filter make one misfit: what a fall of the poses' lengths is worth does not say
+    which of the two it is.
     """
-    peers = [r for r in sound if r is not best and r.against.equals(best.against, rest, CONFOUNDED_DELTA_BIC)]
-    if not peers:
-        return best
-    own = [rescaled(model, r) for r in (best, *peers)]
-    least = np.min([r.against.stays for r in own], axis=0)
-    return max(own, key=lambda r: r.against.worth(least))
+    for r in sound:
+        if r.against.ahead_of(best.against, rest) > 0.0 and r.against.equals(best.against, rest, 0.0):
+            best = r
+    return best
 
 
 def set_apart(model: StepwiseModel, before: list[Scored], after: list[Scored]) -> StepwiseModel:
