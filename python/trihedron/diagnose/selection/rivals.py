@@ -10,7 +10,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.selection.compare import Comparison, cost_of
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel, with_only
 from trihedron.diagnose.selection.prune import explains
-from trihedron.diagnose.selection.stepwise import CONFOUNDED_DELTA_BIC, gives_way, is_demanded
+from trihedron.diagnose.selection.stepwise import CONFOUNDED_DELTA_BIC, gives_way, head_start, is_demanded
 
 MOST_ALTERNATIVES = 2
 """Alternatives tried for each effect: those that explained most when it was chosen."""
@@ -49,6 +49,7 @@ def _best_in_place(model: StepwiseModel, k: int) -> StepwiseModel:
         ahead = there.ahead_of(best[1], rest)
         held, its = best[0].accepted[k].effect.id, other.effect.id
         needed = CONFOUNDED_DELTA_BIC * (gives_way(its, held) - gives_way(held, its))
+        needed += head_start(there.variant, best[1].variant)
         if ahead > needed and _is_sound(there, other, without.context):
             if ahead < CONFOUNDED_DELTA_BIC:
                 rivals.append(held)

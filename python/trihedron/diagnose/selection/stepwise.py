@@ -11,11 +11,12 @@ from scipy.special import chdtrc
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.contract import Effect
+from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.residuals.goodness_of_fit import strayed
-from trihedron.diagnose.selection.compare import Comparison, Refit, refined, refit, rescaled
+from trihedron.diagnose.selection.compare import Comparison, Refit, refit
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel
 from trihedron.diagnose.selection.score import Scored, score_all
+from trihedron.diagnose.selection.sizes import refined, rescaled
 from trihedron.diagnose.session.solve import CORNER_GRID_S, fit
 from trihedron.diagnose.session.twin import stacked
 from trihedron.records.diagnosis import Candidate
@@ -96,12 +97,11 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     for s in leaders:
         if any(r.scored.merit > FAR_AHEAD * s.merit for r in sound):
             break
-        one = refit(model, s)
-        if is_sound(one, context) and s.effect.withstands(context):
+        refits.append(refit(model, s))
+        if is_sound(refits[-1], context) and s.effect.withstands(context):
             # Columns made for 32 ms are no match for a filter that may be of any length: each by its own size.
-            one = rescaled(model, one)
-            sound.append(one)
-        refits.append(one)
+            refits[-1] = rescaled(model, refits[-1])
+            sound.append(refits[-1])
     if not sound:
         return None
     # Rivals are compared against one rest, that of the best explained: else its small differences weigh large gains.
@@ -148,9 +148,15 @@ def _likeliest(best: Refit, sound: list[Refit], rest: FloatArray) -> Refit:
     which of the two it is.
     """
     for r in sound:
-        if r.against.ahead_of(best.against, rest) > 0.0 and r.against.equals(best.against, rest, 0.0):
+        needed = head_start(r.scored.variant, best.scored.variant)
+        if r.against.ahead_of(best.against, rest) > needed and r.against.equals(best.against, rest, -needed):
             best = r
     return best
+
+
+def head_start(one: Variant, other: Variant) -> float:
+    """ΔBIC by which one must be ahead of another to go before it: a shape that stands for many, of a plain one."""
+    return CONFOUNDED_DELTA_BIC * (one.stands_for_many - other.stands_for_many)
 
 
 def set_apart(model: StepwiseModel, before: list[Scored], after: list[Scored]) -> StepwiseModel:

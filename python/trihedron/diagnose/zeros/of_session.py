@@ -9,13 +9,11 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
-from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import CORNER_GRID_S
 from trihedron.diagnose.zeros.evidence import FEWEST_POSES, ZeroEvidence, examine
 from trihedron.diagnose.zeros.readings import SessionZeros, accel_zeros, gyro_zeros
 from trihedron.records.diagnosis import EffectParameter
-from trihedron.records.domains import Domain
 
 FEWEST_FOR_SIZE = 6
 """Poses from which the size of the gyro's scatter is told at all."""
@@ -27,8 +25,6 @@ LEAST_OVER_NOISE = 4.0
 """Scatter over the error of a pose's mean, in variance. That error is itself measured, to 10 or 20 %, and flicker makes
 zeros wander between poses: of seven healthy sessions of a tactical unit one reached 2.8. Less than twice the error is
 the sensor's noise, not a flaw."""
-DISAGREES = 0.01
-"""False alarms at which poses disagree with their predicted noise, shared by the domains (eq. 8.7)."""
 AXES = ("x", "y", "z")
 
 
@@ -73,19 +69,13 @@ def scatter_parameters(found: SessionEvidence, unit: str) -> tuple[EffectParamet
     )
 
 
-def exceeds_noise(found: SessionEvidence, context: Context, domain: Domain) -> bool:
-    """Whether the scatter is at least as large as the errors of the poses' means, or larger than those allow.
+def exceeds_noise(found: SessionEvidence) -> bool:
+    """Whether the scatter is at least as large as the errors of the poses' means.
 
     Of the pose in the middle: a mean over poses is that of the worst, and two restless ones would hide any scatter.
-    Below twice those errors it is the sensor's noise as long as poses agree with it: where they do not, it is a flaw.
     """
     noise = float(np.median((found.zeros.readings.sigma**2).mean(axis=0))) / 2.0
-    if float(np.mean(found.evidence.scatter**2)) > LEAST_OVER_NOISE * noise:
-        return True
-    named = context.obs.zero_scatter
-    if named is not None and named[("static-accel", "static-gyro").index(domain)].any():
-        return True  # poses agree because it is in their errors already
-    return any(one.domain == domain and one.disagrees for one in judge_rows(context.fitted, DISAGREES))
+    return float(np.mean(found.evidence.scatter**2)) > LEAST_OVER_NOISE * noise
 
 
 def share_of_zeros(found: SessionEvidence) -> float:
