@@ -10,7 +10,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.selection.compare import Comparison, cost_of
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel, with_only
 from trihedron.diagnose.selection.prune import explains
-from trihedron.diagnose.selection.stepwise import CONFOUNDED_DELTA_BIC, gives_way, head_start, is_demanded
+from trihedron.diagnose.selection.stepwise import CONFOUNDED_DELTA_BIC, gives_way, head_start, is_demanded, is_predicted
 
 MOST_ALTERNATIVES = 2
 """Alternatives tried for each effect: those that explained most when it was chosen."""
@@ -92,8 +92,7 @@ def _against(without: StepwiseModel, model: StepwiseModel, one: Accepted, first:
 def _is_sound(against: Comparison, other: Alternative, context: Context) -> bool:
     return (
         is_demanded(against, other.effect, context)
-        and against.predicts
-        and against.falls
+        and is_predicted(against, other.effect, context)
         and against.has_size
         and other.effect.is_plausible_variant(against.variant, against.value, against.covariance)
         and explains(against)

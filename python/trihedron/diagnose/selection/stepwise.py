@@ -200,8 +200,11 @@ def is_demanded(against: Comparison, effect: Effect, context: Context) -> bool:
 
     Schwarz's log n counts the walk's rows as data; that test counts poses.
     """
-    if against.bic_gain > MIN_DELTA_BIC:
-        return True
+    return against.bic_gain > MIN_DELTA_BIC or _stands_out(effect, context)
+
+
+def _stands_out(effect: Effect, context: Context) -> bool:
+    """Whether an effect's own test finds it where walk or scatter stand for whatever is there."""
     if context.obs.zero_scatter is None and not any(strayed(context.fitted)):
         return False
     p = effect.own_p_value(context)
@@ -213,11 +216,21 @@ def is_sound(one: Refit, context: Context) -> bool:
     a = one.against
     return (
         is_demanded(a, one.scored.effect, context)
-        and a.predicts
-        and a.falls
+        and is_predicted(a, one.scored.effect, context)
         and a.has_size
         and one.scored.effect.is_plausible_variant(a.variant, a.value, a.covariance)
     )
+
+
+def is_predicted(against: Comparison, effect: Effect, context: Context) -> bool:
+    """Whether what was held out is predicted better, and visibly so.
+
+    A walk at the end of its range predicts any slow curve from its neighbours: where that is so, a test beside a walk
+    of any strength stands for it.
+    """
+    if against.predicts and against.falls:
+        return True
+    return any(strayed(context.fitted)) and _stands_out(effect, context)
 
 
 def _p_adjusted(best: Refit, n_effects: int) -> float:
