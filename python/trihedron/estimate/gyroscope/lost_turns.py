@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.alignment import Aligned
@@ -28,6 +29,10 @@ CERTAIN, DOUBTFUL = 1e-3, 0.05
 """Chance of the misses by noise alone below which losses are asked for: where all moves were fitted, and where some
 were left out. A loss in each move is shared out among the nine numbers of a scale, the moves that lost more are left
 out, and what remains looks nearly sound (sessions wrong by 20 standard errors had χ² of 1.7 per degree of freedom)."""
+POINTS = 100
+"""Instants of a move at which one of two samples may have been lost: a turn bends little from one to the next."""
+MET = 9.21
+"""χ² of two degrees of freedom that noise exceeds once in a hundred."""
 OWN_CLOCK = 1.5
 """Distance of stamps from a straight line, in spreads of their steps, from which on a clock made them: rounding a
 line leaves them within one spread of it."""
@@ -88,6 +93,46 @@ def asks_for_losses(chi2: float, dof: float, n_left_out: int) -> bool:
     return dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < (DOUBTFUL if n_left_out else CERTAIN)
 
 
+def left_out_as_by_losses(time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned) -> bool:
+    """Whether a move that was left out misses gravity by what a sample or two that are lost take from it.
+
+    A sample lost at ``t`` leaves ``h ω(t)`` out of the turn, and gravity behind the move off by ``h R(t) (ω × f)(t)``,
+    carried from ``t`` to the end: a curve of ``t``, and the sums of two of its points, which a knock meets by chance.
+    """
+    S, step_s = np.asarray(aligned.fit.gyroscope_scale), measured.nominal_step_s
+    if not aligned.outliers or not could_be_remade(time_s, step_s):
+        return False
+    f = measured.reading @ np.asarray(aligned.fit.accelerometer_scale).T + np.asarray(aligned.fit.accelerometer_bias)
+    for move in aligned.outliers:
+        begin, end = measured.edges[move]
+        before, after = measured.links[move]
+        rate = np.nan_to_num(measured.rate[begin : end + 1] - measured.zero_mean) @ S.T
+        carried = np.empty((len(rate) + 1, 3))
+        carried[0] = f[before]
+        turns = Rotation.from_rotvec(-rate * step_s)
+        onward = turns.as_matrix()
+        for k, turn in enumerate(onward):
+            carried[k + 1] = turn @ carried[k]
+        off = np.cross(rate, carried[1:]) * step_s
+        to_end = np.eye(3)
+        for k in range(len(rate) - 1, -1, -1):
+            off[k] = to_end @ off[k]
+            to_end = to_end @ onward[k]
+        vertical = f[after] / np.linalg.norm(f[after])
+        across = np.eye(3) - np.outer(vertical, vertical)
+        # What the other moves lost the scale has taken up, and hides as much here: a sample a move is allowed for.
+        short = off.sum(axis=0) / len(off)
+        noise = np.asarray(aligned.fit.cov_residuals)[move] + np.outer(short, short)
+        inverse = np.linalg.pinv(across @ noise @ across, rcond=1e-9, hermitian=True)
+        missed = np.asarray(aligned.fit.residuals)[move]
+        some = off[:: max(len(off) // POINTS, 1)]
+        two = missed - some[:, None] - some[None]
+        nearest = min(float(np.einsum("...i,ij,...j->...", left, inverse, left).min()) for left in (missed - off, two))
+        if nearest < MET:
+            return True
+    return False
+
+
 def losses_that_fit(
     time_s: FloatArray,
     measured: MoveMeasurements,
@@ -146,11 +191,18 @@ def losses_that_fit(
     return PossibleLosses(carried, among_all, scatter)
 
 
+def is_asked_for_losses(
+    time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned, chi2: float, dof: float
+) -> bool:
+    """Whether losses may be behind what moves miss: those in use beyond noise, or those left out by whole samples."""
+    return asks_for_losses(chi2, dof, len(aligned.outliers)) or left_out_as_by_losses(time_s, measured, aligned)
+
+
 def of_alignment(
     time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned, gravity_m_s2: float
 ) -> tuple[Aligned, tuple[Finding, ...]]:
     """An alignment of moves alone, widened by the losses that its misses leave room for, and what is to be said."""
-    if not asks_for_losses(aligned.fit.chi2, aligned.fit.dof, len(aligned.outliers)):
+    if not is_asked_for_losses(time_s, measured, aligned, aligned.fit.chi2, aligned.fit.dof):
         return aligned, ()
     seen = predict(aligned, measured, is_held_out=False)
     S = np.asarray(aligned.fit.gyroscope_scale)
