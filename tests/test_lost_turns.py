@@ -106,7 +106,7 @@ def test_moves_left_out_for_a_sample_they_lack_are_losses_and_knocked_ones_are_n
             is_said = FindingCode.SAMPLES_LOST in {one.code for one in found.findings}
             lossy += is_lossy and is_said
             false += not is_lossy and is_said
-    # 51 of 54 sessions (45 before): in the others no move is left out.
-    assert lossy >= n - 1
-    # Two knocks each meet the curve of a loss by chance: 8 of 50 sessions.
-    assert false <= n // 2
+    # 48 of 54 sessions (44 before).
+    assert lossy >= n - 2
+    # None of 30 sessions: a knock meets the curve of a loss by chance only.
+    assert false <= 1

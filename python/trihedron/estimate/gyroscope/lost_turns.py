@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.alignment import Aligned
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
@@ -31,8 +31,8 @@ were left out. A loss in each move is shared out among the nine numbers of a sca
 out, and what remains looks nearly sound (sessions wrong by 20 standard errors had χ² of 1.7 per degree of freedom)."""
 POINTS = 100
 """Instants of a move at which one of two samples may have been lost: a turn bends little from one to the next."""
-MET = 9.21
-"""χ² of two degrees of freedom that noise exceeds once in a hundred."""
+STRONG = 20.0
+"""Odds that are strong evidence (Kass, Raftery 1995): a fall that ends between two samples misses by parts of one."""
 OWN_CLOCK = 1.5
 """Distance of stamps from a straight line, in spreads of their steps, from which on a clock made them: rounding a
 line leaves them within one spread of it."""
@@ -94,43 +94,52 @@ def asks_for_losses(chi2: float, dof: float, n_left_out: int) -> bool:
 
 
 def left_out_as_by_losses(time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned) -> bool:
-    """Whether a move that was left out misses gravity by what a sample or two that are lost take from it.
+    """Whether moves that were left out miss gravity rather by a sample or two that are lost than by a knock.
 
     A sample lost at ``t`` leaves ``h ω(t)`` out of the turn, and gravity behind the move off by ``h R(t) (ω × f)(t)``,
-    carried from ``t`` to the end: a curve of ``t``, and the sums of two of its points, which a knock meets by chance.
+    carried from ``t`` to the end. The density of the miss, over all instants at which one sample or two may have been
+    lost, is held against that of a knock of unknown direction and just this size.
     """
     S, step_s = np.asarray(aligned.fit.gyroscope_scale), measured.nominal_step_s
     if not aligned.outliers or not could_be_remade(time_s, step_s):
         return False
     f = measured.reading @ np.asarray(aligned.fit.accelerometer_scale).T + np.asarray(aligned.fit.accelerometer_bias)
+    log_odds = 0.0
     for move in aligned.outliers:
         begin, end = measured.edges[move]
         before, after = measured.links[move]
         rate = np.nan_to_num(measured.rate[begin : end + 1] - measured.zero_mean) @ S.T
-        carried = np.empty((len(rate) + 1, 3))
-        carried[0] = f[before]
-        turns = Rotation.from_rotvec(-rate * step_s)
-        onward = turns.as_matrix()
-        for k, turn in enumerate(onward):
-            carried[k + 1] = turn @ carried[k]
-        off = np.cross(rate, carried[1:]) * step_s
-        to_end = np.eye(3)
-        for k in range(len(rate) - 1, -1, -1):
-            off[k] = to_end @ off[k]
-            to_end = to_end @ onward[k]
-        vertical = f[after] / np.linalg.norm(f[after])
-        across = np.eye(3) - np.outer(vertical, vertical)
+        off = _lost_at_each_instant(rate, f[before], step_s)
+        _, _, axes = np.linalg.svd(f[after][None])
+        across = axes[1:]
+        off, missed = off @ across.T, across @ np.asarray(aligned.fit.residuals)[move]
         # What the other moves lost the scale has taken up, and hides as much here: a sample a move is allowed for.
-        short = off.sum(axis=0) / len(off)
-        noise = np.asarray(aligned.fit.cov_residuals)[move] + np.outer(short, short)
-        inverse = np.linalg.pinv(across @ noise @ across, rcond=1e-9, hermitian=True)
-        missed = np.asarray(aligned.fit.residuals)[move]
+        short = off.mean(axis=0)
+        noise = across @ np.asarray(aligned.fit.cov_residuals)[move] @ across.T + np.outer(short, short)
+        inverse, size = np.linalg.inv(noise), 2.0 * np.pi * np.sqrt(np.linalg.det(noise))
         some = off[:: max(len(off) // POINTS, 1)]
-        two = missed - some[:, None] - some[None]
-        nearest = min(float(np.einsum("...i,ij,...j->...", left, inverse, left).min()) for left in (missed - off, two))
-        if nearest < MET:
-            return True
-    return False
+        density = [
+            float(np.exp(-0.5 * np.einsum("...i,ij,...j->...", left, inverse, left)).mean()) / size
+            for left in (missed - off, missed - some[:, None] - some[None])
+        ]
+        knock = 1.0 / (np.pi * np.e * float(missed @ missed))
+        log_odds += float(np.log(max(0.5 * sum(density), 1e-300) / knock))
+    return log_odds > float(np.log(STRONG))
+
+
+def _lost_at_each_instant(rate: FloatArray, force: FloatArray, step_s: float) -> FloatArray:
+    """What a sample lost at each instant of a move leaves gravity behind it off by, (n, 3) of rates (n, 3), m/s²."""
+    onward = _core.rotation_from_vector(np.ascontiguousarray(-rate * step_s))
+    carried = np.empty((len(rate), 3))
+    for k, turn in enumerate(onward):
+        force = turn @ force
+        carried[k] = force
+    off: FloatArray = np.cross(rate, carried) * step_s
+    to_end = np.eye(3)
+    for k in range(len(rate) - 1, -1, -1):
+        off[k] = to_end @ off[k]
+        to_end = to_end @ onward[k]
+    return off
 
 
 def losses_that_fit(
