@@ -131,6 +131,11 @@ def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -
         better = pipeline.improve(given, result)
     for effect_id, why in better.left_out.items():
         say(f"effect {effect_id} is not in the scenario: {why}.")
+    for what, ratio in better.unlike.items():
+        say(
+            f"{what} of the improved scenario miss gravity by {ratio:.2f} times what the log's do: "
+            "what inside the poses looks like noise or makes zeros stray is not all told apart by this log."
+        )
     write_scenario(better.text, path, overwrite=force)
     say(f"improved scenario: {path}")
 
