@@ -32,7 +32,7 @@ class VibrationRectification(Effect):
         names, units = per_axis("accel_bias_per_power"), ("1/(m/s^2)",) * 3
         out = [
             Variant(force_only(context.on_accelerometers(power)), names, units, label=label)
-            for power, label in ((excess, "accelerometer"), (still, "accelerometer, in poses"))
+            for power, label in ((excess, "accelerometer"), (still, "accelerometer-in-poses"))
         ]
         if context.obs.raw_rate is not None:
             total = excess.sum(axis=1, keepdims=True) * np.ones(3)
