@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.read.clock.losses import UNMOVED, _is_unmoved
 from trihedron.segment.channels import mean_present
 from trihedron.segment.runs import Run
 from trihedron.session.aliasing import LENGTH, _between_gaps
@@ -37,3 +38,13 @@ def test_quiet_ranges_with_and_without_bumps() -> None:
     assert Run(3, 9).quiet_ranges() == [(3, 9)]
     assert Run(3, 3).quiet_ranges() == []
     assert Run(3, 9, ((5, 6),)).quiet_ranges() == [(3, 5), (6, 9)]
+
+
+def test_a_stamp_that_moves_either_way_is_seen() -> None:
+    still = 0.4 * UNMOVED * np.random.default_rng(7).uniform(-1.0, 1.0, size=300_000)
+    assert _is_unmoved(still)
+    for by in (1.5 * UNMOVED, -1.5 * UNMOVED, np.nan):
+        moved = still.copy()
+        moved[-1] = moved[-2] + by
+        assert not _is_unmoved(moved)
+    assert not _is_unmoved(still[:1])
