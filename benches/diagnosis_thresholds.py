@@ -1,28 +1,36 @@
 """How near healthy sessions come to the thresholds of the diagnosis: the calibration that their names cite.
 
     python benches/diagnosis_thresholds.py --sessions 60 --seed 11
+    python benches/diagnosis_thresholds.py --sessions 60 --seed 11 --flicker
 
-Every session is healthy, hand-moved poses and table turns in turn, three noise grades in turn. For every statistic
-that a threshold of `diagnose/` is held against: median, 95 % point and extreme over the sessions, and how many pass.
+Every session is healthy, hand-moved poses and table turns in turn, three noise grades in turn; with `--flicker` all are
+of another generator (`benches/nuisance_trial`), without its nuisances, with 1/f noise as consumer parts have it. For
+every statistic that a threshold of `diagnose/` is held against: median, 95 % point and extreme over the sessions, and
+how many pass.
 """
 
 from __future__ import annotations
 
 import argparse
+import tempfile
 from collections import defaultdict
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
+import polars as pl
 from scipy.special import chdtrc
 from scipy.stats import beta
 
 import trihedron
 from blind_trial.draw import GRADES, Job, grade_profile, make, table_session
+from nuisance_trial.draw import G, draw
 from trihedron.diagnose.effects.sample_steps import find_losses, step_errors
 from trihedron.diagnose.effects.table_tilt import TableTilt
 from trihedron.diagnose.effects.table_turns import table_turns
 from trihedron.diagnose.effects.timing_jitter import STEP_FACTOR, common_time_error
 from trihedron.diagnose.effects.turn_angle_error import _without_common_scale
+from trihedron.diagnose.residuals.goodness_of_fit import AT_EDGE, hidden_zeros
 from trihedron.diagnose.residuals.within_holds import find_lines, hold_scatter
 from trihedron.diagnose.selection.model import begin
 from trihedron.diagnose.session.observations import observe
@@ -51,6 +59,15 @@ def healthy(k: int, seed: int) -> tuple[Recording, float]:
     return recording, truth.gravity_m_s2
 
 
+def flickering(k: int, seed: int) -> tuple[Recording, float]:
+    """The same with consumer 1/f noise, through a file as a user's."""
+    columns, _ = draw("none", seed * 1000 + k, 1.0, False, True, [])
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "log.csv"
+        pl.DataFrame(columns).write_csv(log)
+        return trihedron.read(log), G
+
+
 def statistics(recording: Recording, gravity: float) -> Iterator[Row]:
     """Every statistic of one session, by the model before any effect."""
     segments = segments_of(None, recording)
@@ -58,6 +75,9 @@ def statistics(recording: Recording, gravity: float) -> Iterator[Row]:
     obs = observe(recording, segments)
     context = begin(obs, start_twin(obs, calibration), None).context
     step_s = 1.0 / recording.rate_hz
+    for name, zero in zip(("accelerometer", "gyro"), hidden_zeros(context.fitted), strict=True):
+        if zero is not None and zero.is_at_edge:
+            yield f"walk of the {name} at its edge, over the error of a pose", AT_EDGE, zero.rms / zero.noise
     yield "lost samples found", 0.0, float(len(find_losses(context)))
     value, spread, _ = common_time_error(step_errors(context), step_s)
     yield "common time error over its standard error", 5.0, value / spread
@@ -90,10 +110,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--sessions", type=int, default=60)
     parser.add_argument("--seed", type=int, default=11)
+    parser.add_argument("--flicker", action="store_true", help="sessions of another generator, with consumer 1/f noise")
     options = parser.parse_args()
+    made = flickering if options.flicker else healthy
     values: dict[tuple[str, float], list[float]] = defaultdict(list)
     for k in range(options.sessions):
-        for name, limit, value in statistics(*healthy(k, options.seed)):
+        for name, limit, value in statistics(*made(k, options.seed)):
             values[name, limit].append(value)
     print(f"{'statistic':54}{'limit':>8}{'n':>5}{'median':>9}{'95 %':>9}{'most':>9}{'over':>6}  rate at most (95 %)")
     for (name, limit), seen in values.items():

@@ -9,10 +9,10 @@ from scipy.signal import lfilter
 
 from trihedron.diagnose.against import FittedModel, compare_numbers
 from trihedron.diagnose.against.mechanisms import ComparedEffects
-from trihedron.estimate.noise.low_pass import LowPass
 from trihedron.pipeline.comparing_correlation import correlation_times
 from trihedron.pipeline.comparing_noise import compare_noise, sampled
 from trihedron.records import Hold, Recording
+from trihedron.records.channel_facts import LowPass
 
 RATE_HZ, HOLD, EVERY, N_HOLDS = 100.0, 900, 1000, 12
 HOLDS = tuple(Hold(k, EVERY * k, EVERY * k + HOLD, EVERY * k, EVERY * k + HOLD) for k in range(N_HOLDS))
@@ -53,7 +53,7 @@ def _without_corners():
     """Corners of filters cost nine tenths of a spectrum's time; tests/test_noise_holds.py has them."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("trihedron.estimate.noise.holds.low_passes", lambda s, _: [LowPass(None, RATE_HZ)] * len(s))
-        patch.setattr("trihedron.estimate.noise.holds.undisturbed", lambda spectrum, _: spectrum)
+        patch.setattr("trihedron.channel_facts.at_rest.undisturbed", lambda spectrum, _: spectrum)
         yield
 
 

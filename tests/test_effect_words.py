@@ -17,6 +17,7 @@ from trihedron.report.effects import laws
 from trihedron.report.effects.catalogue import CATALOGUE, ENTRIES, OF_ANY
 from trihedron.report.effects.page import page
 from trihedron.report.effects.reasons import REASONS
+from trihedron.report.findings.phrases import PHRASES
 from trihedron.report.findings.wording import places
 
 ROOT = Path(__file__).parents[1]
@@ -229,12 +230,13 @@ def test_laws_write_no_sentence_and_their_sentences_have_their_places():
     asked = {}
     for path in sorted((DIAGNOSE / "laws").glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "law_words":
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "words":
                 asked[node.args[0].value] = {keyword.arg for keyword in node.keywords}
         if path.name != "written.py":  # it writes a file of Python
             said = [text for _, text in written(path) if re.search(r"[a-z] (follows|grows|hold|reach) ", text)]
             assert said == [], path.name
-    assert {case: set(places(sentence)) for case, sentence in laws.SENTENCES.items()} == asked
+    assert {case: set(places(PHRASES[case])) for case in asked} == asked
+    assert {case for case in PHRASES if case.startswith("law-")} < set(asked)
 
 
 def test_every_family_of_a_law_has_an_experiment():

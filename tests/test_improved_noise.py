@@ -10,7 +10,8 @@ import trihedron
 from trihedron.estimate.noise import gain_of, noise_of_holds
 from trihedron.pipeline import driving
 from trihedron.pipeline.comparing_noise import _are_even
-from trihedron.pipeline.driving import driven, zero_in_moves, zero_of_poses
+from trihedron.pipeline.driving import MovedAlike, driven, flicker_of_poses, zero_in_moves, zero_of_poses
+from trihedron.pipeline.improving import _unlike
 from trihedron.records.hold_noise import Measured
 from trihedron.simulate import (
     NoiseTerms,
@@ -109,18 +110,52 @@ def test_what_moves_miss_is_put_on_the_gyros_zero_in_moves_and_then_both_miss_al
     _, recording = session(3, strays=2e-3)
     clean, other = session(4)
     own = trihedron.calibrate(recording, gravity_m_s2=9.80665)
-    found = zero_in_moves(clean, recording, own.segments, own.calibration)
+    found = zero_in_moves(clean, MovedAlike(recording, own.segments, own.calibration))
     # Twenty moves, each of two angles: known to a sixth; four of those, and what the poses add.
     assert found == pytest.approx((2e-3,) * 3, rel=0.6)
     electronics = replace(clean.gyroscope.electronics, zero_in_moves=found)
     better = replace(clean, gyroscope=replace(clean.gyroscope, electronics=electronics))
-    again = zero_in_moves(better, recording, own.segments, own.calibration)
+    again = zero_in_moves(better, MovedAlike(recording, own.segments, own.calibration))
     # Alike within a twentieth, or a small step is left.
     assert again is None or again == pytest.approx(found, rel=0.15)
     # A recording that misses no more than the scenario, but for chance (a sixth), asks for little.
     own = trihedron.calibrate(other, gravity_m_s2=9.80665)
-    little = zero_in_moves(clean, other, own.segments, own.calibration)
+    little = zero_in_moves(clean, MovedAlike(other, own.segments, own.calibration))
     assert little is None or max(little) < 0.4 * 2e-3
+
+
+def beside(own):
+    return MovedAlike(own.recording, own.segments, own.calibration)
+
+
+def test_flicker_that_no_pose_shows_is_taken_out():
+    profile = profile_by_name("mpu")
+    accel, gyro = profile.unit(5)
+    clean = Scenario(hand_session(24, hold_s=2.0, layout=8), "unit", accel, gyro, profile.clock)
+    own = trihedron.calibrate(simulate(clean, 7)[0], gravity_m_s2=9.80665)
+
+    def with_flicker(size):
+        return replace(clean, accelerometer=replace(accel, noise=replace(accel.noise, B=(0.0, 0.0, size))))
+
+    # Twenty times what the poses miss: a quarter of it, as a root, would still be five times.
+    assert max(flicker_of_poses(with_flicker(0.05), beside(own))) < 0.25 * 0.05
+    assert flicker_of_poses(clean, beside(own)) is None
+    # What the recording has itself is left as it is, but for the chance of one recording (a root known to a fifth).
+    noisy = trihedron.calibrate(simulate(with_flicker(0.05), 8)[0], gravity_m_s2=9.80665)
+    left = flicker_of_poses(with_flicker(0.05), beside(noisy))
+    assert left is None or left[2] > 0.5 * 0.05
+
+
+def test_poses_and_moves_that_miss_unlike_the_recordings_are_said():
+    def said(poses, moves):
+        recording = SimpleNamespace(poses=4.0, moves=None, missed=lambda _: (poses, moves))
+        return _unlike(None, recording)
+
+    # Squares; of moves the recording says nothing.
+    assert said(9.0, 7.0) == {"poses": 1.5}
+    assert said(4.0 * 1.09**2, 7.0) == {}
+    assert said(4.0 * 0.8**2, None) == {"poses": pytest.approx(0.8)}
+    assert said(None, None) == {}
 
 
 def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_alike():
@@ -130,17 +165,17 @@ def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_al
     electronics = replace(accel.electronics, zero_scatter=(0.02,) * 3)
     scattered = replace(clean, accelerometer=replace(accel, electronics=electronics))
     own = trihedron.calibrate(simulate(scattered, 6)[0], gravity_m_s2=9.80665)
-    found = zero_of_poses(clean, own.recording, own.segments, own.calibration)
+    found = zero_of_poses(clean, beside(own))
     # 24 poses less nine numbers and the worst: a root known to a fifth; two of those, and the pose that is spared.
     assert found == pytest.approx((0.02,) * 3, rel=0.5)
     better = replace(accel, electronics=replace(accel.electronics, zero_scatter=found))
-    again = zero_of_poses(replace(clean, accelerometer=better), own.recording, own.segments, own.calibration)
+    again = zero_of_poses(replace(clean, accelerometer=better), beside(own))
     assert again is None or again == pytest.approx(found, rel=0.15)
     healthy = trihedron.calibrate(simulate(clean, 7)[0], gravity_m_s2=9.80665)
-    little = zero_of_poses(clean, healthy.recording, healthy.segments, healthy.calibration)
+    little = zero_of_poses(clean, beside(healthy))
     assert little is None or max(little) < 0.15 * 0.02
     # What the scenario has too much is taken out.
-    rest = zero_of_poses(scattered, healthy.recording, healthy.segments, healthy.calibration)
+    rest = zero_of_poses(scattered, beside(healthy))
     assert max(rest) < 0.4 * 0.02
 
 
@@ -153,7 +188,7 @@ def test_one_pose_that_was_pushed_makes_no_scatter_for_all_of_them():
     readings = np.array(recording.accelerometer)
     readings[own.segments.holds[7].samples()] *= 1.003
     pushed = trihedron.calibrate(replace(recording, accelerometer=readings), gravity_m_s2=9.80665)
-    strays = zero_of_poses(clean, pushed.recording, pushed.segments, pushed.calibration)
+    strays = zero_of_poses(clean, beside(pushed))
     # 30 mm/s² in one pose of 24: all of it shared out would be 6 mm/s², what the others take up in the fit is less.
     assert strays is None or max(strays) < 4e-3
 

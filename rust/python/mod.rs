@@ -21,6 +21,7 @@ mod gyro_alignment;
 mod joints;
 mod kalman;
 mod kalman_norm;
+mod mean_noise;
 mod move_signals;
 mod number_text;
 mod poisson;
@@ -52,6 +53,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     first_look::register(module)?;
     gyro_alignment::register(module)?;
     joints::register(module)?;
+    mean_noise::register(module)?;
     move_signals::register(module)?;
     number_text::register(module)?;
     poisson::register(module)?;

@@ -159,7 +159,14 @@ pub fn widened(session: &Session, found: &Fit, inflation: [f64; 2]) -> Result<(S
         found.strengths,
         &found.distortion,
     )?;
-    Ok((session, again))
+    let likely_scatter = found.likely_scatter;
+    Ok((
+        session,
+        Fit {
+            likely_scatter,
+            ..again
+        },
+    ))
 }
 
 /// [`fit`], with the moves as they were carried at the start where that is known.

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use trihedron::rotation::exp;
 use trihedron::session_model::chain::{Chain, Layout, Rows};
-use trihedron::session_model::fit::fit;
+use trihedron::session_model::fit::{Fit, fit, widened};
 use trihedron::session_model::move_rows::Weights;
 use trihedron::session_model::moves::{Move, MoveNoise};
 use trihedron::session_model::{AtRest, Distortion, Session, State, Strengths};
@@ -247,6 +247,54 @@ fn noiseless_readings_are_explained_and_the_instrument_is_found_from_beside_it()
     assert!(found.stop.is_converged());
     let relative = (found.state.rate_scale - truth.rate_scale).norm() / truth.rate_scale.norm();
     assert!(relative < 1e-3, "{relative}");
+}
+
+/// Cost of a fit, at the weights of its own end.
+fn chi2_of(session: &Session, found: &Fit) -> f64 {
+    residuals(session, &found.state, &found.state, &Distortion::default()).norm_squared()
+}
+
+#[test]
+fn rows_that_miss_by_a_thousand_errors_end_in_one_place_whatever_the_start() {
+    let (mut session, truth) = made(false);
+    session.noise.rate_density *= 1e-5;
+    session.noise.force_density *= 1e-5;
+    let none = Distortion::default();
+    let exact = residuals(&session, &truth, &truth, &none);
+    assert!(exact.amax() > 1e3, "{}", exact.amax());
+    let near = fit(&session, truth.clone(), STRENGTHS, &none).expect("fit");
+    let start = beside(&truth, session.layout(0), 0);
+    let far = fit(&session, start, STRENGTHS, &none).expect("fit");
+    assert!(near.stop.is_converged() && far.stop.is_converged());
+    // A rough descent of a dozen, and a few that polish: renewed weights must not begin it again each time.
+    assert!(far.iterations < 60, "{}", far.iterations);
+    // Steps end at a thousandth of the spread that rows show: two ends differ by less than that in every row together.
+    let (one, other) = (chi2_of(&session, &near), chi2_of(&session, &far));
+    assert!((one - other).abs() < 1e-4 * one, "{one} {other}");
+    let parted = (near.state.rate_scale - far.state.rate_scale).norm();
+    assert!(parted < 1e-4 * truth.rate_scale.norm(), "{parted}");
+}
+
+#[test]
+fn moves_widened_from_a_fit_are_those_of_a_session_so_wide_from_the_start() {
+    let (session, truth) = made(true);
+    let none = Distortion::default();
+    let start = beside(&truth, session.layout(0), 0);
+    let found = fit(&session, start.clone(), STRENGTHS, &none).expect("fit");
+    let found = Fit {
+        likely_scatter: [0.7, 0.3],
+        ..found
+    };
+    let (wide, again) = widened(&session, &found, [3.0, 20.0]).expect("fit");
+    assert_eq!(wide.noise.inflation, [3.0, 20.0]);
+    assert_eq!(again.likely_scatter, [0.7, 0.3]);
+    let fresh = fit(&wide, start, STRENGTHS, &none).expect("fit");
+    let rows = |of: &Fit| residuals(&wide, &of.state, &fresh.state, &none);
+    let seen = rows(&fresh);
+    let spread = (seen.norm_squared() / seen.len() as f64).sqrt().max(1.0);
+    // Either ends when a step moves all rows together by less than a thousandth of an error as large as they show it.
+    let parted = (seen - rows(&again)).norm();
+    assert!(parted < 2e-3 * spread, "{parted} {spread}");
 }
 
 #[test]

@@ -44,14 +44,15 @@ class Windows:
         return out
 
 
-def look(sensors: dict[str, FloatArray], rate_hz: float) -> Windows | None:
-    """Windows of a log; None where no window without missing values exists."""
+def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -> Windows | None:
+    """Windows of a log, so many ``in_a_row`` where they are spread; None where none without missing values exists."""
     n = min(len(a) for a in sensors.values())
     length = int(min(max(round(WINDOW_S * rate_hz), 8), max(n, 1)))
     n_windows = n // length
     if n_windows == 0 or n < 2:
         return None
-    picked = np.unique(np.linspace(0, n_windows - 1, min(n_windows, MAX_WINDOWS)).astype(np.int64))
+    first = np.linspace(0, max(n_windows - in_a_row, 0), -(-min(n_windows, MAX_WINDOWS) // in_a_row)).astype(np.int64)
+    picked = np.unique(first[:, None] + np.arange(in_a_row)) if n_windows > MAX_WINDOWS else np.arange(n_windows)
     start = picked * length
     index = start[:, None] + np.arange(length)
     mean: dict[str, FloatArray] = {}

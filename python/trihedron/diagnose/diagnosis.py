@@ -193,7 +193,7 @@ def _with_late(
     late = replace(late, refused=frozenset(one for one in late.refused if not _competes(one)))
     scored, _ = scores(late, exclude=late.refused)
     grown = _grown(late, scored, alpha, lambda _part: None)
-    return judged_again(grown if grown is late else spread_anew(grown)), candidates
+    return judged_again(grown if grown is late else spread_anew(grown, alpha)), candidates
 
 
 def _competes(effect_id: str) -> bool:

@@ -21,6 +21,7 @@ from trihedron.pipeline.comparing_correlation import correlation_times
 from trihedron.pipeline.comparing_frames import rates_of_world, sign_of_gravity
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
 from trihedron.pipeline.comparing_quantisation import quantisation_noise
+from trihedron.pipeline.comparing_ranges import stated_ranges
 from trihedron.pipeline.comparing_slow import slow_noise
 from trihedron.pipeline.comparing_stages import with_noise_stage
 from trihedron.pipeline.diagnosing_rest import Calibrated, at_rest, diagnosed_at_rest
@@ -129,8 +130,8 @@ def _of_poses(
     simulated: _Free | None = None
     if against is not None:
         tell(0.05, "diagnosing the simulated recording")
-        log = _simulated_log(against, recording, segments, gravity)
-        simulated = _simulation(log, gravity, alpha, lambda fraction, text: tell(0.05 + 0.4 * fraction, text))
+        logged = _simulated_log(against, recording, segments, gravity)
+        simulated = _simulation(logged, gravity, alpha, lambda fraction, text: tell(0.05 + 0.4 * fraction, text))
         known = simulated.calibration
         findings += _protocol(simulated.segments, segments)
     begun = 0.05 if simulated is None else 0.45
@@ -156,7 +157,7 @@ def _of_poses(
         if simulated is not None:
             frames = _frames((simulated.segments, simulated.calibration), (segments, used))
             noise = (*simulated.frames, *frames, *_noise(simulated, found, recording_used, segments_used, alpha))
-        free_simulation = None if simulated is None else (simulated.diagnosis, simulated.recording)
+        free_simulation = None if simulated is None else _with_ranges(simulated, found, recording)
         fit = model_of_diagnosis(found)
         found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
         if simulated is not None:
@@ -187,6 +188,16 @@ class _Free:
     sampled: Sampled
     recording: Recording
     frames: tuple[NoiseDifference, ...] = ()
+    scenario: Scenario | None = None
+
+
+def _with_ranges(simulated: _Free, found: Diagnosis, recording: Recording) -> tuple[Diagnosis, Recording]:
+    """The simulation and its diagnosis, with ranges that its scenario states and no reading of it came to."""
+    if simulated.scenario is None:
+        return simulated.diagnosis, simulated.recording
+    shown = {effect.id for effect in simulated.diagnosis.effects}
+    stated = [one for one in stated_ranges(simulated.scenario, found.effects, recording) if one.id not in shown]
+    return replace(simulated.diagnosis, effects=(*simulated.diagnosis.effects, *stated)), simulated.recording
 
 
 def _start(
@@ -208,21 +219,25 @@ def _start(
     return (replace(known, gravity_m_s2=gravity), False) if is_poor and not is_simulation else (own, True)
 
 
-def _simulated_log(against: GivenModel, recording: Recording, segments: Segments, gravity: float) -> Recording:
+def _simulated_log(
+    against: GivenModel, recording: Recording, segments: Segments, gravity: float
+) -> tuple[Recording, Scenario | None]:
+    """The simulated log, and the scenario behind it where that was given."""
     if isinstance(against, Recording):
-        return against
+        return against, None
     if not isinstance(against, Scenario):
         if not isinstance(against, str | os.PathLike):
             kind = type(against).__name__
             raise WrongTypeError(f"against is a simulated recording, a scenario, or the file of one, not {kind}.")
         if Path(against).suffix.lower() != ".toml":
-            return read(against)
+            return read(against), None
         against = read_scenario(Path(against))
     own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
-    return driven(against, recording, segments, own)
+    return driven(against, recording, segments, own), against
 
 
-def _simulation(recording: Recording, gravity: float, alpha: float, tell: Progress) -> _Free:
+def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha: float, tell: Progress) -> _Free:
+    recording, scenario = logged
     of_world = rates_of_world(recording, segment(recording))
     if of_world is not None:
         recording = replace(recording, gyroscope=None)
@@ -233,7 +248,7 @@ def _simulation(recording: Recording, gravity: float, alpha: float, tell: Progre
     diagnosis = diagnose_recording(recording, result.segments, result.calibration, alpha=alpha, progress=tell)
     noise = sampled(recording, result.segments.holds, model_of_diagnosis(diagnosis))
     frames = () if of_world is None else (of_world,)
-    return _Free(result.calibration, result.segments, diagnosis, noise, recording, frames)
+    return _Free(result.calibration, result.segments, diagnosis, noise, recording, frames, scenario)
 
 
 def _frames(

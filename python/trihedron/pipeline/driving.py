@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +13,8 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.files.log import write_recording
 from trihedron.pipeline.calibrating import calibrate
-from trihedron.pipeline.carried_misses import carried_misses
+from trihedron.pipeline.carried_misses import CarriedMisses, carried_misses
 from trihedron.pipeline.reading import read
-from trihedron.pipeline.results import CalibrationResult
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.refused import REFUSALS
 from trihedron.segment import resegment
@@ -27,11 +26,13 @@ FEWEST_POSES_TO_SPARE = 4
 """Degrees of freedom of the lengths of gravity below which no scatter of theirs is told."""
 ALIKE = 1.05
 """Ratio of rms up to which a recording and its simulation miss alike: a tenth is aimed at."""
-STEEPEST = 4.0
-"""Times by which a scatter may show less than it would if no fit took part of it up."""
-SEED, N_SEEDS = 20, 4
+MOST_STEPS = 4
+"""Scatters that are tried beyond what was given: a secant on a nearly straight line needs two or three."""
+LARGEST_STEP = 100.0
+"""Times by which the square of a scatter may grow in one step."""
+SEED, N_SEEDS = 20, 8
 """Of the simulations that are held against the recording: any, but always the same ones. The misses of one simulation
-of twenty poses are known to a fifth, those of four to a tenth."""
+of twenty poses are known to a fifth, those of eight to a fifteenth."""
 
 
 def driven(
@@ -68,70 +69,107 @@ def _as_read(simulated: Recording) -> Recording:
         return read(path)
 
 
-def zero_of_poses(
-    better: Scenario, recording: Recording, segments: Segments, own: Calibration
-) -> tuple[float, float, float] | None:
+class MovedAlike:
+    """Scenarios moved as a recording was, and what poses and moves of theirs and of the recording miss.
+
+    ``poses`` [(m/s²)²] and ``moves`` [rad²]: mean squares of the recording, the worst spared; ``None`` where too few
+    tell. ``duration_s`` (m,) of the moves that count.
+    """
+
+    def __init__(self, recording: Recording, segments: Segments, own: Calibration) -> None:
+        cut = resegment(recording, segments)
+        self._motion = twin_scenario(recording, cut, own).motion
+        self._known: list[tuple[Scenario, tuple[float | None, float | None]]] = []
+        carried = carried_misses(own, recording, cut)
+        self.poses = _of_poses(own)
+        self.moves = _of_moves(carried)
+        # The one that is spared is often the longest.
+        worst = [int(np.argmax(carried.angle_rad))] if len(carried.angle_rad) else []
+        self.duration_s = np.delete(carried.duration_s, worst)
+
+    def missed(self, scenario: Scenario) -> tuple[float | None, float | None]:
+        """Mean squares of poses and of moves over simulations of a scenario, each with its own calibration."""
+        for one, said in self._known:
+            if one == scenario:
+                return said
+        poses, moves = [], []
+        for seed in range(SEED, SEED + N_SEEDS):
+            log = _sensed(replace(scenario, motion=self._motion), seed)
+            try:
+                result = calibrate(log, gravity_m_s2=scenario.environment.gravity)
+            except REFUSALS:
+                continue
+            poses.append(_of_poses(result.calibration))
+            if result.calibration.gyroscope is not None:
+                moves.append(_of_moves(carried_misses(result.calibration, log, resegment(log, result.segments))))
+        said = _mean(poses), _mean(moves)
+        self._known.append((scenario, said))
+        return said
+
+
+def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
+    """Flicker of the accelerometer [m/s²] with which lengths of gravity miss no more than the recording's.
+
+    Octaves inside holds of seconds take a slow line or a hand's tremor for flicker, which wanders on between poses: the
+    lengths of gravity in them show how much of it may. ``None`` where they ask for no less.
+    """
+    part, seen = better.accelerometer, beside.poses
+    if seen is None or not any(part.noise.B):
+        return None
+
+    def missed(share: float) -> float | None:
+        noise = replace(part.noise, B=_scaled(part.noise.B, share))
+        return beside.missed(replace(better, accelerometer=replace(part, noise=noise)))[0]
+
+    all_of_it = missed(1.0)
+    if all_of_it is None or all_of_it <= seen or _are_alike(seen, all_of_it):
+        return None
+    none_of_it = missed(0.0)
+    if none_of_it is None or none_of_it >= all_of_it:
+        return None
+    # B² adds to the square of the misses.
+    return _scaled(part.noise.B, min(max((seen - none_of_it) / (all_of_it - none_of_it), 0.0), 1.0))
+
+
+def zero_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
     """By how much the accelerometer's zero must be another in every pose [m/s²] for lengths of gravity to miss alike.
 
     The worst pose of either side is spared: one that was pushed makes no scatter for all of them. ``None`` where both
     miss alike, or the scenario misses more without any scatter to take out.
     """
-    seen = _of_poses(own)
-    if seen is None:
-        return None
     part = better.accelerometer
-    moved = _Moved(better, recording, segments, own)
+    if beside.poses is None:
+        return None
 
     def missed(square: float) -> float | None:
         electronics = replace(part.electronics, zero_scatter=(math.sqrt(square),) * 3)
-        given = replace(better, accelerometer=replace(part, electronics=electronics))
-        return _mean([_of_poses(one.calibration) for one, _ in moved.simulated(given)])
+        return beside.missed(replace(better, accelerometer=replace(part, electronics=electronics)))[0]
 
-    return _matched(part.electronics.zero_scatter, seen, 1.0, missed)
+    return _matched(part.electronics.zero_scatter, beside.poses, 1.0, missed)
 
 
-def zero_in_moves(
-    better: Scenario, recording: Recording, segments: Segments, own: Calibration
-) -> tuple[float, float, float] | None:
+def zero_in_moves(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:
     """By how much the gyro's zero must stray in moves [rad/s] for an improved scenario to miss as the recording does.
 
     Gravity carried through the moves of the recording and of the scenario moved alike, the worst of either side spared:
     what the recording misses more is put on the zero, the same on all axes. ``None`` where both miss alike, or the
     scenario misses more without any straying to take out.
     """
-    ours = carried_misses(own, recording, resegment(recording, segments))
-    if len(ours.angle_rad) < FEWEST_MOVES:
-        return None
     part = better.gyroscope
-    moved = _Moved(better, recording, segments, own)
+    if beside.moves is None:
+        return None
 
     def missed(square: float) -> float | None:
         electronics = replace(part.electronics, zero_in_moves=(math.sqrt(square),) * 3)
-        given = replace(better, gyroscope=replace(part, electronics=electronics))
-        theirs = [
-            carried_misses(one.calibration, log, resegment(log, one.segments)) for one, log in moved.simulated(given)
-        ]
-        return _mean([_spared(one.angle_rad) if len(one.angle_rad) >= FEWEST_MOVES else None for one in theirs])
+        return beside.missed(replace(better, gyroscope=replace(part, electronics=electronics)))[1]
 
     # Straying σ at both ends and straight between turns by σT/√2 an axis, two axes of three of it across the vertical.
-    slope = 1.0 / float(np.mean(ours.duration_s**2))
-    return _matched(part.electronics.zero_in_moves, _spared(ours.angle_rad), slope, missed)
+    return _matched(part.electronics.zero_in_moves, beside.moves, 1.0 / float(np.mean(beside.duration_s**2)), missed)
 
 
-class _Moved:
-    """Simulations of scenarios moved as a recording was, each with its own calibration, where it has one."""
-
-    def __init__(self, scenario: Scenario, recording: Recording, segments: Segments, own: Calibration) -> None:
-        self._gravity = scenario.environment.gravity
-        self._motion = twin_scenario(recording, resegment(recording, segments), own).motion
-
-    def simulated(self, scenario: Scenario) -> Iterator[tuple[CalibrationResult, Recording]]:
-        for seed in range(SEED, SEED + N_SEEDS):
-            log = _sensed(replace(scenario, motion=self._motion), seed)
-            try:
-                yield calibrate(log, gravity_m_s2=self._gravity), log
-            except REFUSALS:
-                continue
+def _scaled(terms: tuple[float, float, float], share: float) -> tuple[float, float, float]:
+    x, y, z = (math.sqrt(share) * one for one in terms)
+    return (x, y, z)
 
 
 def _matched(
@@ -139,21 +177,31 @@ def _matched(
 ) -> tuple[float, float, float] | None:
     """The scatter by which ``missed`` of its square comes to ``seen`` (eq. 9.4), the same on all axes.
 
-    ``slope``: square of the scatter per square that it adds; how much less of it shows once a fit took part of it up is
-    seen from a first step.
+    ``slope``: square of the scatter per square that it adds, roughly; how much less of it shows once a fit took part of
+    it up is seen from each step (secants; the same draws at every step, so that nothing but the scatter moves).
     """
     before = float(np.mean(np.square(given)))
     made = missed(before)
     if made is None or _are_alike(seen, made):
         return None
-    first = max(before + (seen - made) * slope, 0.0)
-    if first == before:
-        return None
-    again = missed(first)
-    if again is not None and again != made:
-        steep = float(np.clip((first - before) / (again - made), slope, STEEPEST * slope))
-        first = max(first + (seen - again) * steep, 0.0)
-    return (math.sqrt(first),) * 3
+    tried = [(before, made)]
+    square = max(before + (seen - made) * slope, 0.0)
+    for _ in range(MOST_STEPS):
+        if any(square == one for one, _ in tried):
+            break
+        now = missed(square)
+        if now is None:
+            break
+        tried.append((square, now))
+        if _are_alike(seen, now):
+            break
+        (x0, y0), (x1, y1) = tried[-2:]
+        rising = (y1 - y0) / (x1 - x0)
+        # A larger scatter that shows as less is chance of the fits: on with the slope that was expected.
+        step = (seen - y1) / rising if rising > 0.0 else (seen - y1) * slope
+        square = max(min(x1 + step, LARGEST_STEP * max(x1, x0)), 0.0)
+    best = min(tried, key=lambda one: abs(math.log(max(one[1], 1e-300) / max(seen, 1e-300))))[0]
+    return None if best == before else (math.sqrt(best),) * 3
 
 
 def _are_alike(one: float, other: float) -> bool:
@@ -172,6 +220,11 @@ def _of_poses(calibration: Calibration) -> float | None:
     if quality is None or quality.dof < FEWEST_POSES_TO_SPARE:
         return None
     return _spared(quality.residual) * len(quality.residual) / quality.dof
+
+
+def _of_moves(carried: CarriedMisses) -> float | None:
+    """Mean square of the angles by which gravity carried through the moves misses [rad²], but for the worst."""
+    return _spared(carried.angle_rad) if len(carried.angle_rad) >= FEWEST_MOVES else None
 
 
 def _spared(misses: FloatArray) -> float:

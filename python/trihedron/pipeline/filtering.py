@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from trihedron.channel_facts.at_rest import SHORTEST as SHORTEST_HOLD
 from trihedron.estimate.kalman import (
     NormFrame,
     calibrate_session,
@@ -14,7 +15,6 @@ from trihedron.estimate.kalman import (
     noise_from_identified,
 )
 from trihedron.estimate.noise import identify_noise, noise_of_holds
-from trihedron.estimate.noise.holds import SHORTEST as SHORTEST_HOLD
 from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of

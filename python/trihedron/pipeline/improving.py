@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,7 +16,7 @@ from trihedron.estimate.noise import gain_of
 from trihedron.files.scenario import improved_scenario
 from trihedron.pipeline.comparing_noise import Sampled, sampled
 from trihedron.pipeline.comparing_quantisation import white_and_quantisation
-from trihedron.pipeline.driving import zero_in_moves, zero_of_poses
+from trihedron.pipeline.driving import MovedAlike, flicker_of_poses, zero_in_moves, zero_of_poses
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.hold_noise import HoldNoise
@@ -32,16 +32,23 @@ from trihedron.simulate import (
 )
 
 FEWEST_OCTAVES = 4
+AIMED_AT = (0.9, 1.1)
+"""Ratio of what poses and moves miss, simulation over recording, within which the two are called alike."""
 N_FREQUENCIES = 256
 """At which a filter is compared with what was seen: a sixteenth of an octave in the middle of the band."""
 
 
 @dataclass(frozen=True)
 class Improvement:
-    """The text of an improved scenario, and what could not be put into it, each with the reason."""
+    """The text of an improved scenario, and what could not be put into it, each with the reason.
+
+    ``unlike``: what ``poses`` (lengths of gravity) and ``moves`` (gravity carried through them) of the improved
+    scenario miss, rms, over what the recording's do, where that is outside ``AIMED_AT``.
+    """
 
     text: str
     left_out: Mapping[str, str]
+    unlike: Mapping[str, float] = field(default_factory=dict)
 
 
 def improve(
@@ -66,22 +73,37 @@ def improve(
     _noise(tables, given, found)
     if stage == "noise":
         return Improvement(improved_scenario(scenario, tables, [], []), {})
-    physics = [effect for effect in found.effects if effect.side == "recording"]
+    ranged = _ranges(tables, given, found)
+    physics = [effect for effect in found.effects if effect.side == "recording" and effect.id not in ranged]
     shared = {p.id for p in found.parameters if p.significant}
+    shared -= ranged
     sizes, left_out = diagnosed_sizes([e.to_dict() for e in (*physics, *_shared(found, shared))])
-    surplus = [effect.id for effect in found.effects if effect.side == "model"]
+    surplus = [*(effect.id for effect in found.effects if effect.side == "model"), *ranged]
     text = improved_scenario(scenario, tables, sizes, surplus)
     own = found.updated
     if own is not None and own.gyroscope is not None:
-        # Poses first: a force that is another in every pose also turns the gravity that moves are judged by.
-        for sensor, key, of in (
-            ("accelerometer", "zero_scatter", zero_of_poses), ("gyroscope", "zero_in_moves", zero_in_moves),
-        ):  # fmt: skip
-            strays = of(scenario_from_table(tomllib.loads(text)), found.recording, found.segments, own)
-            if strays is not None:
-                tables[sensor]["electronics"] = {key: strays}
+        beside = MovedAlike(found.recording, found.segments, own)
+        # What octaves called flicker and poses do not show goes first. Then poses: a force that is another in every
+        # pose also turns the gravity that moves are judged by.
+        for sensor, table, key, of in (
+            ("accelerometer", "noise", "B", flicker_of_poses),
+            ("accelerometer", "electronics", "zero_scatter", zero_of_poses),
+            ("gyroscope", "electronics", "zero_in_moves", zero_in_moves),
+        ):
+            found_value = of(scenario_from_table(tomllib.loads(text)), beside)
+            if found_value is not None:
+                tables[sensor].setdefault(table, {})[key] = list(found_value)
                 text = improved_scenario(scenario, tables, sizes, surplus)
+        return Improvement(text, left_out, _unlike(scenario_from_table(tomllib.loads(text)), beside))
     return Improvement(text, left_out)
+
+
+def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
+    """What poses and moves of a scenario miss over what the recording's do, where that is not as good as one."""
+    made = dict(zip(("poses", "moves"), beside.missed(better), strict=True))
+    seen = {"poses": beside.poses, "moves": beside.moves}
+    ratios = {k: math.sqrt(m / s) for k, m in made.items() if m is not None and (s := seen[k]) is not None and s > 0.0}
+    return {key: ratio for key, ratio in ratios.items() if not AIMED_AT[0] <= ratio <= AIMED_AT[1]}
 
 
 def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
@@ -175,6 +197,41 @@ def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
     # Told apart only beyond what a latitude changes in its last printed digit.
     if abs(given.environment.gravity - found.gravity_m_s2) > 1e-4:
         tables["environment"]["gravity_m_s2"] = found.gravity_m_s2
+
+
+SATURATION = {"accelerometer": "accel-saturation", "gyroscope": "gyro-saturation"}
+
+
+def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> set[str]:
+    """Ranges of the recording's converters, where its readings end at them exactly; the effects that say so already.
+
+    An end that no reading came to is where the other one is. Channels with limits of their own, and limits that noise
+    has blurred, are none of a converter: those stay an effect.
+    """
+    out = set()
+    for name, effect in SATURATION.items():
+        if getattr(found.recording, name) is None:
+            continue
+        facts = found.recording.facts.of(name)
+        unit = str(tables[name].get("unit", getattr(given, name).unit.value))
+        if not facts.limits or any(limit.sigma > 0.0 for limit in facts.limits):
+            continue
+        if unit != getattr(found.recording, f"{name}_unit").value:
+            continue
+        ends = {is_high: [one.value for one in facts.limits if one.is_high == is_high] for is_high in (False, True)}
+        if any(max(values) - min(values) > float(facts.step.max()) for values in ends.values() if values):
+            continue
+        # A word of bits goes one code further down than up.
+        code = float(facts.step.max()) if any(one.is_word for one in facts.limits) else 0.0
+        low = min(ends[False], default=-max(ends[True], default=0.0) - code)
+        high = max(ends[True], default=-low - code)
+        if not low < high:
+            continue
+        out.add(effect)
+        adc = getattr(given, name).adc
+        if (adc.low, adc.high) != (low, high):
+            tables[name].setdefault("adc", {}).update(low=low, high=high)
+    return out
 
 
 def _noise(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.records.frozen import Frozen
+from trihedron.records.hold_noise import Measured
 from trihedron.refused import RefusedError
 
 SAME_STEP = 0.02
@@ -31,6 +32,18 @@ class Limit(Frozen):
     def count(self) -> int:
         """Readings at the limit."""
         return int(np.sum(self.runs[:, 1] - self.runs[:, 0]))
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """The filter ahead of a channel's samples.
+
+    ``corner_hz`` where one shows, what it lies ``above_hz`` where none does; ``shape``: its order, 0 a Gaussian.
+    """
+
+    corner_hz: Measured | None
+    above_hz: float
+    shape: int = 0
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,17 +50,6 @@ def why_not(name: str, /, **values: Any) -> Words:
     return Words(import_module("trihedron.report.effects.catalogue").why_not(name, values))
 
 
-def law_words(case: str, /, **values: Any) -> Words:
-    """What is said of a law, by its case, with values (``report/effects/laws.py``).
-
-    Raises
-    ------
-    KeyError
-        When the catalogue has no such case, or a place of it has no value.
-    """
-    return Words(import_module("trihedron.report.effects.laws").law_words(case, values))
-
-
 def law_experiment(family: str) -> Words:
     """What would prove a law of a family of variables; empty where the catalogue has none."""
     return Words(import_module("trihedron.report.effects.laws").family_words(family).experiment)

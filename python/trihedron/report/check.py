@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.records import Calibration, Finding, Recording, Segments, SensorCalibration
 from trihedron.report.axes import axes_of
+from trihedron.report.channels import channels_table
 from trihedron.report.document import Block, Document, Facts, Headline, Section, Table
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.numbers import how_many, plain_number, unit_in_print
@@ -17,7 +18,7 @@ def check_report(
     recording: Recording, segments: Segments, calibration: Calibration | None, findings: tuple[Finding, ...]
 ) -> Document:
     """Lay out the audit; ``calibration`` gives the error bars to expect."""
-    blocks: list[Block] = []
+    blocks: list[Block] = [channels_table(recording)]
     if calibration is not None:
         blocks.append(_expected(calibration))
         blocks += _advice(calibration)

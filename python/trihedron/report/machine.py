@@ -9,6 +9,7 @@ from trihedron.files.calibration import calibration_document, plain
 from trihedron.printable import printable_json
 from trihedron.records import AllanCurve, Calibration, Finding, Recording, Segments, Verification
 from trihedron.records.published import published_figures
+from trihedron.report.channels import channels_record
 
 
 def recording_record(recording: Recording) -> dict[str, Any]:
@@ -136,6 +137,7 @@ def check_record(
         **segments_record(recording, segments),
         "is_fit": not any(finding.severity.value == "serious" for finding in findings),
         "expected": expected,
+        "channels": channels_record(recording),
         "findings": [finding.to_dict() for finding in findings],
     }
 

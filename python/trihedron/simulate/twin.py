@@ -23,6 +23,7 @@ from trihedron.simulate.motion import Hold, Motion, Quaternion, Replay, Step, at
 from trihedron.simulate.readout import Adc, Matrix, Triple, sense_axes
 from trihedron.simulate.scenario import Clock, Environment, Scenario
 from trihedron.simulate.twin_noise import noise_of_holds
+from trihedron.simulate.unclipped import unclipped
 
 # Knots of a replayed move: wider ones would blunt the jolt of setting the case down. The price is that the recording's
 # noise inside moves is replayed as motion and the simulation's own comes on top.
@@ -44,11 +45,13 @@ def twin_scenario(recording: Recording, segments: Segments, calibration: Calibra
     accel, gyro = calibration.accelerometer, calibration.gyroscope
     time_s = recording.time_s
     readings = (_filled(recording.accelerometer), _filled(recording.gyroscope))
-    motion = _motion(time_s, readings, segments, calibration)
+    facts = recording.facts
+    # A motion that left a sensor's range leaves it again.
+    beyond = (unclipped(readings[0], facts.of("accelerometer")), unclipped(readings[1], facts.of("gyroscope")))
+    motion = _motion(time_s, beyond, segments, calibration)
     holds = [(hold.start, hold.stop) for hold in segments.holds]
     dt = 1.0 / recording.rate_hz
     parts: list[dict[str, object]] = []
-    facts = recording.facts
     for sensor, raw, known, name in (
         (accel, readings[0], facts.of("accelerometer"), "accelerometer"),
         (gyro, readings[1], facts.of("gyroscope"), "gyroscope"),

@@ -27,6 +27,9 @@ FREE_CURVES = frozenset({"curve", "smooth"})
 """Variants of a drift that have no mechanism: waves over a session, and a curve drawn through its zeros. Of sessions of
 unlike length, or begun at another warmth, they are no numbers to compare."""
 
+CODE = "raw_"
+"""Begins the name of a parameter that is another one's reading, exact as a converter writes it."""
+
 FAINT = 1.0 - 1.0 / 1.05**2
 """Of the variance inside still poses: a line of this share raises their scatter by 5 %, as 30 K raise white noise."""
 
@@ -233,16 +236,19 @@ def _parameters(model: AcceptedEffect, recording: AcceptedEffect, alpha: float) 
         sensor = "gyroscope"
     given = {p.name: p for p in model.parameters}
     shared = [(given[p.name], p) for p in recording.parameters if p.name in given and p.unit == given[p.name].unit]
+    # What neither side gives an error is a count of its session, or a code of its converter: no number of the effect.
+    # Where the codes beneath a number are one, how far apart it lies in SI is the scales' difference, told with them.
+    codes = {r.name for m, r in shared if r.name.startswith(CODE) and m.value == r.value}
+    shared = [(m, r) for m, r in shared if (m.std > 0.0 or r.std > 0.0) and CODE + r.name not in codes]
     if not shared:
         return []
     largest = {p.unit: max(abs(q.value) for _, q in shared if q.unit == p.unit) for p, _ in shared}
     sigma = [float(np.hypot(m.std, r.std)) for m, r in shared]
     beyond = [
-        max(abs(r.value - m.value) - FRAME_TOLERANCE * largest[r.unit], 0.0) / max(s, 1e-300)
+        max(abs(r.value - m.value) - FRAME_TOLERANCE * largest[r.unit], 0.0) / s
         for (m, r), s in zip(shared, sigma, strict=True)
     ]
-    has_error = any(s > 0.0 for s in sigma)
-    p_value = min(1.0, 2.0 * len(shared) * float(norm.sf(max(beyond)))) if has_error else 1.0
+    p_value = min(1.0, 2.0 * len(shared) * float(norm.sf(max(beyond))))
     return [
         ParameterDifference(
             model.id, sensor, r.name, m.value, r.value, r.value - m.value, s, r.unit, p_value, p_value < alpha / 2.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only
-from trihedron.diagnose.effects.late_readings import by_delay, is_confirmed, times_for
+from trihedron.diagnose.effects.late_readings import TIMES_S, by_delay, is_confirmed
 from trihedron.records.words import why_not
 
 
@@ -18,9 +18,7 @@ class AccelGyroTimeOffset(Effect):
         return why_not("no-moves") if not context.moves else None
 
     def variants(self, context: Context) -> list[Variant]:
-        return [
-            _offset(context, sign * t, f"{1e3 * sign * t:+.0f} ms") for t in times_for(context) for sign in (1.0, -1.0)
-        ]
+        return [_offset(context, sign * t, f"{1e3 * sign * t:+.0f} ms") for t in TIMES_S for sign in (1.0, -1.0)]
 
     def rescaled(self, context: Context, variant: Variant, value: FloatArray) -> Variant | None:
         return _offset(context, variant.scale * float(value[0]), variant.label)

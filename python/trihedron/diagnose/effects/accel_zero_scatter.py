@@ -5,6 +5,7 @@ from __future__ import annotations
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.laws.find import MOST_FOLLOWS, accel_zero_laws
+from trihedron.diagnose.residuals.goodness_of_fit import asks_for_scatter
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
 from trihedron.diagnose.zeros.of_session import (
     FEWEST_NORM_POSES,
@@ -31,7 +32,11 @@ class AccelZeroScatter(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         found = accel_evidence(context)
-        if found is None or not exceeds_noise(found) or accel_zero_laws(context).share > MOST_FOLLOWS:
+        if (
+            found is None
+            or not (exceeds_noise(found) or asks_for_scatter(context.fitted, "static-accel"))
+            or accel_zero_laws(context).share > MOST_FOLLOWS
+        ):
             return None  # what follows something is a law, not scatter
         if jumps_in_poses(context.obs).p_value[0] < JUMPS:
             return None  # a zero that changes inside poses is not drawn anew in each

@@ -29,7 +29,8 @@ class Variant:
 
     ``shape`` are nonlinear parameters (time constants, widths) chosen from a grid; each costs as a parameter does.
     ``scale`` is what one of a linear parameter stands for in the unit that is reported, ``given`` what is known of the
-    place (its gravity) and bounds what the parameters can be.
+    place (its gravity) and bounds what the parameters can be. ``stands_for_many`` is set on one of a family of shapes
+    that is tried for all of it (a filter's order and damping): a plain mechanism that explains as much goes before it.
     """
 
     distortion: Distortion
@@ -40,6 +41,7 @@ class Variant:
     shape_sigma: float = 0.0
     scale: float = 1.0
     given: dict[str, float] = field(default_factory=dict)
+    stands_for_many: bool = False
 
 
 class Effect(ABC):

@@ -27,9 +27,13 @@ class GyroThermalBias(Effect):
         return None
 
     def withstands(self, context: Context) -> bool:
+        p = self.own_p_value(context)
+        return p is None or p < STANDS_OUT
+
+    def own_p_value(self, context: Context) -> float | None:
         found = gyro_evidence(context)
         thermal = None if found is None else found.evidence.groups.get("thermal")
-        return thermal is None or thermal.p_value < STANDS_OUT
+        return None if thermal is None else thermal.p_value
 
     def variants(self, context: Context) -> list[Variant]:
         return thermal_bias_variants(context, context.on_gyros, rate_only, "rad/s")

@@ -8,6 +8,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.laws.find import MOST_FOLLOWS, gyro_zero_laws
 from trihedron.diagnose.residuals.creep import settling
+from trihedron.diagnose.residuals.goodness_of_fit import asks_for_scatter
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
 from trihedron.diagnose.zeros.levels import two_levels
 from trihedron.diagnose.zeros.of_session import (
@@ -36,13 +37,18 @@ class GyroZeroScatter(DirectEffect):
 
     def find(self, context: Context) -> Evidence | None:
         found = gyro_evidence(context)
-        if found is None or not exceeds_noise(found) or gyro_zero_laws(context).share > MOST_FOLLOWS:
+        if (
+            found is None
+            or not (exceeds_noise(found) or asks_for_scatter(context.fitted, "static-gyro"))
+            or gyro_zero_laws(context).share > MOST_FOLLOWS
+        ):
             return None  # what follows something is a law, not scatter
         if jumps_in_poses(context.obs).p_value[1] < JUMPS:
             return None  # a zero that changes inside poses is not drawn anew in each
         if _takes_two_values(context):
             return None
-        if settling(context).is_motion:
+        turning = settling(context)
+        if turning.is_motion or (turning.creep > turning.scatter and not exceeds_noise(found)):
             return None  # the poses themselves turn
         sigma, si = found.evidence.scatter, context.si_per_raw("gyroscope")
         return Evidence(

@@ -23,8 +23,8 @@ SIGMA_GRID = np.geomspace(0.03, 2.0, 36)
 """Noise before the converter that is tried, in steps."""
 MOST_CODES = 0.2
 """Codes per reading: on a grid every code is read five times or more, readings without one are all different."""
-FEWEST_CODES = 3
-"""Codes between which one can be missing."""
+FEWEST_CODES = 2
+"""A grid is one step at least: still readings of a coarse converter may stand on two codes only."""
 REACHES = 0.5
 """Noise, in steps, that leaves a third of the readings off their code: its neighbours are to be expected then."""
 MOSTLY = 0.5

@@ -18,7 +18,7 @@ from trihedron.diagnose.laws.search import Accepted, search
 from trihedron.diagnose.zeros.of_session import accel_evidence, gyro_evidence
 from trihedron.records.diagnosis import EffectParameter, Law
 from trihedron.records.domains import Domain, DomainTest, HeldOut
-from trihedron.records.words import law_experiment, law_resembles, law_words
+from trihedron.records.words import law_experiment, law_resembles, words
 
 Sensor = Literal["accelerometer", "gyroscope"]
 OUT: dict[Sensor, str] = {"gyroscope": "rad/s", "accelerometer": "m/s^2"}
@@ -124,8 +124,8 @@ def _laws_of(sensor: Sensor, domain: Domain, found: list[Accepted], before: floa
         )
         depends = tuple(dict.fromkeys(name for _, names, *_ in terms for name in names))
         axes = tuple(dict.fromkeys(t[0] for t in terms))
-        said = law_words(
-            "follows", sensor=ZERO_WORD[sensor], is_at_rest=domain.startswith("static"), axes=axes, depends=depends,
+        said = words(
+            "law-follows", sensor=ZERO_WORD[sensor], is_at_rest=domain.startswith("static"), axes=axes, depends=depends,
             share=share,
         )  # fmt: skip
         rms = [float(np.sqrt(sum(getattr(j, side) for j in judged))) for side in ("held_before", "held_after")]
@@ -144,7 +144,7 @@ def _unit_of_misfit(domain: Domain) -> str:
 
 
 def _form(axes: tuple[str, ...], depends: tuple[str, ...]) -> str:
-    return law_words("form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(depends)])
+    return words("law-form", axes=axes, terms=[f"c{k + 1}·({name})" for k, name in enumerate(depends)])
 
 
 def _unit_of(sensor: Sensor, unit: str, name: str) -> str:
@@ -161,17 +161,17 @@ def _room_law(room: RoomLaw) -> Law:
         for k in range(3)
     ]
     coefficients.append(
-        EffectParameter(law_words("angle-to-vertical"), room.inclination_deg, room.inclination_sigma_deg, "deg")
+        EffectParameter(words("angle-to-vertical"), room.inclination_deg, room.inclination_sigma_deg, "deg")
     )
     before = sum(j.held_before for j in room.judged)
     after = sum(j.held_after for j in room.judged)
     held = HeldOut("static-gyro", 1.0, after / before, before**0.5, after**0.5, "rad/s")
     family = "earth" if _is_rotation(room) else "room"
     return Law(
-        "gyroscope", (ROOM_VECTOR,), law_words("form-room"),
+        "gyroscope", (ROOM_VECTOR,), words("law-form-room"),
         tuple(coefficients), room.share, held, law_resembles(family), law_experiment(family),
-        law_words(
-            "follows-room", inclination_deg=room.inclination_deg, inclination_sigma_deg=room.inclination_sigma_deg,
+        words(
+            "law-follows-room", inclination_deg=room.inclination_deg, inclination_sigma_deg=room.inclination_sigma_deg,
             share=room.share,
         ),
     )  # fmt: skip

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.special import chdtri, fdtrc
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS, physical_rms, weighted_rms
 from trihedron.diagnose.selection.excess import in_the_scatter_of
@@ -22,8 +21,6 @@ from trihedron.diagnose.session.solve import (
     extend,
     held_out_gain,
     leverage,
-    reduce,
-    score,
 )
 from trihedron.diagnose.session.twin import (
     DYNAMICS,
@@ -153,14 +150,27 @@ class Comparison:
         That poses' lengths are few is said of either sensor's effects alike here: a clock that is late and a filter of
         the other sensor make one and the same misfit.
         """
-        return self._over(stays) - self.cost > other._over(stays) - other.cost - margin
+        return self.worth(stays) > other.worth(stays) - margin
+
+    def worth(self, stays: FloatArray) -> float:
+        """ΔBIC by likelihood alone: which of several, not whether any (eq. 8.11e)."""
+        return min(self.likelihood_gain, self._likely(stays)) - self.cost
+
+    def ahead_of(self, other: Comparison, stays: FloatArray) -> float:
+        """ΔBIC between two that are both demanded, by likelihood where poses' lengths concern but one of them."""
+        if (self.variant.distortion.force is None) == (other.variant.distortion.force is None):
+            return self.bic_gain_at(stays) - other.bic_gain_at(stays)
+        return self.worth(stays) - other.worth(stays)
 
     def _over(self, stays: FloatArray) -> float:
-        gain = self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum())
+        gain = self._likely(stays)
         if self.variant.distortion.rate is None:
             # What the accelerometer's walk gains, tuned anew, is of the poses' lengths and counts by their dispersion.
             gain -= max(self.likelihood_gain - float(self.drop.sum()), 0.0) * (1.0 - 1.0 / float(stays[STATIC_ACCEL]))
         return min(self.likelihood_gain, gain)
+
+    def _likely(self, stays: FloatArray) -> float:
+        return self.likelihood_gain - float((self.drop * (1.0 - 1.0 / stays)).sum())
 
     def _of_few(self, drop: float) -> float:
         """What a fall of chi-square of the poses' lengths is not worth, their scatter being known from few.
@@ -252,57 +262,6 @@ def refit(model: StepwiseModel, scored: Scored) -> Refit:
             scored.variant, scored.effect.is_local, base, model.prediction, fitted, cost, base.n_effect
         ),
     )  # fmt: skip
-
-
-def refined(model: StepwiseModel, best: Refit) -> Refit:
-    """The shape number at the top of the profile likelihood, with the standard error its curvature gives.
-
-    A parabola through log-spaced values around the grid's best; done again so that a far optimum is reached.
-    """
-    context: Context = model.context
-    for _ in range(N_RESCALED):
-        again = best.scored.effect.rescaled(context, best.scored.variant, best.against.value)
-        if again is None:
-            break
-        best = refit(model, replace(best.scored, variant=again))
-    variant = best.scored.variant
-    if len(variant.shape) != 1:
-        return best
-    name, (value, unit) = next(iter(variant.shape.items()))
-    effect = best.scored.effect
-    if effect.reshaped(context, variant, value) is None:
-        return best
-    spread = WIDEST_LOG
-    reduced = reduce(context.fitted)
-
-    def gain(v: float) -> float:
-        made = effect.reshaped(context, variant, v)
-        assert made is not None
-        return score(reduced, context.fitted.line.columns(made.distortion)).chi2
-
-    sigma_log = float("inf")
-    for _ in range(3):
-        x = np.linspace(-spread, spread, 5)
-        g = np.array([gain(value * float(np.exp(step))) for step in x])
-        a, b, _c = np.polyfit(x, g, 2)
-        if a < 0.0:
-            move = float(np.clip(-b / (2 * a), -spread, spread))
-            sigma_log = float(np.sqrt(-1.0 / a))
-        else:
-            move = float(x[g.argmax()])
-        value *= float(np.exp(move))
-        spread = float(np.clip(2.0 * sigma_log, NARROWEST_LOG, WIDEST_LOG))
-    made = effect.reshaped(context, variant, value)
-    assert made is not None
-    final = replace(made, shape={name: (value, unit)}, shape_sigma=float(value * min(sigma_log, 10.0)))
-    finer = refit(model, replace(best.scored, variant=final))
-    return finer if finer.against.bic_gain >= best.against.bic_gain else best
-
-
-N_RESCALED = 2
-"""A size off by 20 % is off by 4 %, then by 0.2 %, of the second-order term."""
-WIDEST_LOG, NARROWEST_LOG = 0.5, 0.05
-"""Half-width, in the logarithm of the shape, over which a parabola is laid: one grid step, and the finest worth it."""
 
 
 def _domain_chi2(fitted: Fit) -> FloatArray:

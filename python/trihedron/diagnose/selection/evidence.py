@@ -41,7 +41,7 @@ def with_evidence(
     return model, candidates
 
 
-def spread_anew(model: StepwiseModel) -> StepwiseModel:
+def spread_anew(model: StepwiseModel, alpha: float) -> StepwiseModel:
     """The model with zeros that scatter by what they do beside everything in it, and not by what was left before.
 
     Scatter was found in the rest of a model without what joined since; beside that it may be less, or nothing.
@@ -50,7 +50,7 @@ def spread_anew(model: StepwiseModel) -> StepwiseModel:
     for one in model.accepted:
         if one.effect.is_spread and isinstance(one.effect, DirectEffect) and one.evidence is not None:
             evidence = one.effect.find(model.context)
-            if evidence is None:
+            if evidence is None or not _is_seen(evidence, alpha):
                 continue
             kept.append(replace(one, evidence=evidence))
         else:
@@ -61,7 +61,6 @@ def spread_anew(model: StepwiseModel) -> StepwiseModel:
 def _looked_for(
     context: Context, alpha: float, taken: set[str], *, is_late: bool
 ) -> tuple[list[tuple[DirectEffect, Evidence]], dict[str, Candidate]]:
-    n_effects = len(catalogue())
     candidates: dict[str, Candidate] = {}
     found: list[tuple[DirectEffect, Evidence]] = []
     for effect in catalogue():
@@ -76,11 +75,15 @@ def _looked_for(
         evidence = effect.find(context)
         if not effect.repeatable or evidence is not None:
             candidates[effect.id] = Candidate(effect.id, 1.0 if evidence is None else evidence.p_value, True)
-        # Half of the rate of false alarms belongs to these tests, half to the competition of curves.
-        if evidence is not None and evidence.p_value * n_effects < alpha / 2.0:
+        if evidence is not None and _is_seen(evidence, alpha):
             found.append((effect, evidence))
     found.sort(key=lambda pair: (pair[0].precedence, -pair[1].strength))
     return found, candidates
+
+
+def _is_seen(evidence: Evidence, alpha: float) -> bool:
+    """Whether an effect's own test finds it; half of the rate of false alarms is theirs, half the competition's."""
+    return evidence.p_value * len(catalogue()) < alpha / 2.0
 
 
 def _with_one(model: StepwiseModel, effect: DirectEffect, evidence: Evidence) -> StepwiseModel:

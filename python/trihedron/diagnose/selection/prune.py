@@ -13,7 +13,7 @@ from trihedron.diagnose.selection.compare import (
 )
 from trihedron.diagnose.selection.excess import domain_chi2, explained, in_the_scatter_of
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel, with_only
-from trihedron.diagnose.selection.stepwise import is_demanded
+from trihedron.diagnose.selection.stepwise import is_demanded, is_predicted
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO, Distortion
 
 LEAST_SHARE = 0.5
@@ -67,8 +67,7 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
     now = replace(one, delta_bic=bic, gain=gain, held_out=held)
     stands = (
         is_demanded(against, one.effect, without.context)
-        and against.predicts
-        and against.falls
+        and is_predicted(against, one.effect, without.context)
         and against.has_size
         and one.effect.is_plausible_variant(one.variant, against.value, against.covariance)
         and explains(against)

@@ -10,7 +10,7 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.selection.compare import Comparison, cost_of
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel, with_only
 from trihedron.diagnose.selection.prune import explains
-from trihedron.diagnose.selection.stepwise import CONFOUNDED_DELTA_BIC, gives_way, is_demanded
+from trihedron.diagnose.selection.stepwise import CONFOUNDED_DELTA_BIC, gives_way, head_start, is_demanded, is_predicted
 
 MOST_ALTERNATIVES = 2
 """Alternatives tried for each effect: those that explained most when it was chosen."""
@@ -46,9 +46,10 @@ def _best_in_place(model: StepwiseModel, k: int) -> StepwiseModel:
         there = _against(without, swapped, swapped.accepted[k], first)
         # Compared over one rest, the smaller of each domain, as when they first competed.
         rest = np.minimum(best[1].stays, there.stays)
-        ahead = there.bic_gain_at(rest) - best[1].bic_gain_at(rest)
+        ahead = there.ahead_of(best[1], rest)
         held, its = best[0].accepted[k].effect.id, other.effect.id
         needed = CONFOUNDED_DELTA_BIC * (gives_way(its, held) - gives_way(held, its))
+        needed += head_start(there.variant, best[1].variant)
         if ahead > needed and _is_sound(there, other, without.context):
             if ahead < CONFOUNDED_DELTA_BIC:
                 rivals.append(held)
@@ -91,8 +92,7 @@ def _against(without: StepwiseModel, model: StepwiseModel, one: Accepted, first:
 def _is_sound(against: Comparison, other: Alternative, context: Context) -> bool:
     return (
         is_demanded(against, other.effect, context)
-        and against.predicts
-        and against.falls
+        and is_predicted(against, other.effect, context)
         and against.has_size
         and other.effect.is_plausible_variant(against.variant, against.value, against.covariance)
         and explains(against)

@@ -13,7 +13,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import Effect, catalogue
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.session.solve import N_DOMAINS, Fit, leverage, reduce, score
+from trihedron.diagnose.session.solve import N_DOMAINS, Fit, Reduced, leverage, reduce, score
 from trihedron.diagnose.session.twin import PRIOR
 from trihedron.records.words import why_not
 
@@ -57,17 +57,52 @@ class _Rest:
         used = leverage(fitted)
         return _Rest(residual, domain, _by_domain(domain, residual**2), _by_domain(domain, 1.0 - used)[:N_DOMAINS])
 
-    def gain_and_dispersion(self, after: FloatArray) -> tuple[float, FloatArray]:
-        """Fall of chi-square over the dispersion that is left, and that dispersion (domains,)."""
+    def fall_and_dispersion(self, after: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Fall of chi-square (domains, then the prior), and the dispersion that is left (domains,)."""
         left = _by_domain(self.domain, after**2)
         fewest = np.where(self.dof >= 1.0, self.dof, np.inf)
         scale = np.maximum(1.0, left[:N_DOMAINS] / fewest)
-        fall = self.squares - left
-        return float((fall[:N_DOMAINS] / scale).sum() + fall[N_DOMAINS:].sum()), scale
+        return self.squares - left, scale
 
 
 def _by_domain(domain: npt.NDArray[np.int8], values: FloatArray) -> FloatArray:
     return np.asarray(np.bincount(domain, values, minlength=PRIOR + 1), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """One shape of an effect under the score test: over the dispersion ``scale`` that it leaves itself, and ``fall``
+    of chi-square (domains,) with what it takes off the prior last, to be held over another."""
+
+    scored: Scored
+    fall: FloatArray
+    scale: FloatArray
+    cost: float
+
+    def merit_at(self, scale: FloatArray) -> float:
+        """Merit with the fall of chi-square over another dispersion; an impossible shape stays one."""
+        if not np.isfinite(self.scored.merit):
+            return self.scored.merit
+        return max(float((self.fall[:N_DOMAINS] / scale).sum() + self.fall[N_DOMAINS:].sum()), 0.0) - self.cost
+
+
+def _tried(effect: Effect, variant: Variant, reduced: Reduced, rest: _Rest, n_variants: int) -> _Tried | None:
+    """``None`` where the calibration imitates every direction of the shape."""
+    fitted = reduced.fitted
+    result = score(reduced, fitted.line.columns(variant.distortion))
+    if result.rank == 0:
+        return None
+    fall, scale = rest.fall_and_dispersion(rest.residual + result.projected @ result.estimate)
+    gain = max(float((fall[:N_DOMAINS] / scale).sum() + fall[N_DOMAINS:].sum()), 0.0)
+    n_rows = int((fitted.system.domain != PRIOR).sum())
+    cost = float(np.log(n_rows) * (result.rank + len(variant.shape)) + 2.0 * np.log(n_variants))
+    merit = gain - cost
+    # A shape whose own estimate is impossible (a lag that answers before it is asked) is nobody's rival.
+    spread = result.covariance * float(scale.max())
+    if not effect.is_plausible_variant(variant, result.estimate, spread):
+        merit = -np.inf
+    p = min(1.0, float(chdtrc(result.rank, gain)) * n_variants)
+    return _Tried(Scored(effect, variant, gain, result.rank, p, float(merit)), fall, scale, cost)
 
 
 def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored], list[tuple[str, str]]]:
@@ -78,7 +113,6 @@ def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored],
     fitted = context.fitted
     reduced = reduce(fitted)
     rest = _Rest.of(fitted)
-    n_rows = int((fitted.system.domain != PRIOR).sum())
     out, missing = [], []
     for effect in catalogue():
         if effect.id in exclude:
@@ -87,32 +121,17 @@ def score_all(context: Context, exclude: Collection[str]) -> tuple[list[Scored],
         if reason is not None:
             missing.append((effect.id, reason))
             continue
-        best: Scored | None = None
-        merits: list[float] = []
         variants = effect.variants(context)
         if not variants:
             continue  # judged by its own evidence
-        for variant in variants:
-            columns = fitted.line.columns(variant.distortion)
-            result = score(reduced, columns)
-            if result.rank == 0:
-                continue
-            gain, scale = rest.gain_and_dispersion(rest.residual + result.projected @ result.estimate)
-            gain = max(gain, 0.0)
-            n_shape = len(variant.shape)
-            merit = gain - np.log(n_rows) * (result.rank + n_shape) - 2.0 * np.log(len(variants))
-            # A shape whose own estimate is impossible (a lag that answers before it is asked) is nobody's rival.
-            spread = result.covariance * float(scale.max())
-            if not effect.is_plausible_variant(variant, result.estimate, spread):
-                merit = -np.inf
-            merits.append(float(merit))
-            p = min(1.0, float(chdtrc(result.rank, gain)) * len(variants))
-            scored = Scored(effect, variant, gain, result.rank, p, merit)
-            if best is None or merit > best.merit:
-                best = scored
-        if best is None:
+        seen = [one for variant in variants if (one := _tried(effect, variant, reduced, rest, len(variants)))]
+        if not seen:
             missing.append((effect.id, why_not("imitated")))
-        else:
-            out.append(replace(best, merits=tuple(merits)))
+            continue
+        # Shapes of one effect over one rest, the smallest: over its own, a shape with numbers to spare would be paid
+        # for a rest that is hardly smaller with all that the effect explains.
+        least = np.min([one.scale for one in seen], axis=0)
+        best = max(seen, key=lambda one: one.merit_at(least))
+        out.append(replace(best.scored, merits=tuple(one.scored.merit for one in seen)))
     out.sort(key=lambda s: -s.merit)
     return out, missing

@@ -11,11 +11,12 @@ from scipy.special import chdtrc
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.effects.contract import Effect
+from trihedron.diagnose.effects.contract import Effect, Variant
 from trihedron.diagnose.residuals.goodness_of_fit import strayed
-from trihedron.diagnose.selection.compare import Comparison, Refit, refined, refit
+from trihedron.diagnose.selection.compare import Comparison, Refit, refit
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel
 from trihedron.diagnose.selection.score import Scored, score_all
+from trihedron.diagnose.selection.sizes import refined, rescaled
 from trihedron.diagnose.session.solve import CORNER_GRID_S, fit
 from trihedron.diagnose.session.twin import stacked
 from trihedron.records.diagnosis import Candidate
@@ -98,13 +99,15 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
             break
         refits.append(refit(model, s))
         if is_sound(refits[-1], context) and s.effect.withstands(context):
+            # Columns made for 32 ms are no match for a filter that may be of any length: each by its own size.
+            refits[-1] = rescaled(model, refits[-1])
             sound.append(refits[-1])
     if not sound:
         return None
     # Rivals are compared against one rest, that of the best explained: else its small differences weigh large gains.
     rest = np.min([r.against.stays for r in sound], axis=0)
     best = max(sound, key=lambda r: r.against.bic_gain_at(rest))
-    best = _logged_first(best, sound, rest)
+    best = _logged_first(_likeliest(best, sound, rest), sound, rest)
     # What another mechanism explains as well: by its joint fit, or, for all of its shapes, by the score test.
     enough = best.against.bic_gain_at(rest) - CONFOUNDED_DELTA_BIC
     others = [r for r in refits if r.scored.effect is not best.scored.effect]
@@ -136,6 +139,24 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
         prediction=best.against.prediction,
         accepted=(*model.accepted, one),
     )
+
+
+def _likeliest(best: Refit, sound: list[Refit], rest: FloatArray) -> Refit:
+    """The candidate that no other is ahead of.
+
+    A late clock and the other sensor's filter make one misfit: what a fall of the poses' lengths is worth does not say
+    which of the two it is.
+    """
+    for r in sound:
+        needed = head_start(r.scored.variant, best.scored.variant)
+        if r.against.ahead_of(best.against, rest) > needed and r.against.equals(best.against, rest, -needed):
+            best = r
+    return best
+
+
+def head_start(one: Variant, other: Variant) -> float:
+    """ΔBIC by which one must be ahead of another to go before it: a shape that stands for many, of a plain one."""
+    return CONFOUNDED_DELTA_BIC * (one.stands_for_many - other.stands_for_many)
 
 
 def set_apart(model: StepwiseModel, before: list[Scored], after: list[Scored]) -> StepwiseModel:
@@ -179,8 +200,11 @@ def is_demanded(against: Comparison, effect: Effect, context: Context) -> bool:
 
     Schwarz's log n counts the walk's rows as data; that test counts poses.
     """
-    if against.bic_gain > MIN_DELTA_BIC:
-        return True
+    return against.bic_gain > MIN_DELTA_BIC or _stands_out(effect, context)
+
+
+def _stands_out(effect: Effect, context: Context) -> bool:
+    """Whether an effect's own test finds it where walk or scatter stand for whatever is there."""
     if context.obs.zero_scatter is None and not any(strayed(context.fitted)):
         return False
     p = effect.own_p_value(context)
@@ -192,11 +216,21 @@ def is_sound(one: Refit, context: Context) -> bool:
     a = one.against
     return (
         is_demanded(a, one.scored.effect, context)
-        and a.predicts
-        and a.falls
+        and is_predicted(a, one.scored.effect, context)
         and a.has_size
         and one.scored.effect.is_plausible_variant(a.variant, a.value, a.covariance)
     )
+
+
+def is_predicted(against: Comparison, effect: Effect, context: Context) -> bool:
+    """Whether what was held out is predicted better, and visibly so.
+
+    A walk at the end of its range predicts any slow curve from its neighbours: where that is so, a test beside a walk
+    of any strength stands for it.
+    """
+    if against.predicts and against.falls:
+        return True
+    return any(strayed(context.fitted)) and _stands_out(effect, context)
 
 
 def _p_adjusted(best: Refit, n_effects: int) -> float:

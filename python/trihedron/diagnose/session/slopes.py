@@ -13,13 +13,16 @@ thousands of samples is one of dozens."""
 
 
 def smoothed_slope(values: FloatArray, time_s: FloatArray, width: float) -> FloatArray:
-    """(n,) rate of change, per second, of ``values`` (n,) smoothed by a Gaussian of ``width`` samples."""
+    """(n,) rate of change, per second, of ``values`` (n,) smoothed by a Gaussian of ``width`` samples.
+
+    Stamps are smoothed alike: a straight line keeps its slope across pauses, and to the ends.
+    """
     length = max(round(width / BLOCKS_OF_WIDTH), 1)
     starts = np.arange(0, len(values), length)
     if len(starts) < 2:
         return np.zeros(len(values))
     n = np.diff(starts, append=len(values))
     level, time = (np.add.reduceat(of, starts) / n for of in (values, time_s))
-    smooth = gaussian_filter1d(level, max(width / length, 1.0), mode="nearest")
-    out: FloatArray = np.interp(time_s, time, np.gradient(smooth, time))
+    smooth, at = (gaussian_filter1d(of, max(width / length, 1.0), mode="nearest") for of in (level, time))
+    out: FloatArray = np.interp(time_s, time, np.gradient(smooth, at))
     return out

@@ -25,6 +25,8 @@ AT_EDGE = 0.99
 """Share of the grid's last level at which a strength lies on its edge."""
 TOO_FEW_NORMS, TOO_FEW_ZEROS = 12, 6
 """Poses up to which none can be spared: nine numbers of S and b are fitted to lengths, three means to zeros."""
+AS_LIKELY = 6.0
+"""Twice the log-likelihood by which a drift must beat a logged temperature before that no longer stands for it."""
 ALL: tuple[int, ...] = (SCATTER, WALK, DRIFT)
 Kind = Literal["", "walk", "drift", "slow"]
 
@@ -136,8 +138,28 @@ def _thermal(process: ZeroProcess, every: list[int], columns: list[int]) -> Coef
     if (process.axis_factor != 1.0).any():
         # Every axis tells its own size by its own readings alone: the correction of eq. Z.7.
         chi2 *= (process.readings.n_poses - len(every) + 0.5) / process.readings.n_poses
+    p_value = min(float(chdtrc(value.size, chi2)), _instead_of_drift(process, every, columns))
     wide = np.einsum("akk->ak", block) / np.maximum(np.einsum("akk->ak", plain[:, place][:, :, place]), 1e-300)
-    return Coefficients(value, block, float(chdtrc(value.size, chi2)), bool(np.median(wide) > CONFOUNDED_VARIANCE))
+    return Coefficients(value, block, p_value, bool(np.median(wide) > CONFOUNDED_VARIANCE))
+
+
+def _instead_of_drift(process: ZeroProcess, every: list[int], columns: list[int]) -> float:
+    """p-value of a logged temperature beside scatter and walk of any strength, where it explains what a drift would.
+
+    A temperature that rises all the while is a straight line, which drift takes for nothing: a Wald test beside drift
+    cannot see it. Of two that explain as much the one that was logged explains it, as long as drift does not do better
+    by what names two together (eq. Z.6a).
+    """
+    without = [c for c in every if c not in columns]
+    logged, _ = process.maximum((SCATTER, WALK), every, restricted=False)
+    drift, _ = process.maximum(ALL, without, restricted=False)
+    if 2.0 * (drift - logged) > AS_LIKELY:
+        return 1.0
+    bare, _ = process.maximum((SCATTER, WALK), without, restricted=False)
+    axes = len(process.axis_factor)
+    h, p = process.readings.n_poses, len(every)
+    ratio = 2.0 * (logged - bare) * max(h - p + 0.5, 0.5) / h
+    return float(chdtrc(len(columns) * axes, max(ratio, 0.0)))
 
 
 def _gravity(process: ZeroProcess, every: list[int], columns: list[int]) -> Coefficients:

@@ -1,12 +1,12 @@
 """NOISE: Allan curves at memory speed; which noise terms a static log holds, how large, with what certainty."""
 
+from trihedron.channel_facts.low_pass import gain_of
+from trihedron.channel_facts.pooled import ratio_of
 from trihedron.estimate.noise.allan import allan_deviation, default_clusters, stream_allan_deviation
 from trihedron.estimate.noise.degrees import degrees_of_freedom
 from trihedron.estimate.noise.from_curve import identify_curve
-from trihedron.estimate.noise.hold_statistics import ratio_of
 from trihedron.estimate.noise.holds import noise_of_holds
 from trihedron.estimate.noise.identify import identify_noise
-from trihedron.estimate.noise.low_pass import gain_of
 from trihedron.estimate.noise.planning import recording_length_s, relative_sigma
 from trihedron.estimate.noise.streamed import stream_noise
 

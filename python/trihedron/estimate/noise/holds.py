@@ -9,30 +9,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.step import converter_step
-from trihedron.estimate.noise.hold_lines import lines_of_holds, without_lines
-from trihedron.estimate.noise.hold_statistics import Pooled, as_measured, pooled_logarithm, robust_holds, root_of
-from trihedron.estimate.noise.low_pass import LowPass, Spectrum, densities_below, low_passes, undisturbed
-from trihedron.estimate.noise.spectrum import cosine_transform
-from trihedron.ranges import ranges_of
-from trihedron.records.hold_noise import HoldLine, HoldNoise, Measured, OctaveNoise
+from trihedron.channel_facts.at_rest import AxisAtRest
+from trihedron.channel_facts.low_pass import low_passes
+from trihedron.channel_facts.pooled import as_measured, pooled_logarithm, root_of
+from trihedron.estimate.noise.densities import densities_below
+from trihedron.records.channel_facts import LowPass
+from trihedron.records.hold_noise import HoldNoise, Measured, OctaveNoise
 from trihedron.refused import RefusedError
+from trihedron.transforms import cosine_transform
 
-SHORTEST = 32
-"""Readings of a hold that is used: fewer hold no octave below the uppermost two."""
-LEAST_DITHER = 0.4
-"""Noise over step below which the rounding is not noise of step²/12 any more, and what lies under it is hidden."""
-LAGS = 8
-"""Lags over which squared differences are correlated: filters of a sensor remember no more readings."""
-LONGEST_SEGMENT = 4096
-FEWER = 4.0 / 3.0
-"""So many more readings are worth half the resolution at low frequencies."""
 FEWEST_HOLDS = 3
 """Holds that must show an octave, where there are as many: the scatter of one is not known."""
 LEVEL_KNOWN = 1.0
@@ -85,7 +75,7 @@ def noise_of_holds(
     channels = x.shape[1]
     names = tuple(names) or tuple(f"channel {c + 1}" for c in range(channels))
     units = tuple(units) or ("",) * channels
-    axes = [_Axis.of(x[:, c], rate_hz, holds, names[c]) for c in range(channels)]
+    axes = [AxisAtRest.of(x[:, c], rate_hz, holds, names[c]) for c in range(channels)]
     filters = low_passes([axis.spectrum for axis in axes], rate_hz)
     white = _white(axes, filters, rate_hz)
     return tuple(
@@ -109,88 +99,9 @@ def noise_of_holds(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Axis:
-    """Holds of one axis without disturbed ones and lines, and what is pooled over them."""
-
-    parts: list[FloatArray]
-    step: float
-    lines: tuple[HoldLine, ...]
-    pooled: Pooled
-    spectrum: Spectrum
-
-    @classmethod
-    def of(cls, x: FloatArray, rate_hz: float, holds: Sequence[tuple[int, int]], name: str) -> _Axis:
-        parts = [run for start, stop in holds for run in _unbroken(x[start:stop])]
-        if not parts:
-            raise RefusedError(f"{name}: no hold has {SHORTEST} readings in a row; hold still for longer")
-        step = converter_step(np.concatenate(parts))
-        power = _Power.of(parts)
-        keep = robust_holds(power.variance, power.dof)
-        parts = [part for part, kept in zip(parts, keep, strict=True) if kept]
-        # A line is stated as one; it is neither white noise nor a filter's corner.
-        spectrum = _segments(parts, rate_hz)
-        lines = lines_of_holds(*spectrum, rate_hz)
-        if lines:
-            parts = without_lines(parts, lines, rate_hz)
-            spectrum = _segments(parts, rate_hz)
-        # Correlation and tails are those of what is kept: a knock would lend its own to all.
-        power = _Power.of(parts)
-        pooled = pooled_logarithm(power.variance, power.dof)
-        whole = Spectrum(*_segments(parts, rate_hz, most=True), step**2 / 12.0 / rate_hz, pooled.scatter)
-        beside = whole.beside([line.frequency_hz for line in lines])
-        return cls(parts, step, lines, pooled, undisturbed(beside, rate_hz))
-
-    @property
-    def rounding(self) -> float:
-        return self.step**2 / 12.0
-
-    @property
-    def total(self) -> float:
-        """Half the mean squared difference of a typical hold."""
-        return math.exp(self.pooled.mean)
-
-    @property
-    def is_dithered(self) -> bool:
-        """Whether differences of readings are more than rounding."""
-        return self.total > 0.0 and self._dithers(self.total - self.rounding)
-
-    def _dithers(self, variance: float) -> bool:
-        return self.step == 0.0 or variance > (LEAST_DITHER * self.step) ** 2
-
-    def of_differences(self, rate_hz: float) -> Measured | None:
-        """White density where the spectrum is flat: half the mean squared difference less rounding."""
-        if not self.is_dithered:
-            return None
-        # The rounding is known: what is left carries the whole error.
-        share = self.total / (self.total - self.rounding)
-        sensor = as_measured(self.total - self.rounding, share * self.pooled.sigma, self.pooled.dof)
-        return root_of(sensor, 1.0 / rate_hz)
-
-    def of_level(self, density: float, sigma_log: float, corner_hz: float, rate_hz: float) -> Measured | None:
-        """White density below a filter's corner, of a typical hold.
-
-        ``density`` is that of the mean over holds, which loud ones fill: how far a typical one lies beneath it is read
-        off the same band, for holds differ there by a hand's tremor too, and by less in their differences.
-        """
-        if not (density > 0.0 and self._dithers(2.0 * corner_hz * density)):
-            return None
-        lowest = float(self.spectrum.frequency_hz[0])
-        power, ordinates = _band_power(self.parts, rate_hz, lowest, corner_hz)
-        pooled = pooled_logarithm(power, ordinates)
-        typical = 1.0
-        if pooled.scatter > 0.0:
-            typical = min(math.exp(pooled.mean) * float(ordinates.sum()) / float(power @ ordinates), 1.0)
-        own = pooled.scatter**2 / max(len(power), 1)
-        sigma = math.sqrt(sigma_log**2 + own)
-        share = own / sigma**2
-        dof = max(len(power) - 1, 1) / share**2 if share > 0.0 else math.inf
-        return root_of(as_measured(density * typical, sigma, dof), 1.0)
-
-
-def _white(axes: Sequence[_Axis], filters: Sequence[LowPass], rate_hz: float) -> list[Measured | None]:
+def _white(axes: Sequence[AxisAtRest], filters: Sequence[LowPass], rate_hz: float) -> list[Measured | None]:
     """Densities of white noise: below the corner where a filter shows, of all frequencies where none does."""
-    out = [axis.of_differences(rate_hz) for axis in axes]
+    out = [_of_differences(axis, rate_hz) for axis in axes]
     for one in dict.fromkeys(filters):
         if one.corner_hz is None:
             continue
@@ -199,36 +110,8 @@ def _white(axes: Sequence[_Axis], filters: Sequence[LowPass], rate_hz: float) ->
         for k, level in zip(sharing, levels, strict=True):
             if not level[1] < LEVEL_KNOWN:
                 continue  # the band below the corner is too narrow, or too uneven, to say
-            out[k] = axes[k].of_level(*level, one.corner_hz.value, rate_hz)
+            out[k] = _of_level(axes[k], *level, one.corner_hz.value, rate_hz)
     return out
-
-
-def _unbroken(part: FloatArray) -> list[FloatArray]:
-    return [part[a:b] for a, b in ranges_of(np.isfinite(part)) if b - a >= SHORTEST]
-
-
-@dataclass(frozen=True, eq=False)
-class _Power:
-    """Half the mean squared difference of each hold (k,), and its degrees of freedom (k,)."""
-
-    variance: FloatArray
-    dof: FloatArray
-
-    @classmethod
-    def of(cls, parts: Sequence[FloatArray]) -> _Power:
-        """Of holds (n,) each; the correlation and the kurtosis of differences are those of all holds together."""
-        squares = [np.diff(part) ** 2 for part in parts]
-        mean = np.array([float(s.mean()) for s in squares])
-        count = np.array([len(s) for s in squares], dtype=np.float64)
-        # Relative to each hold's own level: holds may differ.
-        about = [s / m - 1.0 for s, m in zip(squares, mean, strict=True) if m > 0.0]
-        spread = np.zeros(LAGS + 1)
-        for lag in range(LAGS + 1):
-            products = [float(a[lag:] @ a[: len(a) - lag]) for a in about]
-            spread[lag] = sum(products) / max(sum(len(a) - lag for a in about), 1)
-        # White noise: 2 (1 + 2/4) = 3 per difference, two thirds of a degree of freedom each.
-        per_difference = max(float(spread[0] + 2.0 * spread[1:].sum()), 0.5 * float(spread[0]), 1e-12)
-        return cls(0.5 * mean, 2.0 * count / per_difference)
 
 
 def _band_power(
@@ -243,6 +126,37 @@ def _band_power(
             power.append(float(inside.mean()))
             ordinates.append(float(len(inside)))
     return np.array(power), np.array(ordinates)
+
+
+def _of_differences(axis: AxisAtRest, rate_hz: float) -> Measured | None:
+    """White density where the spectrum is flat: half the mean squared difference less rounding."""
+    if not axis.is_dithered:
+        return None
+    # The rounding is known: what is left carries the whole error.
+    share = axis.total / (axis.total - axis.rounding)
+    sensor = as_measured(axis.total - axis.rounding, share * axis.pooled.sigma, axis.pooled.dof)
+    return root_of(sensor, 1.0 / rate_hz)
+
+
+def _of_level(axis: AxisAtRest, density: float, sigma_log: float, corner_hz: float, rate_hz: float) -> Measured | None:
+    """White density below a filter's corner, of a typical hold.
+
+    ``density`` is that of the mean over holds, which loud ones fill: how far a typical one lies beneath it is read off
+    the same band, for holds differ there by a hand's tremor too, and by less in their differences.
+    """
+    if not (density > 0.0 and axis.dithers(2.0 * corner_hz * density)):
+        return None
+    lowest = float(axis.spectrum.frequency_hz[0])
+    power, ordinates = _band_power(axis.parts, rate_hz, lowest, corner_hz)
+    pooled = pooled_logarithm(power, ordinates)
+    typical = 1.0
+    if pooled.scatter > 0.0:
+        typical = min(math.exp(pooled.mean) * float(ordinates.sum()) / float(power @ ordinates), 1.0)
+    own = pooled.scatter**2 / max(len(power), 1)
+    sigma = math.sqrt(sigma_log**2 + own)
+    share = own / sigma**2
+    dof = max(len(power) - 1, 1) / share**2 if share > 0.0 else math.inf
+    return root_of(as_measured(density * typical, sigma, dof), 1.0)
 
 
 def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, ...]:
@@ -274,24 +188,3 @@ def _octaves(parts: Sequence[FloatArray], rate_hz: float) -> tuple[OctaveNoise, 
         density = as_measured(math.exp(pooled.mean), pooled.sigma, pooled.dof)
         out.append(OctaveNoise(2.0**octave, min(2.0 ** (octave + 1), nyquist), density))
     return tuple(out)
-
-
-def _segments(parts: Sequence[FloatArray], rate_hz: float, *, most: bool = False) -> tuple[FloatArray, FloatArray, int]:
-    """Frequencies (k,), mean power (k,) and number of segments of one length that most holds have.
-
-    With ``most``, of half that length where more readings are in such segments by a third.
-    """
-    length = 1 << int(math.log2(max(SHORTEST, min(LONGEST_SEGMENT, float(np.median([len(p) for p in parts]))))))
-
-    def used(n: int) -> int:
-        return sum(len(part) // n * n for part in parts)
-
-    if most and length > SHORTEST and used(length // 2) > used(length) * FEWER:
-        length //= 2
-    rows = [part[s : s + length] for part in parts for s in range(0, len(part) - length + 1, length)]
-    stack = np.stack(rows)
-    stack = stack - stack.mean(axis=1, keepdims=True)
-    # A line's power in one ordinate depends on its phase there; the mean over segments does not.
-    power = np.mean(cosine_transform(stack)[:, 1:] ** 2, axis=0) / rate_hz
-    frequency: FloatArray = np.arange(1.0, length) * (rate_hz / (2.0 * length))
-    return frequency, np.asarray(power), len(rows)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,7 @@ from trihedron.estimate.noise.gaps import (
 )
 from trihedron.estimate.noise.leakage import flicker_leakage
 from trihedron.refused import RefusedError
+from trihedron.transforms import cosine_transform
 
 LONGEST_TRANSFORM = 1 << 17
 """Longest transform; a longer stretch is averaged to block means first."""
@@ -204,26 +205,3 @@ def line_coefficients(n: int, order: npt.NDArray[np.int64]) -> FloatArray:
     """Orthonormal cosine coefficients of 0, 1, 2 … n−1 (order 1 and up): zero for even orders."""
     half = np.pi * order / (2.0 * n)
     return np.asarray(np.where(order % 2 == 1, -np.sqrt(2.0 / n) * np.cos(half) / (2.0 * np.sin(half) ** 2), 0.0))
-
-
-def cosine_transform(x: FloatArray) -> FloatArray:
-    """Orthonormal discrete cosine transform (type II) along the last axis, by one Fourier transform (Makhoul, 1980)."""
-    n = x.shape[-1]
-    reordered = np.empty_like(x, dtype=np.float64)
-    even = (n + 1) // 2
-    reordered[..., :even] = x[..., ::2]
-    reordered[..., even:] = x[..., 1::2][..., ::-1]
-    half = np.fft.rfft(reordered, axis=-1)
-    half *= _turns(n)
-    out = reordered
-    out[..., : half.shape[-1]] = half.real
-    out[..., half.shape[-1] :] = -half.imag[..., 1 : n - half.shape[-1] + 1][..., ::-1]
-    return out
-
-
-@lru_cache(maxsize=2)
-def _turns(n: int) -> npt.NDArray[np.complex128]:
-    turns: npt.NDArray[np.complex128] = np.exp(-0.5j * np.pi * np.arange(n // 2 + 1) / n) * np.sqrt(2.0 / n)
-    turns[0] = np.sqrt(1.0 / n)
-    turns.setflags(write=False)
-    return turns

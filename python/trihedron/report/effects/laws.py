@@ -1,13 +1,10 @@
-"""What is said of laws of what stays unexplained, by the family of their variables."""
+"""What would prove a law of what stays unexplained, and what it resembles, by the family of its variables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
-
-from trihedron.report.findings.wording import filled
 
 
 @dataclass(frozen=True)
@@ -18,16 +15,13 @@ class FamilyWords:
     resembles: tuple[str, ...] = ()
 
 
+_TURNED_TABLE = (
+    "hold the same poses with the table turned by 90° about the vertical, and once more with a magnet near by"
+)
 FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
     {
-        "room": FamilyWords(
-            "hold the same poses with the table turned by 90° about the vertical, and once more with a magnet near by",
-            ("a magnetic field",),
-        ),
-        "earth": FamilyWords(
-            "hold the same poses with the table turned by 90° about the vertical, and once more with a magnet near by",
-            ("the Earth's turn",),
-        ),
+        "room": FamilyWords(_TURNED_TABLE, ("a magnetic field",)),
+        "earth": FamilyWords(_TURNED_TABLE, ("the Earth's turn",)),
         "force": FamilyWords("hold poses on edges and corners as well as on faces, each twice", ("unequal stiffness",)),
         "previous pose": FamilyWords(
             "reach one pose from six different ones, twice each", ("hysteresis", "creep after a turn")
@@ -57,29 +51,6 @@ FAMILIES: Mapping[str, FamilyWords] = MappingProxyType(
     }
 )
 """By the family that the dictionary of variables gives (``diagnose/laws``); a family not named here has no words."""
-
-SENTENCES: Mapping[str, str] = MappingProxyType(
-    {
-        "follows": "The {sensor}'s {is_at_rest:?zero|reading in motion} ({axes:&, }) follows {depends:and}: "
-        "{share:.0f %} of the held-out misfit.",
-        "follows-room": "The gyro's zero follows a vector fixed in the room, {inclination_deg:.0f}° ± "
-        "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the held-out misfit.",
-        "form": "reading of {axes:&, } grows by {terms:& + }",
-        "form-room": "zero = K Rᵀ m, m a unit vector fixed in the room",
-        "angle-to-vertical": "angle to the vertical",
-    }
-)
-
-
-def law_words(case: str, values: Mapping[str, Any]) -> str:
-    """A sentence about a law.
-
-    Raises
-    ------
-    KeyError
-        When there is no such sentence, or a place of it has no value.
-    """
-    return filled(SENTENCES[case], values, {})
 
 
 def family_words(family: str) -> FamilyWords:

@@ -65,6 +65,14 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "rate-at-rest": "rate at rest, minus its mean",
         "gravity-missed": "gravity missed after the move",
         "velocity-over-move": "velocity over the move",
+        # laws of what stays unexplained
+        "law-follows": "The {sensor}'s {is_at_rest:?zero|reading in motion} ({axes:&, }) follows {depends:and}: "
+        "{share:.0f %} of the held-out misfit.",
+        "law-follows-room": "The gyro's zero follows a vector fixed in the room, {inclination_deg:.0f}° ± "
+        "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the held-out misfit.",
+        "law-form": "reading of {axes:&, } grows by {terms:& + }",
+        "law-form-room": "zero = K Rᵀ m, m a unit vector fixed in the room",
+        "angle-to-vertical": "angle to the vertical",
         # places in a file, amounts
         "line": "line {line}",
         "row": "row {row}",

@@ -10,7 +10,7 @@ from scipy.special import chdtri
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.estimate.noise.hold_statistics import as_measured, root_of
+from trihedron.channel_facts.pooled import as_measured, root_of
 from trihedron.records.hold_noise import HoldLine
 
 LINE_CHANCE = 1e-4

@@ -1,0 +1,79 @@
+"""What a log says of the parts behind its channels: the converter's step, the range met, the filter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from trihedron.records import Recording
+from trihedron.records.channel_facts import Limit, LowPass
+from trihedron.report.document import Table
+from trihedron.report.numbers import MINUS, plain_number, unit_in_print
+
+AXES = ("x", "y", "z")
+UNKNOWN = "not known"
+
+
+def channels_table(recording: Recording) -> Table:
+    """A row per axis, one for a sensor whose axes are alike."""
+    rows: list[tuple[str, ...]] = []
+    for name, unit in _sensors(recording).items():
+        facts, filters = recording.facts.of(name), recording.low_passes.get(name)
+        cells = [
+            (
+                f"{plain_number(float(facts.step[k]))} {unit}" if facts.step[k] else "none to be seen",
+                _ends([limit for limit in facts.limits if limit.axis == k], unit),
+                UNKNOWN if filters is None else _filter(filters[k]),
+            )
+            for k in range(3)
+        ]
+        if len(set(cells)) == 1:
+            rows.append((name, *cells[0]))
+        else:
+            rows += [(f"{name} {axis}", *cell) for axis, cell in zip(AXES, cells, strict=True)]
+    return Table(("", "step", "ends of its range met", "low-pass, half power at"), tuple(rows), "The channels")
+
+
+def channels_record(recording: Recording) -> dict[str, Any]:
+    """The same for programs: ``step`` (3,), ``limits`` and ``low_pass`` of every axis, raw units and Hz."""
+    out: dict[str, Any] = {}
+    for name in _sensors(recording):
+        facts, filters = recording.facts.of(name), recording.low_passes.get(name)
+        out[name] = {
+            "step": facts.step,
+            "limits": [{"axis": AXES[one.axis], "value": one.value, "count": one.count} for one in facts.limits],
+            "low_pass": None if filters is None else [_filter_record(one) for one in filters],
+        }
+    return out
+
+
+def _sensors(recording: Recording) -> Mapping[str, str]:
+    return {
+        name: unit_in_print(unit)
+        for name, readings, unit in (
+            ("accelerometer", recording.accelerometer, recording.accelerometer_unit.value),
+            ("gyroscope", recording.gyroscope, recording.gyroscope_unit.value),
+        )
+        if readings is not None
+    }
+
+
+def _ends(limits: list[Limit], unit: str) -> str:
+    values = [plain_number(one.value, 4).replace("-", MINUS) for one in sorted(limits, key=lambda one: one.value)]
+    return f"{' and '.join(values)} {unit}" if values else "none"
+
+
+def _filter(one: LowPass) -> str:
+    if one.corner_hz is None:
+        return f"none below {plain_number(one.above_hz, 2)} Hz"
+    corner = one.corner_hz
+    low, high = (plain_number(value, 2) for value in (corner.lower, corner.upper))
+    kind = "Gaussian" if one.shape == 0 else f"order {one.shape}"
+    return f"{plain_number(corner.value, 2)} Hz ({low} to {high}), {kind}"
+
+
+def _filter_record(one: LowPass) -> dict[str, Any]:
+    if one.corner_hz is None:
+        return {"corner_hz": None, "above_hz": one.above_hz}
+    return {"corner_hz": one.corner_hz.value, "lower_hz": one.corner_hz.lower, "upper_hz": one.corner_hz.upper,
+            "order": one.shape or None}  # fmt: skip

@@ -1,0 +1,121 @@
+"""Ends of range in an improved scenario: carried exactly, reached again, and no physics once the scenario has them."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import tomllib
+
+import trihedron
+from trihedron.pipeline import driving, improve
+from trihedron.pipeline.comparing_ranges import stated_ranges
+from trihedron.records.channel_facts import ChannelFacts, Limit
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.simulate import Scenario, hand_session, read_scenario, simulate
+from trihedron.simulate.profiles import profile_by_name
+from trihedron.simulate.readout import Adc
+from trihedron.simulate.unclipped import unclipped
+
+G = 9.80665
+LIMIT_DEG_S = 150.0
+IDEAL = 'name = "ideal"\nprofile = "ideal"\n\n[session]\nkind = "hand"\n'
+
+
+@pytest.fixture(scope="module")
+def clipped():
+    """A recording whose gyro ends at ±150 °/s of its converter in several moves, with noise of its own."""
+    profile = profile_by_name("mpu")
+    accel, gyro = profile.unit(5)
+    code = round(math.radians(LIMIT_DEG_S) / gyro.S[0][0])
+    gyro = replace(gyro, adc=replace(gyro.adc, low=-float(code), high=float(code)))
+    scenario = Scenario(hand_session(24, hold_s=3.0, move_s=1.6, layout=8), "unit", accel, gyro, profile.clock)
+    return code, simulate(scenario, 11)[0]
+
+
+@pytest.fixture(scope="module")
+def improved(clipped, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("range")
+    given, better = folder / "ideal.toml", folder / "better.toml"
+    given.write_text(IDEAL)
+    patch = pytest.MonkeyPatch()
+    patch.setattr(driving, "N_SEEDS", 2)
+    found = trihedron.diagnose(clipped[1], against=given, gravity_m_s2=G)
+    better.write_text(improve(given, found).text)
+    patch.undo()
+    return found, better
+
+
+def test_the_ends_of_a_recordings_range_are_those_of_the_improved_scenario(clipped, improved):
+    code, _ = clipped
+    found, better = improved
+    assert "gyro-saturation" in {e.id for e in found.effects}
+    table = tomllib.loads(better.read_text())
+    assert (table["gyroscope"]["adc"]["low"], table["gyroscope"]["adc"]["high"]) == (-code, code)
+    # The converter's, not an effect beside it; and none of the accelerometer, whose range nothing came to.
+    assert "gyro-saturation" not in {e["id"] for e in table.get("effect", [])}
+    assert "low" not in table["accelerometer"].get("adc", {})
+
+
+def test_a_scenario_with_the_recordings_range_lacks_no_saturation(clipped, improved):
+    _, recording = clipped
+    again = trihedron.diagnose(recording, against=improved[1], gravity_m_s2=G)
+    assert "gyro-saturation" not in {e.id for e in again.effects}
+    assert not [p for p in again.parameters if p.id == "gyro-saturation" and p.significant]
+
+
+def test_a_scenario_without_noise_takes_the_recordings(improved):
+    # Three axes of the part's data sheet; 24 holds of three seconds know a density to some per cent.
+    part = profile_by_name("mpu").unit(5)
+    scenario = read_scenario(improved[1])
+    for name, own in zip(("accelerometer", "gyroscope"), part, strict=True):
+        density = np.array(getattr(scenario, name).noise.N) * np.ones(3)
+        assert density == pytest.approx(np.array(own.noise.N) * np.ones(3), rel=0.15), name
+
+
+def triangle(peak, limit):
+    """Readings of a triangle of 41 samples, cut at ``limit``, along x."""
+    x = np.zeros((81, 3))
+    x[20:61, 0] = peak * (1.0 - np.abs(np.arange(-20, 21)) / 20.0)
+    cut = np.minimum(x, limit)
+    at = np.flatnonzero(cut[:, 0] == limit)
+    runs = np.array([[at[0], at[-1] + 1]])
+    facts = ChannelFacts(np.zeros(3), np.zeros(3), (Limit(0, limit, True, runs),))
+    return x, cut, facts
+
+
+def test_a_cut_peak_is_drawn_beyond_the_limit_and_nothing_else_is_touched():
+    x, cut, facts = triangle(100.0, 80.0)
+    out = unclipped(cut, facts)
+    at = cut[:, 0] == 80.0
+    assert np.array_equal(out[~at], cut[~at])
+    # A cubic reaches a quarter to half as high as the tip of a triangle of its slopes, and never inside the limit.
+    assert np.all(out[at, 0] >= 80.0)
+    assert 82.0 < out[:, 0].max() < 100.0
+    assert unclipped(x, replace(facts, limits=())) is x
+
+
+def test_the_sign_and_the_place_of_a_limit_do_not_matter():
+    _, cut, facts = triangle(100.0, 80.0)
+    limit = facts.limits[0]
+    below = replace(facts, limits=(replace(limit, value=-80.0, is_high=False),))
+    np.testing.assert_allclose(unclipped(-cut, below), -unclipped(cut, facts), atol=1e-12)
+    # A peak that the log begins in has no slope to be drawn with.
+    begun = replace(facts, limits=(replace(limit, runs=limit.runs - limit.runs[0, 0]),))
+    assert np.array_equal(unclipped(cut[limit.runs[0, 0] :], begun), cut[limit.runs[0, 0] :])
+
+
+@pytest.mark.parametrize(("share", "is_stated"), [(1.0, True), (1.02, True), (1.1, False), (0.9, False)])
+def test_a_range_is_stated_where_it_ends_within_what_axes_differ_by(clipped, improved, share, is_stated):
+    code, recording = clipped
+    profile = profile_by_name("mpu")
+    accel, gyro = profile.unit(5)
+    scenario = Scenario(
+        hand_session(4), "unit", accel, replace(gyro, adc=Adc(1.0, -share * code, share * code)), profile.clock
+    )
+    found = [e for e in improved[0].effects if e.id == "gyro-saturation"]
+    assert bool(stated_ranges(scenario, found, recording)) == is_stated
+    assert not stated_ranges(replace(scenario, gyroscope=replace(gyro, adc=Adc())), found, recording)
+    # An effect without a limit states nothing.
+    bare = replace(found[0], parameters=(EffectParameter("samples", 3.0, 0.0, "1"),))
+    assert not stated_ranges(scenario, [bare], recording)
