@@ -64,6 +64,7 @@ def judged(answer, said, crash, seconds):
     effects = said["effects"]
     ids = [e["id"] for e in effects]
     out |= {"verdict": said["verdict"], "ids": ids, "z": coverage(answer, said["calibration"]["extended"]),
+            "z_linear": coverage(answer, said["calibration"]["baseline"]),
             "left": [d["domain"] for d in said["remaining"] if d["disagrees"]],
             "confounded": [e["confounded_with"] for e in effects], "worthless": worthless(effects)}  # fmt: skip
     beside = set().union(*(ALLOWED_BESIDE[n] for n in answer["nuisances"])) if answer["nuisances"] else set()
@@ -159,6 +160,10 @@ def report(results):
         if len(z):
             print(f"{sensor}: |z| < 1.96 in {100 * np.mean(np.abs(z) < 1.96):.0f} % of S entries, in answered trials "
                   f"{100 * np.mean(np.abs(right) < 1.96) if len(right) else 0:.0f} %")  # fmt: skip
+        linear = np.array([v for r in results if r.get("z_linear") for v in r["z_linear"].get(sensor, [])])
+        if len(linear):
+            print(f"{sensor}, the linear model without effects (calibration.baseline): "
+                  f"{100 * np.mean(np.abs(linear) < 1.96):.0f} %, rms z {np.sqrt(np.mean(linear**2)):.2f}")  # fmt: skip
     print(
         f"CPU {np.sum([r['seconds'] for r in results]):.0f} s, median {np.median([r['seconds'] for r in results]):.1f}"
     )

@@ -304,13 +304,15 @@ def scored(pair: Pair, document: dict[str, Any], answer: dict[str, Any]) -> dict
     effects = [(e["in"], e["id"], e["confounded_with"]) for e in document["effects"]]
     # Also of an effect that both logs have, which is no difference.
     is_open = left_open([*effects, ("", answer["effect"], [])])
+    # A linear file of a log with an effect has taken it up: its numbers are right for that log and true of no unit.
+    is_bent = pair.by_file and answer["kind"] in ("surplus", "both")
     for group, values in answer["numbers"].items():
         rows = [p for p in document["parameters"] if p["id"] == group]
         if any(abs(v) > 1e-9 for v in values):
             may.add(group)
         if len(rows) == len(values):
             errors = [(p["difference"] - v) / p["std"] for p, v in zip(rows, values, strict=True)]
-            z |= {} if group in is_open else {group: errors}
+            z |= {} if group in is_open or is_bent else {group: errors}
             if any(abs(v) > 5 * p["std"] for p, v in zip(rows, values, strict=True)):
                 must.add(group)
         elif group == "gravity":

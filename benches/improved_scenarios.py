@@ -71,7 +71,7 @@ def of_poses(log, segments, calibration):
     """
     a = calibration.accelerometer
     if a.quality is not None:
-        return spared(a.quality.residual) * len(a.quality.residual) / a.quality.dof
+        return spared(a.quality.residual) * len(a.quality.residual) / max(a.quality.dof, 1)
     length = [np.linalg.norm(correct(log.accelerometer[h.samples()].mean(axis=0), a.S, a.b)) for h in segments.holds]
     return spared(np.array(length) - calibration.gravity_m_s2)
 

@@ -139,11 +139,11 @@ class Trial:
     arm: np.ndarray
 
 
-def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, track_hz=100, earth=None, **more):
+def tracked(seed, seconds=50, sigma_deg=0.05, has_path=False, track_hz=100, earth=None, rest_s=2.0, **more):
     """A hand before an optical tracker; ``earth`` is the Earth's rate along the tracker's axes [rad/s]."""
     rng = np.random.default_rng(seed)
     u = unit(rng, **more)
-    t, C, path = hand(rng, seconds)
+    t, C, path = hand(rng, seconds, rest_s=rest_s)
     arm = rng.uniform(-0.1, 0.1, 3) if has_path else np.zeros(3)
     f, w = forces(C, path, arm), rates_of(C)
     if earth is not None:

@@ -27,7 +27,12 @@ def refused(given, capsys):
         (GOOD.replace("[0.0, 0.0, 0.0]", "[0.0, 0.0]"), "gyroscope.b must hold 3 values", "got [0.0, 0.0]"),
         (GOOD.replace('"hand"', '"hands"'), "no session is of kind 'hands'", "there are"),
         (GOOD.replace('"mpu"', '"mpu'), "mine.toml is not a TOML file", "line 2"),
-        (GOOD + '[[effect]]\nid = "gyro-g-sensitivty"\n', "no effect is called 'gyro-g-sensitivty'", "there are"),
+        (
+            GOOD + '[[effect]]\nid = "gyro-g-sensitivty"\n',
+            "no effect is called 'gyro-g-sensitivty'",
+            "is 'gyro-g-sensitivity' meant?",
+        ),
+        (GOOD.replace('"mpu"', '"mpuu"'), "no profile is called 'mpuu'", "is 'mpu' meant?"),
         (GOOD + '[[effect]]\nid = "accel-quadratic"\nk3 = 1.0\n', "effect accel-quadratic", "'k3'"),
     ],
 )

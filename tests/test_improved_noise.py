@@ -11,6 +11,7 @@ from trihedron.estimate.noise import gain_of, noise_of_holds
 from trihedron.pipeline import driving
 from trihedron.pipeline.comparing_noise import _are_even
 from trihedron.pipeline.driving import MovedAlike, driven, flicker_of_poses, zero_in_moves, zero_of_poses
+from trihedron.pipeline.improving import _unlike
 from trihedron.records.hold_noise import Measured
 from trihedron.simulate import (
     NoiseTerms,
@@ -143,6 +144,18 @@ def test_flicker_that_no_pose_shows_is_taken_out():
     noisy = trihedron.calibrate(simulate(with_flicker(0.05), 8)[0], gravity_m_s2=9.80665)
     left = flicker_of_poses(with_flicker(0.05), beside(noisy))
     assert left is None or left[2] > 0.5 * 0.05
+
+
+def test_poses_and_moves_that_miss_unlike_the_recordings_are_said():
+    def said(poses, moves):
+        recording = SimpleNamespace(poses=4.0, moves=None, missed=lambda _: (poses, moves))
+        return _unlike(None, recording)
+
+    # Squares; of moves the recording says nothing.
+    assert said(9.0, 7.0) == {"poses": 1.5}
+    assert said(4.0 * 1.09**2, 7.0) == {}
+    assert said(4.0 * 0.8**2, None) == {"poses": pytest.approx(0.8)}
+    assert said(None, None) == {}
 
 
 def test_what_poses_miss_is_put_on_the_accelerometers_zero_and_then_both_miss_alike():

@@ -188,9 +188,27 @@ def test_a_reference_clock_that_jumps_is_refused_with_the_place():
         fit_reference(trial.log, replace(trial.motion, time_s=late), G)
 
 
+@pytest.mark.parametrize("seed", [52, 53])
+def test_a_clock_that_jumps_early_is_refused_with_the_place(seed):
+    # One stretch of eight seconds before the jump, the other spoilt by it.
+    trial = tracked(seed, seconds=60)
+    late = trial.motion.time_s + np.where(trial.motion.time_s > 12.0, 0.7, 0.0)
+    with pytest.raises(ValueError, match=r"clock jumps by \+0\.[67]\d* s between \d+ and \d+ s of the log"):
+        fit_reference(trial.log, replace(trial.motion, time_s=late), G)
+
+
 def test_a_reference_of_another_motion_is_refused(posed):
     with pytest.raises(ValueError, match="share no motion"):
         fit_reference(posed.log, tracked(999, seconds=30).motion, G)
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_a_log_that_mostly_rests_is_held_against_its_reference_and_against_no_other(seed):
+    # Four fifths at rest, as a session of poses: there the tracker's noise, as a rate, is all that either shows.
+    trial = tracked(seed, 90, sigma_deg=0.2, rest_s=36.0)
+    assert np.abs(z_of(fit_reference(trial.log, trial.motion, G), trial)).max() < 4.5
+    with pytest.raises(ValueError, match="share no motion"):
+        fit_reference(trial.log, tracked(seed + 50, 90, sigma_deg=0.2, rest_s=36.0).motion, G)
 
 
 def test_a_rate_in_degrees_called_radians_is_refused():

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import TYPE_CHECKING, Annotated, Optional
 
 import typer
 
 from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
 from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+
+if TYPE_CHECKING:
+    from trihedron.pipeline import DiagnosisResult
 
 Calibration = Annotated[
     Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
@@ -100,13 +103,7 @@ def diagnose(
     write_json(machine, json, force=force)
     write_report(document, machine, report, force=force)
     if improved is not None and against is not None:
-        from trihedron.files.scenario import write_scenario
-
-        better = pipeline.improve(against, result)
-        for effect_id, why in better.left_out.items():
-            say(f"effect {effect_id} is not in the scenario: {why}.")
-        write_scenario(better.text, improved, overwrite=force)
-        say(f"improved scenario: {improved}")
+        _improve(against, result, improved, force=force)
     if updated is not None:
         if result.updated is None:
             say(f"{updated}: not written, the poses of this log do not carry a calibration of their own.")
@@ -116,9 +113,37 @@ def diagnose(
     elif result.updated is not None and any(p.significant for p in result.parameters):
         say("The calibration that this log itself gives: --updated FILE.")
     if not full and report is None:
-        say("Every candidate, both models and findings: --full; pictures before and after: --report FILE.html.")
+        _point_to_more(result)
     if known is not None:
         from trihedron.pipeline.applying import doubted
 
         # What a model that nobody should trust differs by says nothing of the physics.
         leave(doubted(known))
+
+
+def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -> None:
+    """The scenario with what the log says, and what could not be put into it."""
+    from trihedron import pipeline
+    from trihedron.files.scenario import write_scenario
+
+    with progress("improving the scenario") as tell:
+        tell(0.1, "moving the improved scenario as the log was")
+        better = pipeline.improve(given, result)
+    for effect_id, why in better.left_out.items():
+        say(f"effect {effect_id} is not in the scenario: {why}.")
+    for what, ratio in better.unlike.items():
+        say(
+            f"{what} of the improved scenario miss gravity by {ratio:.2f} times what the log's do: "
+            "what inside the poses looks like noise or makes zeros stray is not all told apart by this log."
+        )
+    write_scenario(better.text, path, overwrite=force)
+    say(f"improved scenario: {path}")
+
+
+def _point_to_more(result: DiagnosisResult) -> None:
+    """Where the rest is, and how much of it are warnings."""
+    from trihedron.records import Severity
+
+    doubts = sum(finding.severity is Severity.WARNING for finding in result.findings)
+    counted = f" ({doubts} warning{'s' if doubts > 1 else ''})" if doubts else ""
+    say(f"Every candidate, both models and findings{counted}: --full; pictures before and after: --report FILE.html.")

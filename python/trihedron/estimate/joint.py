@@ -13,7 +13,7 @@ from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, M
 from trihedron.estimate.gyroscope.findings import findings_of
 from trihedron.estimate.gyroscope.lost_turns import (
     PossibleLosses,
-    asks_for_losses,
+    is_asked_for_losses,
     losses_that_fit,
     of_alignment,
     relative_sigma,
@@ -107,7 +107,7 @@ def _by_session(
         covariance[21:, 21:] += np.diag(np.maximum(np.diag(more) - np.diag(covariance[21:, 21:]), 0.0))
     own_sigma = relative_sigma(covariance[12:, 12:], solution.S_w)
     losses = PossibleLosses()
-    if asks_for_losses(solution.moves_chi2, solution.moves_dof, len(aligned.outliers)):
+    if is_asked_for_losses(recording.time_s, measured, aligned, solution.moves_chi2, solution.moves_dof):
         missed = seen.angle_deg, seen.floor2
         losses = losses_that_fit(
             recording.time_s, measured, solution.S_w, gravity_m_s2, missed, solution.moves_dof, aligned.used

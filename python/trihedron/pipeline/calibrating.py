@@ -11,8 +11,9 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm
+from trihedron.estimate.accelerometer.bending import with_bending
 from trihedron.estimate.accelerometer.face_poses import identify
-from trihedron.estimate.accelerometer.shapes import shape_findings
+from trihedron.estimate.accelerometer.shapes import with_shapes
 from trihedron.estimate.gyroscope import (
     MoveOptions,
     Turn,
@@ -132,14 +133,14 @@ def calibrate(
         calibration = _by_poses(
             recording, segments, gravity, source, method, wanted, axis_signs, loss, options, turns_deg
         )
-    calibration = in_frame(calibration, wanted)
+    calibration = in_frame(with_bending(calibration, segments), wanted)
     findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))
     return CalibrationResult(replace(calibration, findings=findings), segments, recording)
 
 
 def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) -> Found:
     """Findings of the fit, its poses, a gyro's scale that its unit does not explain, and samples that its log lost."""
-    gyro, fitted = calibration.gyroscope, (*calibration.findings, *shape_findings(calibration, segments))
+    gyro, fitted = calibration.gyroscope, with_shapes(calibration, segments)
     if gyro is None:
         return fitted
     relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)

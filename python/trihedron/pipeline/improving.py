@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -32,16 +32,23 @@ from trihedron.simulate import (
 )
 
 FEWEST_OCTAVES = 4
+AIMED_AT = (0.9, 1.1)
+"""Ratio of what poses and moves miss, simulation over recording, within which the two are called alike."""
 N_FREQUENCIES = 256
 """At which a filter is compared with what was seen: a sixteenth of an octave in the middle of the band."""
 
 
 @dataclass(frozen=True)
 class Improvement:
-    """The text of an improved scenario, and what could not be put into it, each with the reason."""
+    """The text of an improved scenario, and what could not be put into it, each with the reason.
+
+    ``unlike``: what ``poses`` (lengths of gravity) and ``moves`` (gravity carried through them) of the improved
+    scenario miss, rms, over what the recording's do, where that is outside ``AIMED_AT``.
+    """
 
     text: str
     left_out: Mapping[str, str]
+    unlike: Mapping[str, float] = field(default_factory=dict)
 
 
 def improve(
@@ -87,7 +94,16 @@ def improve(
             if found_value is not None:
                 tables[sensor].setdefault(table, {})[key] = list(found_value)
                 text = improved_scenario(scenario, tables, sizes, surplus)
+        return Improvement(text, left_out, _unlike(scenario_from_table(tomllib.loads(text)), beside))
     return Improvement(text, left_out)
+
+
+def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
+    """What poses and moves of a scenario miss over what the recording's do, where that is not as good as one."""
+    made = dict(zip(("poses", "moves"), beside.missed(better), strict=True))
+    seen = {"poses": beside.poses, "moves": beside.moves}
+    ratios = {k: math.sqrt(m / s) for k, m in made.items() if m is not None and (s := seen[k]) is not None and s > 0.0}
+    return {key: ratio for key, ratio in ratios.items() if not AIMED_AT[0] <= ratio <= AIMED_AT[1]}
 
 
 def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:

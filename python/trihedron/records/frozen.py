@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+_NEVER_WRITTEN = frozenset({type(None), bool, int, float, str})
+"""Kinds of most fields, told without a look at arrays and containers."""
+
 
 class Frozen:
     """Base of a frozen dataclass whose arrays are read-only views, its lists tuples, its dictionaries read-only."""
@@ -32,6 +35,8 @@ def freeze(record: Any) -> None:
 
 def frozen(value: Any) -> Any:
     """The value that cannot be written to: the same one where it cannot be anyway."""
+    if type(value) in _NEVER_WRITTEN:
+        return value
     if isinstance(value, np.ndarray):
         if not value.flags.writeable:
             return value

@@ -32,9 +32,10 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
             f"{_footnotes(diagnosis)}."
         )
     if diagnosis.verdict == "unexplained":
-        named = [effect.id for effect in diagnosis.effects if effect.side == "recording"]
+        named = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
         off = left if named else off
-        beside = f" ({listed(list(dict.fromkeys(named)))} is there too, and explains little)" if named else ""
+        verbs = "are there too, and explain" if len(named) > 1 else "is there too, and explains"
+        beside = f" ({listed(named)} {verbs} little)" if named else ""
         return (
             f"UNEXPLAINED: {listed(off) if off else 'the recording'} "
             f"{'disagree' if len(off) > 1 else 'disagrees'} with the model, and no known effect accounts for it{beside}"

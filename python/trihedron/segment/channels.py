@@ -136,6 +136,12 @@ def _not_below_arithmetic(step: FloatArray, mean: FloatArray) -> FloatArray:
     return np.maximum(step, FINEST * np.ptp(present, axis=0)) if len(present) else step
 
 
+def mean_present(rows: FloatArray) -> FloatArray:
+    """(c,) mean of rows (k, c), those that are no numbers passed over; they are looked for where there are any."""
+    mean: FloatArray = rows.mean(axis=0)
+    return np.nanmean(rows, axis=0) if np.isnan(mean).any() else mean
+
+
 def rolling_mean(values: FloatArray, width: int) -> FloatArray:
     """(m, c) mean over ``width`` blocks centred on each; at the ends the nearest whole window."""
     n = len(values)

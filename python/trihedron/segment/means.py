@@ -10,7 +10,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.records import Hold, Recording
-from trihedron.segment.channels import Channels
+from trihedron.segment.channels import Channels, mean_present
 from trihedron.segment.noise import MeanNoise, split_by_halves
 from trihedron.segment.runs import Run
 from trihedron.segment.vertical import along, noise_along, upright
@@ -193,7 +193,7 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     is_hidden = noise < q2 / 4.0
     left = np.interp(np.sqrt(np.where(is_hidden, 0.0, noise) / q2), NOISE_TRIED, BIAS_VARIANCE)
     if len(runs) >= FEWEST_PHASES:
-        by_hold = np.array([np.nanmean(rows, axis=0) for rows in own]) / q2
+        by_hold = np.array([mean_present(rows) for rows in own]) / q2
         # Mean over what the noise may be: it is as uncertain as the holds' own variances scatter.
         seen, error = by_hold.mean(axis=0), by_hold.std(axis=0) / np.sqrt(len(runs))
         tried = np.interp(np.maximum(seen + np.outer(NORMAL_AT, error), 0.0), SEEN_VARIANCE, NOISE_TRIED)

@@ -62,6 +62,8 @@ class Run:
 
     def quiet_ranges(self) -> list[Range]:
         """The stretches between bumps."""
+        if not self.bumps:
+            return [(self.first, self.last)] if self.last > self.first else []
         edges = [self.first, *(k for bump in self.bumps for k in bump), self.last]
         return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
 

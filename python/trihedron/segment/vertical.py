@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.segment.channels import Channels
+from trihedron.segment.channels import Channels, mean_present
 from trihedron.segment.noise import MeanNoise, pool_mean_noise
 from trihedron.segment.runs import Run
 
@@ -55,7 +55,7 @@ def along(channels: Channels, runs: list[Run], up: FloatArray) -> Channels:
     for run, direction in zip(runs, up, strict=True):
         for a, b in run.quiet_ranges():
             blocks = channels.mean[a:b, force]
-            mean[a:b, 0] = (blocks - np.nanmean(blocks, axis=0)) @ direction
+            mean[a:b, 0] = (blocks - mean_present(blocks)) @ direction
             variance[a:b, 0] = channels.variance[a:b, force] @ direction**2
     quantum = np.array([float(channels.quantum[force].min()), 0.0, 0.0])
     return replace(channels, mean=mean, variance=variance, quantum=quantum, is_gyroscope=np.zeros(3, dtype=bool))

@@ -96,6 +96,9 @@ def _between_gaps(ranges: IntArray, time_s: FloatArray | None, step_s: float) ->
     A range whose steps are mostly long has stamps that say little of the samples, and stays whole.
     """
     after = np.zeros(0, dtype=np.int64) if time_s is None else np.flatnonzero(np.diff(time_s) > GAP * step_s) + 1
+    if not len(after):
+        whole = np.flatnonzero(ranges[:, 1] - ranges[:, 0] >= LENGTH).astype(np.int64)
+        return ranges[whole], whole
     pieces, owners = [], []
     for k, (start, stop) in enumerate(ranges):
         inside = after[(after > start) & (after < stop)]

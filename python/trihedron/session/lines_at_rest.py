@@ -32,6 +32,10 @@ FEWEST_BINS, MOST_BINS = 27, 101
 """Frequencies whose median is the level of the noise at one: few follow its colour, many know it well."""
 MOST_LINES = 3
 """A shaker and its first harmonics; what remains widens the error bar."""
+STILL_SHAKES = 2.0
+"""Scatter beside the lines over that of quiet poses from which something still shakes there."""
+N_BESIDE = 4
+"""Bins beside frequency zero that tell the noise there: below the slowest line looked for, known to a third."""
 BLOCKS = 8
 """Stretches of a pose whose means tell whether something slow is left."""
 
@@ -188,4 +192,23 @@ def _constant_beside(part: FloatArray, lines: Sequence[float], sigma: FloatArray
     blocks = np.array([rest[a:b].mean(axis=0) for a, b in pairwise(edges)])
     scatter = blocks.std(axis=0, ddof=1) / np.sqrt(BLOCKS)
     # Eight blocks tell a pose that goes on settling, not a fifth of its noise.
-    return coefficient[0], np.where(scatter > 2.0 * error, scatter, error)
+    error = np.where(scatter > 2.0 * error, scatter, error)
+    tapered, its_error = _tapered(rest, sigma)
+    # A shaker whose frequency wanders stays in the rest, far from frequency zero where the mean is.
+    is_better = (level > STILL_SHAKES * sigma) & (its_error < error)
+    return coefficient[0] + np.where(is_better, tapered, 0.0), np.where(is_better, its_error, error)
+
+
+def _tapered(rest: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean (3,) by Hann's window and its standard error (3,) from the spectrum beside frequency zero.
+
+    Of motion k cycles from zero the window passes 1/k³, a plain mean 1/k. The noise of the mean is that of the bins
+    3 to 6 (the window spreads what is at zero over two), and at least the sensor's white noise.
+    """
+    n = len(rest)
+    window = np.hanning(n)
+    whole = window.sum()
+    mean = (window @ rest) / whole
+    beside = np.fft.rfft(window[:, None] * (rest - mean), axis=0)[3 : 3 + N_BESIDE]
+    error = np.sqrt(np.mean(np.abs(beside) ** 2, axis=0)) / whole
+    return mean, np.maximum(error, sigma * np.sqrt((window**2).sum()) / whole)

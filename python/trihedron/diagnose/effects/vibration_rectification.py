@@ -27,8 +27,13 @@ class VibrationRectification(Effect):
 
     def variants(self, context: Context) -> list[Variant]:
         excess = context.vibration_power
-        own = context.on_accelerometers(excess)
-        out = [Variant(force_only(own), per_axis("accel_bias_per_power"), ("1/(m/s^2)",) * 3, label="accelerometer")]
+        # What shakes on the way is hard to tell from the haste of the hand: once with it, once without.
+        still = np.where(np.arange(len(excess))[:, None] < context.obs.n_holds, excess, 0.0)
+        names, units = per_axis("accel_bias_per_power"), ("1/(m/s^2)",) * 3
+        out = [
+            Variant(force_only(context.on_accelerometers(power)), names, units, label=label)
+            for power, label in ((excess, "accelerometer"), (still, "accelerometer-in-poses"))
+        ]
         if context.obs.raw_rate is not None:
             total = excess.sum(axis=1, keepdims=True) * np.ones(3)
             gyro = context.on_gyros(total)

@@ -33,6 +33,9 @@ ENOUGH_STRETCHES = 6
 """Spectra in the average before longer ones are preferred: it is then known to 40 %."""
 PARTS = 8
 """Parts of a pose, every other one of which predicts those between."""
+STEADY = 0.3
+"""Power of a line in the second halves of poses over that in the first: a support that rings (2 to 6 Hz, gone in half a
+second) keeps a tenth and less in poses of 2 s."""
 COHERENT = 4.0
 """Standard errors of an amplitude that keeps its phase through the recording: by noise alone once in 3000 lines."""
 
@@ -123,16 +126,31 @@ def find_lines(obs: Observations, p_limit: float = 1e-4) -> list[Line]:
         smooth = median_filter(power, size=width, mode="nearest")
         # The median of an average of `count` exponentials sits a little below its mean.
         ratio = power / smooth * (1.0 - 1.0 / (3.0 * count))
-        usable = slice(max(3, n // 128), n // 2 - 1)
-        k = usable.start + int(np.argmax(ratio[usable]))
-        # Adjacent bins of a Hann window share power: the free bins are about two thirds of all.
-        p = float(min(1.0, gammaincc(count, count * ratio[k]) * (n / 2) * spectrum.shape[1]))
-        if p > p_limit:
-            continue
-        line = _refine(obs, pieces, c, k * rate / n, rate / n, p, float(smooth[k] / (np.hanning(n) ** 2).sum()))
-        if line is not None:
-            out.append(line)
+        lowest = max(3, n // 128)
+        while lowest < n // 2 - 1:
+            k = lowest + int(np.argmax(ratio[lowest : n // 2 - 1]))
+            # Adjacent bins of a Hann window share power: the free bins are about two thirds of all.
+            p = float(min(1.0, gammaincc(count, count * ratio[k]) * (n / 2) * spectrum.shape[1]))
+            if p > p_limit:
+                break
+            density = float(smooth[k] / (np.hanning(n) ** 2).sum())
+            line = _refine(obs, pieces, c, k * rate / n, rate / n, p, density)
+            if line is not None and not _dies_away(pieces, c, line.frequency_hz / rate, density):
+                out.append(line)
+                break
+            lowest = 2 * k  # above what rings, whose poses ring at frequencies of their own
     return out
+
+
+def _dies_away(pieces: list[tuple[int, FloatArray]], c: int, per_sample: float, density: float) -> bool:
+    """Whether it is the ring of supports, loud on setting down and gone by the second half of the poses."""
+    power = np.zeros(2)
+    for _, piece in pieces:
+        for k, half in enumerate(np.array_split(piece[:, c], 2)):
+            window = np.hanning(len(half))
+            turned = window * np.exp(-2j * np.pi * per_sample * np.arange(len(half)))
+            power[k] += np.abs(np.sum(turned * (half - half.mean()))) ** 2 / np.sum(window**2) - density
+    return bool(power[0] > 0.0 and power[1] < STEADY * power[0])
 
 
 def _refine(

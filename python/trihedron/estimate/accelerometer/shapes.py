@@ -16,7 +16,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import design_rows
 from trihedron.probability import fdtrc
-from trihedron.records.calibration import Calibration
+from trihedron.records.calibration import Calibration, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.segments import Segments
 
@@ -90,13 +90,19 @@ def shape_of(
     return found
 
 
+def verticals(fitted: SensorCalibration, reading: FloatArray) -> FloatArray:
+    """Unit verticals (n, 3) of still poses by their mean readings (n, 3)."""
+    up: FloatArray = reading @ fitted.S.T + fitted.b
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    return up
+
+
 def shape_findings(calibration: Calibration, segments: Segments) -> tuple[Finding, ...]:
     """The shape in a calibration's residual of still poses, as a finding that says what it does to S and b."""
     fitted, reading = calibration.accelerometer, segments.accelerometer_mean
     if fitted.quality is None or reading is None or len(fitted.quality.residual) != len(reading):
         return ()
-    up = reading @ fitted.S.T + fitted.b
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    up = verticals(fitted, reading)
     seen = fitted.quality
     scale = max(seen.covariance_scale, seen.chi2 / seen.dof if seen.dof > 0 else 1.0, 1.0)
     shape = shape_of(up, seen.residual, seen.sigma, calibration.gravity_m_s2, scale)
@@ -113,3 +119,10 @@ def shape_findings(calibration: Calibration, segments: Segments) -> tuple[Findin
             shift_sigma=shape.shift_sigma,
         ),
     )
+
+
+def with_shapes(calibration: Calibration, segments: Segments) -> tuple[Finding, ...]:
+    """A calibration's findings and a shape's: one that is told is no longer one that is not excluded."""
+    shapes = shape_findings(calibration, segments)
+    kept = (one for one in calibration.findings if not shapes or one.code is not FindingCode.NONLINEAR_RESIDUAL)
+    return (*kept, *shapes)

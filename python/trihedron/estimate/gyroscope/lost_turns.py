@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.alignment import Aligned
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
@@ -28,6 +29,10 @@ CERTAIN, DOUBTFUL = 1e-3, 0.05
 """Chance of the misses by noise alone below which losses are asked for: where all moves were fitted, and where some
 were left out. A loss in each move is shared out among the nine numbers of a scale, the moves that lost more are left
 out, and what remains looks nearly sound (sessions wrong by 20 standard errors had χ² of 1.7 per degree of freedom)."""
+POINTS = 100
+"""Instants of a move at which one of two samples may have been lost: a turn bends little from one to the next."""
+STRONG = 20.0
+"""Odds that are strong evidence (Kass, Raftery 1995): a fall that ends between two samples misses by parts of one."""
 OWN_CLOCK = 1.5
 """Distance of stamps from a straight line, in spreads of their steps, from which on a clock made them: rounding a
 line leaves them within one spread of it."""
@@ -88,6 +93,55 @@ def asks_for_losses(chi2: float, dof: float, n_left_out: int) -> bool:
     return dof >= 1.0 and fdtrc(dof, NOISE_DOF, chi2 / dof) < (DOUBTFUL if n_left_out else CERTAIN)
 
 
+def left_out_as_by_losses(time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned) -> bool:
+    """Whether moves that were left out miss gravity rather by a sample or two that are lost than by a knock.
+
+    A sample lost at ``t`` leaves ``h ω(t)`` out of the turn, and gravity behind the move off by ``h R(t) (ω × f)(t)``,
+    carried from ``t`` to the end. The density of the miss, over all instants at which one sample or two may have been
+    lost, is held against that of a knock of unknown direction and just this size.
+    """
+    S, step_s = np.asarray(aligned.fit.gyroscope_scale), measured.nominal_step_s
+    if not aligned.outliers or not could_be_remade(time_s, step_s):
+        return False
+    f = measured.reading @ np.asarray(aligned.fit.accelerometer_scale).T + np.asarray(aligned.fit.accelerometer_bias)
+    log_odds = 0.0
+    for move in aligned.outliers:
+        begin, end = measured.edges[move]
+        before, after = measured.links[move]
+        rate = np.nan_to_num(measured.rate[begin : end + 1] - measured.zero_mean) @ S.T
+        off = _lost_at_each_instant(rate, f[before], step_s)
+        _, _, axes = np.linalg.svd(f[after][None])
+        across = axes[1:]
+        off, missed = off @ across.T, across @ np.asarray(aligned.fit.residuals)[move]
+        # What the other moves lost the scale has taken up, and hides as much here: a sample a move is allowed for.
+        short = off.mean(axis=0)
+        noise = across @ np.asarray(aligned.fit.cov_residuals)[move] @ across.T + np.outer(short, short)
+        inverse, size = np.linalg.inv(noise), 2.0 * np.pi * np.sqrt(np.linalg.det(noise))
+        some = off[:: max(len(off) // POINTS, 1)]
+        density = [
+            float(np.exp(-0.5 * np.einsum("...i,ij,...j->...", left, inverse, left)).mean()) / size
+            for left in (missed - off, missed - some[:, None] - some[None])
+        ]
+        knock = 1.0 / (np.pi * np.e * float(missed @ missed))
+        log_odds += float(np.log(max(0.5 * sum(density), 1e-300) / knock))
+    return log_odds > float(np.log(STRONG))
+
+
+def _lost_at_each_instant(rate: FloatArray, force: FloatArray, step_s: float) -> FloatArray:
+    """What a sample lost at each instant of a move leaves gravity behind it off by, (n, 3) of rates (n, 3), m/s²."""
+    onward = _core.rotation_from_vector(np.ascontiguousarray(-rate * step_s))
+    carried = np.empty((len(rate), 3))
+    for k, turn in enumerate(onward):
+        force = turn @ force
+        carried[k] = force
+    off: FloatArray = np.cross(rate, carried) * step_s
+    to_end = np.eye(3)
+    for k in range(len(rate) - 1, -1, -1):
+        off[k] = to_end @ off[k]
+        to_end = to_end @ onward[k]
+    return off
+
+
 def losses_that_fit(
     time_s: FloatArray,
     measured: MoveMeasurements,
@@ -146,11 +200,18 @@ def losses_that_fit(
     return PossibleLosses(carried, among_all, scatter)
 
 
+def is_asked_for_losses(
+    time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned, chi2: float, dof: float
+) -> bool:
+    """Whether losses may be behind what moves miss: those in use beyond noise, or those left out by whole samples."""
+    return asks_for_losses(chi2, dof, len(aligned.outliers)) or left_out_as_by_losses(time_s, measured, aligned)
+
+
 def of_alignment(
     time_s: FloatArray, measured: MoveMeasurements, aligned: Aligned, gravity_m_s2: float
 ) -> tuple[Aligned, tuple[Finding, ...]]:
     """An alignment of moves alone, widened by the losses that its misses leave room for, and what is to be said."""
-    if not asks_for_losses(aligned.fit.chi2, aligned.fit.dof, len(aligned.outliers)):
+    if not is_asked_for_losses(time_s, measured, aligned, aligned.fit.chi2, aligned.fit.dof):
         return aligned, ()
     seen = predict(aligned, measured, is_held_out=False)
     S = np.asarray(aligned.fit.gyroscope_scale)

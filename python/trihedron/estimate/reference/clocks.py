@@ -22,6 +22,11 @@ JUMP_S = 0.05
 """A lag that changes by more from one stretch to the next is a jump: those of stretches scatter by milliseconds."""
 LOCKED = 0.9
 """Correlation of a stretch that is believed: unrelated turns of 8 s reach 0.8 at some lag within six seconds."""
+FEWEST_BEYOND = 2
+"""Stretches on either side of a jump whose lags bear each other out."""
+SURE = 0.97
+"""Correlation of a lone stretch at either end of the log that, with less than ``LOCKED`` at the lag of the others, is
+beyond a jump: one that found a neighbouring turn instead fits worse there than at its own lag."""
 SEARCH_S = 6.0
 ALIKE = 0.01
 """Peaks whose correlation is this near the best are not told apart by it: the stamps then decide."""
@@ -144,6 +149,7 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
     if len(ours) < 3 * length:
         return offset, 0.0
     lags, middles = [], []
+    fits: list[tuple[float, FloatArray]] = []
     spread = np.nanstd(ours)
     search = round(SEARCH_S / grid.step_s)
     for start in range(0, len(ours) - length + 1, length):
@@ -164,6 +170,7 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
         if correlation[k] > LOCKED:
             lags.append((lag[k] - search) * grid.step_s)
             middles.append(float(grid.time_s[start] + 0.5 * length * grid.step_s))
+            fits.append((float(correlation[k]), np.where(is_near, correlation, -1.0)[(lag >= 0) & (lag <= 2 * search)]))
     if len(lags) < 3:
         return offset, 0.0
     found, at = np.array(lags), np.array(middles)
@@ -172,7 +179,12 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
     for k in np.flatnonzero(np.abs(step) > JUMP_S).tolist():
         before, after = np.median(found[max(0, k - 2) : k + 1]), np.median(found[k + 1 : k + 4])
         steady = np.median(np.abs(np.delete(step, k))) if len(step) > 1 else 0.0
-        if abs(after - before) > JUMP_S and abs(step[k]) > 5.0 * steady and min(k + 1, len(found) - k - 1) >= 2:
+        is_borne_out = min(k + 1, len(found) - k - 1) >= FEWEST_BEYOND
+        if not is_borne_out:
+            lone, others = (0, after) if k == 0 else (len(found) - 1, before)
+            best, correlation = fits[lone]
+            is_borne_out = best > SURE and float(correlation[round(others / grid.step_s) + search]) < LOCKED
+        if abs(after - before) > JUMP_S and abs(step[k]) > 5.0 * steady and is_borne_out:
             raise RefusedError(
                 f"{reference.motion.source}: the reference's clock jumps by {after - before:+.3g} s between "
                 f"{at[k]:.0f} and {at[k + 1]:.0f} s of the log: cut the reference there and use the parts one by one."

@@ -38,6 +38,8 @@ FORCE_WINDOW_S = 0.1
 """Forces are compared up to 5 Hz: beyond it a position differentiated twice is noise."""
 STRANGERS = 0.6
 """A fit that leaves this part of the reference's rate has found no shared motion, whatever the sizes correlate."""
+TURNING = 0.5
+"""Part of the rate's rms from which on a row turns: of a session of poses its moves, of a restless hand most."""
 TURNED_ROUND = 0.2
 """Beyond this part of the motion left the other direction is tried: shared motion leaves some hundredths."""
 _AXES = ("x", "y", "z")
@@ -141,9 +143,10 @@ def _right_way_round(
 
 
 def _share_left(gyro: GyroFit) -> float:
-    """Rms of what is left over that of the reference's rate, middle rows (medians: knocks do not decide)."""
-    left = np.linalg.norm(gyro.solution.residual, axis=1)
-    return float(np.median(left) / max(float(np.median(gyro.size)), 1e-300))
+    """What is left over the reference's rate, middle rows (medians: knocks do not decide) of those that turn."""
+    turns = gyro.size >= TURNING * float(np.sqrt(np.mean(gyro.size**2)))
+    left = np.linalg.norm(gyro.solution.residual, axis=1)[turns]
+    return float(np.median(left) / max(float(np.median(gyro.size[turns])), 1e-300))
 
 
 def _stamped(recording: Recording, motion: ReferenceMotion) -> float | None:

@@ -115,7 +115,7 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
     """
     at = earliest(late, width)
     first = late[at]
-    if len(first) > 1 and float(np.abs(np.diff(first)).max()) <= UNMOVED:
+    if _is_unmoved(first):
         # Nor does any minimum over neighbours move further: nothing is lost, and no hidden loss is to be looked for.
         _behind_last(late, int(at[-1]), float(first[-1]), is_sharp, lost)
         return 0, len(at)
@@ -138,6 +138,12 @@ def _count_losses(late: FloatArray, width: int, reach: int, is_sharp: bool, lost
         lost[a + 1 : b + 1] += np.diff(whole, prepend=0)
     _behind_last(late, int(at[-1]), float(first[-1]), is_sharp, lost)
     return back, len(at)
+
+
+def _is_unmoved(first: FloatArray) -> bool:
+    """Whether no earliest stamp (m,), in periods, is further from the one before than noise is."""
+    count, _, _, least, most = _core.inside_steps(first, -np.inf, np.inf)
+    return 0 < count == len(first) - 1 and max(-least, most) <= UNMOVED
 
 
 def _behind_last(late: FloatArray, at: int, level: float, is_sharp: bool, lost: IntArray) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from itertools import islice
 
 COMMENT_STARTS = ("#", "%", "//")
 MISSING = frozenset({"", "na", "n/a", "null", "none", "nan", "-", "--", "?", "#n/a", "missing"})
@@ -144,10 +143,14 @@ def detect(text: str) -> Layout | None:
 
 def _from_the_end(lines: list[str]) -> list[str]:
     """The last 200 of the second half of the lines that are neither blank nor remarks."""
-    stripped = ((line, line.strip()) for line in reversed(lines))
-    bodies = (line.strip(" ") for line, plain in stripped if plain and not is_comment(plain))
-    body = list(islice(bodies, 2 * _JUDGED))[::-1]
-    return body[len(body) // 2 :]
+    body: list[str] = []
+    for line in reversed(lines):
+        plain = line.strip()
+        if plain and not plain.startswith(COMMENT_STARTS):
+            body.append(line)
+            if len(body) == 2 * _JUDGED:
+                break
+    return [line.strip(" ") for line in body[: len(body) - len(body) // 2][::-1]]
 
 
 def _past_start_and_rate(lines: list[str], first: int, separator: str) -> tuple[int, dict[str, str]]:

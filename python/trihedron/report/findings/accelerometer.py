@@ -85,9 +85,19 @@ ENTRIES = (
         "What the still poses miss of |g| has the shape of {is_cubic:?an axis whose reading bends with the cube of the "
         "force|{is_quadratic:?an axis whose reading bends with the square of the force|an axis with another scale in "
         "each direction}} (p = {p:.1g} by chance): S and b are off by up to {shift_m_s2:.2g mm/s²} at 1 g from it, "
-        "{shift_sigma:.2g} of their standard errors.",
+        "{shift_sigma:.2g} of the standard errors that scatter alone would leave.",
         "An accelerometer that is not linear, or one driven near the end of its range.",
         "Run `trihedron diagnose`: it says which, and calibrates without it.",
+    ),
+    Entry(
+        Code.NONLINEAR_RESIDUAL,
+        "not-excluded",
+        WARNING,
+        "What the still poses miss of |g| beyond their noise may be zeros that scatter or an axis that bends (odds of "
+        "the latter {weight:.0f %}); error bars of S and b allow for both, up to {widening:.2g} times as wide as for "
+        "scatter alone.",
+        "Too few poses to tell one from the other, or an accelerometer that is not linear.",
+        "Log more poses (24 or more), spread over all directions; `trihedron diagnose` looks for the cause.",
     ),
     Entry(
         Code.LEFT_HANDED,
