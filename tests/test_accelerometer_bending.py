@@ -25,7 +25,7 @@ def errors(rng, n, name):
     chi2 = float(np.sum((residual / sigma) ** 2)) / (n - 9)
     alone = chi2 * np.diag(np.linalg.inv(white.T @ white))
     bending = bending_of(up, residual, sigma, G)
-    return found / np.sqrt(alone), found / np.sqrt(alone + np.diag(bending.covariance)), bending.weight
+    return found / np.sqrt(alone), found / np.sqrt(alone + np.diag(bending.added_to(alone))), bending.weight
 
 
 @pytest.mark.parametrize("name", [None, *SHAPES])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from trihedron import calibrate, diagnose, verify
+from trihedron.records import FindingCode
 from trihedron.records.published import published_figures
 from trihedron.report.calibration import figures_in_words
 from trihedron.report.machine import calibration_record
@@ -32,7 +33,13 @@ def test_calibrate_and_diagnose_agree_on_every_parameter_within_a_tenth_of_its_e
         assert apart.max() < 0.1
         assert (np.abs(sensor.b - np.array(model["b"])) / sensor.sigma_b).max() < 0.1
         # One measuring of noise, one of strengths: error bars differ by what single precision of a grid leaves.
-        np.testing.assert_allclose(np.array(model["sigma_S"])[free], sensor.sigma_S[free], rtol=0.05)
+        wider = sensor.sigma_S[free] / np.array(model["sigma_S"])[free]
+        assert wider.min() > 0.95
+        if FindingCode.RESIDUAL_ABOVE_NOISE not in {one.code for one in result.findings}:
+            assert wider.max() < 1.05
+        # Where poses miss beyond their noise a calibration's bars allow for axes that bend (11.12c), which a diagnosis
+        # looks for by name: by odds of 5 % here, for which 1.96 errors reach a third farther.
+        assert wider.max() < 1.5
 
 
 def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(healthy):

@@ -7,6 +7,7 @@ answer averages over both as their evidence has it, as it does over scatters (do
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.poses import ENTRIES, design_rows
 from trihedron.estimate.accelerometer.shapes import SHAPES, verticals
 from trihedron.estimate.accelerometer.verdict import covariance_scale
+from trihedron.probability import ndtr
 from trihedron.records.calibration import Calibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.segments import Segments
@@ -26,15 +28,30 @@ SAID = 2.0
 """Factor on a standard error from which on its cause is said: the interval is then another one."""
 REWEIGHINGS = 30
 """Fixed point of the scatter; every step at least halves its distance."""
+OUTSIDE, QUANTILE, HALVINGS = 0.05, 1.96, 40
+"""What an interval of so many standard errors is to leave out, and steps to the twelfth digit of its width."""
+TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
 class Bending:
     """How likely it is that an axis bends, given that poses miss by more than noise, and the covariance (9, 9) that
-    this adds to the relative errors of S, row by row of its lower triangle, and to b in units of |g|."""
+    the relative errors of S, row by row of its lower triangle, and of b in units of |g| have besides if one does."""
 
     weight: float
     covariance: FloatArray
+
+    def added_to(self, alone: FloatArray) -> FloatArray:
+        """Covariance (9, 9) to add to variances (9,) of scatter alone, so that 1.96 standard errors hold in 95 %.
+
+        The two together have a narrow part and a wide one. Variances averaged by the odds would make every bar that of
+        the wide one, however unlikely it is; a 95 % interval is as wide as both together need it.
+        """
+        wide = np.diag(self.covariance)
+        pairs = zip(alone.tolist(), wide.tolist(), strict=True)
+        reach = np.array([_reach(one, one + more, self.weight) if one > 0.0 else 0.0 for one, more in pairs])
+        share = np.sqrt(np.maximum((reach / QUANTILE) ** 2 - alone, 0.0) / np.maximum(wide, TINY))
+        return share[:, None] * self.covariance * share
 
 
 def bending_of(up: FloatArray, residual: FloatArray, sigma: FloatArray, gravity_m_s2: float) -> Bending | None:
@@ -81,7 +98,20 @@ def bending_of(up: FloatArray, residual: FloatArray, sigma: FloatArray, gravity_
         taken = np.linalg.solve(r, q.T @ columns)
         added += factor * taken @ (of_strength + np.outer(strength, strength)) @ taken.T
         odds += factor
-    return Bending(odds / (1.0 + odds), added / (1.0 + odds))
+    if odds == 0.0:
+        return None
+    return Bending(odds / (1.0 + odds), added / odds)
+
+
+def _reach(narrow: float, wide: float, weight: float) -> float:
+    """Value that a normal error passes in 5 %, its variance ``wide`` with probability ``weight``, else ``narrow``."""
+    narrow, wide = math.sqrt(narrow), math.sqrt(wide)
+    low, high = QUANTILE * narrow, QUANTILE * wide
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        beyond = (1.0 - weight) * ndtr(-middle / narrow) + weight * ndtr(-middle / wide)
+        low, high = (middle, high) if 2.0 * beyond > OUTSIDE else (low, middle)
+    return 0.5 * (low + high)
 
 
 def _reweighed(
@@ -116,13 +146,14 @@ def with_bending(calibration: Calibration, segments: Segments) -> Calibration:
     if bending is None:
         return in_frame(calibration, frame)
     wrt = _wrt_relative_errors(fitted.S, fitted.b, calibration.gravity_m_s2)
+    to_relative = np.linalg.pinv(wrt)
+    own = to_relative @ calibration.covariance[:12, :12] @ to_relative.T
+    added = bending.added_to(np.diag(own))
     if calibration.gyroscope is not None:
         # The gyro's frame is the accelerometer's: it follows as far as the fit ties it to S and b.
-        to_relative = np.linalg.pinv(wrt)
-        own = to_relative @ calibration.covariance[:12, :12] @ to_relative.T
         tied = np.linalg.lstsq(own, to_relative @ calibration.covariance[:12, 12:], rcond=None)[0].T
         wrt = np.concatenate([wrt, tied])
-    covariance = calibration.covariance + wrt @ bending.covariance @ wrt.T
+    covariance = calibration.covariance + wrt @ added @ wrt.T
     before, after = np.diag(calibration.covariance)[:12], np.diag(covariance)[:12]
     is_known = before > 0.0
     most = float(np.sqrt((after[is_known] / before[is_known]).max(initial=1.0)))
