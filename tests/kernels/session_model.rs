@@ -286,8 +286,10 @@ fn moves_widened_from_a_fit_are_those_of_a_session_so_wide_from_the_start() {
         ..found
     };
     let (wide, again) = widened(&session, &found, [3.0, 20.0]).expect("fit");
-    assert_eq!(wide.noise.inflation, [3.0, 20.0]);
-    assert_eq!(again.likely_scatter, [0.7, 0.3]);
+    // Handed on bit for bit.
+    let bits = |pair: [f64; 2]| pair.map(f64::to_bits);
+    assert_eq!(bits(wide.noise.inflation), bits([3.0, 20.0]));
+    assert_eq!(bits(again.likely_scatter), bits([0.7, 0.3]));
     let fresh = fit(&wide, start, STRENGTHS, &none).expect("fit");
     let rows = |of: &Fit| residuals(&wide, &of.state, &fresh.state, &none);
     let seen = rows(&fresh);
