@@ -142,8 +142,10 @@ def with_nuisances(recording: Recording, rng: np.random.Generator) -> Recording:
     line = np.radians(rng.uniform(0.005, 0.02)) / unit_g * np.sin(2 * np.pi * rng.uniform(3, 30) * t)
     gyro[:, int(rng.integers(3))] += line
     # Every second recording has passed its converter after all that; the other was brought to other units since.
-    if np.random.default_rng(int(rng.integers(1 << 30))).random() < 0.5:
-        accel, gyro = np.round(accel), np.round(gyro)
+    again = np.random.default_rng(int(rng.integers(1 << 30)))
+    if again.random() < 0.5:
+        # Whole codes moved by a part of one would be moved by none or a whole one: zeros a step apart, in two values.
+        accel, gyro = (np.round(x + again.uniform(-0.5, 0.5, x.shape)) for x in (accel, gyro))
     return replace(recording, accelerometer=accel, gyroscope=gyro)
 
 
