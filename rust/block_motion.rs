@@ -122,7 +122,7 @@ impl Windows<'_> {
     ) -> (Vec<f64>, Vec<f64>) {
         let weights = solution.map(|s| {
             let left = self.left(s, scale);
-            let least = crate::stamps::median(&mut left.clone()).max(1e-12);
+            let least = crate::order_statistics::median(&mut left.clone()).max(1e-12);
             left.iter()
                 .map(|l| 1.0 / l.max(least))
                 .collect::<Vec<f64>>()

@@ -38,3 +38,26 @@ pub fn running_maximum(values: &[f64], half: usize) -> Vec<f64> {
         })
         .collect()
 }
+
+/// Mean over `width` rows of `channels` numbers centred on each; at the ends the nearest whole window. By running sums.
+#[must_use]
+pub fn rolling_mean(rows: &[f64], channels: usize, width: usize) -> Vec<f64> {
+    let n = rows.len() / channels.max(1);
+    if n == 0 {
+        return Vec::new();
+    }
+    let width = width.clamp(1, n);
+    let mut total = Vec::with_capacity(rows.len() + channels);
+    total.resize(channels, 0.0);
+    for (at, value) in rows.iter().enumerate() {
+        total.push(total[at] + value);
+    }
+    let whole: Vec<f64> = total[width * channels..]
+        .iter()
+        .zip(&total)
+        .map(|(high, low)| (high - low) / width as f64)
+        .collect();
+    let first = whole[..channels].repeat(width / 2);
+    let last = whole[whole.len() - channels..].repeat(width - 1 - width / 2);
+    [first, whole, last].concat()
+}

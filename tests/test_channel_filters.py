@@ -16,7 +16,7 @@ FINER = 8
 def filtered(noise, corner, order):
     """Samples behind an analogue Butterworth of half the power at ``corner`` (of the rate), sampled finely."""
     if not corner:
-        return noise[::FINER] * np.sqrt(1.0)
+        return noise[::FINER]
     b, a = bilinear(*butter(order, 2.0 * np.pi * corner, analog=True), fs=FINER)
     return lfilter(b, a, noise, zi=lfilter_zi(b, a) * noise[0])[0][::FINER]
 

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 
 class RefusedError(ValueError): ...
 
@@ -216,6 +216,24 @@ def running_median(values: FloatArray, size: int) -> FloatArray: ...
 def first_clean(off: FloatArray, most: int, sizes: list[int], variances: FloatArray, limit: float) -> int | None: ...
 def band_power(readings: FloatArray, taps: list[float], ranges: npt.NDArray[np.int64]) -> FloatArray: ...
 def share_of_gyroscope(change: FloatArray, mean: FloatArray, rate: FloatArray, scale: list[float]) -> list[float]: ...
+
+# the noise floor of a log
+def noise_floor(
+    mean: FloatArray,
+    variance: FloatArray,
+    is_valid: BoolArray,
+    tells: BoolArray,
+    rounding: FloatArray,
+    length: int,
+    asked: tuple[int, int, float],
+    tails: tuple[float, float],
+) -> tuple[FloatArray, FloatArray, list[float], BoolArray, FloatArray, FloatArray]: ...
+def still_limit(activity: FloatArray, freedom: int, tails: tuple[float, float]) -> float: ...
+def rolling_mean(values: FloatArray, width: int) -> FloatArray: ...
+
+# order statistics
+def column_medians(values: FloatArray) -> FloatArray: ...
+def column_quantiles(values: FloatArray, at: list[float]) -> FloatArray: ...
 
 # means over ranges of rows
 def means_by_owner(

@@ -1,8 +1,10 @@
-"""Text from elsewhere (names of columns, files, topics) made harmless for a terminal."""
+"""Names from elsewhere (columns, files, keys) in messages: harmless for a terminal; the one meant, when unknown."""
 
 from __future__ import annotations
 
+import difflib
 import re
+from collections.abc import Iterable
 
 # C0 but for tab and line end, DEL and C1 (of which terminals take 0x9b for an escape), and what turns the direction of
 # writing: a name could hide or forge what stands beside it.
@@ -35,3 +37,9 @@ def printable_json(text: str) -> str:
 def _spelled(character: str, short: str) -> str:
     number = ord(character)
     return (short if number < 0x100 else "\\u{:04x}").format(number)
+
+
+def meant(name: str, known: Iterable[str]) -> str:
+    """`` (is 'near' meant?)`` where a name that nothing bears is nearly one of those known, else nothing."""
+    near = difflib.get_close_matches(name, list(known), 1)
+    return f" (is {near[0]!r} meant?)" if near else ""

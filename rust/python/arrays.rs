@@ -29,6 +29,16 @@ pub(super) fn flat3<'a>(
     })
 }
 
+/// The values of an `(n, c)` array, row by row.
+pub(super) fn flat2<'a, T: numpy::Element + Copy>(
+    array: &'a PyReadonlyArray2<'_, T>,
+) -> Cow<'a, [T]> {
+    match array.as_slice() {
+        Ok(flat) if array.is_c_contiguous() => Cow::Borrowed(flat),
+        _ => Cow::Owned(array.as_array().iter().copied().collect()),
+    }
+}
+
 /// The same numbers as rows.
 pub(super) fn as_rows(flat: &[f64]) -> &[[f64; 3]] {
     flat.as_chunks::<3>().0

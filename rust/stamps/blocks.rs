@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::Tick;
-use super::median::median;
+use crate::order_statistics::median;
 
 /// Blocks that a thread takes at a time.
 const BLOCKS: usize = 1024;

@@ -1,6 +1,6 @@
 //! A straight line through points of which some are far off.
 
-use super::median::median;
+use crate::order_statistics::median;
 
 /// Median absolute deviation to standard deviation of a Gaussian.
 const MAD_TO_SIGMA: f64 = 1.4826;

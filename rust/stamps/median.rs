@@ -1,23 +1,9 @@
-//! Medians: of numbers at hand, and of the steps of a log, which are never written down.
+//! The median of the steps of a log, which are never written down.
 
 use super::steps::of_each_share;
 
 /// Bits of a step by which one pass narrows down where the median lies.
 const DIGIT: u32 = 11;
-
-/// Median of finite numbers, their order lost; the mean of the middle two of an even number. NaN of none.
-pub fn median(values: &mut [f64]) -> f64 {
-    let n = values.len();
-    if n == 0 {
-        return f64::NAN;
-    }
-    let (below, &mut upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
-    if n % 2 == 1 {
-        return upper;
-    }
-    let lower = below.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    f64::midpoint(lower, upper)
-}
 
 /// Median of the steps forward of stamps; NaN where there is none.
 #[must_use]

@@ -13,7 +13,7 @@ mod steps;
 pub use blocks::{block_means, block_medians, earliest};
 pub use errors::{deviation, falls, less};
 pub use line::robust_line;
-pub use median::{median, usual_step};
+pub use median::usual_step;
 pub use steps::{Inside, Steps, inside, steps, steps_above};
 
 use rayon::prelude::*;

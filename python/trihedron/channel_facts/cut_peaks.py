@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.ends import TO_SIGMA, End
+from trihedron.quantiles import median
 
 FAR = 0.3
 """Part of an axis' span that lies between a limit and where the sensor mostly is."""
@@ -36,7 +37,7 @@ def is_cut(end: End, *, is_known: bool, is_word: bool = False) -> bool:
     runs = end.runs if is_word else end.moving_runs
     runs = runs[np.diff(runs, axis=1)[:, 0] > 1]
     steps = np.abs(np.concatenate([np.diff(part[np.isfinite(part)]) for part in end.stretches]))
-    noise = TO_SIGMA * float(np.median(steps)) / np.sqrt(2.0) if len(steps) else 0.0
+    noise = TO_SIGMA * median(steps) / np.sqrt(2.0) if len(steps) else 0.0
     pairs = 0
     for first, stop in runs[:: max(1, -(-len(runs) // MOST_RUNS))].tolist():
         if _falls_on_both_sides(column, first, stop, end.step, noise):

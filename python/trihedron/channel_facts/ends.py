@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.quantiles import median
 
 FLAT = 1.5
 """Steps that a channel at rest between two codes may go to and fro; hands and their tremor are far more."""
@@ -79,14 +80,14 @@ class End:
         """Where the axis mostly is."""
         seen = np.concatenate(self.stretches)
         seen = seen[np.isfinite(seen)]
-        return float(np.median(seen) if len(seen) else np.nanmedian(self.column))
+        return median(seen) if len(seen) else float(np.nanmedian(self.column))
 
     @cached_property
     def dither(self) -> float:
         """Noise of one sample that carries readings from code to code, 0 where what looks like noise may be motion."""
         rough = np.abs(np.concatenate([np.diff(part, ORDER) for part in self.stretches]))
         rough = rough[np.isfinite(rough)]
-        seen = TO_SIGMA * float(np.median(rough)) / GAIN if len(rough) else 0.0
+        seen = TO_SIGMA * median(rough) / GAIN if len(rough) else 0.0
         return min(seen, self.noise) if seen > WHITE * self.noise else 0.0
 
     @property

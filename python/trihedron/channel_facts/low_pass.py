@@ -20,6 +20,9 @@ RISE = 4.6
 """Rise at the ends of its 95 % interval, other terms on the edge of what can be (docs/noise.md, 3)."""
 TOLERANCE = 0.03
 """No band of the spectrum is believed to better: no nearer is real noise flat, or a filter one of the shapes."""
+SHAPE = 0.05
+"""By how much, in the logarithm, half the power of running means two to four times over lies from that of the nearest
+shape (4 %): the interval reaches that much further. Of one that peaks, or of equal poles, it can lie a third away."""
 ORDERS = (1, 2, 3, 4)
 """Of Butterworth filters; beside them a Gaussian, which cascades of running means (CIC) come to."""
 FLICKER_AND_WALK = (1, 2)
@@ -32,6 +35,9 @@ LEAST_GAIN = 1e-9
 """A Gaussian far above its corner is nothing that numbers hold."""
 HUMP = 0.25
 """In the logarithm, on either side of a line: a resonance of quality 2 has fallen to its half there."""
+FINER = 8
+"""Corners tried on either side of the best of the grid, up to its neighbours."""
+SAME = 1e-9
 HIGHEST_FLOOR = 0.125
 """Of the rate: a quarter of the spectrum below Nyquist may be taken for disturbance, no more."""
 MODEL_PARAMETERS = 5
@@ -119,9 +125,16 @@ def low_passes(spectra: Sequence[Spectrum], rate_hz: float) -> list[LowPass]:
         against = max(min(float(table[place]), own_flat) - float(table.min()) for table, own_flat in tables)
     else:
         against = max(own_flat - float(table.min()) for table, own_flat in tables)
+
+    def settled(of: Sequence[Spectrum], table: FloatArray, without: float) -> LowPass:
+        around = _around(grid, table)
+        finer = np.sum([_deviances(s, around, rate_hz, len(spectra))[0] for s in of], axis=0)
+        order = np.argsort(corners := np.concatenate([grid, around]))
+        return _settled(np.hstack([table, finer])[:, order], without, corners[order])
+
     if against <= EARNED:
-        return [_settled(together, flat, grid)] * len(spectra)
-    return [_settled(table, own_flat, grid) for table, own_flat in tables]
+        return [settled(spectra, together, flat)] * len(spectra)
+    return [settled([s], table, own_flat) for s, (table, own_flat) in zip(spectra, tables, strict=True)]
 
 
 def corners_tried(spectra: Sequence[Spectrum], rate_hz: float) -> FloatArray:
@@ -171,17 +184,36 @@ def _deviances(spectrum: Spectrum, grid: FloatArray, rate_hz: float, axes: int) 
     return np.array(table), deviance(np.ones(len(power)))
 
 
+def _around(grid: FloatArray, table: FloatArray) -> FloatArray:
+    """Corners between the best of the grid and its neighbours, which are further apart than corners can be told."""
+    place = int(np.argmin(table.min(axis=0)))
+    ends = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
+    fine = np.geomspace(*ends, 2 * FINER + 1)
+    known = grid[max(place - 1, 0) : place + 2]
+    return fine[np.all(np.abs(fine[:, np.newaxis] / known - 1.0) > SAME, axis=1)]
+
+
 def _settled(table: FloatArray, flat: float, grid: FloatArray) -> LowPass:
     best = table.min(axis=0)
-    inside = grid[best <= min(float(best.min()), flat) + RISE]
+    rise = best - (min(float(best.min()), flat) + RISE)
+    inside = np.flatnonzero(rise <= 0.0)
     place = int(np.argmin(best))
     if flat - best[place] < EARNED:
-        return LowPass(None, float(inside[0]) if len(inside) else float(grid[-1]))
-    ratio = float(grid[1] / grid[0])
-    lower, upper = float(inside[0]) / math.sqrt(ratio), float(inside[-1]) * math.sqrt(ratio)
+        return LowPass(None, float(grid[inside[0]]) if len(inside) else float(grid[-1]))
+    lower, upper = _crossing(grid, rise, int(inside[0]), -1), _crossing(grid, rise, int(inside[-1]), 1)
+    lower, upper = lower * math.exp(-SHAPE), upper * math.exp(SHAPE)
     sigma = math.log(upper / lower) / (2.0 * math.sqrt(RISE))
     shape = (0, *ORDERS)[int(np.argmin(table[:, place]))]
     return LowPass(Measured(float(grid[place]), lower, upper, sigma), lower, shape)
+
+
+def _crossing(grid: FloatArray, rise: FloatArray, last: int, step: int) -> float:
+    """Where the deviance crosses its limit beyond the ``last`` corner inside, straight between two corners."""
+    beyond = last + step
+    if not 0 <= beyond < len(grid):
+        return float(grid[last])
+    part = rise[last] / (rise[last] - rise[beyond])
+    return float(grid[last] * (grid[beyond] / grid[last]) ** part)
 
 
 def gain_of(frequency_hz: FloatArray, corner_hz: float, shape: int, rate_hz: float) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.quantiles import median, medians, quantile
 
 WINDOW_S = 0.5
 MAX_WINDOWS = 2000
@@ -40,7 +41,7 @@ class Windows:
 
     def quiet_noise(self, sensor: str) -> FloatArray:
         """(3,) median noise of one sample over the quiet windows."""
-        out: FloatArray = np.median(self.noise[sensor][self.quiet], axis=0)
+        out: FloatArray = medians(self.noise[sensor][self.quiet])
         return out
 
 
@@ -80,10 +81,10 @@ def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -
     quiet = np.ones(len(start), dtype=bool)
     for value in spread.values():
         # The quietest tenth shows the sensor's own noise; three times that still is no hand motion.
-        quiet &= value <= 3.0 * np.percentile(value, 10.0)
+        quiet &= value <= 3.0 * quantile(value, 0.1)
     if not quiet.any():
-        total = sum(v / max(float(np.median(v)), 1e-300) for v in spread.values())
-        quiet = np.asarray(total <= np.percentile(total, 10.0))
+        total = np.sum([v / max(median(v), 1e-300) for v in spread.values()], axis=0)
+        quiet = np.asarray(total <= quantile(total, 0.1))
     if not quiet.any():
         quiet[:] = True
     return Windows(start, length, mean, noise, quiet)

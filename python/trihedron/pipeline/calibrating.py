@@ -30,6 +30,7 @@ from trihedron.estimate.joint import calibrate_joint
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
 from trihedron.pipeline.results import CalibrationResult
+from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.progress import Progress
 from trihedron.records.words import words
@@ -144,7 +145,7 @@ def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) 
     if gyro is None:
         return fitted
     relative = np.diagonal(gyro.sigma_S) / np.linalg.norm(gyro.S, axis=0)
-    missing = tuple(missing_samples(recording, segments, float(np.median(relative))))
+    missing = tuple(missing_samples(recording, segments, median(relative)))
     return (*unless_seen(fitted, missing), *scale_findings(gyro.S, recording.gyroscope_unit), *missing)
 
 

@@ -16,6 +16,7 @@ from trihedron.estimate.noise import gain_of
 from trihedron.files.scenario import improved_scenario
 from trihedron.pipeline.comparing_noise import Sampled, sampled
 from trihedron.pipeline.comparing_quantisation import white_and_quantisation
+from trihedron.pipeline.comparing_ranges import SENSOR
 from trihedron.pipeline.driving import MovedAlike, flicker_of_poses, zero_in_moves, zero_of_poses
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records.diagnosis import AcceptedEffect
@@ -199,9 +200,6 @@ def _gravity(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
         tables["environment"]["gravity_m_s2"] = found.gravity_m_s2
 
 
-SATURATION = {"accelerometer": "accel-saturation", "gyroscope": "gyro-saturation"}
-
-
 def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: DiagnosisResult) -> set[str]:
     """Ranges of the recording's converters, where its readings end at them exactly; the effects that say so already.
 
@@ -209,7 +207,7 @@ def _ranges(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosis
     has blurred, are none of a converter: those stay an effect.
     """
     out = set()
-    for name, effect in SATURATION.items():
+    for effect, name in SENSOR.items():
         if getattr(found.recording, name) is None:
             continue
         facts = found.recording.facts.of(name)

@@ -144,9 +144,4 @@ def mean_present(rows: FloatArray) -> FloatArray:
 
 def rolling_mean(values: FloatArray, width: int) -> FloatArray:
     """(m, c) mean over ``width`` blocks centred on each; at the ends the nearest whole window."""
-    n = len(values)
-    width = min(width, n)
-    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
-    first = np.clip(np.arange(n) - width // 2, 0, n - width)
-    out: FloatArray = (total[first + width] - total[first]) / width
-    return out
+    return _core.rolling_mean(values, width)

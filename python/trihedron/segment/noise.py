@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron import _core, probability
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.quantiles import medians
 from trihedron.ranges import Range
 from trihedron.segment.channels import Channels
 
@@ -70,7 +71,7 @@ def pool_mean_noise(channels: Channels, ranges: list[Range], is_robust: bool = F
     members = [octave == k for k in np.unique(octave)]
     n = np.array([float(m.sum()) for m in members])
     if is_robust:
-        variances = np.array([np.median(halves.square[m], axis=0) for m in members]) / probability.chdtri(1, 0.5)
+        variances = np.array([medians(halves.square[m]) for m in members]) / probability.chdtri(1, 0.5)
     else:
         variances = np.array([halves.square[m].mean(axis=0) for m in members])
     tau = halves.size * channels.step_s

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trihedron.arrays import BoolArray
+from trihedron.quantiles import quantile
 from trihedron.ranges import Range
 from trihedron.records import Recording
 from trihedron.records.channel_facts import Limit
@@ -61,7 +62,7 @@ def _usual_noise(channels: Channels, channel: int) -> float:
     variance = np.where(channels.is_valid, channels.variance[:, channel], 0.0)[:, None]
     power = rolling_mean(variance, min(WINDOW_BLOCKS, channels.n_blocks))[:, 0]
     live = power[channels.is_valid & (power > 2.0 * channels.quantisation_variance[channel])]
-    return float(np.quantile(live, USUALLY_STILL)) if len(live) else 0.0
+    return quantile(live, USUALLY_STILL) if len(live) else 0.0
 
 
 def inside_the_range(channels: Channels, ends: Sequence[RangeEnd]) -> BoolArray:

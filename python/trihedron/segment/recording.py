@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.quantiles import quantiles
 from trihedron.ranges import ranges_of
 from trihedron.records import Finding, Hold, Move, Recording, Segments
 from trihedron.records.channel_facts import Limit
@@ -142,7 +143,7 @@ def _gravity_reading(recording: Recording, channels: Channels) -> float | None:
         return 9.8
     if recording.accelerometer_unit is AccelerationUnit.G:
         return 1.0
-    low, high = np.quantile(channels.mean[channels.is_valid][:, ~channels.is_gyroscope], [0.01, 0.99], axis=0)
+    low, high = quantiles(channels.mean[channels.is_valid][:, ~channels.is_gyroscope], [0.01, 0.99])
     return float((high - low).max() / 2.0) or None
 
 

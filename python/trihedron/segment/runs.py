@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.quantiles import medians, quantile, quantiles
 from trihedron.ranges import Range, grown, ranges_of
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels
 from trihedron.segment.floor import Activity
@@ -83,7 +84,7 @@ def loose_blocks(activity: Activity, is_valid: BoolArray) -> BoolArray:
     for level, limit in ((activity.fast, activity.fast_limit), (activity.slow, activity.slow_limit)):
         moves = level[moving & (level > limit)]
         if len(moves):
-            below &= level < max(limit, 0.5 * float(np.quantile(moves, 0.9)))
+            below &= level < max(limit, 0.5 * quantile(moves, 0.9))
     return loose | below
 
 
@@ -109,8 +110,8 @@ def speed_of_moves(channels: Channels, quiet: BoolArray) -> float:
     gyro = channels.is_gyroscope
     if not moving.any() or not quiet.any() or not gyro.any():
         return float("inf")
-    zero = np.median(channels.mean[quiet][:, gyro], axis=0)
-    return float(np.quantile(np.abs(channels.mean[moving][:, gyro] - zero), 0.9, axis=0).max())
+    zero = medians(channels.mean[quiet][:, gyro])
+    return float(quantiles(np.abs(channels.mean[moving][:, gyro] - zero), [0.9]).max())
 
 
 def join_quiet(channels: Channels, quiet: BoolArray, loose: BoolArray, noise: MeanNoise) -> list[Run]:
@@ -207,9 +208,7 @@ def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravi
         free[slice(*grown(free, (run.first, run.last)))] = False
     attitude = channels.mean[:, accelerometer] / gravity
     zero = (
-        np.median(np.vstack([channels.mean[a:b] for run in steady for a, b in run.quiet_ranges()]), axis=0)
-        if (steady)
-        else None
+        medians(np.vstack([channels.mean[a:b] for run in steady for a, b in run.quiet_ranges()])) if (steady) else None
     )
     shortest, bump = channels.blocks(MIN_HOLD_S), channels.blocks(BUMP_S)
     found: list[Run] = []

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.quantiles import medians
 from trihedron.ranges import Range, grown, ranges_of
 from trihedron.records import Recording
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
@@ -61,7 +62,7 @@ def find_shaken(
     gravity, radians_per_reading = scales
     if gravity is None or radians_per_reading is None or not steady or gyro.all() or not gyro.any():
         return taken
-    zero = np.median(np.vstack([channels.mean[a:b] for a, b in steady])[:, gyro], axis=0)
+    zero = medians(np.vstack([channels.mean[a:b] for a, b in steady])[:, gyro])
     rate = np.where(channels.is_valid[:, None], channels.mean[:, gyro] - zero, 0.0) * radians_per_reading
     force = np.where(channels.is_valid[:, None], channels.mean[:, ~gyro], 0.0)
     seen = _Seen(_smoothed(force, channels) / gravity, rate * channels.step_s, steady)

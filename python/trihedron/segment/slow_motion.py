@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron import _core, probability
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.quantiles import medians
 from trihedron.ranges import Range
 from trihedron.segment.channels import Channels
 
@@ -106,7 +107,7 @@ def _noise_of_change(channels: Channels, windows: _Windows, half: int, white_var
         # A channel that never changes has no noise to be weighed by.
         scale = np.sqrt(np.where(white > 0.0, white, max(float(white.max()), 1.0)))
         rest = windows.left(_share_of_gyroscope(windows.some(MOST_FITTED), scale))
-    seen = np.median(rest**2, axis=0) / float(probability.chdtri(1, 0.5))
+    seen = medians(rest**2) / float(probability.chdtri(1, 0.5))
     floor = 2.0 * channels.quantisation_variance[accelerometer] / (half * channels.length)
     out: FloatArray = np.maximum(np.maximum(seen, white), floor)
     return out

@@ -6,6 +6,7 @@ import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.quantiles import medians
 from trihedron.ranges import Range, ranges_of
 from trihedron.segment.channels import WINDOW_BLOCKS, Channels, rolling_mean
 from trihedron.segment.runs import CREEP_PART, MIN_HOLD_S, SAME_POSE, SWAY_RAD, speed_of_moves
@@ -28,7 +29,7 @@ def turning_blocks(
     gyro = np.flatnonzero(channels.is_gyroscope)
     if not len(gyro) or not quiet.any():
         return out
-    centre = np.median(channels.mean[quiet][:, gyro], axis=0)
+    centre = medians(channels.mean[quiet][:, gyro])
     reading = np.where(channels.is_valid[:, None], channels.mean[:, gyro] - centre, 0.0)
     second = np.zeros_like(reading)
     ranges = ranges_of(quiet)
@@ -39,14 +40,14 @@ def turning_blocks(
     long = _edges([(a, b) for a, b in ranges if b - a >= channels.blocks(MIN_HOLD_S)])
     if len(long) > 2:
         nearest = np.minimum.reduceat(np.abs(second[: long[-1]] - zero), long[:-1], axis=0)[::2]
-        scatter = np.maximum(scatter, 1.4826 * np.median(nearest, axis=0))
+        scatter = np.maximum(scatter, 1.4826 * medians(nearest))
     # A few short holds hold a few independent seconds: the shortest interval among them flatters. No window is known
     # better than the white noise of its blocks.
     inner = _edges([(a, b - 1) for a, b in ranges if b - a >= 2])
     if len(inner):
         squares = np.add.reduceat(np.diff(reading[: inner[-1] + 1], axis=0) ** 2, inner[:-1], axis=0)[::2]
         variance = squares / (2.0 * np.diff(inner)[::2, None])
-        scatter = np.maximum(scatter, np.sqrt(np.median(variance, axis=0) / channels.blocks(1.0)))
+        scatter = np.maximum(scatter, np.sqrt(medians(variance) / channels.blocks(1.0)))
     scatter = np.maximum(scatter, channels.quantum[gyro] / np.sqrt(12.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = np.nan_to_num(np.abs(second - zero) / scatter, nan=0.0)

@@ -17,6 +17,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.quantiles import medians
 
 _AT_HALF = [1.0 / 16.0, -4.0 / 16.0, 6.0 / 16.0, -4.0 / 16.0, 1.0 / 16.0]
 """Unit gain at half the sampling frequency, fourth-order zero at rest: smooth motion does not pass."""
@@ -70,7 +71,7 @@ def unresolved_variance(
 
     def excess(taps: list[float]) -> FloatArray:
         power = _core.band_power(readings, taps, np.concatenate([holds, pieces]))
-        level = np.median(power[: len(holds)] / n_holds, axis=0) if len(holds) else np.zeros(3)
+        level = medians(power[: len(holds)] / n_holds) if len(holds) else np.zeros(3)
         level = np.maximum(level, quantum**2 / 12.0)
         # Neighbouring outputs of five taps share samples: about a third as many independent squares.
         usual = level * (1.0 + MARGIN * np.sqrt(6.0 / np.maximum(n_moves, 1)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from trihedron.arrays import FloatArray
+from trihedron.quantiles import medians, quantiles
 
 QUIET, QUIET_OF_NORMAL = 0.3, 0.3853
 """Quantile over the poses of the change from first half to second, and that of |x| for a normal x: slow noise is in all
@@ -41,8 +42,8 @@ def coloured_variance(
     (moves, 3) array, (raw unit · s)²
     """
     white = density / np.sqrt(hold_duration_s)[:, None]
-    quiet = (np.quantile(np.abs(halves / white), QUIET, axis=0) / (2.0 * QUIET_OF_NORMAL)) ** 2
-    pooled = np.median((hold_sigma / white) ** 2, axis=0)
+    quiet = (quantiles(np.abs(halves / white), [QUIET])[0] / (2.0 * QUIET_OF_NORMAL)) ** 2
+    pooled = medians((hold_sigma / white) ** 2)
     colour = np.maximum(np.minimum(pooled, MAY_EXCEED * quiet), 1.0)
     out: FloatArray = np.outer(move_duration_s, (colour - 1.0) * density**2)
     return out

@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.quantiles import medians
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.refused import RefusedError
@@ -119,9 +120,9 @@ def scatter_unit(force_sigma: FloatArray, rate_sigma: FloatArray | None, along: 
     along the vertical where it is known: no other scatter shows at rest.
     """
     out = np.ones((2, 3))
-    out[0] = np.sqrt(np.mean(np.median(force_sigma, axis=0) ** 2))
+    out[0] = np.sqrt(np.mean(medians(force_sigma) ** 2))
     if along is not None and np.isfinite(along[1]).any():
         out[0] = np.nanmedian(along[1])
     if rate_sigma is not None:
-        out[1] = np.sqrt(np.mean(np.median(rate_sigma, axis=0) ** 2))
+        out[1] = np.sqrt(np.mean(medians(rate_sigma) ** 2))
     return np.maximum(out, 1e-300)

@@ -6,10 +6,10 @@ What a data sheet says in its own units is written so here and converted at once
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 
 import numpy as np
 
+from trihedron.printable import meant
 from trihedron.refused import RefusedError
 from trihedron.simulate.accelerometer import Accelerometer, ProofMass
 from trihedron.simulate.gyroscope import Gyroscope
@@ -186,7 +186,5 @@ def profile_by_name(name: str) -> Profile:
         When there is none of that name.
     """
     if name not in PROFILES:
-        near = get_close_matches(name, PROFILES, 1)
-        meant = f" (is {near[0]!r} meant?)" if near else ""
-        raise RefusedError(f"no profile is called {name!r}{meant}; there are {', '.join(PROFILES)}")
+        raise RefusedError(f"no profile is called {name!r}{meant(name, PROFILES)}; there are {', '.join(PROFILES)}")
     return PROFILES[name]

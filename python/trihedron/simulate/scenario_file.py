@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import enum
 import sys
 import types
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from trihedron.documents import DocumentError, check_values, of_path, read_text
+from trihedron.printable import meant
 from trihedron.refused import RefusedError
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.motion import LEVEL, Disturb, Hold, Motion, MoveTo, Oscillate, Turn, Vibrate, attitude_with_up
@@ -131,9 +131,7 @@ def _tupled(value: Any) -> Any:
 def _refuse_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
     for key in values:
         if key not in known:
-            near = difflib.get_close_matches(key, known, 1)
-            meant = f" (is {near[0]!r} meant?)" if near else ""
-            raise RefusedError(f"{where} has no key {key!r}{meant}; it knows {', '.join(known)}")
+            raise RefusedError(f"{where} has no key {key!r}{meant(key, known)}; it knows {', '.join(known)}")
 
 
 def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:

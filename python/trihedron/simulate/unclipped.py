@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import BoolArray, FloatArray
 from trihedron.records.channel_facts import ChannelFacts
 
 SLOPE_OVER = 2
@@ -23,9 +23,10 @@ def unclipped(readings: FloatArray, facts: ChannelFacts) -> FloatArray:
         return readings
     out = readings.copy()
     last = len(readings) - 1
+    at_limits = facts.at_limits(len(readings))
     for limit in facts.limits:
         column = readings[:, limit.axis]
-        at_limit = facts.at_limits(len(readings))[:, limit.axis]
+        at_limit = at_limits[:, limit.axis]
         away = abs(limit.value - float(np.nanmedian(column)))
         sign = 1.0 if limit.is_high else -1.0
         for first, stop in limit.runs.tolist():
@@ -42,7 +43,7 @@ def unclipped(readings: FloatArray, facts: ChannelFacts) -> FloatArray:
     return out
 
 
-def _slope(column: FloatArray, at_limit: np.ndarray, place: int, step: int) -> float:
+def _slope(column: FloatArray, at_limit: BoolArray, place: int, step: int) -> float:
     """Slope [raw/sample] at ``place``, from readings on its side that lie at no limit."""
     other = place
     for _ in range(SLOPE_OVER):

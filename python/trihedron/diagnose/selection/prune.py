@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect
 from trihedron.diagnose.selection.compare import (
     Comparison,
     cost_of,
@@ -13,7 +15,7 @@ from trihedron.diagnose.selection.compare import (
 )
 from trihedron.diagnose.selection.excess import domain_chi2, explained, in_the_scatter_of
 from trihedron.diagnose.selection.model import Accepted, StepwiseModel, with_only
-from trihedron.diagnose.selection.stepwise import is_demanded, is_predicted
+from trihedron.diagnose.selection.stepwise import is_sound
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO, Distortion
 
 LEAST_SHARE = 0.5
@@ -33,7 +35,7 @@ def judged_again(model: StepwiseModel) -> StepwiseModel:
     """
     while True:
         judged = [_judged(model, k) for k in range(len(model.accepted))]
-        failed = [k for k, (_, stands) in enumerate(judged) if not stands]
+        failed = [k for k, (_, held_up) in enumerate(judged) if not held_up]
         if not failed:
             return replace(model, accepted=tuple(one for one, _ in judged))
         weakest = min(failed, key=lambda k: judged[k][0].delta_bic)
@@ -52,10 +54,10 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
     if one.reobserves:
         assert one.evidence is not None
         gain = explained(without.fitted, model.fitted)
-        stands = getattr(one.effect, "is_proof", False) or mends(
+        held_up = getattr(one.effect, "is_proof", False) or mends(
             without.fitted, without.prediction, model.fitted, model.prediction, one.evidence.touched
         )
-        return replace(one, gain=gain, held_out=one.evidence.held_out or held), stands
+        return replace(one, gain=gain, held_out=one.evidence.held_out or held), held_up
     assert one.variant is not None
     first = sum(o.variant.distortion.n_parameters for o in model.accepted[:k] if o.variant is not None)
     against = Comparison(
@@ -65,14 +67,12 @@ def _judged(model: StepwiseModel, k: int) -> tuple[Accepted, bool]:
     bic = against.bic_gain
     gain = explained(without.fitted, model.fitted)
     now = replace(one, delta_bic=bic, gain=gain, held_out=held)
-    stands = (
-        is_demanded(against, one.effect, without.context)
-        and is_predicted(against, one.effect, without.context)
-        and against.has_size
-        and one.effect.is_plausible_variant(one.variant, against.value, against.covariance)
-        and explains(against)
-    )
-    return now, stands
+    return now, stands(against, one.effect, without.context)
+
+
+def stands(against: Comparison, effect: Effect, context: Context) -> bool:
+    """Whether an effect keeps its place among others: sound, and its share of its own sensor's misfit removed."""
+    return is_sound(against, effect, context) and explains(against)
 
 
 def explains(against: Comparison) -> bool:

@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron.diagnose.context import Context
 from trihedron.diagnose.selection.compare import Comparison, cost_of
 from trihedron.diagnose.selection.model import Accepted, Alternative, StepwiseModel, with_only
-from trihedron.diagnose.selection.prune import explains
-from trihedron.diagnose.selection.stepwise import CONFOUNDED_DELTA_BIC, gives_way, head_start, is_demanded, is_predicted
+from trihedron.diagnose.selection.prune import stands
+from trihedron.diagnose.selection.stepwise import CONFOUNDED_DELTA_BIC, gives_way, head_start
 
 MOST_ALTERNATIVES = 2
 """Alternatives tried for each effect: those that explained most when it was chosen."""
@@ -50,12 +49,12 @@ def _best_in_place(model: StepwiseModel, k: int) -> StepwiseModel:
         held, its = best[0].accepted[k].effect.id, other.effect.id
         needed = CONFOUNDED_DELTA_BIC * (gives_way(its, held) - gives_way(held, its))
         needed += head_start(there.variant, best[1].variant)
-        if ahead > needed and _is_sound(there, other, without.context):
+        if ahead > needed and stands(there, other.effect, without.context):
             if ahead < CONFOUNDED_DELTA_BIC:
                 rivals.append(held)
             best = swapped, there
         elif ahead > -CONFOUNDED_DELTA_BIC or (
-            there.equals(best[1], rest, CONFOUNDED_DELTA_BIC) and _is_sound(there, other, without.context)
+            there.equals(best[1], rest, CONFOUNDED_DELTA_BIC) and stands(there, other.effect, without.context)
         ):
             rivals.append(its)
     final, against = best
@@ -87,13 +86,3 @@ def _against(without: StepwiseModel, model: StepwiseModel, one: Accepted, first:
         one.variant, one.effect.is_local, without.fitted, without.prediction, model.fitted, cost, first,
         model.prediction,
     )  # fmt: skip
-
-
-def _is_sound(against: Comparison, other: Alternative, context: Context) -> bool:
-    return (
-        is_demanded(against, other.effect, context)
-        and is_predicted(against, other.effect, context)
-        and against.has_size
-        and other.effect.is_plausible_variant(against.variant, against.value, against.covariance)
-        and explains(against)
-    )

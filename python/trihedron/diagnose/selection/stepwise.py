@@ -98,7 +98,7 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
         if any(r.scored.merit > FAR_AHEAD * s.merit for r in sound):
             break
         refits.append(refit(model, s))
-        if is_sound(refits[-1], context) and s.effect.withstands(context):
+        if is_sound(refits[-1].against, s.effect, context) and s.effect.withstands(context):
             # Columns made for 32 ms are no match for a filter that may be of any length: each by its own size.
             refits[-1] = rescaled(model, refits[-1])
             sound.append(refits[-1])
@@ -211,14 +211,13 @@ def _stands_out(effect: Effect, context: Context) -> bool:
     return p is not None and p < OWN_TEST
 
 
-def is_sound(one: Refit, context: Context) -> bool:
+def is_sound(against: Comparison, effect: Effect, context: Context) -> bool:
     """The rules of acceptance: evidence, prediction, a fall in physical units, a size, a possible one."""
-    a = one.against
     return (
-        is_demanded(a, one.scored.effect, context)
-        and is_predicted(a, one.scored.effect, context)
-        and a.has_size
-        and one.scored.effect.is_plausible_variant(a.variant, a.value, a.covariance)
+        is_demanded(against, effect, context)
+        and is_predicted(against, effect, context)
+        and against.has_size
+        and effect.is_plausible_variant(against.variant, against.value, against.covariance)
     )
 
 

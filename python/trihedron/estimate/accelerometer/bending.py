@@ -2,7 +2,7 @@
 
 Scatter from pose to pose is drawn anew in every pose; a bent axis (``shapes``) is the same function of direction in all
 of them, and most of it goes into the nine parameters. Few poses leave as much room for the one as for the other. The
-answer averages over both as their evidence has it, as it does over scatters (docs/model-session.md, 11.12c).
+bars hold for the two together, as their evidence has it (docs/model-session.md, 11.12c).
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ REWEIGHINGS = 30
 OUTSIDE, QUANTILE, HALVINGS = 0.05, 1.96, 40
 """What an interval of so many standard errors is to leave out, and steps to the twelfth digit of its width."""
 TINY = 1e-300
+"""Where nothing is to be added."""
 
 
 @dataclass(frozen=True, eq=False)

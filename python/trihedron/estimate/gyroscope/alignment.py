@@ -12,6 +12,7 @@ from trihedron._core import AlignmentFit
 from trihedron.arrays import BoolArray, FloatArray
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.probability import MEDIAN_CHI2, chdtrc, chdtri
+from trihedron.quantiles import median
 from trihedron.records.calibration import SensorCalibration
 from trihedron.refused import RefusedError
 
@@ -176,7 +177,7 @@ def are_far(distance: FloatArray, dof: float) -> BoolArray:
     n = len(distance)
     # Residuals of fitted parameters are smaller.
     shrink = max(dof / (2.0 * n), LEAST_SHRINK)
-    typical = max(1.0, float(np.median(distance)) / (MEDIAN_CHI2[2] * shrink))
+    typical = max(1.0, median(distance) / (MEDIAN_CHI2[2] * shrink))
     far: BoolArray = distance > chdtri(2, FALSE_ALARM / n) * typical
     return far
 

@@ -20,6 +20,7 @@ from trihedron.estimate.gyroscope.rounding import (
 )
 from trihedron.estimate.gyroscope.zeros import excess_variance, pool_zeros, shrink
 from trihedron.probability import chdtrc
+from trihedron.quantiles import median, medians
 from trihedron.records.calibration import SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
@@ -147,7 +148,7 @@ def measure_moves(
     else:
         attitude, rate = None, gyroscope
     clipped = bridge_clipping(recording) if is_bridged else None
-    extra = rounding_variance(gyroscope, quantum, np.median(gyroscope_mean, axis=0), undithered)
+    extra = rounding_variance(gyroscope, quantum, medians(gyroscope_mean), undithered)
     if clipped is not None:
         rate, extra = _bridged(rate, extra, clipped, gyroscope)
     mid_s = np.ascontiguousarray(segments.time_mid_s[links])
@@ -242,8 +243,8 @@ def _pooled_hidden(
 def _steps_of(recording: Recording) -> tuple[FloatArray, float, float]:
     """Steps between samples, the usual one, and the standard deviation of a stamp, s."""
     steps = np.diff(recording.time_s)
-    nominal = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 1.0 / recording.rate_hz
-    return steps, nominal, float(np.median(np.abs(steps - nominal))) * 1.4826 / np.sqrt(2.0)
+    nominal = median(steps[steps > 0]) if np.any(steps > 0) else 1.0 / recording.rate_hz
+    return steps, nominal, median(np.abs(steps - nominal)) * 1.4826 / np.sqrt(2.0)
 
 
 def audit_moves(measured: MoveMeasurements) -> list[Finding]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align, assemble
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
+from trihedron.quantiles import median
 from trihedron.records.calibration import FitQuality
 from trihedron.records.words import words
 
@@ -74,7 +75,7 @@ def _behind(aligned: Aligned, measured: MoveMeasurements) -> tuple[FloatArray, F
 
 def missed_deg(aligned: Aligned, measured: MoveMeasurements) -> float:
     """Median angle between gravity carried through a move and gravity behind it, of all moves that tell."""
-    return float(np.median(_behind(aligned, measured)[1][~measured.is_lost]))
+    return median(_behind(aligned, measured)[1][~measured.is_lost])
 
 
 def is_astray(aligned: Aligned, measured: MoveMeasurements) -> bool:

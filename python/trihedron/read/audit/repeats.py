@@ -8,6 +8,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.quantiles import quantile
 
 CHUNK = 1 << 20
 """Rows after which windows begin anew."""
@@ -32,7 +33,7 @@ class Repeats:
 
     def chance(self, k: int) -> float:
         """Usual share of equal neighbours where they are frequent (ninth decile over windows of 64 rows)."""
-        rate: np.float64 = np.percentile(self.rates[:, k], 90.0)
+        rate = quantile(self.rates[:, k], 0.9)
         return float(rate)
 
 

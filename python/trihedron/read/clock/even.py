@@ -10,6 +10,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.quantiles import median, quantiles
 from trihedron.read.clock.losses import STALL_STEPS, ahead, behind_late_rows, block_rows, earliest, lateness, track
 from trihedron.read.clock.period import Period, find_period
 from trihedron.read.clock.rounded import numbers_of_rounded
@@ -175,7 +176,7 @@ def _lay(
         u = (x - x0) / scale
         line = _core.robust_line(u, y)
         left = y - np.polyval(line, u)
-        noise = 1.4826 * float(np.median(np.abs(np.diff(each)))) / np.sqrt(2.0) + 1e-3 * period
+        noise = 1.4826 * median(np.abs(np.diff(each))) / np.sqrt(2.0) + 1e-3 * period
         size = min(max(len(y) // 12, 5), 401) | 1
         smooth = _core.running_median(left, size)
         # Wander: the smoothed rest is far more than the blocks' own scatter leaves in it.
@@ -213,21 +214,21 @@ def _growth(error: FloatArray, pauses: IntArray, unseen: float) -> float:
 
     def typical(lag: int) -> float:
         change = np.abs(piece[lag:] - piece[:-lag])
-        return float(np.mean(np.minimum(change, 8.0 * np.median(change) + 1e-300) ** 2))
+        return float(np.mean(np.minimum(change, 8.0 * median(change) + 1e-300) ** 2))
 
     return typical(far) / max(typical(near), unseen**2)
 
 
 def _range(error: FloatArray) -> float:
     """Width that holds all but 2 % of the errors: those next to a loss may stand on its wrong side."""
-    low, high = np.percentile(error[:: max(len(error) // 100_000, 1)], [1.0, 99.0])
+    low, high = quantiles(error[:: max(len(error) // 100_000, 1), None], [0.01, 0.99])[:, 0]
     return float(high - low)
 
 
 def _kind(error: FloatArray, period: float, grid: float) -> StampKind:
     """Kind of stamps from their errors (n,) about the even clock."""
     probe = error[:: max(len(error) // 100_000, 1)]
-    low, middle, high = np.percentile(probe, [0.2, 50.0, 99.8])
+    low, middle, high = quantiles(probe[:, None], [0.002, 0.5, 0.998])[:, 0]
     rms = float(np.std(probe))
     if rms < EXACT * period:
         return StampKind.EXACT

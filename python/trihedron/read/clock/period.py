@@ -10,6 +10,7 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.probability import chdtri
+from trihedron.quantiles import quantile
 
 WINDOW = 2048
 """Rows of one phase sum: a rate that wanders by 10⁻⁴ within it turns the phase by a fifth of a period."""
@@ -160,7 +161,7 @@ def _windows(time_s: FloatArray) -> tuple[list[FloatArray], float]:
         kept = [time_s - time_s[0]]
     steps = [float(w[-1]) / (len(w) - 1) for w in kept]
     # Losses lengthen it, a stall at an end shortens it: the lower quartile is near the window with the fewest.
-    return kept, float(np.percentile(steps, 25.0))
+    return kept, quantile(np.array(steps), 0.25)
 
 
 def _poll(spectrum: _Spectrum) -> float:
@@ -177,7 +178,7 @@ def _poll(spectrum: _Spectrum) -> float:
 
 def _shortest_step(windows: list[FloatArray]) -> float:
     """A step that only one in 500 falls short of."""
-    return float(np.percentile(np.concatenate([np.diff(w) for w in windows]), 0.2))
+    return quantile(np.concatenate([np.diff(w) for w in windows]), 0.002)
 
 
 def _choose(spectrum: _Spectrum, line: float, shortest: float) -> float | None:

@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from typing import Any
 
+from trihedron.printable import meant
 from trihedron.refused import RefusedError
 from trihedron.simulate.effects import experiment, sensor
 from trihedron.simulate.effects.sizes import Change
@@ -63,9 +63,9 @@ def with_effect(scenario: Scenario, effect_id: str, **size: Any) -> Scenario:
         When the id is unknown or its parameters are not what the effect takes.
     """
     if effect_id not in _EFFECTS:
-        near = get_close_matches(effect_id, _EFFECTS, 1)
-        meant = f" (is {near[0]!r} meant?)" if near else ""
-        raise RefusedError(f"no effect is called {effect_id!r}{meant}; there are {', '.join(_EFFECTS)}")
+        raise RefusedError(
+            f"no effect is called {effect_id!r}{meant(effect_id, _EFFECTS)}; there are {', '.join(_EFFECTS)}"
+        )
     try:
         return _EFFECTS[effect_id](scenario, **size)
     except TypeError as error:

@@ -1,0 +1,45 @@
+//! Medians and quantiles across the seam.
+
+use numpy::{PyArray1, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::arrays::{flat2, rows};
+use crate::order_statistics;
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(column_medians, module)?)?;
+    module.add_function(wrap_pyfunction!(column_quantiles, module)?)
+}
+
+/// Median of each column `(c,)`; NaN where one of its values is.
+#[pyfunction]
+fn column_medians<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let width = values.shape()[1];
+    let flat = flat2(&values);
+    let found = super::run(py, || Ok(order_statistics::column_medians(&flat, width)))?;
+    Ok(PyArray1::from_vec(py, found))
+}
+
+/// Quantiles `at` `(k,)` of each column, `(k, c)`.
+#[pyfunction]
+fn column_quantiles<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray2<'py, f64>,
+    at: Vec<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let width = values.shape()[1];
+    if width == 0 || at.iter().any(|part| !(0.0..=1.0).contains(part)) {
+        return Err(PyValueError::new_err(
+            "quantiles lie between 0 and 1, of one column at least",
+        ));
+    }
+    let flat = flat2(&values);
+    let found = super::run(py, || {
+        Ok(order_statistics::column_quantiles(&flat, width, &at))
+    })?;
+    rows(py, &found, width)
+}
