@@ -10,6 +10,7 @@ that stands still while all others stand still as well nothing follows: it is a 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts.crowded_ends import crowded_together, is_crowded, is_cut_noise, is_repeated, is_wall
 from trihedron.channel_facts.cut_peaks import is_cut
 from trihedron.channel_facts.ends import End
+from trihedron.channel_facts.held import new_readings, with_repeats
 from trihedron.records.channel_facts import Limit
 
 FEWEST = 8
@@ -38,6 +40,18 @@ def find_limits(
     """Limits of a triad (n, 3) with ``noise`` (3,) of one sample at rest and ``step`` (3,) of the converter; its
     ``extremes`` where they are known.
     """
+    found = _limits(readings, noise, step, extremes)
+    rows = new_readings(readings, noise, step) if found else None
+    if rows is None:
+        return found
+    # A peak that was written three times over is no plateau.
+    return tuple(
+        replace(limit, runs=with_repeats(limit.runs, rows, len(readings)))
+        for limit in _limits(readings[rows], noise, step, None)
+    )
+
+
+def _limits(readings: FloatArray, noise: FloatArray, step: FloatArray, extremes: Extremes | None) -> tuple[Limit, ...]:
     if len(readings) < FEWEST:
         return ()
     ends = [

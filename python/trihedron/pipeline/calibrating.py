@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 import numpy as np
 
 from trihedron import probability
-from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm
+from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm, shared_rounding
 from trihedron.estimate.accelerometer.bending import with_bending
 from trihedron.estimate.accelerometer.face_poses import identify
 from trihedron.estimate.accelerometer.shapes import with_shapes
@@ -257,13 +257,13 @@ def _by_faces(
     turns_deg: Sequence[float] | None,
     nominal: float | None,
 ) -> Calibration:
-    assert segments.accelerometer_mean is not None
-    assert segments.accelerometer_sigma_mean is not None
+    mean, sigma_mean = segments.accelerometer_mean, segments.accelerometer_sigma_mean
     unit = recording.accelerometer_unit
-    up = identify(segments.accelerometer_mean, unit) if faces is None else np.asarray(faces, dtype=np.int64)
-    accelerometer, found = calibrate_faces(
-        segments.accelerometer_mean, segments.accelerometer_sigma_mean, gravity, up=faces, raw_unit=unit
-    )
+    assert mean is not None
+    assert sigma_mean is not None
+    up = identify(mean, unit) if faces is None else np.asarray(faces, dtype=np.int64)
+    shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
+    accelerometer, found = calibrate_faces(mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared)
     alone = _alone(accelerometer, found, "case", gravity, source, recording)
     if recording.gyroscope is None:
         return alone

@@ -161,7 +161,7 @@ def _prior_freedom(ratio: FloatArray, freedom: FloatArray) -> float:
 NORMAL_AT, NORMAL_WEIGHT = np.array([-np.sqrt(3.0), 0.0, np.sqrt(3.0)]), np.array([1.0, 4.0, 1.0]) / 6.0
 """Three points that stand for a normal number (Gauss and Hermite)."""
 FEWEST_PHASES = 6
-"""Holds, a step of the converter and more apart in the rms, from which on their places inside a step are any."""
+"""Codes, a step of the converter and more apart in the rms, from which on places inside a step are any."""
 HARMONICS = np.arange(1, 61)
 """Of a period of one step: with noise of 3 % of a step the sixtieth is down to a thousandth."""
 NOISE_TRIED = np.concatenate([[0.0], np.linspace(0.03, 1.0, 98)])
@@ -174,6 +174,13 @@ BIAS_VARIANCE = np.where(
 """Variance of what rounding leaves in a mean, in steps squared, over all places inside a step."""
 SEEN_VARIANCE = np.maximum.accumulate(NOISE_TRIED**2 + 1.0 / 12.0 - BIAS_VARIANCE)
 """And that of the rounded readings about their mean: the noise, q²/12, less what stays in the mean."""
+
+
+def _mean_bias(seen: FloatArray) -> float:
+    """Mean of what rounding leaves over what the noise may be: as uncertain as variances (n,) of places scatter."""
+    tried = seen.mean() + NORMAL_AT * seen.std() / np.sqrt(len(seen))
+    noise = np.interp(np.maximum(tried, 0.0), SEEN_VARIANCE, NOISE_TRIED)
+    return float(NORMAL_WEIGHT @ np.interp(noise, NOISE_TRIED, BIAS_VARIANCE))
 
 
 def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
@@ -195,11 +202,12 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     left = np.interp(np.sqrt(np.where(is_hidden, 0.0, noise) / q2), NOISE_TRIED, BIAS_VARIANCE)
     if len(runs) >= FEWEST_PHASES:
         by_hold = means_of(channels.variance, parts) / q2
-        # Mean over what the noise may be: it is as uncertain as the holds' own variances scatter.
-        seen, error = by_hold.mean(axis=0), by_hold.std(axis=0) / np.sqrt(len(runs))
-        tried = np.interp(np.maximum(seen + np.outer(NORMAL_AT, error), 0.0), SEEN_VARIANCE, NOISE_TRIED)
-        shown = NORMAL_WEIGHT @ np.interp(tried, NOISE_TRIED, BIAS_VARIANCE)
-        left = np.where(is_hidden & (mean.var(axis=0) > q2), shown, left)
+        for axis in np.flatnonzero(is_hidden & (mean.var(axis=0) > q2)):
+            # Holds that read one code (a face, turned on its table) show one place inside a step, once.
+            place = np.unique(np.round(mean[:, axis] / np.sqrt(q2[axis])), return_inverse=True)[1]
+            n = int(place.max()) + 1
+            if n >= FEWEST_PHASES:
+                left[axis] = _mean_bias(np.bincount(place, by_hold[:, axis]) / np.bincount(place))
     left = left * q2
     out: FloatArray = np.where(channels.quantum > 0.0, left, 0.0)
     return out

@@ -1,6 +1,7 @@
 """Accelerometer triad from still poses: method 1 (faces of the case) and method 2 (norm of gravity, any pose)."""
 
+from trihedron.estimate.accelerometer.face_placements import shared_rounding
 from trihedron.estimate.accelerometer.faces import calibrate_faces
 from trihedron.estimate.accelerometer.norm import calibrate_norm, calibrate_norm_samples
 
-__all__ = ["calibrate_faces", "calibrate_norm", "calibrate_norm_samples"]
+__all__ = ["calibrate_faces", "calibrate_norm", "calibrate_norm_samples", "shared_rounding"]

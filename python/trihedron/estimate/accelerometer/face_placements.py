@@ -10,6 +10,8 @@ import numpy.typing as npt
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.accelerometer import face_poses, verdict
+from trihedron.estimate.gyroscope.rounding import undithered_axes
+from trihedron.records.segments import Segments
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +28,24 @@ class Placements:
     scatter: float | None
 
 
-def placements(values: FloatArray, noise: FloatArray, faces: IntArray) -> Placements:
+def shared_rounding(segments: Segments, step: FloatArray) -> FloatArray | None:
+    """Variance (3,) [raw²] of hold means that readings at one place inside a converter's step share.
+
+    Where noise does not dither the ``step`` (3,), what the best of the means keeps is the rounding.
+    """
+    sigma, sigma_mean = segments.accelerometer_sigma, segments.accelerometer_sigma_mean
+    if sigma is None or sigma_mean is None:
+        return None
+    white = np.sqrt(np.maximum(sigma**2 - step**2 / 12.0, 0.0))
+    out: FloatArray = np.where(undithered_axes(step, white), np.min(sigma_mean, axis=0) ** 2, 0.0)
+    return out
+
+
+def placements(values: FloatArray, noise: FloatArray, faces: IntArray, shared: FloatArray | None = None) -> Placements:
     """Merge the holds of every placement.
+
+    ``shared`` (3,) raw² is the part of the noise that equal readings share (rounding): an axis that is up reads alike
+    at every heading, one that lies level at every return to a heading.
 
     Taken as independent they would seem to show, by agreeing with each other, that nothing is tilted. What they scatter
     beyond noise is a tilt that turns with the case, and goes into the error of their mean; a heading that the case came
@@ -48,20 +66,25 @@ def placements(values: FloatArray, noise: FloatArray, faces: IntArray) -> Placem
         of_heading = np.array([values[a:b][heading == k].mean(axis=0) for k in range(n)])
         count = np.bincount(heading, minlength=n)[heading]
         means.append(of_heading.mean(axis=0))
-        errors.append(np.sum(noise[a:b] / (count[:, None, None] * n) ** 2, axis=0))
+        share = count[:, None, None] * n
+        error = np.sum(noise[a:b] / share**2, axis=0)
+        if shared is not None:
+            once = np.where(across, shared / n, shared)
+            error += np.diag(once) - np.sum(np.diag(shared) / share**2, axis=0)
+        errors.append(error)
         squares += float(np.sum((of_heading - means[-1])[:, across] ** 2))
         n_headings.append(n)
-    merged, error = np.array(means), np.array(errors)
+    merged, widened = np.array(means), np.array(errors)
     freedom = 2.0 * n_within
     expected = float(np.mean(np.einsum("nii->n", noise))) / 3.0
     limit = expected * float(probability.chdtri(freedom, verdict.SIGNIFICANCE)) if freedom else np.inf
     apart = 2.0 * float(np.sum(np.array(n_headings) - 1))
     if within <= limit or apart == 0.0:
-        return Placements(merged, error, faces[start], None)
+        return Placements(merged, widened, faces[start], None)
     scatter = squares / apart
     level_parts = level[start][:, :, None] * np.eye(3)
-    error = error + level_parts * (scatter / np.array(n_headings))[:, None, None]
-    return Placements(merged, error, faces[start], scatter)
+    widened = widened + level_parts * (scatter / np.array(n_headings))[:, None, None]
+    return Placements(merged, widened, faces[start], scatter)
 
 
 def _headings(values: FloatArray, noise: FloatArray) -> npt.NDArray[np.intp]:

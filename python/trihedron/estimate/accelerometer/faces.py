@@ -46,6 +46,7 @@ def calibrate_faces(
     raw_unit: AccelerationUnit | str = AccelerationUnit.COUNTS,
     method: Literal["least-squares", "closed-form"] = "least-squares",
     frame: Frame = "case",
+    shared: FloatArray | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Accelerometer triad from poses with one axis of the case along the vertical.
 
@@ -70,9 +71,11 @@ def calibrate_faces(
     raw_unit : AccelerationUnit
         Unit of ``means``.
     method : "least-squares" or "closed-form"
-        The closed form weighs the six faces equally.
+        The latter weighs the six faces equally.
     frame : "case", "lower" or "symmetric"
-        Frame of the answer; the others than ``case`` by exact conversion.
+        Of the answer.
+    shared : (3,), optional
+        Part of the means' variance, raw², that equal readings share (rounding).
 
     Raises
     ------
@@ -80,8 +83,7 @@ def calibrate_faces(
         When arrays do not fit or faces are missing; names them.
     """
     values, noise = inputs.pose_means(means, sigma_means)
-    g = inputs.gravity(gravity_m_s2)
-    unit = AccelerationUnit(raw_unit)
+    g, unit = inputs.gravity(gravity_m_s2), AccelerationUnit(raw_unit)
     if method not in ("least-squares", "closed-form"):
         raise RefusedError(f"method must be 'least-squares' or 'closed-form', got {method!r}")
     if len(values) == 0:
@@ -90,9 +92,8 @@ def calibrate_faces(
     used = np.flatnonzero(faces)
     closed = method == "closed-form"
     face_poses.check_sufficient(faces[used], all_six=closed)
-    estimate = _estimate_placements(values[used], noise[used], faces[used], g, closed=closed)
+    estimate = _estimate_placements(values[used], noise[used], faces[used], g, shared, closed=closed)
     S, b = other_form(estimate.S_a, estimate.b_a)
-    jacobian = other_form_jacobian(estimate.S_a, estimate.b_a)
     quality, apart = _quality(values, noise, faces, g, estimate, closed=closed)
     findings = [
         *_left_out(faces, values),
@@ -102,7 +103,7 @@ def calibrate_faces(
     ]
     observability = _observability(noise[used], faces[used], estimate, g)
     change = reframing(S, b, frame)
-    jacobian = change.jacobian @ jacobian
+    jacobian = change.jacobian @ other_form_jacobian(estimate.S_a, estimate.b_a)
     sensor = SensorCalibration(
         S=change.rotation @ S,
         b=change.rotation @ b,
@@ -117,10 +118,10 @@ def calibrate_faces(
 
 
 def _estimate_placements(
-    values: FloatArray, noise: FloatArray, faces: IntArray, g: float, *, closed: bool
+    values: FloatArray, noise: FloatArray, faces: IntArray, g: float, shared: FloatArray | None, *, closed: bool
 ) -> _Estimate:
     """Fit with one mean for each time that the case was set down: holds between turns on one face share their tilt."""
-    placed = placements(values, noise, faces)
+    placed = placements(values, noise, faces, shared)
     if len(placed.means) == len(faces):
         return _estimate(values, noise, faces, g, closed=closed)
     estimate = _estimate(placed.means, placed.noise, placed.faces, g, closed=closed)

@@ -11,6 +11,7 @@ import numpy as np
 from trihedron._core import integrate_raw_rate
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import BLOCK_S
+from trihedron.estimate.gyroscope.turn_rounding import HiddenAngles, hidden_angles
 from trihedron.estimate.gyroscope.zeros import pool_zeros
 from trihedron.records.recording import Recording
 from trihedron.refused import RefusedError
@@ -99,7 +100,7 @@ class MeasuredTurns:
     """``raw_angle`` (k, 3) = ∫w' dt and ``duration_s`` (k,) of the turns, the same of the zero turns, and their noise.
 
     ``var_rate`` (3,) is ``N²`` in raw unit² · s; ``zero_spread`` (3,) the variance of the true zero reading between
-    zero turns, ``zero_excess`` (3,) the χ² of its constancy.
+    zero turns, ``zero_excess`` (3,) the χ² of its constancy. ``hidden``: what a coarse converter hides of them.
     """
 
     raw_angle: FloatArray
@@ -110,6 +111,7 @@ class MeasuredTurns:
     zero_spread: FloatArray
     zero_excess: FloatArray
     zero_mean: FloatArray
+    hidden: HiddenAngles | None = None
 
 
 def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[tuple[int, int]]) -> MeasuredTurns:
@@ -150,7 +152,10 @@ def measure_turns(recording: Recording, turns: Sequence[Turn], zeros: Sequence[t
     zero_s = np.array(zero_duration)
     rates = zero_angle / zero_s[:, None]
     _, mean, _, excess, spread = pool_zeros(rates, var_rate / zero_s[:, None])
-    return MeasuredTurns(raw_angle, np.array(duration), zero_angle, zero_s, var_rate, spread, excess, mean)
+    hidden = hidden_angles(
+        gyroscope, step_s, recording.facts.of("gyroscope").step, [(t.start, t.stop) for t in turns], zeros, raw_angle
+    )
+    return MeasuredTurns(raw_angle, np.array(duration), zero_angle, zero_s, var_rate, spread, excess, mean, hidden)
 
 
 AMBIGUOUS = (

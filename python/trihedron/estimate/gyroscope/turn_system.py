@@ -52,11 +52,19 @@ class TurnSystem:
 
     def noise(self) -> FloatArray:
         """(k, 3, 3) of the raw turns from the sensor alone."""
-        return self._noise(self.measured.duration_s)
+        hidden = self.measured.hidden
+        return self._noise(self.measured.duration_s, None if hidden is None else hidden.variance_of_turns())
 
-    def _noise(self, duration_s: FloatArray) -> FloatArray:
+    def noise_of_zeros(self) -> FloatArray:
+        """(z, 3, 3) of the raw zero turns."""
+        hidden = self.measured.hidden
+        return self._noise(self.measured.zero_duration_s, None if hidden is None else hidden.variance_of_zeros())
+
+    def _noise(self, duration_s: FloatArray, rounding: FloatArray | None) -> FloatArray:
         t = duration_s[:, None]
         variance = self.measured.var_rate * t + self.measured.zero_spread * t**2
+        if rounding is not None:
+            variance = variance + rounding
         noise: FloatArray = variance[:, :, None] * np.eye(3)
         return noise
 
@@ -76,7 +84,7 @@ class TurnSystem:
         design = factor @ self.designs(self.angles[used], measured.duration_s[used])
         side = (factor @ measured.raw_angle[used, :, None])[:, :, 0]
         if with_zeros:
-            factor = np.linalg.inv(np.linalg.cholesky(self._noise(measured.zero_duration_s)))
+            factor = np.linalg.inv(np.linalg.cholesky(self.noise_of_zeros()))
             still = self.designs(np.zeros_like(measured.zero_angle), measured.zero_duration_s)
             design = np.concatenate([design, factor @ still])
             side = np.concatenate([side, (factor @ measured.zero_angle[:, :, None])[:, :, 0]])
@@ -88,6 +96,21 @@ class TurnSystem:
         factor = np.linalg.inv(np.linalg.cholesky(self.covariances()[used]))
         moved = factor @ (fit.S_w @ errors[used])
         out: FloatArray = fit.covariance @ matrix.T @ moved.reshape(len(matrix), -1)
+        return out
+
+    def correlation(self, fit: Solution, used: BoolArray) -> FloatArray:
+        """(12, 12) to add to the solution's covariance where rounding errors are shared: weights take none as so."""
+        hidden = self.measured.hidden
+        if hidden is None:
+            return np.zeros((12, 12))
+        matrix, _ = self.whitened(used)
+        factor = np.linalg.inv(np.linalg.cholesky(np.concatenate([self.covariances()[used], self.noise_of_zeros()])))
+        errors = np.concatenate([hidden.turns[used], hidden.zeros])
+        # (n, 12, 3): by what an error of each row pulls the solution.
+        gain = np.einsum("rij,rik->rjk", (matrix @ fit.covariance).reshape(-1, 3, 12), factor)
+        together = np.einsum("rjk,rkm->jm", gain, errors)
+        apart = np.einsum("rjk,rk,rlk->jl", gain, np.sum(errors**2, axis=2), gain)
+        out: FloatArray = together @ together.T - apart
         return out
 
     def residuals(self, fit: Solution) -> FloatArray:
@@ -127,12 +150,16 @@ def solve_zero_first(system: TurnSystem, used: BoolArray) -> Solution:
     The error of ``b_w`` reaches ``S_w`` through every turn at once: ``δS_w = −G δb_w``.
     """
     measured = system.measured
-    var = measured.var_rate / measured.zero_duration_s[:, None] + measured.zero_spread
+    zero_s = measured.zero_duration_s[:, None]
+    var = measured.var_rate / zero_s + measured.zero_spread
     weight = 1.0 / var
     total = weight.sum(axis=0)
-    rates = measured.zero_angle / measured.zero_duration_s[:, None]
+    rates = measured.zero_angle / zero_s
     b_w = (weight * rates).sum(axis=0) / total
     cov_b = np.diag(1.0 / total)
+    if measured.hidden is not None:
+        # What a step hides of the zero is the same in every zero turn.
+        cov_b += np.diag(np.mean(measured.hidden.variance_of_zeros() / zero_s**2, axis=0))
     chi2 = float(np.sum(weight * (rates - b_w) ** 2))
     matrix, side = system.whitened(used, with_zeros=False)
     to_scale, to_bias = matrix[:, :9], matrix[:, 9:]

@@ -129,11 +129,11 @@ def calibrate_turns(
     fit = solve_zero_first(system, used) if route == "zero-turn-first" else solve(system, used)
     S, b = other_form(fit.S_w, fit.b_w)
     inflation = _inflation(fit)
-    pull = None if shared_errors is None else system.pull(fit, used, shared_errors)
+    shared = _of_shared_errors(system, fit, used, route, shared_errors)
     calibration = SensorCalibration(
         S=S,
         b=b,
-        covariance=_covariance(fit, inflation, pull),
+        covariance=_covariance(fit, inflation, shared),
         raw_unit=recording.gyroscope_unit.value,
         si_unit="rad/s",
         method="turns" if route == "least-squares" else "turns, zero turn first",
@@ -146,13 +146,25 @@ def calibrate_turns(
     )
 
 
-def _covariance(fit: Solution, inflation: float, pull: FloatArray | None) -> FloatArray:
-    """(12, 12) of the direct form, errors that all turns share added."""
+def _of_shared_errors(
+    system: TurnSystem,
+    fit: Solution,
+    used: npt.NDArray[np.bool_],
+    route: Route,
+    shared_errors: FloatArray | None,
+) -> FloatArray:
+    """(12, 12) that errors which turns share add to the covariance of the inverse form."""
+    added = np.zeros((12, 12)) if route == "zero-turn-first" else system.correlation(fit, used)
+    if shared_errors is not None:
+        pull = system.pull(fit, used, shared_errors)
+        added = added + pull @ pull.T
+    return added
+
+
+def _covariance(fit: Solution, inflation: float, added: FloatArray) -> FloatArray:
+    """(12, 12) of the direct form."""
     jacobian = other_form_jacobian(fit.S_w, fit.b_w)
-    inverse = inflation * fit.covariance
-    if pull is not None:
-        inverse = inverse + pull @ pull.T
-    covariance: FloatArray = jacobian @ inverse @ jacobian.T
+    covariance: FloatArray = jacobian @ (inflation * fit.covariance + added) @ jacobian.T
     return 0.5 * (covariance + covariance.T)
 
 
