@@ -256,7 +256,7 @@ def _sway(attitude: FloatArray, runs: list[Run]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class EdgeNoise:
-    """What an end of a hold is compared by: the ``law`` (3, c) of a mean's noise, its ``variance`` (k, c) for stretches of
+    """What an end of a hold is compared by: the ``law`` (3, c) of a mean's noise, its ``variance`` (k, c) over
     ``EDGE_BLOCKS``, and the ``limit`` of χ² of the channels that are ``live`` (c,)."""
 
     law: FloatArray
