@@ -259,6 +259,8 @@ def block_differences(
 # joints of a motion, and the law of its noise
 def motion_joints(
     readings: FloatArray,
+    noise: FloatArray,
+    moves: npt.NDArray[np.int64],
     contrasts: FloatArray,
     *,
     nearby: int,
