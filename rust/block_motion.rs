@@ -38,6 +38,86 @@ pub fn first_clean(
     })
 }
 
+/// What the ends of a hold are compared by; one number a channel, or a row a channel wide.
+#[derive(Debug, Clone, Copy)]
+pub struct Edges<'a> {
+    /// Variance of a mean over T seconds is `white / T + flicker + walk T / 3`: three rows.
+    pub law: &'a [f64],
+    /// Variance of rounding to the converter's step.
+    pub rounding: &'a [f64],
+    /// Seconds in a block.
+    pub step_s: f64,
+    /// Variance of the mean of 1, 2, 4 ... blocks: a row each.
+    pub variances: &'a [f64],
+    /// Channels that show noise.
+    pub is_live: &'a [bool],
+    /// Of the squares of a stretch's distances over their variances.
+    pub limit: f64,
+}
+
+/// Blocks to take off both ends of a hold until no stretch at an end departs from its middle half; at most a third each.
+///
+/// `rows` are its blocks, `bumps` ranges of them that are left out. Nothing is taken off where hardly a middle is left:
+/// such a hold creeps throughout, which is said instead.
+#[must_use]
+pub fn ends_to_trim(rows: &[f64], bumps: &[[usize; 2]], edges: &Edges) -> (usize, usize) {
+    let channels = edges.rounding.len().max(1);
+    let n = rows.len() / channels;
+    let is_good = |i: usize| {
+        !bumps
+            .iter()
+            .any(|&[first, last]| (first..last).contains(&i))
+    };
+    let good: Vec<usize> = (0..n).filter(|&i| is_good(i)).collect();
+    let middle = n / 4..n - n / 4;
+    let mut core: Vec<usize> = good
+        .iter()
+        .copied()
+        .filter(|i| middle.contains(i))
+        .collect();
+    if core.len() < 2 {
+        core.clone_from(&good);
+    }
+    let mut level = vec![0.0; channels];
+    for &i in &core {
+        for (level, value) in level.iter_mut().zip(&rows[i * channels..]) {
+            *level += value;
+        }
+    }
+    let mut off = vec![0.0; n * channels];
+    for &i in &good {
+        for c in 0..channels {
+            off[i * channels + c] = rows[i * channels + c] - level[c] / core.len() as f64;
+        }
+    }
+    let most = n / 3;
+    let sizes: Vec<usize> = (0..edges.variances.len() / channels)
+        .map(|k| 1 << k)
+        .take_while(|&size| size <= most)
+        .collect();
+    let (white, slow) = edges.law.split_at(channels);
+    let (flicker, walk) = slow.split_at(channels);
+    let duration_s = core.len() as f64 * edges.step_s;
+    let of_core = |c: usize| white[c] / duration_s + flicker[c] + walk[c] * duration_s / 3.0;
+    let known = |(at, &variance): (usize, &f64)| match at % channels {
+        c if edges.is_live[c] => variance + of_core(c) + edges.rounding[c],
+        _ => 0.0,
+    };
+    let variances = &edges.variances[..sizes.len() * channels];
+    let variances: Vec<f64> = variances.iter().enumerate().map(known).collect();
+    let clean = |off: &[f64]| {
+        // A soft beginning goes on below what can be seen: as much again is given away; and one block, which may be
+        // the one the motion begins in.
+        first_clean(off, channels, most, &sizes, &variances, edges.limit)
+            .map_or(most, |clean| (2 * clean + 1).min(most))
+    };
+    let backward: Vec<f64> = off.rchunks(channels).flatten().copied().collect();
+    match (clean(&off), clean(&backward)) {
+        (start, tail) if start + tail > n / 2 => (0, 0),
+        ends => ends,
+    }
+}
+
 /// Sums of the squared output of a filter of five taps over ranges of rows, two less at either end; missing readings
 /// count as zero.
 #[must_use]

@@ -34,6 +34,31 @@ pub fn means_by_owner(
     ((0..n).map(mean).collect(), count)
 }
 
+/// `(n, channels)` means by owner of rows of `channels` numbers; those that are no numbers are passed over one by one.
+/// NaN where none is left.
+#[must_use]
+pub fn column_means(
+    rows: &[f64],
+    channels: usize,
+    ranges: &[[usize; 2]],
+    owner: &[usize],
+    n: usize,
+) -> Vec<f64> {
+    let (mut sum, mut count) = (vec![0.0; n * channels], vec![0_usize; n * channels]);
+    for (&[start, stop], &k) in ranges.iter().zip(owner) {
+        let own = k * channels..(k + 1) * channels;
+        for row in rows[start * channels..stop * channels].chunks_exact(channels) {
+            let cells = sum[own.clone()].iter_mut().zip(&mut count[own.clone()]);
+            for ((sum, count), value) in cells.zip(row).filter(|(_, value)| !value.is_nan()) {
+                *sum += value;
+                *count += 1;
+            }
+        }
+    }
+    let mean = |(sum, count): (f64, usize)| sum / count as f64;
+    sum.into_iter().zip(count).map(mean).collect()
+}
+
 /// `Σ ½ (difference of neighbouring block means)² · rows in a block`, and the number of differences: blocks of `length`
 /// rows that are numbers, or of a quarter of the rows of an owner that has fewer than four of those. Ranges of one owner
 /// stand side by side and are read as one.

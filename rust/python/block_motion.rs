@@ -1,14 +1,16 @@
 //! Motion in the means of blocks across the seam.
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{as_rows, flat3};
-use crate::block_motion::{self, UNKNOWNS, Windows};
+use super::arrays::{as_rows, flat1, flat2, flat3};
+use crate::block_motion::{self, Edges, UNKNOWNS, Windows};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(first_clean, module)?)?;
+    module.add_function(wrap_pyfunction!(ends_to_trim, module)?)?;
     module.add_function(wrap_pyfunction!(band_power, module)?)?;
     module.add_function(wrap_pyfunction!(share_of_gyroscope, module)?)
 }
@@ -17,28 +19,46 @@ fn wrong(what: &str) -> PyErr {
     PyValueError::new_err(what.to_owned())
 }
 
-/// First of `most + 1` rows of `off` `(n, c)` from which no stretch of `sizes` `(k,)` departs by its `variances` `(k, c)`.
+/// Blocks to take off both ends of a hold of `rows` `(n, c)` without `bumps`: by the `law` `(3, c)` of a mean's noise, the
+/// variance of `rounding` `(c,)`, blocks of `step_s`, `variances` `(k, c)` of the means of 1, 2, 4 ... blocks, and the
+/// `limit` of the channels `is_live` `(c,)`.
 #[pyfunction]
-fn first_clean(
+#[expect(
+    clippy::too_many_arguments,
+    reason = "what ends are compared by, by name"
+)]
+fn ends_to_trim(
     py: Python<'_>,
-    off: PyReadonlyArray2<'_, f64>,
-    most: usize,
-    sizes: Vec<usize>,
+    rows: PyReadonlyArray2<'_, f64>,
+    bumps: Vec<[usize; 2]>,
+    law: PyReadonlyArray2<'_, f64>,
+    rounding: PyReadonlyArray1<'_, f64>,
+    step_s: f64,
     variances: PyReadonlyArray2<'_, f64>,
+    is_live: PyReadonlyArray1<'_, bool>,
     limit: f64,
-) -> PyResult<Option<usize>> {
-    let channels = off.shape()[1];
-    if channels == 0 || variances.shape() != [sizes.len(), channels] || most > off.shape()[0] {
-        return Err(wrong(
-            "off (n, c) and variances (k, c) of k sizes do not fit",
-        ));
+) -> PyResult<(usize, usize)> {
+    let channels = rows.shape()[1];
+    let fits = channels > 0
+        && law.shape() == [3, channels]
+        && variances.shape()[1] == channels
+        && rounding.len() == channels
+        && is_live.len() == channels;
+    if !fits {
+        return Err(wrong("rows (n, c) and their noise (c,) do not fit"));
     }
-    let off: Vec<f64> = off.as_array().iter().copied().collect();
-    let variances: Vec<f64> = variances.as_array().iter().copied().collect();
+    let (rows, law, variances) = (flat2(&rows), flat2(&law), flat2(&variances));
+    let (rounding, is_live) = (flat1(&rounding), flat1(&is_live));
     super::run(py, || {
-        Ok(block_motion::first_clean(
-            &off, channels, most, &sizes, &variances, limit,
-        ))
+        let edges = Edges {
+            law: &law,
+            rounding: &rounding,
+            step_s,
+            variances: &variances,
+            is_live: &is_live,
+            limit,
+        };
+        Ok(block_motion::ends_to_trim(&rows, &bumps, &edges))
     })
 }
 

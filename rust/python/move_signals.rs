@@ -6,13 +6,14 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{as_rows, flat1, flat3};
-use crate::move_signals;
+use super::arrays::{as_rows, as_vectors, flat1, flat3, matrix3, of3, vector3};
+use crate::{move_moments as kernel, move_signals};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(play, module)?)?;
     module.add_function(wrap_pyfunction!(move_derivative, module)?)?;
     module.add_function(wrap_pyfunction!(move_shifted, module)?)?;
+    module.add_function(wrap_pyfunction!(move_moments, module)?)?;
     Ok(())
 }
 
@@ -112,4 +113,50 @@ fn move_shifted<'py>(
         ))
     })?;
     out.as_flattened().to_pyarray(py).reshape([n, 3])
+}
+
+/// `∫ (S a + b) (w - zero)ᵀ dt` `(3, 3)` of readings `a` and rates `w` `(n, 3)` over each of the moves `(m, 2)`, with a
+/// `zero` `(m, 3)` each; nothing where fewer than two rows of a move are numbers.
+#[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "two sensors and their moves by name"
+)]
+fn move_moments<'py>(
+    py: Python<'py>,
+    time_s: PyReadonlyArray1<'py, f64>,
+    reading: PyReadonlyArray2<'py, f64>,
+    direct_s: PyReadonlyArray2<'py, f64>,
+    direct_b: PyReadonlyArray1<'py, f64>,
+    rate: PyReadonlyArray2<'py, f64>,
+    moves: PyReadonlyArray2<'py, i64>,
+    zero: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Vec<Option<Array2<'py>>>> {
+    let n = time_s.len();
+    if reading.shape()[0] != n || rate.shape()[0] != n || zero.shape()[0] != moves.shape()[0] {
+        return Err(PyValueError::new_err(
+            "readings and rates (n, 3) belong to times (n,), and a zero to every move",
+        ));
+    }
+    let moves = edges(&moves, n)?;
+    let (time, reading, rate) = (
+        flat1(&time_s),
+        flat3("reading", &reading)?,
+        flat3("rate", &rate)?,
+    );
+    let zero = flat3("zero", &zero)?;
+    let (scale, bias) = (matrix3("S", &direct_s)?, vector3("b", &direct_b)?);
+    let found = super::run(py, || {
+        let (reading, rate) = (as_vectors(&reading), as_vectors(&rate));
+        Ok(kernel::moments(
+            &time,
+            reading,
+            (&scale, &bias),
+            rate,
+            &moves,
+            as_vectors(&zero),
+        ))
+    })?;
+    let array = |moment: &Option<_>| moment.as_ref().map(|one| of3(py, one)).transpose();
+    found.iter().map(array).collect()
 }

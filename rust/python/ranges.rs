@@ -4,11 +4,12 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArr
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::arrays::{as_rows, flat1, flat3, rows};
+use super::arrays::{as_rows, flat1, flat2, flat3, rows};
 use crate::ranges;
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(means_by_owner, module)?)?;
+    module.add_function(wrap_pyfunction!(column_means, module)?)?;
     module.add_function(wrap_pyfunction!(block_differences, module)?)
 }
 
@@ -84,6 +85,28 @@ fn means_by_owner<'py>(
         rows(py, means.as_flattened(), 3)?,
         PyArray1::from_vec(py, counts),
     ))
+}
+
+/// `(n, c)` means of values `(m, c)` over ranges `(k, 2)` by `owner` `(k,)`; what is no number is passed over.
+#[pyfunction]
+fn column_means<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray2<'py, f64>,
+    ranges: PyReadonlyArray2<'py, i64>,
+    owner: PyReadonlyArray1<'py, i64>,
+    n: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let channels = values.shape()[1];
+    if channels == 0 {
+        return Err(PyValueError::new_err("values (m, c) need a column"));
+    }
+    let ranges = ranges_within(&ranges, values.shape()[0])?;
+    let owner = owners(&owner, ranges.len(), n)?;
+    let flat = flat2(&values);
+    let means = super::run(py, || {
+        Ok(ranges::column_means(&flat, channels, &ranges, &owner, n))
+    })?;
+    rows(py, &means, channels)
 }
 
 /// `(3,)` sums over blocks of `length` rows, and how many differences there were.

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron import probability
-from trihedron.arrays import BoolArray
-from trihedron.ranges import ranges_of
+from trihedron.arrays import BoolArray, FloatArray
+from trihedron.ranges import Range, ranges_of
 from trihedron.records import Finding, FindingCode, Hold, Recording
 from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.range_ends import RangeEnd, is_cut
-from trihedron.segment.runs import MIN_HOLD_S, Run
+from trihedron.segment.runs import MIN_HOLD_S, Run, means_of
 
 CREEP_CHANCE = 1e-3
 """Chance that some steady hold of a log is called creeping though none is."""
@@ -30,13 +30,8 @@ def judge_runs(
 ) -> list[Finding]:
     """Creep, bumps and unsteadiness of single holds, each named by its number and time."""
     found: list[Finding] = []
-    creeping: list[tuple[float, int]] = []
-    for k, run in enumerate(runs):
-        if run.is_unsteady:
-            continue
-        size = _creep_size(channels, run, noise, CREEP_CHANCE / max(len(runs), 1))
-        if size > 0.0:
-            creeping.append((size, k))
+    sizes = _creep_sizes(channels, runs, noise, CREEP_CHANCE / max(len(runs), 1))
+    creeping = [(size, k) for k, size in enumerate(sizes.tolist()) if size > 0.0]
     if creeping:
         worst, k = max(creeping)
         found.append(
@@ -77,18 +72,44 @@ def judge_runs(
     return found
 
 
-def _creep_size(channels: Channels, run: Run, noise: MeanNoise, chance: float) -> float:
-    """Distance of the two halves in standard errors where it is more than chance allows, else 0."""
-    blocks = run.quiet_rows(channels.mean)
-    half = len(blocks) // 2
-    if half < 2:
-        return 0.0
-    difference = blocks[-half:].mean(axis=0) - blocks[:half].mean(axis=0)
-    variance = 2.0 * noise.variance(half * channels.step_s) + channels.quantisation_variance / channels.length
+def _creep_sizes(channels: Channels, runs: list[Run], noise: MeanNoise, chance: float) -> FloatArray:
+    """(h,) distance of the halves of steady runs in standard errors where it is more than chance allows, else 0."""
+    sizes = np.zeros(len(runs))
+    judged = [k for k, run in enumerate(runs) if not run.is_unsteady and len(_halves(run)[0]) > 0]
+    if not judged:
+        return sizes
+    halves = [_halves(runs[k]) for k in judged]
+    n = np.array([sum(b - a for a, b in first) for first, _ in halves])
+    means = means_of(channels.mean, [half for both in halves for half in both])
+    difference = means[1::2] - means[::2]
+    variance = 2.0 * noise.variance(n[:, None] * channels.step_s) + channels.quantisation_variance / channels.length
     live = variance > 0.0
-    statistic = float(np.sum(difference[live] ** 2 / variance[live]))
-    freedom = int(live.sum())
-    return float(np.sqrt(statistic)) if freedom and statistic > float(probability.chdtri(freedom, chance)) else 0.0
+    statistic = np.sum(np.where(live, difference**2, 0.0) / np.where(live, variance, 1.0), axis=1)
+    limit = {freedom: probability.chdtri(freedom, chance) for freedom in set(live.sum(axis=1).tolist()) if freedom}
+    is_beyond = statistic > np.array([limit.get(freedom, np.inf) for freedom in live.sum(axis=1).tolist()])
+    sizes[judged] = np.where(is_beyond, np.sqrt(statistic), 0.0)
+    return sizes
+
+
+def _halves(run: Run) -> tuple[list[Range], list[Range]]:
+    """Ranges of the first and of the last half of a run's quiet blocks; none of halves of a single block."""
+    ranges = run.quiet_ranges()
+    half = sum(b - a for a, b in ranges) // 2
+    if half < 2:
+        return [], []
+    first, left = [], half
+    for a, b in ranges:
+        first.append((a, min(b, a + left)))
+        left -= first[-1][1] - a
+        if not left:
+            break
+    last, left = [], half
+    for a, b in reversed(ranges):
+        last.append((max(a, b - left), b))
+        left -= b - last[-1][0]
+        if not left:
+            break
+    return first, last[::-1]
 
 
 def without_cut(

@@ -10,9 +10,9 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray, IntArray
 from trihedron.records import Hold, Recording
-from trihedron.segment.channels import Channels, mean_present
+from trihedron.segment.channels import Channels
 from trihedron.segment.noise import MeanNoise, split_by_halves
-from trihedron.segment.runs import Run
+from trihedron.segment.runs import Run, means_of
 from trihedron.segment.vertical import along, noise_along, upright
 from trihedron.units import acceleration_to_si
 
@@ -192,15 +192,16 @@ def rounding_bias_variance(channels: Channels, runs: list[Run]) -> FloatArray:
     """
     if not runs:
         return np.zeros(channels.mean.shape[1])
-    own = [run.quiet_rows(channels.variance) for run in runs]
-    mean = np.array([run.quiet_rows(channels.mean).mean(axis=0) for run in runs])
+    parts = [run.quiet_ranges() for run in runs]
+    mean = means_of(channels.mean, parts)
+    pooled = means_of(channels.variance, [[r for part in parts for r in part]])[0]
     q2 = np.where(channels.quantum > 0.0, channels.quantum**2, 1.0)
-    noise = np.maximum(np.nanmean(np.vstack(own), axis=0) - channels.quantisation_variance, 0.0)
+    noise = np.maximum(pooled - channels.quantisation_variance, 0.0)
     # Readings that only toggle between two neighbours (variance up to q²/4) do not show how large the noise is.
     is_hidden = noise < q2 / 4.0
     left = np.interp(np.sqrt(np.where(is_hidden, 0.0, noise) / q2), NOISE_TRIED, BIAS_VARIANCE)
     if len(runs) >= FEWEST_PHASES:
-        by_hold = np.array([mean_present(rows) for rows in own]) / q2
+        by_hold = means_of(channels.variance, parts) / q2
         for axis in np.flatnonzero(is_hidden & (mean.var(axis=0) > q2)):
             # Holds that read one code (a face, turned on its table) show one place inside a step, once.
             place = np.unique(np.round(mean[:, axis] / np.sqrt(q2[axis])), return_inverse=True)[1]

@@ -128,10 +128,10 @@ def _find_runs(recording: Recording, channels: Channels, quiet: BoolArray, loose
     noise = pool_mean_noise(channels, core, is_robust=True)
     edges = EdgeNoise.of(channels, noise)
     joined = join_quiet(channels, quiet, loose, noise)
-    steady = [trim_edges(channels, run, noise, edges) for run in long_enough(channels, joined, MIN_HOLD_S)]
+    steady = [trim_edges(channels, run, edges) for run in long_enough(channels, joined, MIN_HOLD_S)]
     unsteady = find_unsteady(channels, loose, steady, _gravity_reading(recording, channels))
     other = set_down(channels, joined, loose, [*steady, *unsteady])
-    short = [trim_edges(channels, run, noise, edges) for run in other]
+    short = [trim_edges(channels, run, edges) for run in other]
     return sorted([*steady, *unsteady, *short], key=lambda run: run.first)
 
 

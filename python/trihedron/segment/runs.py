@@ -149,8 +149,8 @@ def set_down(channels: Channels, runs: list[Run], loose: BoolArray, taken: list[
         if run.last - run.first < FAR_SHORTER * usual:
             continue
         first, last = grown(loose, (run.first, run.last))
-        is_free = all(other.outer_last <= first or other.outer_first >= last for other in taken)
-        if is_free and first > 0 and last < len(loose) and max(run.first - first, last - run.last) <= most:
+        is_short = first > 0 and last < len(loose) and max(run.first - first, last - run.last) <= most
+        if is_short and all(other.outer_last <= first or other.outer_first >= last for other in taken):
             found.append(run)
     return found
 
@@ -192,6 +192,13 @@ def run_mean(channels: Channels, run: Run) -> tuple[FloatArray, int]:
     """(c,) mean reading of the quiet blocks of a run, and how many they are."""
     blocks = run.quiet_rows(channels.mean)
     return blocks.mean(axis=0), len(blocks)
+
+
+def means_of(values: FloatArray, parts: list[list[Range]]) -> FloatArray:
+    """(h, c) means of one row a block ``values`` (m, c) over the ranges of each part (h,), missing ones passed over."""
+    ranges = np.array([r for part in parts for r in part], dtype=np.int64).reshape(-1, 2)
+    owner = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    return _core.column_means(values, ranges, owner, len(parts))
 
 
 def find_unsteady(channels: Channels, loose: BoolArray, steady: list[Run], gravity: float | None) -> list[Run]:
@@ -249,9 +256,10 @@ def _sway(attitude: FloatArray, runs: list[Run]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class EdgeNoise:
-    """What an end of a hold is compared by: ``variance`` (k, c) of the mean of 1, 2, 4 ... blocks, and the ``limit`` of
-    χ² of the channels that are ``live`` (c,)."""
+    """What an end of a hold is compared by: the ``law`` (3, c) of a mean's noise, its ``variance`` (k, c) over
+    ``EDGE_BLOCKS``, and the ``limit`` of χ² of the channels that are ``live`` (c,)."""
 
+    law: FloatArray
     variance: FloatArray
     live: BoolArray
     limit: float
@@ -262,43 +270,26 @@ class EdgeNoise:
         live = np.asarray(noise.variance(1.0) > 0.0)
         duration_s = np.array(EDGE_BLOCKS, dtype=np.float64)[:, None] * channels.step_s
         limit = float(probability.chdtri(int(live.sum()), CLEAN_EDGE))
-        return cls(noise.variance(duration_s), live, limit)
+        return cls(np.array([noise.white, noise.flicker, noise.walk]), noise.variance(duration_s), live, limit)
 
 
-def trim_edges(channels: Channels, run: Run, noise: MeanNoise, edges: EdgeNoise) -> Run:
+def trim_edges(channels: Channels, run: Run, edges: EdgeNoise) -> Run:
     """Take blocks off both ends until no stretch at an end departs from the middle of the hold.
 
     Stretches of 1, 2, 4 ... blocks at each end are compared with the central half; at most a third is taken off.
     """
     n = run.last - run.first
-    centre = np.zeros(n, dtype=bool)
-    centre[n // 4 : n - n // 4] = True
-    good = np.ones(n, dtype=bool)
-    for a, b in run.bumps:
-        good[a - run.first : b - run.first] = False
-    core = centre & good
-    if core.sum() < 2:
-        core = good
-    mean = channels.mean[run.first : run.last]
-    level = mean[core].mean(axis=0)
-    off = np.where(good[:, None], mean - level, 0.0)
-    core_variance = noise.variance(core.sum() * channels.step_s)
-    most = n // 3
-    sizes = [size for size in EDGE_BLOCKS if size <= most]
-    known = edges.variance[: len(sizes)] + core_variance + channels.quantisation_variance
-    variance = np.where(edges.live, known, 0.0)
-    start, tail = (_clean_from(side, most, sizes, variance, edges.limit) for side in (off, off[::-1]))
-    if start + tail > n // 2:
-        # Hardly a middle is left: the hold creeps throughout, which is said instead of trimmed.
-        start = tail = 0
+    start, tail = _core.ends_to_trim(
+        channels.mean[run.first : run.last],
+        [(a - run.first, b - run.first) for a, b in run.bumps],
+        edges.law,
+        channels.quantisation_variance,
+        channels.step_s,
+        edges.variance,
+        edges.live,
+        edges.limit,
+    )
     stop = n - tail
     bumps = tuple((a, b) for a, b in run.bumps if b > run.first + start and a < run.first + stop)
     bumps = tuple((max(a, run.first + start), min(b, run.first + stop)) for a, b in bumps)
     return replace(run, first=run.first + start, last=run.first + stop, bumps=bumps, trimmed=(start, n - stop))
-
-
-def _clean_from(off: FloatArray, most: int, sizes: list[int], variance: FloatArray, limit: float) -> int:
-    clean = _core.first_clean(off, most, sizes, variance, limit)
-    # A soft beginning goes on below what can be seen: as much again is given away; and one block, which may be the
-    # one the motion begins in.
-    return most if clean is None else min(2 * clean + 1, most)

@@ -125,7 +125,7 @@ def _poses(channels: Channels, seen: _Seen, calm: BoolArray, taken: list[Run], s
         if any(_is_one_pose(channels, seen.attitude, run, near) for near in [*taken, *found]):
             continue
         noise = _own_noise(channels, run, seen.steady)
-        run = trim_edges(channels, run, noise, EdgeNoise.of(channels, noise))
+        run = trim_edges(channels, run, EdgeNoise.of(channels, noise))
         if run.last - run.first >= WINDOW_BLOCKS:
             found.append(run)
     return found

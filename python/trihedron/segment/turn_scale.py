@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.quantiles import quantile
 from trihedron.ranges import Range
 from trihedron.records import Recording
 from trihedron.segment.channels import Channels
@@ -14,8 +14,8 @@ from trihedron.units import rate_to_si
 
 LEAST_TURN_RAD = 0.3
 """Gravity must turn by this much between two stretches to weigh the gyro's path against it."""
-USUAL = 80.0
-"""Percentile over the moves of gravity's turn over the gyro's path: near one where a move is direct and about a level
+USUAL = 0.8
+"""Quantile over the moves of gravity's turn over the gyro's path: near one where a move is direct and about a level
 axis, less for all others."""
 
 
@@ -32,22 +32,22 @@ def radians_per_reading(
     gyro = channels.is_gyroscope
     if not gyro.any() or gyro.all():
         return None
-    ratios = []
-    for (a, b), (c, d) in pairwise(ranges):
-        before, after = channels.mean[b - 1], channels.mean[c]
-        f, g = before[~gyro] - centre, after[~gyro] - centre
-        size = float(np.linalg.norm(f) * np.linalg.norm(g))
-        if size == 0.0:
-            continue
-        angle = float(np.arccos(np.clip(f @ g / size, -1.0, 1.0)))
-        if angle < LEAST_TURN_RAD:
-            continue
-        zero = 0.5 * (channels.mean[a:b][:, gyro].mean(axis=0) + channels.mean[c:d][:, gyro].mean(axis=0))
-        rate = channels.mean[b:c][channels.is_valid[b:c]][:, gyro] - zero
-        path = float(np.linalg.norm(rate, axis=1).sum()) * channels.step_s
-        if path > 0.0:
-            ratios.append(angle / path)
-    return float(np.percentile(ratios, USUAL)) if ratios else None
+    edges = np.array(ranges, dtype=np.int64).reshape(-1, 2)
+    zeros = _core.column_means(channels.mean, edges, np.arange(len(edges)), len(edges))[:, gyro]
+    force = channels.mean[:, ~gyro] - centre
+    before, after = force[edges[:-1, 1] - 1], force[edges[1:, 0]]
+    size = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    cosine = np.sum(before * after, axis=1) / np.where(size > 0.0, size, 1.0)
+    angle = np.where(size > 0.0, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
+    # Of every block between two stretches: which two, and how fast the gyro turned.
+    length = edges[1:, 0] - edges[:-1, 1]
+    move = np.repeat(np.arange(len(length)), length)
+    block = np.arange(len(move)) + (edges[1:, 0] - np.cumsum(length))[move]
+    zero = 0.5 * (zeros[:-1] + zeros[1:])
+    rate = np.linalg.norm(channels.mean[block][:, gyro] - zero[move], axis=1)
+    path = np.bincount(move, np.where(channels.is_valid[block], rate, 0.0), len(angle)) * channels.step_s
+    told = (angle >= LEAST_TURN_RAD) & (path > 0.0)
+    return quantile(angle[told] / path[told], USUAL) if told.any() else None
 
 
 def centre_of(recording_is_counts: bool, channels: Channels, quiet: BoolArray) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.estimate.attitude import integrate_rate
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
@@ -32,21 +33,21 @@ def integral_start(
     """
     if recording.accelerometer is None:
         return None
-    rows, sides = [], []
-    force = accelerometer.S @ measured.reading.T + accelerometer.b[:, None]
-    for (start, stop), (before, after), clipped in zip(measured.edges, measured.links, measured.is_lost, strict=True):
-        time = recording.time_s[start:stop]
-        rate = measured.rate[start:stop] - 0.5 * (measured.zero[before] + measured.zero[after])
-        inside = recording.accelerometer[start:stop] @ accelerometer.S.T + accelerometer.b
-        if not (np.isfinite(rate).all() and np.isfinite(inside).all()):
-            keep = np.all(np.isfinite(rate) & np.isfinite(inside), axis=1)
-            time, inside, rate = time[keep], inside[keep], rate[keep]
-        if clipped or len(time) < 2:
-            continue
-        # ∂([f]× S w)/∂S_ij = f × e_i w_j, integrated by trapezoids.
-        moment = (inside * _trapezoid_weights(time)[:, None]).T @ rate
-        rows.append(np.moveaxis(_ACROSS @ moment, 0, 1).reshape(3, 9))
-        sides.append(force[:, after] - force[:, before])
+    before, after = np.asarray(measured.links).T
+    moments = _core.move_moments(
+        recording.time_s,
+        recording.accelerometer,
+        accelerometer.S,
+        accelerometer.b,
+        measured.rate,
+        np.asarray(measured.edges, dtype=np.int64),
+        0.5 * (measured.zero[before] + measured.zero[after]),
+    )
+    force = measured.reading @ accelerometer.S.T + accelerometer.b
+    used = [k for k, moment in enumerate(moments) if moment is not None and not measured.is_lost[k]]
+    # ∂([f]× S w)/∂S_ij = f × e_i w_j.
+    rows = [np.moveaxis(_ACROSS @ moments[k], 0, 1).reshape(3, 9) for k in used]
+    sides = [force[after[k]] - force[before[k]] for k in used]
     if len(rows) < FEWEST_MOVES:
         return None
     matrix, side = np.concatenate(rows), np.concatenate(sides)

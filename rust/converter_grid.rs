@@ -1,0 +1,177 @@
+//! The grid on which the values of a converter lie, from the gaps between those that occur.
+
+/// Values that differ by less, as a part of the largest, are one: so far the arithmetic of a conversion rounds.
+const ARITHMETIC: f64 = 1e-9;
+/// Values closer than this part of a step are one code whose last digit was written in two ways.
+const WRITTEN: f64 = 0.02;
+/// Part of a step that the spellings of a code may span on average: more, and they are codes of their own.
+const MOST_WRITTEN: f64 = 0.05;
+/// Gaps between neighbouring values that are tried as the step, coarse before fine: most neighbours are one step apart
+/// where all codes were visited, the smallest gap is two spellings of one code where digits were written.
+const QUANTILES: [f64; 8] = [0.9, 0.75, 0.5, 0.25, 0.1, 0.05, 0.01, 0.0];
+/// Part of a step by which a gap may miss a whole number of steps: a third of it where text has cut three digits in a
+/// step (half a digit at either end), and a margin. Gaps of continuous readings are so near by chance in 36 of 100.
+const OFF_GRID: f64 = 0.18;
+/// Part of the gaps that must be whole.
+const ON_GRID: f64 = 0.95;
+/// Steps of a gap beyond which its being whole says nothing: the error of the step itself has grown to its size.
+const REACH: f64 = 20.0;
+/// Levels of the densest stretch, where the refinement of the step begins.
+const DENSE: usize = 32;
+/// The step is refined over levels ever further apart: each reach tells it well enough for one so much wider.
+const WIDER: f64 = 4.0;
+/// Gaps within reach, of many, that are evidence: all of them are whole by chance once in 0.36⁻⁷ = 1300 logs.
+pub const TESTABLE: usize = 8;
+/// Fewer gaps must be whole by so much that chance does it as seldom, or all be one step.
+const BY_CHANCE: f64 = 1e-3;
+/// And the readings must repeat then, so many times a value.
+pub const REPEATS: usize = 2;
+/// Part by which what all gaps say of the step may differ from the gap that was tried: more, and it was another.
+const DRIFT: f64 = 0.3;
+/// Gaps that are looked at, evenly spread where there are more.
+const MOST_GAPS: usize = 4096;
+
+/// The step of a grid on which all `levels` (ascending, different) of `n` readings lie; `None` where they lie on none.
+#[must_use]
+pub fn step(levels: &[f64], n: usize) -> Option<f64> {
+    let (&lowest, &highest) = (levels.first()?, levels.last()?);
+    let least = ARITHMETIC * lowest.abs().max(highest.abs());
+    let gaps = levels.windows(2).map(|pair| pair[1] - pair[0]);
+    let gaps: Vec<f64> = gaps.filter(|&gap| gap > least).collect();
+    if gaps.is_empty() || (gaps.len() < TESTABLE && n < REPEATS * levels.len()) {
+        return None;
+    }
+    let thin = gaps.len().div_ceil(MOST_GAPS);
+    let gaps: Vec<f64> = gaps.into_iter().step_by(thin).collect();
+    let found = tried(&gaps)
+        .into_iter()
+        .find_map(|near| spacing(&gaps, near))?;
+    let found = refined(levels, found);
+    // Counts are whole to the last bit.
+    let is_counts = found > 0.5 && levels.iter().all(|v| v.fract().to_bits() << 1 == 0);
+    Some(if is_counts {
+        found.round_ties_even()
+    } else {
+        found
+    })
+}
+
+/// Gaps that may be the step, and what is left of one after whole ones: two and three steps, never one, leave a step too.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a place among the gaps"
+)]
+fn tried(gaps: &[f64]) -> Vec<f64> {
+    let mut ordered = gaps.to_vec();
+    ordered.sort_unstable_by(f64::total_cmp);
+    let last = (ordered.len() - 1) as f64;
+    let mut out = QUANTILES
+        .map(|at| ordered[(at * last).round_ties_even() as usize])
+        .to_vec();
+    out.dedup();
+    let least = ordered[0];
+    let left = gaps
+        .iter()
+        .map(|gap| (gap - least * (gap / least).round_ties_even()).abs())
+        .filter(|&left| left > OFF_GRID * least)
+        .fold(f64::INFINITY, f64::min);
+    if left.is_finite() {
+        out.push(left);
+    }
+    out
+}
+
+/// The step by all levels: what digits have cut off a gap is the less, the further apart two levels are.
+fn refined(levels: &[f64], mut step: f64) -> f64 {
+    let wide = DENSE.min(levels.len() - 1);
+    let spans = levels.windows(wide + 1).map(|few| few[wide] - few[0]);
+    let densest = spans.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+    let middle = levels[densest.map_or(0, |(at, _)| at) + wide / 2];
+    let widest = levels[levels.len() - 1] - levels[0];
+    let mut reach = REACH;
+    loop {
+        let first = levels.partition_point(|v| middle - v > reach * step);
+        let last = levels.partition_point(|v| v - middle <= reach * step);
+        let near = levels[first..last].iter().map(|v| v - middle);
+        let place = |v: f64| (v / step).round_ties_even();
+        let n = (last - first) as f64;
+        let on = near
+            .clone()
+            .filter(|&v| (v / step - place(v)).abs() < OFF_GRID)
+            .count();
+        if on as f64 / n < ON_GRID {
+            return step; // further out the error of the step has grown to its size
+        }
+        let mean = near.clone().map(place).sum::<f64>() / n;
+        let (squares, product) = near.fold((0.0, 0.0), |(squares, product), v| {
+            let off = place(v) - mean;
+            (squares + off * off, product + off * v)
+        });
+        if squares > 0.0 {
+            step = product / squares;
+        }
+        if reach * step > widest {
+            return step;
+        }
+        reach *= WIDER;
+    }
+}
+
+/// The step close to `near` of which gaps are whole multiples.
+fn spacing(gaps: &[f64], near: f64) -> Option<f64> {
+    let (apart, written): (Vec<f64>, Vec<f64>) =
+        gaps.iter().partition(|&&gap| gap > WRITTEN * near);
+    if written.iter().sum::<f64>() > MOST_WRITTEN * near * apart.len() as f64 {
+        return None;
+    }
+    let mut step = near;
+    for reach in [1.0, 3.0, REACH, REACH] {
+        let (mut length, mut steps) = (0.0, 0.0);
+        for &gap in &apart {
+            let whole = (gap / step).round_ties_even();
+            if (1.0..=reach).contains(&whole) {
+                length += gap;
+                steps += whole;
+            }
+        }
+        if steps > 0.0 {
+            // Written digits cut neighbouring gaps the other way: in the sum they cancel.
+            step = length / steps;
+        }
+    }
+    let places = apart.iter().map(|gap| gap / step);
+    let places: Vec<f64> = places.filter(|&place| place < REACH + 0.5).collect();
+    let n = places.len();
+    if n < TESTABLE.min(apart.len()) || (step / near - 1.0).abs() > DRIFT {
+        return None;
+    }
+    let is_one_apart = places.iter().all(|place| (place - 1.0).abs() < 0.5);
+    let few = if n >= TESTABLE || is_one_apart {
+        OFF_GRID
+    } else {
+        OFF_GRID.min(0.5 * BY_CHANCE.powf(1.0 / (n as f64 - 1.0)))
+    };
+    let is_on = |place: &&f64| {
+        let whole = place.round_ties_even();
+        (*place - whole).abs() < few && whole > 0.0
+    };
+    let on = places.iter().filter(is_on).count();
+    (n > 0 && on as f64 / n as f64 >= ON_GRID).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::step;
+
+    #[test]
+    fn counts_without_every_code_have_a_whole_step() {
+        let levels: Vec<f64> = [
+            0.0, 2.0, 4.0, 10.0, 12.0, 18.0, 20.0, 22.0, 30.0, 36.0, 38.0,
+        ]
+        .to_vec();
+        assert_eq!(step(&levels, 100), Some(2.0));
+        assert_eq!(step(&levels[..1], 100), None);
+        assert_eq!(step(&[], 0), None);
+    }
+}
