@@ -6,7 +6,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from review_walk import hands
+from review_walk import causes, hands
 
 
 def main() -> None:
@@ -17,7 +17,8 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", default="", help="settings whose name holds this")
     given = parser.parse_args()
-    hands.run(given.deliverable, given.sessions, given.first, given.only)
+    run = causes.run if given.deliverable in causes.SETTINGS else hands.run
+    run(given.deliverable, given.sessions, given.first, given.only)
 
 
 if __name__ == "__main__":

@@ -53,8 +53,8 @@ def flicker(n, rate_hz, rng):
     ratio = np.log(times[1] / times[0])
     x = np.zeros((n, 3))
     for tau in times:
-        # The sum over τ, evenly in log τ, of 4σ²τ/(1 + (ωτ)²) is 2πσ²/(ω ratio): the one-sided density B²/(2πf).
-        sigma = np.sqrt(ratio / (2.0 * np.pi))
+        # The sum over τ, evenly in log τ, of 2σ²τ/(1 + (ωτ)²) is πσ²/(ω ratio): the two-sided density B²/(2πf).
+        sigma = np.sqrt(ratio / np.pi)
         a = np.exp(-1.0 / (rate_hz * tau))
         x += ornstein(n, a, sigma, rng)
     return x - x.mean(axis=0)
@@ -74,10 +74,29 @@ def ornstein(n, a, sigma, rng):
     return np.concatenate(out)[:n]
 
 
-def read_out(motion, part, rate_hz, rng, stamps=None):
-    """Time [s], counts of accelerometer and gyro, and the truth."""
-    t = np.arange(0.0, motion.at, 1.0 / rate_hz) if stamps is None else stamps
+def filtered(motion, t, order, lag_s, which):
+    """Rate or force behind `order` equal first-order lags that sum to `lag_s`; order 0 is a pure delay."""
+    if order == 0:
+        return motion.sense(t - lag_s)[which]
+    fine = 1e-3
+    at = np.arange(t[0] - 20.0 * lag_s, t[-1] + fine, fine)
+    x = motion.sense(np.clip(at, 0.0, motion.at - fine))[which]
+    tau = lag_s / order
+    age = np.arange(0.0, 20.0 * lag_s, fine)
+    kernel = (age ** (order - 1)) * np.exp(-age / tau)
+    kernel[0] *= 0.5
+    kernel /= kernel.sum()
+    n = 2 ** int(np.ceil(np.log2(len(at) + len(age))))
+    y = np.fft.irfft(np.fft.rfft(x, n, axis=0) * np.fft.rfft(kernel, n)[:, None], n, axis=0)[: len(at)]
+    return np.column_stack([np.interp(t, at, column) for column in y.T])
+
+
+def read_out(motion, part, rate_hz, rng, behind=None):
+    """Time [s], counts of accelerometer and gyro, and the truth; `behind` a lag of the gyro: its order and size [s]."""
+    t = np.arange(0.0, motion.at, 1.0 / rate_hz)
     w, f = motion.sense(t)
+    if behind is not None:
+        w = filtered(motion, t, *behind, 0)
     out, truth = [], []
     for name, x in (("accel", f), ("gyro", w)):
         get = lambda key, name=name: getattr(part, f"{name}_{key}")  # noqa: E731

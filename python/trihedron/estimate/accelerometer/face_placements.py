@@ -19,13 +19,14 @@ class Placements:
     """One mean (n, 3) of covariance ``noise`` (n, 3, 3) and face (n,) for each time that the case was set down.
 
     ``scatter`` is the variance [raw²] per level component by which headings on one face differ beyond noise, ``None``
-    where they do not.
+    where they do not; it is not in ``noise`` and averages over ``n_headings`` (n,).
     """
 
     means: FloatArray
     noise: FloatArray
     faces: IntArray
     scatter: float | None
+    n_headings: FloatArray
 
 
 def shared_rounding(segments: Segments, step: FloatArray) -> FloatArray | None:
@@ -80,11 +81,8 @@ def placements(values: FloatArray, noise: FloatArray, faces: IntArray, shared: F
     limit = expected * float(probability.chdtri(freedom, verdict.SIGNIFICANCE)) if freedom else np.inf
     apart = 2.0 * float(np.sum(np.array(n_headings) - 1))
     if within <= limit or apart == 0.0:
-        return Placements(merged, widened, faces[start], None)
-    scatter = squares / apart
-    level_parts = level[start][:, :, None] * np.eye(3)
-    widened = widened + level_parts * (scatter / np.array(n_headings))[:, None, None]
-    return Placements(merged, widened, faces[start], scatter)
+        return Placements(merged, widened, faces[start], None, np.array(n_headings, dtype=np.float64))
+    return Placements(merged, widened, faces[start], squares / apart, np.array(n_headings, dtype=np.float64))
 
 
 def _headings(values: FloatArray, noise: FloatArray) -> npt.NDArray[np.intp]:

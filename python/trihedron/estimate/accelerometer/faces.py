@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from trihedron import probability
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.estimate.accelerometer import face_poses, inputs, verdict
+from trihedron.estimate.accelerometer import face_poses, face_tilt, inputs, verdict
 from trihedron.estimate.accelerometer.face_placements import placements
 from trihedron.estimate.accelerometer.norm import norm_residual
 from trihedron.records.calibration import FitQuality, Frame, Observability, SensorCalibration
@@ -124,21 +124,28 @@ def _estimate_placements(
     placed = placements(values, noise, faces, shared)
     if len(placed.means) == len(faces):
         return _estimate(values, noise, faces, g, closed=closed)
-    estimate = _estimate(placed.means, placed.noise, placed.faces, g, closed=closed)
+    spread = placed.noise
     if placed.scatter is not None:
-        tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(estimate.S_a**2, axis=0))))
-        estimate = _with_doubt(estimate, tilt2)
+        S_a, _, _ = _least_squares(placed.means, placed.noise, placed.faces, g)
+        tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(S_a**2, axis=0))))
+        # Through the misalignments a tilt reaches the reading of the axis that is up as well.
+        spread = face_tilt.tilted(placed.noise, placed.faces, S_a, g, np.sqrt(tilt2 / placed.n_headings))
+    estimate = _estimate(placed.means, spread, placed.faces, g, closed=closed)
+    if placed.scatter is not None:
+        estimate = _with_doubt(estimate, tilt2, g)
     residual = values - g * face_poses.direction_of(faces) @ estimate.S_a.T - estimate.b_a
     return replace(estimate, residual=residual)
 
 
-def _with_doubt(estimate: _Estimate, tilt2: float) -> _Estimate:
-    """A tilted face reads ``g cos t``: the scale may be short by the mean square tilt per component, to second order.
+def _with_doubt(estimate: _Estimate, tilt2: float, g: float) -> _Estimate:
+    """A tilted face reads ``g cos t``: the scale may be short by the mean square tilt per component, to second order,
+    and the zero off by as much of g: misalignments by which the tilt reaches an axis that is up are known to it only.
 
     It is not corrected, for what scatters need not be a tilt; the error bars contain it.
     """
     scale = np.concatenate([estimate.S_a.ravel(), np.zeros(3)])
     covariance = estimate.covariance + np.outer(scale, scale) * tilt2**2
+    covariance[9:, 9:] += (g * tilt2) ** 2 * estimate.S_a @ estimate.S_a.T
     return replace(estimate, covariance=covariance, tilt_rad=float(np.sqrt(estimate.tilt_rad**2 + tilt2)))
 
 
@@ -154,24 +161,16 @@ def _estimate(values: FloatArray, noise: FloatArray, faces: IntArray, g: float, 
     low, high = 0.0, 0.5
     for _ in range(60):
         tilt = 0.5 * (low + high)
-        if _chi2(values, _tilted(noise, faces, S_a, g, tilt), faces, g) > dof:
+        if _chi2(values, face_tilt.tilted(noise, faces, S_a, g, tilt), faces, g) > dof:
             low = tilt
         else:
             high = tilt
-    widened = _tilted(noise, faces, S_a, g, high)
+    widened = face_tilt.tilted(noise, faces, S_a, g, high)
     S_a, b_a, covariance = fit(values, widened, faces, g)
     residual = values - g * face_poses.direction_of(faces) @ S_a.T - b_a
     # A tilt estimated from few degrees of freedom has Student's tails: 1.96 standard errors shall hold in 95 %.
-    covariance = covariance * float(probability.stdtrit(dof, 0.025) / probability.ndtri(0.025)) ** 2
-    return _with_doubt(_Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof), high**2)
-
-
-def _tilted(noise: FloatArray, faces: IntArray, S_a: FloatArray, g: float, tilt_rad: float) -> FloatArray:
-    """Covariances (n, 3, 3) of raw means with a horizontal error of ``g tilt`` rms per component on top (eq. 9)."""
-    unit = face_poses.direction_of(faces)
-    horizontal = np.eye(3) - unit[:, :, None] * unit[:, None, :]
-    widened: FloatArray = noise + (g * tilt_rad) ** 2 * np.einsum("ij,njk,lk->nil", S_a, horizontal, S_a)
-    return widened
+    covariance = covariance * face_tilt.widened(dof, len(values)) ** 2
+    return _with_doubt(_Estimate(S_a, b_a, covariance, residual, 0.0, chi2_noise, dof), high**2, g)
 
 
 def _inverses(noise: FloatArray) -> FloatArray:
@@ -287,7 +286,7 @@ def _left_out_pose(
     """Norm error of one pose by the model of the others, and its standard error."""
     fit = _closed_form if closed else _least_squares
     S_a, _, _ = fit(values[others], noise[others], faces[others], g)
-    widened = _tilted(noise[others], faces[others], S_a, g, tilt_rad)
+    widened = face_tilt.tilted(noise[others], faces[others], S_a, g, tilt_rad)
     S_a, b_a, covariance = fit(values[others], widened, faces[others], g)
     S, b = other_form(S_a, b_a)
     f = values[pose] @ S.T + b
@@ -332,7 +331,7 @@ def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: In
 
 def _observability(noise: FloatArray, faces: IntArray, estimate: _Estimate, g: float) -> Observability:
     """Of the twelve parameters, from the whitened design."""
-    roots = np.linalg.cholesky(_inverses(_tilted(noise, faces, estimate.S_a, g, estimate.tilt_rad)))
+    roots = np.linalg.cholesky(_inverses(face_tilt.tilted(noise, faces, estimate.S_a, g, estimate.tilt_rad)))
     rows = np.einsum("nji,njk->nik", roots, _design(faces, g)).reshape(-1, 12)
     rows = rows / np.linalg.norm(rows, axis=0)
     s = np.linalg.svd(rows, compute_uv=False)
