@@ -267,8 +267,7 @@ def motion_joints(
     sharp: float,
     part: tuple[float, float],
     whole: tuple[float, float],
-    left: float,
-    mirrored: float,
+    left: tuple[float, float],
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]: ...
 def halves_of(
     blocks: FloatArray, stretches: npt.NDArray[np.int64]

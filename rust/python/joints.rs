@@ -17,9 +17,10 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 type Flags<'py> = Bound<'py, PyArray1<bool>>;
 
 /// Which steps of moves `(m, 2)`, one after the other, would show a lost sample, are one sample too long, one too short,
-/// `(k,)` each; readings `(n, c)` with a `noise` `(c,)` of their own.
+/// `(k,)` each; readings `(n, c)` with a `noise` `(c,)` of their own. `left` is what
+/// may be left, in ordinary joints, and of a step that falls short as a part of what there was.
 #[pyfunction]
-#[pyo3(signature = (readings, noise, moves, contrasts, *, nearby, sharp, part, whole, left, mirrored))]
+#[pyo3(signature = (readings, noise, moves, contrasts, *, nearby, sharp, part, whole, left))]
 #[expect(clippy::too_many_arguments, reason = "limits by name")]
 fn motion_joints<'py>(
     py: Python<'py>,
@@ -31,8 +32,7 @@ fn motion_joints<'py>(
     sharp: f64,
     part: (f64, f64),
     whole: (f64, f64),
-    left: f64,
-    mirrored: f64,
+    left: (f64, f64),
 ) -> PyResult<(Flags<'py>, Flags<'py>, Flags<'py>)> {
     if contrasts.shape() != [3, FREE, 2 * HALF] {
         return Err(PyValueError::new_err(format!(
@@ -63,8 +63,8 @@ fn motion_joints<'py>(
         sharp,
         part,
         whole,
-        left,
-        mirrored,
+        left: left.0,
+        mirrored: left.1,
     };
     let found = super::run(py, || {
         joints::joints_of_moves(&readings, &noise, &moves, &contrasts, &limits)

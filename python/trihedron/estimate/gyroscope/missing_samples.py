@@ -145,7 +145,6 @@ def _steps(readings: FloatArray, noise: FloatArray, moves: list[Range]) -> _Step
         sharp=SHARP,
         part=PART,
         whole=WHOLE,
-        left=STILL_ORDINARY,
-        mirrored=MIRRORED,
+        left=(STILL_ORDINARY, MIRRORED),
     )
     return _Steps(*flags)
