@@ -48,6 +48,17 @@ def test_both_sides_stand_in_one_panel_per_axis_and_what_is_not_known_is_not_dra
     assert noise_pictures(SimpleNamespace(noise_compared=rows[-1:])) == ()
 
 
+def test_an_allan_curve_is_made_of_octaves_that_adjoin():
+    """A band between that one side lacks would be drawn as a dip."""
+    low = (0.5, 1.0, 2.0, 16.0, 32.0)
+    found = SimpleNamespace(noise_compared=[octave("gyroscope", "x", one, 1e-4, 2e-4) for one in low])
+    recording = allan_chart(found).panels[0].marks[0]
+    # From half a period of 4 Hz on.
+    assert recording.x.min() == pytest.approx(0.5 / 4.0)
+    alone = SimpleNamespace(noise_compared=[octave("gyroscope", "x", one, 1e-4, 2e-4) for one in (0.5, 32.0)])
+    assert [picture.name for picture in noise_pictures(alone)] == ["spectra-both"]
+
+
 def test_stages_are_drawn_domain_by_domain():
     stages = [
         Stage(name, (StageDomain("moves", size, None, "deg"), StageDomain("noise", 3.0, None, "dB")))

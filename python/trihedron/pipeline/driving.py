@@ -79,7 +79,7 @@ class MovedAlike:
     def __init__(self, recording: Recording, segments: Segments, own: Calibration) -> None:
         cut = resegment(recording, segments)
         self._motion = twin_scenario(recording, cut, own).motion
-        self._known: list[tuple[Scenario, tuple[float | None, float | None]]] = []
+        self._known: list[tuple[Scenario, dict[int, tuple[float | None, float | None]]]] = []
         carried = carried_misses(own, recording, cut)
         self.poses = _of_poses(own)
         self.moves = _of_moves(carried)
@@ -89,22 +89,30 @@ class MovedAlike:
 
     def missed(self, scenario: Scenario) -> tuple[float | None, float | None]:
         """Mean squares of poses and of moves over simulations of a scenario, each with its own calibration."""
-        for one, said in self._known:
-            if one == scenario:
-                return said
-        poses, moves = [], []
-        for seed in range(SEED, SEED + N_SEEDS):
-            log = _sensed(replace(scenario, motion=self._motion), seed)
-            try:
-                result = calibrate(log, gravity_m_s2=scenario.environment.gravity)
-            except REFUSALS:
-                continue
-            poses.append(_of_poses(result.calibration))
-            if result.calibration.gyroscope is not None:
-                moves.append(_of_moves(carried_misses(result.calibration, log, resegment(log, result.segments))))
-        said = _mean(poses), _mean(moves)
-        self._known.append((scenario, said))
-        return said
+        drawn = self.draws(scenario, range(SEED, SEED + N_SEEDS))
+        return _mean([poses for poses, _ in drawn]), _mean([moves for _, moves in drawn])
+
+    def draws(self, scenario: Scenario, seeds: range) -> list[tuple[float | None, float | None]]:
+        """Mean squares of poses and of moves, seed by seed; of one that no calibration carries, ``None``."""
+        done = next((said for one, said in self._known if one == scenario), None)
+        if done is None:
+            done = {}
+            self._known.append((scenario, done))
+        for seed in seeds:
+            if seed not in done:
+                done[seed] = self._draw(scenario, seed)
+        return [done[seed] for seed in seeds]
+
+    def _draw(self, scenario: Scenario, seed: int) -> tuple[float | None, float | None]:
+        log = _sensed(replace(scenario, motion=self._motion), seed)
+        try:
+            result = calibrate(log, gravity_m_s2=scenario.environment.gravity)
+        except REFUSALS:
+            return None, None
+        poses, moves = _of_poses(result.calibration), None
+        if result.calibration.gyroscope is not None:
+            moves = _of_moves(carried_misses(result.calibration, log, resegment(log, result.segments)))
+        return poses, moves
 
 
 def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:

@@ -152,6 +152,8 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 def _term(n: NoiseDifference) -> str:
     """The term, or the band of an octave."""
+    if n.term in ("poses", "moves"):
+        return f"{n.term}, gravity missed (interval: 1 − alpha)"
     return f"{n.band_hz[0]:g} to {n.band_hz[1]:g} Hz" if n.band_hz else n.term
 
 

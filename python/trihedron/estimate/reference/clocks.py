@@ -18,6 +18,8 @@ LEAST_OVERLAP = 0.25
 """Share of the shorter of the two that must lie within both."""
 BLOCK_S = 8.0
 """Stretches whose own lag is found: long enough for several turns of a hand."""
+BLOCK_PARTS = 8
+"""Less than this part of a stretch behind the last one tells nothing that it does not."""
 JUMP_S = 0.05
 """A lag that changes by more from one stretch to the next is a jump: those of stretches scatter by milliseconds."""
 LOCKED = 0.9
@@ -152,7 +154,11 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
     fits: list[tuple[float, FloatArray]] = []
     spread = np.nanstd(ours)
     search = round(SEARCH_S / grid.step_s)
-    for start in range(0, len(ours) - length + 1, length):
+    starts = list(range(0, len(ours) - length + 1, length))
+    if len(ours) - length - starts[-1] > length // BLOCK_PARTS:
+        # What is left behind the last whole stretch: a clock that jumps there is in no other.
+        starts.append(len(ours) - length)
+    for start in starts:
         a = ours[start : start + length]
         if np.isfinite(a).sum() < 0.7 * length or np.nanstd(a) < 0.3 * spread:
             continue
