@@ -197,6 +197,16 @@ def test_a_clock_that_jumps_early_is_refused_with_the_place(seed):
         fit_reference(trial.log, replace(trial.motion, time_s=late), G)
 
 
+@pytest.mark.parametrize("seed", [54, 55])
+@pytest.mark.parametrize("jump_at_s", [5.0, 50.0])
+def test_a_clock_that_jumps_within_the_first_or_the_last_stretch_is_refused(seed, jump_at_s):
+    # Of sixty seconds: no whole stretch of eight lies beyond the jump.
+    trial = tracked(seed, seconds=60)
+    late = trial.motion.time_s + np.where(trial.motion.time_s > jump_at_s, 0.4, 0.0)
+    with pytest.raises(ValueError, match=r"clock jumps by \+0\.[34]\d* s between"):
+        fit_reference(trial.log, replace(trial.motion, time_s=late), G)
+
+
 def test_a_reference_of_another_motion_is_refused(posed):
     with pytest.raises(ValueError, match="share no motion"):
         fit_reference(posed.log, tracked(999, seconds=30).motion, G)
