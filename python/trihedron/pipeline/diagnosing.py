@@ -163,9 +163,8 @@ def _of_poses(
         found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
         if simulated is not None:
             stages = with_noise_stage(found.stages, simulated.sampled, recording_used, segments_used, fit, noise)
-            found = judged_by_motion(
-                replace(found, stages=stages), simulated.scenario, recording_used, segments_used, used, alpha
-            )
+            moved = (simulated.scenario, recording_used, segments_used, used)
+            found = judged_by_motion(replace(found, stages=stages), *moved, alpha)
         updated, used = used, given
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(
