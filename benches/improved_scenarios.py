@@ -6,7 +6,8 @@ For each set an ideal scenario is held against the recording (``diagnose --again
 numbers, then noise, then effects and scatter, and every one of them is moved as the recording was. A line a stage:
 simulation over recording, mean in the logarithm of up to twelve simulations (with its 98 % interval), of what poses
 miss in the length of gravity and moves in its direction, the worst of either side spared, and of the noise per octave
-(geometric mean of all octaves and axes, lowest and highest octave). As given, both are read with the scenario's numbers; from the stage of the numbers on each is read
+(geometric mean of all octaves and axes, lowest and highest octave). As given, both are read with the
+scenario's numbers; from the stage of the numbers on each is read
 with its own calibration. The last column is the verdict of ``diagnose --against`` the improved scenario.
 """
 
