@@ -265,7 +265,7 @@ def core_state(twin: Twin) -> _core.SessionState:
 def twin_of(core: _core.SessionFit, gravity_m_s2: float) -> Twin:
     """The point where a fit ended, biases in SI."""
     accel_S, gyro_S = np.asarray(core.force_scale), np.asarray(core.rate_scale)
-    accel_corner, gyro_corner = core.corners_s
+    accel_corner, gyro_corner = core.strengths[0]
     return Twin(
         gravity=gravity_m_s2, accel_S=accel_S, accel_b=np.asarray(core.force_bias), gyro_S=gyro_S,
         up=np.asarray(core.up), gyro_bias=core.rate_zero @ gyro_S.T, accel_bias=core.force_zero @ accel_S.T,
