@@ -630,7 +630,7 @@ class SessionModel:
         moves: SessionMoves,
         noise: tuple[float, float, tuple[float, float]],
         prior: tuple[FloatArray, FloatArray, bool] | None,
-        scatter: tuple[FloatArray, bool] | None,
+        scatter: tuple[FloatArray, bool, float] | None,
     ) -> SessionModel: ...
     def fit(
         self,

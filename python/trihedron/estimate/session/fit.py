@@ -31,7 +31,7 @@ STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 class SessionSolution:
     """A session at its optimum, in the lower frame, on raw readings.
 
-    ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); ``b_a``, ``b_w`` are those of one zero for the session.
+    ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); the zeros are those of one for the session.
     ``moves_chi2`` over ``moves_dof`` degrees of freedom of gravity after the moves, in the noise of the samples.
     ``inflation`` of the moves' standard errors; ``accel_zero_rms``, ``gyro_zero_rms`` what the zeros of the holds
     differ from the session's by, m/s² and rad/s: as far as S, b alone must miss; ``is_walk_at_edge`` says for either
