@@ -98,6 +98,15 @@ def rest_log(path, **accelerometer):
     return path
 
 
+def test_a_log_of_rest_in_counts_of_another_range_is_refused(session, tmp_path, capsys):
+    # Half the counts at twice the range: half the noise, too little to tell from a quieter place, and half of gravity.
+    rest = rest_log(tmp_path / "rest.csv", noise=NoiseTerms(N=(0.01,) * 3))
+    half = np.loadtxt(rest, delimiter=",", skiprows=1) * [1.0, 0.5, 0.5, 0.5]
+    np.savetxt(rest, half, delimiter=",", header="t,ax [m/s^2],ay [m/s^2],az [m/s^2]", comments="", fmt="%.9g")
+    assert run(session, "--reference", session / "angles.csv", "--noise", rest) == 1
+    assert "another converter, range or unit" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("noise", [0.01 / 28, 0.0025, 0.1])
 def test_a_log_of_rest_with_the_noise_of_another_converter_is_refused(session, tmp_path, capsys, noise):
     rest = rest_log(tmp_path / "rest.csv", noise=NoiseTerms(N=(noise,) * 3))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from review_walk import causes, hands
+from review_walk import causes, hands, programs
 
 
 def main() -> None:
@@ -17,7 +17,8 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--only", default="", help="settings whose name holds this")
     given = parser.parse_args()
-    run = causes.run if given.deliverable in causes.SETTINGS else hands.run
+    rooms = ((causes.SETTINGS, causes.run), (programs.GROUPS, programs.run), (hands.GROUPS, hands.run))
+    run = next(run for known, run in rooms if given.deliverable in known)
     run(given.deliverable, given.sessions, given.first, given.only)
 
 

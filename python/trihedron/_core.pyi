@@ -259,14 +259,15 @@ def block_differences(
 # joints of a motion, and the law of its noise
 def motion_joints(
     readings: FloatArray,
+    noise: FloatArray,
+    moves: npt.NDArray[np.int64],
     contrasts: FloatArray,
     *,
     nearby: int,
     sharp: float,
     part: tuple[float, float],
     whole: tuple[float, float],
-    left: float,
-    mirrored: float,
+    left: tuple[float, float],
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]: ...
 def halves_of(
     blocks: FloatArray, stretches: npt.NDArray[np.int64]

@@ -12,6 +12,7 @@ from trihedron.estimate.kalman import (
     calibrate_session,
     calibrate_session_without_references,
     check_same_converter,
+    check_same_gravity,
     noise_from_identified,
 )
 from trihedron.estimate.noise import identify_noise, noise_of_holds
@@ -110,7 +111,7 @@ def kalman(
         table = read_pose_table(table, gravity_m_s2=gravity, sigma_angle_deg=sigma_angle_deg)
     given, noted, identified = _settle_noise(noise, recording)
     segments = segments_of(segments, recording, progress)
-    if identified and isinstance(given, Sequence):
+    if identified is not None and isinstance(given, Sequence):
         _check_converter(given, recording, segments)
     outcome: KalmanCalibration | NormKalmanCalibration
     if table is None:
@@ -119,6 +120,8 @@ def kalman(
         )
     else:
         outcome = calibrate_session(recording, segments, table, noise=given)
+    if identified is not None:
+        check_same_gravity(identified.axes, outcome.accelerometer, gravity)
     findings = (*said, *noted, *recording.findings, *segments.findings, *outcome.findings)
     calibration = Calibration(
         accelerometer=outcome.accelerometer,
@@ -136,20 +139,20 @@ def kalman(
 
 def _settle_noise(
     noise: NoiseSource | None, recording: Recording
-) -> tuple[AxisNoise | Sequence[AxisNoise] | None, tuple[Finding, ...], bool]:
-    """Noise in raw units, what was noticed while it was identified, and whether it was identified from a log."""
+) -> tuple[AxisNoise | Sequence[AxisNoise] | None, tuple[Finding, ...], Noise | None]:
+    """Noise in raw units, what was noticed while it was identified, and what was identified from a log."""
     if isinstance(noise, str | os.PathLike):
         if os.fspath(noise).lower().endswith(".json"):
-            return read_axis_noise(noise), (), False
+            return read_axis_noise(noise), (), None
         noise = _identify(read_recording(noise))
     if isinstance(noise, Noise):
         noticed = [*noise.findings, *(finding for axis in noise.axes for finding in axis.findings)]
         weighty = tuple(finding for finding in noticed if finding.severity is not Severity.NOTE)
-        return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty, True
+        return noise_from_identified(noise.axes, recording.accelerometer_unit), weighty, noise
     is_axes = isinstance(noise, Sequence) and all(isinstance(axis, AxisNoise) for axis in noise)
     if noise is not None and not isinstance(noise, AxisNoise) and not is_axes:
         raise WrongTypeError(f"noise is what trihedron.noise found, or the name of a file, not {type(noise).__name__}.")
-    return noise, (), False
+    return noise, (), None
 
 
 def _check_converter(given: Sequence[AxisNoise], recording: Recording, segments: Segments) -> None:

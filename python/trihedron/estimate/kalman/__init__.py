@@ -2,7 +2,7 @@
 
 from trihedron.estimate.kalman.consistency import check_innovations, normalised_error_squared
 from trihedron.estimate.kalman.guide import Goal
-from trihedron.estimate.kalman.identified import check_same_converter, noise_from_identified
+from trihedron.estimate.kalman.identified import check_same_converter, check_same_gravity, noise_from_identified
 from trihedron.estimate.kalman.live import LiveCalibration
 from trihedron.estimate.kalman.norm_invariant import LiveNormCalibration, NormFrame, calibrate_without_references
 from trihedron.estimate.kalman.norm_start import NormStart
@@ -29,6 +29,7 @@ __all__ = [
     "calibrate_without_references",
     "check_innovations",
     "check_same_converter",
+    "check_same_gravity",
     "noise_from_holds",
     "noise_from_identified",
     "normalised_error_squared",

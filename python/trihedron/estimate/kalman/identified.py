@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
+import numpy as np
+
+from trihedron.records.calibration import SensorCalibration
 from trihedron.records.hold_noise import OctaveNoise
 from trihedron.records.kalman import AxisNoise
 from trihedron.refused import RefusedError
@@ -15,6 +18,9 @@ MOST_ABOVE = 2.0
 """Noise of the session over that of the log of rest beyond which its error bars would be more than twice too small."""
 MOST_BELOW = 3.0
 """The other way round: a sensor may be quieter in a session than in an office, not so in every octave."""
+LARGEST_MISS_OF_GRAVITY = 0.3
+"""Part of g by which a log of rest may miss it as the calibration reads it: ranges differ by factors of two, zeros
+from one day to another, or of a second unit of a cheap kind, by less."""
 COARSER = math.sqrt(2.0)
 """Steps that differ by more are of another converter or range."""
 
@@ -41,6 +47,10 @@ class IdentifiedAxis(Protocol):
     @property
     def unit(self) -> str:
         """Unit of the channel."""
+
+    @property
+    def mean(self) -> float:
+        """Mean of the readings."""
 
     @property
     def sample_sigma(self) -> float:
@@ -70,16 +80,58 @@ def noise_from_identified(
     ValueError
         When there are not three such axes, or their unit cannot be turned into the raw unit.
     """
+    out = [_one(axis, AccelerationUnit(raw_unit)) for axis in _accelerometer_axes(axes)]
+    return out[0], out[1], out[2]
+
+
+def _accelerometer_axes(axes: Sequence[IdentifiedAxis]) -> list[IdentifiedAxis]:
     units = {unit.value for unit in AccelerationUnit} - {AccelerationUnit.COUNTS.value}
     chosen = [axis for axis in axes if axis.unit in units] or list(axes[:3])
     if len(chosen) != 3:
         names = ", ".join(axis.name for axis in axes)
         raise RefusedError(f"noise of three accelerometer axes is needed, and was identified for {names}")
-    out = [_one(axis, AccelerationUnit(raw_unit)) for axis in chosen]
-    return out[0], out[1], out[2]
+    return chosen
+
+
+def check_same_gravity(axes: Sequence[IdentifiedAxis], accelerometer: SensorCalibration, gravity_m_s2: float) -> None:
+    """Refuse the noise of a log of rest that, read by the session's calibration, does not measure gravity.
+
+    A range twice as large halves the noise in counts, which no test of densities tells from a quieter place.
+
+    Raises
+    ------
+    ValueError
+        With what the log of rest reads, and the remedy.
+    """
+    raw_unit = AccelerationUnit(accelerometer.raw_unit)
+    mean = np.array([axis.mean * _factor(axis, raw_unit) for axis in _accelerometer_axes(axes)])
+    seen = float(np.linalg.norm(accelerometer.S @ mean + accelerometer.b))
+    if abs(seen - gravity_m_s2) > LARGEST_MISS_OF_GRAVITY * gravity_m_s2:
+        raise RefusedError(
+            f"the log of rest reads {seen:.3g} m/s² of gravity ({gravity_m_s2:.4g}) as this session is calibrated: "
+            "another converter, range or unit; record the rest with the range, rate and output of the session"
+        )
 
 
 def _one(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> AxisNoise:
+    factor = _factor(axis, raw_unit)
+    process = axis.gauss_markov
+    noise = AxisNoise(
+        quantisation=axis.fitted("Q"),
+        white=axis.fitted("N"),
+        flicker=axis.fitted("B"),
+        walk=axis.fitted("K"),
+        ramp=abs(axis.fitted("R")),
+        gauss_markov=0.0 if process is None else process.sigma_process,
+        gauss_markov_time_s=0.0 if process is None else process.correlation_time_s,
+        resolution=axis.resolution,
+        sample_sigma=axis.sample_sigma,
+    )
+    return noise.scaled(factor)
+
+
+def _factor(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> float:
+    """Raw units of the log to be calibrated in one unit of the axis."""
     factor = 1.0
     if axis.unit != raw_unit.value:
         has = (
@@ -94,19 +146,7 @@ def _one(axis: IdentifiedAxis, raw_unit: AccelerationUnit) -> AxisNoise:
                 "identify the noise from a log in the same unit"
             )
         factor = has / wanted
-    process = axis.gauss_markov
-    noise = AxisNoise(
-        quantisation=axis.fitted("Q"),
-        white=axis.fitted("N"),
-        flicker=axis.fitted("B"),
-        walk=axis.fitted("K"),
-        ramp=abs(axis.fitted("R")),
-        gauss_markov=0.0 if process is None else process.sigma_process,
-        gauss_markov_time_s=0.0 if process is None else process.correlation_time_s,
-        resolution=axis.resolution,
-        sample_sigma=axis.sample_sigma,
-    )
-    return noise.scaled(factor)
+    return factor
 
 
 def check_same_converter(
