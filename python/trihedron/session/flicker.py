@@ -46,8 +46,8 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> f
     parts = _steps(readings, spans, up, PARTS).ravel()
     of_halves, of_parts = _mean_square(halves), _mean_square(parts)
     white = 2.0 * of_parts / PARTS  # what halves would differ by if the parts' were white
-    if of_halves <= white * (1.0 + SEEN * math.sqrt(2.0 / len(halves))):
-        return 0.0
+    if not of_halves > white * (1.0 + SEEN * math.sqrt(2.0 / len(halves))):
+        return 0.0  # of readings that are missing as well
     level = (of_halves - white) / (4.0 * math.log(2.0) * (1.0 - 2.0 / PARTS))
     octaves = float(np.ptp(spans)) / (2.0 * float(np.median(size)))
     return math.sqrt(level * math.log(octaves)) if octaves > 1.0 else 0.0
@@ -65,4 +65,5 @@ def _steps(readings: FloatArray, spans: IntArray, up: FloatArray, n: int) -> Flo
 
 def _mean_square(x: FloatArray) -> float:
     squares = x**2
-    return float(np.mean(np.minimum(squares, FAR * np.median(squares) / MEDIAN_OF_SQUARE)))
+    near = squares <= FAR * np.median(squares) / MEDIAN_OF_SQUARE
+    return float(np.mean(squares[near]))
