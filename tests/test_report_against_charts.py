@@ -92,3 +92,20 @@ def test_every_picture_can_be_drawn_with_the_model_dashed_and_scales_as_the_page
                 assert (lines["model"], lines["recording"]) == ("--", "-")
         # Without a panel below, the names of the stages or the label stand under it.
         assert all(axes.get_xlabel() or axes.get_xticklabels() for axes in shown[-picture.chart().columns :])
+
+
+def test_the_page_names_the_stages_and_counts_what_has_no_room():
+    from trihedron.report.chart import Chart, Line, Panel, Scale
+    from trihedron.report.drawn import drawn
+
+    def page(names):
+        line = Line(np.arange(1.0, len(names) + 1), np.ones(len(names)))
+        x = Scale("stage", limits=(0.6, len(names) + 0.4), whole=True, names=names)
+        return drawn(Chart((Panel(x, Scale("rms"), (line,)),)), "about")
+
+    short = page(("as given", "numbers", "noise", "effects"))
+    assert all(f">{name}</span>" in short for name in ("as given", "numbers", "noise", "effects"))
+    assert 'data-xnames="as given|numbers|noise|effects"' in short
+    long = page(tuple(f"serial number {k}" for k in range(12)))
+    assert "serial number" not in long
+    assert ">5</span>" in long or ">6</span>" in long

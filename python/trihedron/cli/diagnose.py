@@ -132,13 +132,9 @@ def _improve(given: Path, result: DiagnosisResult, path: Path, *, force: bool) -
     for effect_id, why in better.left_out.items():
         say(f"effect {effect_id} is not in the scenario: {why}.")
     for what, ratio in better.unlike.items():
-        low, high = ratio.interval
-        why = "within what chance makes of so few"
-        if not ratio.may_be_chance:
-            why = "what inside the poses looks like noise or makes zeros stray is not all told apart by this log"
         say(
-            f"{what} of the improved scenario miss gravity by {ratio.value:.2f} times ({low:.2f} to {high:.2f}) "
-            f"what the log's do: {why}."
+            f"{what} of the improved scenario miss gravity by {ratio:.2f} times what the log's do: "
+            "what inside the poses looks like noise or makes zeros stray is not all told apart by this log."
         )
     write_scenario(better.text, path, overwrite=force)
     say(f"improved scenario: {path}")

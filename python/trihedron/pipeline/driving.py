@@ -79,7 +79,7 @@ class MovedAlike:
     def __init__(self, recording: Recording, segments: Segments, own: Calibration) -> None:
         cut = resegment(recording, segments)
         self._motion = twin_scenario(recording, cut, own).motion
-        self._known: list[tuple[Scenario, dict[int, tuple[float | None, float | None]]]] = []
+        self._known: list[tuple[Scenario, tuple[float | None, float | None]]] = []
         carried = carried_misses(own, recording, cut)
         self.poses = _of_poses(own)
         self.moves = _of_moves(carried)
@@ -89,30 +89,25 @@ class MovedAlike:
 
     def missed(self, scenario: Scenario) -> tuple[float | None, float | None]:
         """Mean squares of poses and of moves over simulations of a scenario, each with its own calibration."""
-        drawn = self.draws(scenario, range(SEED, SEED + N_SEEDS))
-        return _mean([poses for poses, _ in drawn]), _mean([moves for _, moves in drawn])
+        for one, said in self._known:
+            if one == scenario:
+                return said
+        made = [self.missed_by(scenario, seed) for seed in range(SEED, SEED + N_SEEDS)]
+        said = _mean([poses for poses, _ in made]), _mean([moves for _, moves in made])
+        self._known.append((scenario, said))
+        return said
 
-    def draws(self, scenario: Scenario, seeds: range) -> list[tuple[float | None, float | None]]:
-        """Mean squares of poses and of moves, seed by seed; of one that no calibration carries, ``None``."""
-        done = next((said for one, said in self._known if one == scenario), None)
-        if done is None:
-            done = {}
-            self._known.append((scenario, done))
-        for seed in seeds:
-            if seed not in done:
-                done[seed] = self._draw(scenario, seed)
-        return [done[seed] for seed in seeds]
-
-    def _draw(self, scenario: Scenario, seed: int) -> tuple[float | None, float | None]:
+    def missed_by(self, scenario: Scenario, seed: int) -> tuple[float | None, float | None]:
+        """Mean squares of poses and of moves of one simulation, with its own calibration."""
         log = _sensed(replace(scenario, motion=self._motion), seed)
         try:
             result = calibrate(log, gravity_m_s2=scenario.environment.gravity)
         except REFUSALS:
             return None, None
-        poses, moves = _of_poses(result.calibration), None
-        if result.calibration.gyroscope is not None:
-            moves = _of_moves(carried_misses(result.calibration, log, resegment(log, result.segments)))
-        return poses, moves
+        if result.calibration.gyroscope is None:
+            return _of_poses(result.calibration), None
+        carried = carried_misses(result.calibration, log, resegment(log, result.segments))
+        return _of_poses(result.calibration), _of_moves(carried)
 
 
 def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:

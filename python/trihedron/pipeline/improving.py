@@ -14,7 +14,7 @@ import tomllib
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.estimate.noise import gain_of
 from trihedron.files.scenario import improved_scenario
-from trihedron.pipeline.comparing_misses import MissRatio, miss_ratios
+from trihedron.pipeline.comparing_moved import AIMED_AT
 from trihedron.pipeline.comparing_noise import Sampled, sampled
 from trihedron.pipeline.comparing_quantisation import white_and_quantisation
 from trihedron.pipeline.comparing_ranges import SENSOR
@@ -34,8 +34,6 @@ from trihedron.simulate import (
 )
 
 FEWEST_OCTAVES = 4
-ALPHA = 0.01
-"""Chance that the ratio of two instruments lies outside the interval that is told: that of a diagnosis."""
 N_FREQUENCIES = 256
 """At which a filter is compared with what was seen: a sixteenth of an octave in the middle of the band."""
 
@@ -45,12 +43,12 @@ class Improvement:
     """The text of an improved scenario, and what could not be put into it, each with the reason.
 
     ``unlike``: what ``poses`` (lengths of gravity) and ``moves`` (gravity carried through them) of the improved
-    scenario miss, rms, over what the recording's do, with interval, where that is outside 0.9 to 1.1.
+    scenario miss, rms, over what the recording's do, where that is outside ``AIMED_AT``.
     """
 
     text: str
     left_out: Mapping[str, str]
-    unlike: Mapping[str, MissRatio] = field(default_factory=dict)
+    unlike: Mapping[str, float] = field(default_factory=dict)
 
 
 def improve(
@@ -100,9 +98,12 @@ def improve(
     return Improvement(text, left_out)
 
 
-def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, MissRatio]:
+def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
     """What poses and moves of a scenario miss over what the recording's do, where that is not as good as one."""
-    return {what: one for what, one in miss_ratios(better, beside, ALPHA).items() if not one.is_good}
+    made = dict(zip(("poses", "moves"), beside.missed(better), strict=True))
+    seen = {"poses": beside.poses, "moves": beside.moves}
+    ratios = {k: math.sqrt(m / s) for k, m in made.items() if m is not None and (s := seen[k]) is not None and s > 0.0}
+    return {key: ratio for key, ratio in ratios.items() if not AIMED_AT[0] <= ratio <= AIMED_AT[1]}
 
 
 def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:

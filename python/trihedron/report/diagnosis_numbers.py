@@ -143,7 +143,7 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         )
         for n in diagnosis.noise_compared
     )
-    blocks: list[Block] = [Table(("", "term", "model", "recording", "ratio (95 %)", "unit", ""), rows)]
+    blocks: list[Block] = [Table(("", "term", "model", "recording", "ratio (interval)", "unit", ""), rows)]
     remarks = tuple(("", n.remark) for n in diagnosis.noise_compared if n.remark and n.significant)
     if remarks:
         blocks.append(Facts(tuple(dict.fromkeys(remarks))))
@@ -152,8 +152,6 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 def _term(n: NoiseDifference) -> str:
     """The term, or the band of an octave."""
-    if n.term in ("poses", "moves"):
-        return f"{n.term}, gravity missed (interval: 1 − alpha)"
     return f"{n.band_hz[0]:g} to {n.band_hz[1]:g} Hz" if n.band_hz else n.term
 
 
