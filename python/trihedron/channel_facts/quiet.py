@@ -16,7 +16,7 @@ from trihedron.quantiles import median, medians, quantile
 
 WINDOW_S = 0.5
 MAX_WINDOWS = 2000
-_FIRST_ROWS = 64
+_ROWS_AT_ONCE = 2048
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +93,11 @@ def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -
 def is_integer(array: FloatArray) -> bool:
     """All readings (of a sample of up to about 20000 rows) are whole numbers."""
     probe = array[:: max(1, len(array) // 20000)]
-    # Most logs show in their first rows that they are none.
-    return all(_is_whole(part) for part in (probe[:_FIRST_ROWS], probe)) and bool(np.isfinite(probe).any())
+    # In pieces: most logs show in their first rows that they are none, and memory for all at once costs more than a look.
+    pieces = (probe[k : k + _ROWS_AT_ONCE] for k in range(0, len(probe), _ROWS_AT_ONCE))
+    return all(_is_whole(piece) for piece in pieces) and bool(np.isfinite(probe).any())
 
 
-def _is_whole(probe: FloatArray) -> bool:
-    return bool(np.all((probe == np.rint(probe)) | ~np.isfinite(probe)))
+def _is_whole(piece: FloatArray) -> bool:
+    whole = piece == np.rint(piece)
+    return bool(whole.all() or (whole | ~np.isfinite(piece)).all())
