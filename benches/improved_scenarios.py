@@ -4,9 +4,10 @@
 
 For each set an ideal scenario is held against the recording (``diagnose --against``), improved with the recording's
 numbers, then noise, then effects and scatter, and every one of them is moved as the recording was. A line a stage:
-simulation over recording, rms of up to twelve simulations, of what poses miss in the length of gravity and moves in its
-direction, the worst of either side spared, and of the noise per octave (geometric mean of all octaves and axes, lowest
-and highest octave). As given, both are read with the scenario's numbers; from the stage of the numbers on each is read
+simulation over recording, mean in the logarithm of up to twelve simulations (with its 98 % interval), of what poses
+miss in the length of gravity and moves in its direction, the worst of either side spared, and of the noise per octave
+(geometric mean of all octaves and axes, lowest and highest octave). As given, both are read with the
+scenario's numbers; from the stage of the numbers on each is read
 with its own calibration. The last column is the verdict of ``diagnose --against`` the improved scenario.
 """
 
@@ -22,6 +23,7 @@ from trihedron.diagnose.against.fitted import model_of_calibration
 from trihedron.pipeline import driven, improve
 from trihedron.pipeline.carried_misses import carried_misses
 from trihedron.pipeline.comparing_noise import sampled
+from trihedron.probability import stdtrit
 from trihedron.segment import resegment
 from trihedron.sensor_model import correct
 from trihedron.simulate import read_scenario
@@ -125,8 +127,8 @@ def one(name, paths, gravity, work):
             ).items():
                 ratios.setdefault(key, []).extend(values)
         reads = with_numbers(own.calibration, scenario) if stage == "as-given" else own.calibration
-        beside = np.mean(made, axis=0) / (of_poses(recording, poses, reads), of_moves(recording, poses, reads))
-        cells = [name if stage == "as-given" else "", stage, *(f"{v:.2f}" for v in np.sqrt(beside))]
+        own_misses = of_poses(recording, poses, reads), of_moves(recording, poses, reads)
+        cells = [name if stage == "as-given" else "", stage, *map(with_interval, zip(*made, strict=True), own_misses)]
         cells += [in_short(ratios, sensor) for sensor in ("accelerometer", "gyroscope")]
         print(f"| {' | '.join([*cells, said.get(stage, '')])} |", flush=True)
 
@@ -139,6 +141,19 @@ def with_numbers(calibration, scenario):
         accelerometer=replace(calibration.accelerometer, S=np.array(a.S), b=np.array(a.b), quality=None),
         gyroscope=replace(calibration.gyroscope, S=np.array(g.S), b=np.array(g.b)),
     )
+
+
+def with_interval(squares, of_recording):
+    """Ratio of root mean squares, mean in the logarithm; with its 98 % interval where three or more simulations tell.
+
+    The recording is one more draw: s √(1 + 1/K) times Student's t.
+    """
+    logs = 0.5 * np.log(np.maximum(squares, 1e-300) / of_recording)
+    ratio, n = float(np.exp(logs.mean())), len(logs)
+    if n < 3:
+        return f"{ratio:.2f}"
+    half = stdtrit(n - 1, 0.99) * logs.std(ddof=1) * np.sqrt(1.0 + 1.0 / n)
+    return f"{ratio:.2f} ({ratio * np.exp(-half):.2f} to {ratio * np.exp(half):.2f})"
 
 
 def in_short(ratios, sensor):

@@ -75,6 +75,7 @@ fn session(n_poses: usize) -> (Session, State) {
         prior: None,
         scatter: Some([Vector3::repeat(1e-3), Vector3::repeat(1e-4)]),
         is_scatter_given: false,
+        expected_scatter: 0.0,
     };
     let state = State {
         force_scale: Matrix3::identity(),

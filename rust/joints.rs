@@ -1,5 +1,7 @@
 //! Steps of a motion that are longer than the motion around them by one sample: joints of the curves on either side.
 
+use rayon::prelude::*;
+
 use crate::error::{Error, Result};
 use crate::running::{running_maximum, running_median};
 
@@ -103,6 +105,42 @@ pub fn joints(
         out.is_sharp.push(is_sharp);
         out.is_long.push(is_off(s.gain[0]));
         out.is_short.push(is_off(s.gain[1]) || is_mirrored);
+    }
+    Ok(out)
+}
+
+/// Joints of all steps of moves `[first, last)` one after the other, readings `(n, channels)` in noises `(channels,)` of
+/// their own; what is no number counts as nothing.
+///
+/// # Errors
+/// `BadInput` when the numbers do not make rows, or samples on either side of a move are missing.
+pub fn joints_of_moves(
+    readings: &[f64],
+    noise: &[f64],
+    moves: &[[usize; 2]],
+    contrasts: &[Contrasts; 3],
+    limits: &Limits,
+) -> Result<Joints> {
+    let channels = noise.len();
+    let of_move = |&[first, last]: &[usize; 2]| {
+        let from = first.checked_sub(HALF).map(|row| row * channels);
+        let rows = from.and_then(|from| readings.get(from..(last + HALF + 1) * channels));
+        let Some(rows) = rows else {
+            return Err(Error::bad_input(format!(
+                "a move needs {HALF} samples before it and {} behind",
+                HALF + 1
+            )));
+        };
+        let scaled = rows.iter().zip(noise.iter().cycle()).map(|(v, s)| v / s);
+        let whole = scaled.map(|v| if v.is_finite() { v } else { 0.0 });
+        joints(&whole.collect::<Vec<f64>>(), channels, contrasts, limits)
+    };
+    let found: Vec<Joints> = moves.par_iter().map(of_move).collect::<Result<_>>()?;
+    let mut out = Joints::default();
+    for one in found {
+        out.is_sharp.extend(one.is_sharp);
+        out.is_long.extend(one.is_long);
+        out.is_short.extend(one.is_short);
     }
     Ok(out)
 }

@@ -188,6 +188,26 @@ def test_a_reference_clock_that_jumps_is_refused_with_the_place():
         fit_reference(trial.log, replace(trial.motion, time_s=late), G)
 
 
+@pytest.mark.parametrize("seed", [61, 62, 63])
+@pytest.mark.parametrize("by_s", [0.4, -0.25])
+def test_a_clock_that_jumps_late_is_refused_with_the_place(seed, by_s):
+    # Ten seconds before the end: too little for two stretches of eight seconds, and the fit calls it outliers.
+    trial = tracked(seed)
+    t = trial.motion.time_s
+    late = t > t[-1] - 10.0
+    stamps = t + np.where(late, by_s, 0.0)
+    kept = np.concatenate(([True], np.diff(np.maximum.accumulate(stamps)) > 0.0))
+    moved = replace(trial.motion, time_s=stamps[kept], attitude=trial.motion.attitude[kept])
+    with pytest.raises(ValueError, match=r"clock jumps"):
+        fit_reference(trial.log, moved, G)
+
+
+def test_no_part_of_a_sound_reference_is_called_elsewhere_however_noisy():
+    for seed in range(70, 74):
+        trial = tracked(seed, sigma_deg=0.3)
+        assert fit_reference(trial.log, trial.motion, G).overlap_s > 40.0
+
+
 @pytest.mark.parametrize("seed", [52, 53])
 def test_a_clock_that_jumps_early_is_refused_with_the_place(seed):
     # One stretch of eight seconds before the jump, the other spoilt by it.
@@ -195,6 +215,19 @@ def test_a_clock_that_jumps_early_is_refused_with_the_place(seed):
     late = trial.motion.time_s + np.where(trial.motion.time_s > 12.0, 0.7, 0.0)
     with pytest.raises(ValueError, match=r"clock jumps by \+0\.[67]\d* s between \d+ and \d+ s of the log"):
         fit_reference(trial.log, replace(trial.motion, time_s=late), G)
+
+
+def test_a_clock_that_jumps_in_the_last_seconds_is_mostly_refused():
+    # Five of sixty seconds, less than a stretch: 6 of 8 in seeds 700 to 707; fewer than 3 of 8 has a chance of 0.004.
+    refused = 0
+    for seed in range(708, 716):
+        trial = tracked(seed, seconds=60)
+        late = trial.motion.time_s + np.where(trial.motion.time_s > 55.0, 0.3, 0.0)
+        try:
+            fit_reference(trial.log, replace(trial.motion, time_s=late), G)
+        except ValueError as error:
+            refused += "clock jumps" in str(error)
+    assert refused >= 3
 
 
 def test_a_reference_of_another_motion_is_refused(posed):

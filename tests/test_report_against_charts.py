@@ -48,6 +48,17 @@ def test_both_sides_stand_in_one_panel_per_axis_and_what_is_not_known_is_not_dra
     assert noise_pictures(SimpleNamespace(noise_compared=rows[-1:])) == ()
 
 
+def test_an_allan_curve_is_made_of_octaves_that_adjoin():
+    """A band between that one side lacks would be drawn as a dip."""
+    low = (0.5, 1.0, 2.0, 16.0, 32.0)
+    found = SimpleNamespace(noise_compared=[octave("gyroscope", "x", one, 1e-4, 2e-4) for one in low])
+    recording = allan_chart(found).panels[0].marks[0]
+    # From half a period of 4 Hz on.
+    assert recording.x.min() == pytest.approx(0.5 / 4.0)
+    alone = SimpleNamespace(noise_compared=[octave("gyroscope", "x", one, 1e-4, 2e-4) for one in (0.5, 32.0)])
+    assert [picture.name for picture in noise_pictures(alone)] == ["spectra-both"]
+
+
 def test_stages_are_drawn_domain_by_domain():
     stages = [
         Stage(name, (StageDomain("moves", size, None, "deg"), StageDomain("noise", 3.0, None, "dB")))
@@ -81,3 +92,20 @@ def test_every_picture_can_be_drawn_with_the_model_dashed_and_scales_as_the_page
                 assert (lines["model"], lines["recording"]) == ("--", "-")
         # Without a panel below, the names of the stages or the label stand under it.
         assert all(axes.get_xlabel() or axes.get_xticklabels() for axes in shown[-picture.chart().columns :])
+
+
+def test_the_page_names_the_stages_and_counts_what_has_no_room():
+    from trihedron.report.chart import Chart, Line, Panel, Scale
+    from trihedron.report.drawn import drawn
+
+    def page(names):
+        line = Line(np.arange(1.0, len(names) + 1), np.ones(len(names)))
+        x = Scale("stage", limits=(0.6, len(names) + 0.4), whole=True, names=names)
+        return drawn(Chart((Panel(x, Scale("rms"), (line,)),)), "about")
+
+    short = page(("as given", "numbers", "noise", "effects"))
+    assert all(f">{name}</span>" in short for name in ("as given", "numbers", "noise", "effects"))
+    assert 'data-xnames="as given|numbers|noise|effects"' in short
+    long = page(tuple(f"serial number {k}" for k in range(12)))
+    assert "serial number" not in long
+    assert ">5</span>" in long or ">6</span>" in long

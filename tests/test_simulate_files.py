@@ -96,7 +96,7 @@ def test_a_scenario_file_says_the_same_as_python(tmp_path):
         ("[[step]]\nkind = 'jump'", "is of kind 'jump'"),
         ("[[step]]\nkind = 'hold'", "missing 1 required positional argument"),
         ("session = { kind = 'tango' }", "no session is of kind 'tango'"),
-        ("session = { kind = 'hand', n = 3 }", "unexpected keyword argument 'n'"),
+        ("session = { kind = 'hand', n = 3 }", "there is no 'n'; there are kind, n_poses"),
         ("[[effect]]\nid = 'gremlin'", "no effect is called 'gremlin'"),
         ("[accelerometer.noise]\nN = -1", "noise term N"),
     ],

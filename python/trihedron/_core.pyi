@@ -259,14 +259,15 @@ def block_differences(
 # joints of a motion, and the law of its noise
 def motion_joints(
     readings: FloatArray,
+    noise: FloatArray,
+    moves: npt.NDArray[np.int64],
     contrasts: FloatArray,
     *,
     nearby: int,
     sharp: float,
     part: tuple[float, float],
     whole: tuple[float, float],
-    left: float,
-    mirrored: float,
+    left: tuple[float, float],
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_], npt.NDArray[np.bool_]]: ...
 def halves_of(
     blocks: FloatArray, stretches: npt.NDArray[np.int64]
@@ -630,7 +631,7 @@ class SessionModel:
         moves: SessionMoves,
         noise: tuple[float, float, tuple[float, float]],
         prior: tuple[FloatArray, FloatArray, bool] | None,
-        scatter: tuple[FloatArray, bool] | None,
+        scatter: tuple[FloatArray, bool, float] | None,
     ) -> SessionModel: ...
     def fit(
         self,
@@ -650,6 +651,8 @@ class SessionFit:
     @property
     def force_bias(self) -> FloatArray: ...
     @property
+    def session_force_bias(self) -> FloatArray: ...
+    @property
     def rate_scale(self) -> FloatArray: ...
     @property
     def up(self) -> FloatArray: ...
@@ -659,10 +662,6 @@ class SessionFit:
     def force_zero(self) -> FloatArray: ...
     @property
     def effect(self) -> FloatArray: ...
-    @property
-    def corners_s(self) -> tuple[float, float]: ...
-    @property
-    def scatter(self) -> tuple[float, float]: ...
     @property
     def strengths(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]: ...
     @property

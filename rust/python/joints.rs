@@ -1,9 +1,13 @@
 //! Joints of a motion across the seam.
 
-use numpy::{PyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{
+    PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::arrays::{flat1, flat2};
+use super::ranges::ranges_within;
 use crate::joints::{self, Contrasts, FREE, HALF, Limits};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -12,20 +16,23 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 type Flags<'py> = Bound<'py, PyArray1<bool>>;
 
-/// Which inner steps of a motion would show a lost sample, are one sample too long, one too short, `(n - 9,)` each.
+/// Which steps of moves `(m, 2)`, one after the other, would show a lost sample, are one sample too long, one too short,
+/// `(k,)` each; readings `(n, c)` with a `noise` `(c,)` of their own. `left` is what
+/// may be left, in ordinary joints, and of a step that falls short as a part of what there was.
 #[pyfunction]
-#[pyo3(signature = (readings, contrasts, *, nearby, sharp, part, whole, left, mirrored))]
+#[pyo3(signature = (readings, noise, moves, contrasts, *, nearby, sharp, part, whole, left))]
 #[expect(clippy::too_many_arguments, reason = "limits by name")]
 fn motion_joints<'py>(
     py: Python<'py>,
     readings: PyReadonlyArray2<'py, f64>,
+    noise: PyReadonlyArray1<'py, f64>,
+    moves: PyReadonlyArray2<'py, i64>,
     contrasts: PyReadonlyArray3<'py, f64>,
     nearby: usize,
     sharp: f64,
     part: (f64, f64),
     whole: (f64, f64),
-    left: f64,
-    mirrored: f64,
+    left: (f64, f64),
 ) -> PyResult<(Flags<'py>, Flags<'py>, Flags<'py>)> {
     if contrasts.shape() != [3, FREE, 2 * HALF] {
         return Err(PyValueError::new_err(format!(
@@ -44,17 +51,24 @@ fn motion_joints<'py>(
         std::array::from_fn(|i| std::array::from_fn(|j| weights[[c, i, j]]))
     };
     let contrasts = [of(0), of(1), of(2)];
-    let channels = readings.shape()[1];
-    let flat: Vec<f64> = readings.as_array().iter().copied().collect();
+    if readings.shape()[1] != noise.len() {
+        return Err(PyValueError::new_err(
+            "every channel of the readings has a noise",
+        ));
+    }
+    let moves = ranges_within(&moves, readings.shape()[0])?;
+    let (readings, noise) = (flat2(&readings), flat1(&noise));
     let limits = Limits {
         nearby,
         sharp,
         part,
         whole,
-        left,
-        mirrored,
+        left: left.0,
+        mirrored: left.1,
     };
-    let found = super::run(py, || joints::joints(&flat, channels, &contrasts, &limits))?;
+    let found = super::run(py, || {
+        joints::joints_of_moves(&readings, &noise, &moves, &contrasts, &limits)
+    })?;
     Ok((
         PyArray1::from_vec(py, found.is_sharp),
         PyArray1::from_vec(py, found.is_long),

@@ -144,6 +144,8 @@ pub struct Session {
     pub scatter: Option<[Vector3<f64>; 2]>,
     /// Whether that scatter is known and not to be searched for.
     pub is_scatter_given: bool,
+    /// Strength of the accelerometer's that the noise inside poses lets expect; 0 where it shows none (11.12d).
+    pub expected_scatter: f64,
 }
 
 /// Strengths of the processes behind the zeros.

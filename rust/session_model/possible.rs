@@ -13,6 +13,10 @@ use crate::error::Result;
 /// Scatters of the accelerometer's zero that its error bars allow for, in units of the reference, together as likely
 /// beforehand as none; and corner times of its walk beside them, s.
 const POSSIBLE_SCATTER: [f64; 8] = [0.35, 0.55, 0.85, 1.3, 2.0, 3.2, 5.0, 10.0];
+/// Where flicker inside poses lets expect a scatter: that it stops there all the same, and how well its size is known
+/// (logarithm); one half of the rest lies around it, the other is as where nothing is expected.
+const NONE_ALL_THE_SAME: f64 = 0.1;
+const EXPECTED_TO: f64 = 0.4;
 const POSSIBLE_CORNER_S: [f64; 4] = [20.0, 80.0, 320.0, 2560.0];
 /// Possibilities less likely than this beside the best change no error bar.
 const LEAST_WEIGHT: f64 = 1e-2;
@@ -22,6 +26,24 @@ pub(super) struct Possible {
     pub weight: f64,
     pub step: DVector<f64>,
     pub factor: Factor,
+}
+
+/// Scatters and the logarithm of how likely each is beforehand (11.12b, 11.12d).
+fn scatters_beforehand(expected: f64) -> Vec<(f64, f64)> {
+    let n_some = POSSIBLE_SCATTER.len() as f64;
+    if expected < POSSIBLE_SCATTER[0] {
+        let some = POSSIBLE_SCATTER.map(|scatter| (scatter, -n_some.ln()));
+        return std::iter::once((NO_SCATTER, 0.0)).chain(some).collect();
+    }
+    let near = POSSIBLE_SCATTER.map(|s| (-0.5 * ((s / expected).ln() / EXPECTED_TO).powi(2)).exp());
+    let total: f64 = near.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+    let some = POSSIBLE_SCATTER.iter().zip(near).map(|(&scatter, near)| {
+        let part = 0.5 * (near / total + 1.0 / n_some);
+        (scatter, ((1.0 - NONE_ALL_THE_SAME) * part).ln())
+    });
+    std::iter::once((NO_SCATTER, NONE_ALL_THE_SAME.ln()))
+        .chain(some)
+        .collect()
 }
 
 /// Ways the accelerometer's zeros may scatter and walk, weighed by their evidence (11.12b); nothing where that is not
@@ -34,10 +56,8 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
         return Ok(Vec::new());
     }
     let evidence = Evidence::of(fit);
-    let n_some = POSSIBLE_SCATTER.len() as f64;
     let mut tried = Vec::new();
-    let some = POSSIBLE_SCATTER.map(|scatter| (scatter, -n_some.ln()));
-    let scatters: Vec<_> = std::iter::once((NO_SCATTER, 0.0)).chain(some).collect();
+    let scatters = scatters_beforehand(session.expected_scatter);
     for (which, (scatter, prior)) in scatters.iter().enumerate() {
         for corner in POSSIBLE_CORNER_S {
             let mut at = fit.strengths;

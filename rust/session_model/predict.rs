@@ -8,7 +8,7 @@ use super::fit::{Fit, gradient};
 use super::possible::possible_scatters;
 use super::rows::{Domain, Group};
 
-use super::{LOWER, Session, State};
+use super::{LOWER, N_POSE_SCATTER, Session, State};
 use crate::error::Result;
 
 /// Domains that are judged: all but the prior.
@@ -87,7 +87,7 @@ impl Fit {
         origins: &[Vector3<f64>; 2],
     ) -> Result<(DMatrix<f64>, Vector3<f64>)> {
         let layout = self.layout();
-        let mut map = force_map(layout, &origins[0], 24);
+        let mut map = force_map(&self.state, layout, &origins[0], 24);
         let mut bias = Vector3::zeros();
         let mut beyond = Matrix3::zeros();
         if let Some(one) = self.session_zero(session) {
@@ -157,7 +157,7 @@ impl Fit {
             rows.add_transposed(layout, &-r, &mut side);
         }
         let step = -factor.solve(&side).column(0).into_owned();
-        let map = force_map(layout, origin, 12);
+        let map = force_map(&self.state, layout, origin, 12);
         Ok((self.state.moved(&step, layout), factor.inner(&map)))
     }
 
@@ -171,12 +171,22 @@ impl Fit {
     }
 }
 
-/// From all unknowns to `(S_a, b_a)` on raw readings, row by row, in the first of `n` columns.
-fn force_map(layout: Layout, origin: &Vector3<f64>, n: usize) -> DMatrix<f64> {
+/// From all unknowns to `(S_a, b_a)` on raw readings, row by row, in the first of `n` columns; one zero for the session
+/// (11.16b).
+fn force_map(state: &State, layout: Layout, origin: &Vector3<f64>, n: usize) -> DMatrix<f64> {
     let mut map = DMatrix::zeros(layout.n(), n);
+    let zero = origin + state.mean_force_zero();
+    let share = 1.0 / layout.n_poses as f64;
     for (c, &(i, j)) in LOWER.iter().enumerate() {
         map[(c, 3 * i + j)] = 1.0;
-        map[(c, 9 + i)] -= origin[j];
+        map[(c, 9 + i)] -= zero[j];
+        for h in 0..layout.n_poses {
+            let at = layout.at(h);
+            map[(at + 5 + j, 9 + i)] = -state.force_scale[(i, j)] * share;
+            if layout.pose == N_POSE_SCATTER {
+                map[(at + 11 + j, 9 + i)] = state.force_scale[(i, j)] * share;
+            }
+        }
     }
     for i in 0..3 {
         map[(6 + i, 9 + i)] = 1.0;

@@ -128,6 +128,19 @@ impl State {
         out
     }
 
+    /// Mean of the accelerometer's raw zeros over the poses, without what is one pose's alone.
+    #[must_use]
+    pub fn mean_force_zero(&self) -> Vector3<f64> {
+        let all = self.force_zero.iter().zip(&self.own[0]);
+        all.map(|(zero, own)| zero - own).sum::<Vector3<f64>>() / self.force_zero.len() as f64
+    }
+
+    /// Accelerometer `b`, on centred readings, with one zero for the session (docs/model-session.md, 11.16b).
+    #[must_use]
+    pub fn session_force_bias(&self) -> Vector3<f64> {
+        self.force_bias - self.force_scale * self.mean_force_zero()
+    }
+
     /// The 18 parameters of the linear models.
     #[must_use]
     pub fn model(&self) -> SVector<f64, N_MODEL> {

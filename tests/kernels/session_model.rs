@@ -116,6 +116,7 @@ fn made(scatter: bool) -> (Session, State) {
         prior: None,
         scatter: scatter.then_some([noise_force / 2.0, noise_rate / 2.0]),
         is_scatter_given: false,
+        expected_scatter: 0.0,
     };
     let state = State {
         force_scale,

@@ -73,6 +73,8 @@ def compared(
             verdict = "missing-physics"
     elif found.verdict == "unexplained" and effects.surplus:
         verdict = "missing-physics"
+    if found.effects and simulated is not None and not effects.missing:
+        found = _with_shared_effects(found)
     return replace(
         found,
         verdict=verdict,
@@ -82,6 +84,19 @@ def compared(
         parameters=parameters,
         noise_compared=noise,
         stages=(_as_given(as_read(given, own), recording, segments), *found.stages),
+    )
+
+
+def _with_shared_effects(found: Diagnosis) -> Diagnosis:
+    """Stages and residuals of a recording whose effects the model has all: new numbers take none of them away."""
+    with_effects = next((stage.domains for stage in found.stages if stage.stage == "effects"), ())
+    return replace(
+        found,
+        stages=tuple(replace(one, domains=with_effects) if with_effects else one for one in found.stages),
+        residuals=tuple(
+            replace(one, time_before_s=one.time_after_s, before=one.after, sigma_before=one.sigma_after)
+            for one in found.residuals
+        ),
     )
 
 

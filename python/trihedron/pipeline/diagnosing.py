@@ -19,6 +19,7 @@ from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.comparing import compared
 from trihedron.pipeline.comparing_correlation import correlation_times
 from trihedron.pipeline.comparing_frames import rates_of_world, sign_of_gravity
+from trihedron.pipeline.comparing_moved import judged_by_motion
 from trihedron.pipeline.comparing_noise import Sampled, compare_noise, sampled
 from trihedron.pipeline.comparing_quantisation import quantisation_noise
 from trihedron.pipeline.comparing_ranges import stated_ranges
@@ -162,7 +163,8 @@ def _of_poses(
         found = compared(found, given, free_simulation, noise, recording_used, segments_used, alpha)
         if simulated is not None:
             stages = with_noise_stage(found.stages, simulated.sampled, recording_used, segments_used, fit, noise)
-            found = replace(found, stages=stages)
+            moved = (simulated.scenario, recording_used, segments_used, used)
+            found = judged_by_motion(replace(found, stages=stages), *moved, alpha)
         updated, used = used, given
     values: dict[str, Any] = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisResult(

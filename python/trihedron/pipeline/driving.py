@@ -92,19 +92,22 @@ class MovedAlike:
         for one, said in self._known:
             if one == scenario:
                 return said
-        poses, moves = [], []
-        for seed in range(SEED, SEED + N_SEEDS):
-            log = _sensed(replace(scenario, motion=self._motion), seed)
-            try:
-                result = calibrate(log, gravity_m_s2=scenario.environment.gravity)
-            except REFUSALS:
-                continue
-            poses.append(_of_poses(result.calibration))
-            if result.calibration.gyroscope is not None:
-                moves.append(_of_moves(carried_misses(result.calibration, log, resegment(log, result.segments))))
-        said = _mean(poses), _mean(moves)
+        made = [self.missed_by(scenario, seed) for seed in range(SEED, SEED + N_SEEDS)]
+        said = _mean([poses for poses, _ in made]), _mean([moves for _, moves in made])
         self._known.append((scenario, said))
         return said
+
+    def missed_by(self, scenario: Scenario, seed: int) -> tuple[float | None, float | None]:
+        """Mean squares of poses and of moves of one simulation, with its own calibration."""
+        log = _sensed(replace(scenario, motion=self._motion), seed)
+        try:
+            result = calibrate(log, gravity_m_s2=scenario.environment.gravity)
+        except REFUSALS:
+            return None, None
+        if result.calibration.gyroscope is None:
+            return _of_poses(result.calibration), None
+        carried = carried_misses(result.calibration, log, resegment(log, result.segments))
+        return _of_poses(result.calibration), _of_moves(carried)
 
 
 def flicker_of_poses(better: Scenario, beside: MovedAlike) -> tuple[float, float, float] | None:

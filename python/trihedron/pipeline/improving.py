@@ -14,6 +14,7 @@ import tomllib
 from trihedron.diagnose.against import model_of_diagnosis
 from trihedron.estimate.noise import gain_of
 from trihedron.files.scenario import improved_scenario
+from trihedron.pipeline.comparing_moved import AIMED_AT
 from trihedron.pipeline.comparing_noise import Sampled, sampled
 from trihedron.pipeline.comparing_quantisation import white_and_quantisation
 from trihedron.pipeline.comparing_ranges import SENSOR
@@ -33,8 +34,6 @@ from trihedron.simulate import (
 )
 
 FEWEST_OCTAVES = 4
-AIMED_AT = (0.9, 1.1)
-"""Ratio of what poses and moves miss, simulation over recording, within which the two are called alike."""
 N_FREQUENCIES = 256
 """At which a filter is compared with what was seen: a sixteenth of an octave in the middle of the band."""
 

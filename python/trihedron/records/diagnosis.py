@@ -79,7 +79,7 @@ class ParameterDifference(Plain):
 
 NoiseTerm = Literal[
     "N", "B", "K", "Q", "bandwidth", "line", "resolution", "range", "rate", "jitter", "octave", "distribution",
-    "unit", "frame", "correlation-time",
+    "unit", "frame", "correlation-time", "poses", "moves",
 ]  # fmt: skip
 
 
@@ -90,7 +90,8 @@ class NoiseDifference(Plain):
     ``ratio`` is model over recording with its 95 % ``interval``; ``axis`` is empty for what all axes share; ``remark``
     says in words what the number resembles (a density scaled by the rate twice). ``term`` ``unit`` is a reading written
     in another unit than it says, ``frame`` one along other axes (gravity's sign, rates of the world).
-    ``band_hz`` is where an octave begins and ends.
+    ``band_hz`` is where an octave begins and ends. ``poses`` and ``moves``: what the lengths of gravity and gravity
+    carried through the moves miss, rms, of simulations moved as the recording was; their interval is of 1 − 2 alpha.
     """
 
     sensor: Literal["accelerometer", "gyroscope", "both"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.records.diagnosis import Diagnosis, NoiseDifference
-from trihedron.report.chart import AXIS_COLOURS, Chart, Line, Mark, Panel, Points, Scale
+from trihedron.report.chart import Chart, Line, Mark, Panel, Points, Scale
 from trihedron.report.document import Block, Picture
 from trihedron.report.drawing import later
 from trihedron.report.numbers import plain_number
@@ -49,12 +49,12 @@ def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     seen = _spectra(diagnosis.noise_compared)
     if not seen:
         return ()
-    first = "Noise inside still poses, model (dashed) and recording, octave by octave."
+    first = "Noise inside still poses, model (dashed) and recording, in octaves that both logs show."
     second = "Allan deviation of that noise, model (dashed) and recording: what the octaves above make of it."
-    return (
-        _picture("spectra-both", first, partial(spectra_chart, diagnosis)),
-        _picture("allan-both", second, partial(allan_chart, diagnosis)),
-    )
+    spectra = _picture("spectra-both", first, partial(spectra_chart, diagnosis))
+    if not any(len(_without_gaps(*one)[0]) >= FEWEST_OCTAVES for one in seen.values()):
+        return (spectra,)
+    return spectra, _picture("allan-both", second, partial(allan_chart, diagnosis))
 
 
 def _picture(name: str, caption: str, chart: Callable[[], Chart]) -> Picture:
@@ -93,7 +93,7 @@ def spectra_chart(diagnosis: Diagnosis) -> Chart:
     for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
         unit = _unit(sensor) + "/√Hz"
         x = np.concatenate([edges, np.full((len(edges), 1), np.nan)], axis=1).ravel()
-        marks = _both(x, np.repeat(model, 3), np.repeat(own, 3), "xyz".index(axis))
+        marks = _both(x, np.repeat(model, 3), np.repeat(own, 3))
         panels.append(_panel("frequency [Hz]", "Hz", f"density [{unit}]", unit, marks, f"{_said(sensor)} {axis}"))
     return Chart(tuple(panels), columns=3)
 
@@ -107,8 +107,11 @@ def allan_chart(diagnosis: Diagnosis) -> Chart:
     panels = []
     for (sensor, axis), (edges, model, own) in _spectra(diagnosis.noise_compared).items():
         unit = _unit(sensor)
+        edges, model, own = _without_gaps(edges, model, own)
+        if len(edges) < FEWEST_OCTAVES:
+            continue
         tau = np.geomspace(0.5 / edges[-1, 1], 0.25 / edges[0, 0], 60)
-        marks = _both(tau, allan_of(edges, model, tau), allan_of(edges, own, tau), "xyz".index(axis))
+        marks = _both(tau, allan_of(edges, model, tau), allan_of(edges, own, tau))
         panels.append(
             _panel("averaging time τ [s]", "s", f"Allan deviation [{unit}]", unit, marks, f"{_said(sensor)} {axis}")
         )
@@ -125,9 +128,9 @@ def allan_of(edges_hz: FloatArray, density: FloatArray, tau_s: FloatArray) -> Fl
     return np.sqrt(out)
 
 
-def _both(x: FloatArray, model: FloatArray, own: FloatArray, k: int) -> tuple[Mark, ...]:
+def _both(x: FloatArray, model: FloatArray, own: FloatArray) -> tuple[Mark, ...]:
     return (
-        Line(x, own, "recording", AXIS_COLOURS[k]),
+        Line(x, own, "recording", "accent"),
         Line(x, model, "model", "ink", is_dashed=True),
     )
 
@@ -151,6 +154,13 @@ def _spectra(compared: Sequence[NoiseDifference]) -> dict[tuple[str, str], Spect
             table = np.array(sorted(found))
             out[key] = table[:, :2], table[:, 2], table[:, 3]
     return out
+
+
+def _without_gaps(edges: FloatArray, model: FloatArray, own: FloatArray) -> Spectrum:
+    """The longest run of octaves that adjoin: a band that one side lacks would look like a dip and a ripple."""
+    runs = np.split(np.arange(len(edges)), 1 + np.flatnonzero(~np.isclose(edges[1:, 0], edges[:-1, 1])))
+    longest = max(runs, key=len)
+    return edges[longest], model[longest], own[longest]
 
 
 def _unit(sensor: str) -> str:

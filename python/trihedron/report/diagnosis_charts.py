@@ -26,10 +26,15 @@ HALF_WINDOW_S = 0.3
 
 
 def before_after_chart(residuals: DomainResiduals, *, has_effects: bool) -> Chart:
-    """One domain, before beside after on one scale; without effects only the linear model."""
+    """One domain, before beside after on one scale; without effects only what was fitted."""
     factor, unit = PRINTED[residuals.unit]
     sides = [
-        ("linear model", residuals.time_before_s, residuals.before, residuals.sigma_before),
+        (
+            "linear model" if has_effects else "fitted model",
+            residuals.time_before_s,
+            residuals.before,
+            residuals.sigma_before,
+        ),
         ("with the effects", residuals.time_after_s, residuals.after, residuals.sigma_after),
     ][: 2 if has_effects else 1]
     low, high = _limits(sides, factor, is_angle=residuals.domain == "moves")

@@ -20,12 +20,17 @@ _PRINTED = {
 
 
 def draw_before_after(residuals: DomainResiduals, *, has_effects: bool) -> Figure:
-    """One domain, before beside after on one scale; without effects only the linear model."""
+    """One domain, before beside after on one scale; without effects only what was fitted."""
     factor, unit = _PRINTED[residuals.unit]
     n = 2 if has_effects else 1
     figure, axes = panels(1, n, (9.5, 3.3))
     sides = [
-        ("linear model", residuals.time_before_s, residuals.before, residuals.sigma_before),
+        (
+            "linear model" if has_effects else "fitted model",
+            residuals.time_before_s,
+            residuals.before,
+            residuals.sigma_before,
+        ),
         ("with the effects", residuals.time_after_s, residuals.after, residuals.sigma_after),
     ][:n]
     for axis, (title, time_s, value, sigma) in zip(axes, sides, strict=True):

@@ -143,7 +143,7 @@ def noise_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
         )
         for n in diagnosis.noise_compared
     )
-    blocks: list[Block] = [Table(("", "term", "model", "recording", "ratio (95 %)", "unit", ""), rows)]
+    blocks: list[Block] = [Table(("", "term", "model", "recording", "ratio (interval)", "unit", ""), rows)]
     remarks = tuple(("", n.remark) for n in diagnosis.noise_compared if n.remark and n.significant)
     if remarks:
         blocks.append(Facts(tuple(dict.fromkeys(remarks))))

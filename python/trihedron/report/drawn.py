@@ -16,6 +16,8 @@ from trihedron.report.ticks import ticks
 
 UNITS = 10000
 """Across a panel, both ways. Marks are in these; a page of 4 k is a third as fine."""
+MOST_LETTERS = 32
+"""Of all names below a panel; half a page has room for these side by side. Longer ones are counted."""
 
 
 def drawn(chart: Chart, caption: str) -> str:
@@ -80,6 +82,8 @@ def _panel(panel: Panel, caption: str) -> str:
     at = _Places(panel)
     (x0, x1), (y0, y1) = at.x_limits, at.y_limits
     x_ticks = ticks(x0, x1, is_log=panel.x.is_log, whole=panel.x.whole)
+    if _has_room_for_names(panel):
+        x_ticks = [(float(k), name) for k, name in enumerate(panel.x.names, 1)]
     y_ticks = ticks(y0, y1, is_log=panel.y.is_log, whole=panel.y.whole, most=5)
     xs, ys = at.x([t for t, _ in x_ticks]), at.y([t for t, _ in y_ticks])
     grid = "".join(f"M{x:.0f} 0V{UNITS}" for x in xs) + "".join(f"M0 {y:.0f}H{UNITS}" for y in ys)
@@ -97,6 +101,8 @@ def _panel(panel: Panel, caption: str) -> str:
     spec += f'data-uy="{escape(panel.y.unit)}" data-lx="{escape(panel.x.label)}"'
     spec += (" data-xlog" if panel.x.is_log else "") + (" data-ylog" if panel.y.is_log else "")
     spec += " data-xwhole" if panel.x.whole else ""
+    if _has_room_for_names(panel):
+        spec += f' data-xnames="{escape("|".join(panel.x.names))}"'
     return (
         f'<div class="panel" {spec} style="--room:{room}ch;--high:{panel.height_px}px">{title}'
         f'<div class="ylabel">{escape(panel.y.label)}</div>'
@@ -106,6 +112,10 @@ def _panel(panel: Panel, caption: str) -> str:
         f'<g class="front">{"".join(front)}</g></svg>{notes}</div>'
         f'<div class="xticks" aria-hidden="true">{x_words}</div><div class="xlabel">{escape(panel.x.label)}</div></div>'
     )
+
+
+def _has_room_for_names(panel: Panel) -> bool:
+    return 0 < len("".join(panel.x.names)) <= MOST_LETTERS
 
 
 def _word(text: str, place: str) -> str:

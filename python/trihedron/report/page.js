@@ -74,11 +74,12 @@
       for (const [way, most, name, edge] of [["x", 6, ".xticks", "left"], ["y", 5, ".yticks", "top"]]) {
         const [low, high] = [this.value(0, way), this.value(1, way)], [a, b] = this.full[way], [u, v] = this.now[way];
         const place = this.node.querySelector(name); place.replaceChildren();
+        const names = way === "x" && this.node.dataset.xnames ? this.node.dataset.xnames.split("|") : null;
         for (const [at, word] of this.log[way] ? logTicks(low, high) : ticks(low, high, most)) {
           const s = this.log[way] ? Math.log10(at) : at, whole = (s - a) / (b - a) * UNITS, here = (s - u) / (v - u);
           grid += way === "x" ? `M${whole} 0V${UNITS}` : `M0 ${UNITS - whole}H${UNITS}`;
           const span = document.createElement("span");
-          span.textContent = word; span.style[edge] = 100 * (way === "x" ? here : 1 - here) + "%"; place.append(span);
+          span.textContent = names ? names[at - 1] ?? "" : word; span.style[edge] = 100 * (way === "x" ? here : 1 - here) + "%"; place.append(span);
         }
       }
       this.svg.querySelector(".grid").setAttribute("d", grid);

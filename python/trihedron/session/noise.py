@@ -14,6 +14,7 @@ from trihedron.records.segments import Segments
 from trihedron.refused import RefusedError
 from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.coloured_noise import coloured_variance
+from trihedron.session.flicker import expected_scatter
 
 LEAST_SHARE = 1e-9
 """Where nothing scatters (a simulation without noise) a billionth of a unit stands for the rounding of the log."""
@@ -31,7 +32,8 @@ class SessionNoise:
     Standard errors of pose means (h, 3), white noise ``density`` (3,) raw · √s, and ``unresolved`` (m, 2, 3): variance
     of every move's integrals, force and rate, (raw unit · s)², by motion faster than the samples and by noise slower
     than a move. ``force_up`` are the verticals (h, 3) and the standard errors (h,) of the means along them, NaN where
-    those of the axes hold; ``None`` where no vertical is known.
+    those of the axes hold; ``None`` where no vertical is known. ``force_scatter`` [raw]: by how much flicker lets the
+    accelerometer's zero differ from pose to pose, 0 where poses show none.
     """
 
     force_sigma: FloatArray
@@ -40,6 +42,7 @@ class SessionNoise:
     rate_density: FloatArray | None
     unresolved: FloatArray
     force_up: Along | None = None
+    force_scatter: float = 0.0
 
 
 def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[int, int]]) -> SessionNoise:
@@ -85,7 +88,10 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
     assert densities[0] is not None
     up, error = segments.accelerometer_up, segments.accelerometer_sigma_up
     along = None if up is None or error is None else (np.ascontiguousarray(up), np.maximum(error, floor))
-    return SessionNoise(sigmas[0], densities[0], sigmas[1], densities[1], variances, along)
+    scatter = 0.0
+    if along is not None:
+        scatter = expected_scatter(recording.accelerometer, np.array(spans, dtype=np.int64).reshape(-1, 2), along[0])
+    return SessionNoise(sigmas[0], densities[0], sigmas[1], densities[1], variances, along, scatter)
 
 
 def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
+import inspect
 import sys
 import types
 import typing
@@ -114,6 +115,10 @@ def _motion(table: Mapping[str, Any]) -> Motion:
         for key, value in values.items():
             if isinstance(value, int) and abs(value) > _MOST_POSES:
                 raise RefusedError(f"session {kind}: {key} is {value:.3g}, and a session has at most {_MOST_POSES}")
+        known = list(inspect.signature(SESSIONS[kind]).parameters)
+        for key in values:
+            if key not in known:
+                raise RefusedError(f"session {kind}: there is no {key!r}; there are kind, {', '.join(known)}")
         try:
             motion = SESSIONS[kind](**values)
         except TypeError as error:

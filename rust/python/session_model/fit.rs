@@ -60,6 +60,16 @@ impl SessionFit {
         self.fit.state.force_bias.as_slice().to_pyarray(py)
     }
 
+    /// With one zero for the session.
+    #[getter]
+    fn session_force_bias<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.fit
+            .state
+            .session_force_bias()
+            .as_slice()
+            .to_pyarray(py)
+    }
+
     #[getter]
     fn rate_scale<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         of3(py, &self.fit.state.rate_scale)
@@ -83,18 +93,6 @@ impl SessionFit {
     #[getter]
     fn effect<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.fit.state.effect.as_slice().to_pyarray(py)
-    }
-
-    #[getter]
-    fn corners_s(&self) -> (f64, f64) {
-        let [a, b] = self.fit.strengths.corner_s;
-        (a, b)
-    }
-
-    #[getter]
-    fn scatter(&self) -> (f64, f64) {
-        let [a, b] = self.fit.strengths.scatter;
-        (a, b)
     }
 
     /// Corner times, s; scatter in its units; straying between poses in units of the scatter: accelerometer, gyro each.
@@ -280,8 +278,8 @@ impl SessionFit {
         matrix(py, &self.fit.border_covariance())
     }
 
-    /// `(24, 24)` covariance of `(S_a, b_a, S_w, b_w)` on raw readings centred at two origins, and `b_w` `(3,)` with one
-    /// zero for the session.
+    /// `(24, 24)` covariance of `(S_a, b_a, S_w, b_w)` on raw readings centred at two origins, and `b_w` `(3,)`; one
+    /// zero of either sensor for the session.
     #[allow(clippy::type_complexity)]
     fn linear_covariance<'py>(
         &self,
@@ -316,7 +314,7 @@ impl SessionFit {
         let lent = found.iter().map(|(state, covariance)| {
             Ok((
                 of3(py, &state.force_scale)?,
-                state.force_bias.as_slice().to_pyarray(py),
+                state.session_force_bias().as_slice().to_pyarray(py),
                 of3(py, &state.rate_scale)?,
                 matrix(py, covariance)?,
             ))

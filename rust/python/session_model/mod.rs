@@ -88,7 +88,8 @@ fn distortion(
 impl SessionModel {
     /// `noise`: jitter of the sample instants s, usual step s, factors on the standard errors of both kinds of residuals of
     /// moves. `prior`: mean `(18,)`, covariance `(18, 18)`, whether it is weak. `scatter`: `(2, 3)` raw, what strength one
-    /// means, and whether that is known.
+    /// means, whether that is known, and the strength of the accelerometer's that its noise inside poses lets expect, 0 where
+    /// it shows none.
     #[new]
     #[pyo3(signature = (*, gravity_m_s2, poses, moves, noise, prior, scatter))]
     fn new(
@@ -98,14 +99,15 @@ impl SessionModel {
         moves: &SessionMoves,
         noise: (f64, f64, Corners),
         prior: Option<(PyReadonlyArray1<'_, f64>, Array2<'_>, bool)>,
-        scatter: Option<(Array2<'_>, bool)>,
+        scatter: Option<(Array2<'_>, bool, f64)>,
     ) -> PyResult<Self> {
         let prior = prior
             .map(|(mean, covariance, is_weak)| prior_of(&mean, &covariance, is_weak))
             .transpose()?;
-        let is_scatter_given = scatter.as_ref().is_some_and(|(_, is_given)| *is_given);
+        let is_scatter_given = scatter.as_ref().is_some_and(|(_, is_given, _)| *is_given);
+        let expected_scatter = scatter.as_ref().map_or(0.0, |(_, _, expected)| *expected);
         let scatter = scatter
-            .map(|(array, _)| match rows3("scatter", &array)?.as_slice() {
+            .map(|(array, ..)| match rows3("scatter", &array)?.as_slice() {
                 [a, b] => Ok([*a, *b]),
                 _ => Err(PyValueError::new_err("scatter must have shape (2, 3)")),
             })
@@ -131,6 +133,7 @@ impl SessionModel {
             prior,
             scatter,
             is_scatter_given,
+            expected_scatter,
         };
         super::run(py, || session.check())?;
         Ok(Self {

@@ -52,7 +52,7 @@ def _shown(fitted: Fit) -> dict[str, _Shown]:
     line, twin, obs = fitted.line, fitted.twin, fitted.line.obs
     h = obs.n_holds
     out: dict[str, _Shown] = {}
-    force = obs.hold_force @ twin.accel_S.T + twin.accel_b
+    force = obs.hold_force @ twin.accel_S.T + line.core.session_force_bias
     if line.distortion.force is not None:
         force = force - line.distortion.force[:h] @ twin.effect
     size = np.linalg.norm(force, axis=1)

@@ -40,7 +40,8 @@ class Observations:
     ``zero_scatter`` (2, 3), once a diagnosis has found it: how far zeros scatter from hold to hold beside their walk,
     accelerometer and gyro, raw units. ``hold_creep`` (h, 3), once it was seen: by how much (one sigma,
     raw units) poses turn that settle; it is in ``hold_rate_sigma``.
-    ``force_up`` are verticals (h, 3), raw unit vectors, and the errors (h,) of the means along them.
+    ``force_up`` are verticals (h, 3), raw unit vectors, and the errors (h,) of the means along them; ``force_scatter``
+    is how far flicker lets the accelerometer's zero scatter, raw.
     The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
     """
 
@@ -69,6 +70,7 @@ class Observations:
     zero_scatter: FloatArray | None = None
     hold_creep: FloatArray | None = None
     force_up: Along | None = None
+    force_scatter: float = 0.0
 
     @property
     def n_holds(self) -> int:
@@ -226,6 +228,7 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         rate_density=noise.rate_density,
         bumped_s=bumped,
         force_up=noise.force_up,
+        force_scatter=noise.force_scatter,
         unresolved=dict(zip(holds, unresolved, strict=True)),
     )
 

@@ -179,7 +179,7 @@ def linear_model(fitted: Fit) -> LinearModel:
     sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     accel: dict[str, Any] = {
         "S": twin.accel_S.tolist(),
-        "b": (twin.accel_b - twin.accel_S @ obs.force_origin).tolist(),
+        "b": (fitted.line.core.session_force_bias - twin.accel_S @ obs.force_origin).tolist(),
         "sigma_S": sigma[:9].reshape(3, 3).tolist(),
         "sigma_b": sigma[9:12].tolist(),
         "raw_unit": obs.recording.accelerometer_unit.value,

@@ -225,14 +225,14 @@ def core_model(
     scatter = None
     if is_scatter_free or obs.zero_scatter is not None:
         unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma, obs.force_up)
-        scatter = (unit, False)
+        scatter = (unit, False, obs.force_scatter / float(unit[0, 0]))
         if obs.zero_scatter is not None and is_scatter_free:
             unit[1] = np.maximum(obs.zero_scatter[1], START_STRENGTHS[1][0] * unit[1])
         elif obs.zero_scatter is not None:
             # A sensor that does not scatter has any unit, and a strength that counts as none.
             named = obs.zero_scatter.any(axis=1, keepdims=True)
             floor = START_STRENGTHS[1][0] * unit
-            scatter = (np.where(named, np.maximum(obs.zero_scatter, floor), unit), True)
+            scatter = (np.where(named, np.maximum(obs.zero_scatter, floor), unit), True, 0.0)
     return _core.SessionModel(
         gravity_m_s2=gravity_m_s2,
         poses=core_poses(obs),
@@ -265,7 +265,7 @@ def core_state(twin: Twin) -> _core.SessionState:
 def twin_of(core: _core.SessionFit, gravity_m_s2: float) -> Twin:
     """The point where a fit ended, biases in SI."""
     accel_S, gyro_S = np.asarray(core.force_scale), np.asarray(core.rate_scale)
-    accel_corner, gyro_corner = core.corners_s
+    accel_corner, gyro_corner = core.strengths[0]
     return Twin(
         gravity=gravity_m_s2, accel_S=accel_S, accel_b=np.asarray(core.force_bias), gyro_S=gyro_S,
         up=np.asarray(core.up), gyro_bias=core.rate_zero @ gyro_S.T, accel_bias=core.force_zero @ accel_S.T,

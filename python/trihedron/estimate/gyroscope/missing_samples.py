@@ -10,6 +10,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.probability import bdtrc
+from trihedron.ranges import Range
 from trihedron.records import Finding, FindingCode, Recording, Segments, Severity
 
 HALF_WINDOW = 4
@@ -51,30 +52,29 @@ def missing_samples(recording: Recording, segments: Segments, sigma_scale: float
     gyroscope = recording.gyroscope
     if gyroscope is None or segments.gyroscope_sigma is None or not segments.moves:
         return []
-    channels = [gyroscope / _positive(segments.gyroscope_sigma)]
+    triads, noise = [gyroscope], [_positive(segments.gyroscope_sigma)]
     if recording.accelerometer is not None and segments.accelerometer_sigma is not None:
-        channels.append(recording.accelerometer / _positive(segments.accelerometer_sigma))
-    readings = np.concatenate(channels, axis=1)
+        triads.append(recording.accelerometer)
+        noise.append(_positive(segments.accelerometer_sigma))
+    readings = np.concatenate(triads, axis=1)
     step_s = 1.0 / recording.rate_hz
     # A step that the stamps show to be long is a gap, known and reported; no curve is laid across it.
     is_gap = ~(np.abs(np.diff(recording.time_s) - step_s) < 0.4 * step_s)
     if not np.isfinite(readings).all():
         is_missing: npt.NDArray[np.bool_] = ~np.all(np.isfinite(readings), axis=1)
         is_gap |= is_missing[1:] | is_missing[:-1]
-        readings = np.nan_to_num(readings)
     is_cut = np.convolve(is_gap, np.ones(2 * HALF_WINDOW + 1), mode="same") > 0.5 if is_gap.any() else is_gap
-    n, n_short, long_steps = 0, 0, []
-    for move in segments.moves:
-        first = max(move.start, HALF_WINDOW)
-        last = min(move.stop, recording.n_samples - HALF_WINDOW - 1)
-        if last - first < 2 * HALF_WINDOW:
-            continue
-        found = _steps(readings[first - HALF_WINDOW : last + HALF_WINDOW + 1])
-        is_known = ~is_cut[first:last]
-        n += int(np.count_nonzero(found.is_sharp & is_known))
-        n_short += int(np.count_nonzero(found.is_short & is_known))
-        long_steps.append(first + np.flatnonzero(found.is_long & is_known))
-    at = np.concatenate(long_steps) if long_steps else np.zeros(0, dtype=np.intp)
+    ends = recording.n_samples - HALF_WINDOW - 1
+    inner = [(max(move.start, HALF_WINDOW), min(move.stop, ends)) for move in segments.moves]
+    inner = [(first, last) for first, last in inner if last - first >= 2 * HALF_WINDOW]
+    if not inner:
+        return []
+    found = _steps(readings, np.concatenate(noise), inner)
+    step = np.concatenate([np.arange(first, last) for first, last in inner])
+    is_known = ~is_cut[step]
+    n = int(np.count_nonzero(found.is_sharp & is_known))
+    n_short = int(np.count_nonzero(found.is_short & is_known))
+    at = step[found.is_long & is_known]
     n_long = len(at)
     if n_long < FEWEST or float(bdtrc(n_long - 1, n_long + n_short, 0.5)) > CHANCE:
         return []
@@ -111,7 +111,7 @@ def _positive(sigma: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Steps:
-    """Of the steps of one move: which would show a lost sample, which are one sample too long, which too short."""
+    """Of the steps of moves: which would show a lost sample, which are one sample too long, which too short."""
 
     is_sharp: npt.NDArray[np.bool_]
     is_long: npt.NDArray[np.bool_]
@@ -130,13 +130,21 @@ CONTRASTS = np.array([_contrasts(missing) for missing in (0, 1, -1)])
 """As the readings stand, with one sample put between, and with one taken out."""
 
 
-def _steps(readings: FloatArray) -> _Steps:
-    """The steps behind samples ``HALF_WINDOW`` to the last but ``HALF_WINDOW + 1``.
+def _steps(readings: FloatArray, noise: FloatArray, moves: list[Range]) -> _Steps:
+    """The steps behind the samples of ``moves``, one after the other; ``noise`` (c,) of the channels.
 
     A short step is also one whose jump falls short of the slope beside it, the mirror image of a long one: a bend is as
     often the one as the other.
     """
     flags = _core.motion_joints(
-        readings, CONTRASTS, nearby=NEARBY, sharp=SHARP, part=PART, whole=WHOLE, left=STILL_ORDINARY, mirrored=MIRRORED
+        readings,
+        noise,
+        np.array(moves, dtype=np.int64),
+        CONTRASTS,
+        nearby=NEARBY,
+        sharp=SHARP,
+        part=PART,
+        whole=WHOLE,
+        left=(STILL_ORDINARY, MIRRORED),
     )
     return _Steps(*flags)

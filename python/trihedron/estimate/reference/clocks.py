@@ -18,6 +18,8 @@ LEAST_OVERLAP = 0.25
 """Share of the shorter of the two that must lie within both."""
 BLOCK_S = 8.0
 """Stretches whose own lag is found: long enough for several turns of a hand."""
+BLOCK_PARTS = 8
+"""Less than this part of a stretch behind the last one tells nothing that it does not."""
 JUMP_S = 0.05
 """A lag that changes by more from one stretch to the next is a jump: those of stretches scatter by milliseconds."""
 LOCKED = 0.9
@@ -137,6 +139,19 @@ def _correlations(a: FloatArray, b: FloatArray) -> tuple[FloatArray, npt.NDArray
     return np.asarray(correlation[keep]), np.asarray(lag[keep]), np.asarray(np.round(count[keep]))
 
 
+def _stretches(n: int, whole: int) -> list[tuple[int, int]]:
+    """Beginning and length of stretches of ``n`` samples, by their middles: whole ones, and more at both ends.
+
+    A clock that jumps within the first or the last of them spoils it: half of it, and what is behind the last whole
+    one, tell.
+    """
+    found = [(start, whole) for start in range(0, n - whole + 1, whole)]
+    found += [(0, whole // 2), (n - whole // 2, whole // 2)]
+    if n % whole > whole // BLOCK_PARTS:
+        found.append((n - whole, whole))
+    return sorted(found, key=lambda one: 2 * one[0] + one[1])
+
+
 def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) -> tuple[float, float]:
     """Offset and rate from the lags of stretches.
 
@@ -145,14 +160,13 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
     ValueError
         When two neighbouring stretches each fit well at lags that no steady clock joins.
     """
-    length = round(BLOCK_S / grid.step_s)
-    if len(ours) < 3 * length:
+    if len(ours) < 3 * round(BLOCK_S / grid.step_s):
         return offset, 0.0
     lags, middles = [], []
     fits: list[tuple[float, FloatArray]] = []
     spread = np.nanstd(ours)
     search = round(SEARCH_S / grid.step_s)
-    for start in range(0, len(ours) - length + 1, length):
+    for start, length in _stretches(len(ours), round(BLOCK_S / grid.step_s)):
         a = ours[start : start + length]
         if np.isfinite(a).sum() < 0.7 * length or np.nanstd(a) < 0.3 * spread:
             continue
@@ -167,7 +181,7 @@ def _refined(ours: FloatArray, grid: Grid, reference: Reference, offset: float) 
         if not np.any(is_near):
             continue
         k = int(np.flatnonzero(is_near)[np.argmax(correlation[is_near])])
-        if correlation[k] > LOCKED:
+        if correlation[k] > (SURE if length < round(BLOCK_S / grid.step_s) else LOCKED):
             lags.append((lag[k] - search) * grid.step_s)
             middles.append(float(grid.time_s[start] + 0.5 * length * grid.step_s))
             fits.append((float(correlation[k]), np.where(is_near, correlation, -1.0)[(lag >= 0) & (lag <= 2 * search)]))

@@ -14,6 +14,7 @@ from trihedron.estimate.reference.accelerometer import ForceFit, fit_acceleromet
 from trihedron.estimate.reference.clocks import align
 from trihedron.estimate.reference.coloured import BLOCKS, Solution
 from trihedron.estimate.reference.gyroscope import GyroFit, Signals, fit_gyroscope
+from trihedron.estimate.reference.parts import refuse_parts_elsewhere
 from trihedron.estimate.reference.remarks import remarks
 from trihedron.estimate.reference.replay import replay
 from trihedron.estimate.reference.settled import plateaus
@@ -78,6 +79,7 @@ def fit_reference(
     _refuse_strangers(gyro, motion)
     _refuse_units(recording, gyro, motion)
     _refuse_still(gyro, motion)
+    refuse_parts_elsewhere(grid, reference, gyro)
     handedness = float(np.sign(np.linalg.det(gyro.A)))
     spacing = max(windows.spacing, round(FORCE_WINDOW_S / grid.step_s))
     wide = windows_on(seen, grid.step_s, spacing)

@@ -30,7 +30,7 @@ def plateaus(grid: Grid, reference: Reference, time: FloatArray) -> Mask:
         later = raw[len(raw) // 3 :]
         level = np.median(later, axis=0)
         sigma = 1.4826 * np.median(np.abs(later - level), axis=0) + 1e-12 * np.abs(level).max() + 1e-300
-        smooth = _running_mean(np.abs(raw - level) / sigma, max(guard // 2, 1))
+        smooth = running_mean(np.abs(raw - level) / sigma, max(guard // 2, 1))
         off = np.flatnonzero(np.any(smooth > LEVELS, axis=1))
         begin = off[off < len(raw) // 3]
         first = int(begin[-1]) + guard if len(begin) else 0
@@ -38,7 +38,7 @@ def plateaus(grid: Grid, reference: Reference, time: FloatArray) -> Mask:
     return out
 
 
-def _running_mean(x: FloatArray, n: int) -> FloatArray:
+def running_mean(x: FloatArray, n: int) -> FloatArray:
     total = np.cumsum(np.vstack([np.zeros((1, x.shape[1])), x]), axis=0)
     at = np.arange(len(x))
     low, high = np.maximum(at - n // 2, 0), np.minimum(at - n // 2 + n, len(x))

@@ -31,7 +31,7 @@ STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 class SessionSolution:
     """A session at its optimum, in the lower frame, on raw readings.
 
-    ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); ``b_w`` is that of one zero for the session.
+    ``S_a``, ``b_a``, ``S_w``, ``b_w`` with their ``covariance`` (24, 24); the zeros are those of one for the session.
     ``moves_chi2`` over ``moves_dof`` degrees of freedom of gravity after the moves, in the noise of the samples.
     ``inflation`` of the moves' standard errors; ``accel_zero_rms``, ``gyro_zero_rms`` what the zeros of the holds
     differ from the session's by, m/s² and rad/s: as far as S, b alone must miss; ``is_walk_at_edge`` says for either
@@ -75,7 +75,7 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     away = core.force_zero @ S_a.T, (core.rate_zero - core.rate_zero.mean(axis=0)) @ S_w.T
     return SessionSolution(
         S_a=S_a,
-        b_a=np.asarray(core.force_bias) - S_a @ observed.force_origin,
+        b_a=np.asarray(core.session_force_bias) - S_a @ observed.force_origin,
         S_w=S_w,
         b_w=b_w,
         covariance=covariance,

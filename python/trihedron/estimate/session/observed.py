@@ -21,7 +21,7 @@ class Observed:
 
     Hold means and standard errors (n, 3), densities (3,) raw · √s, the samples of the ``moves`` with the holds
     ``before`` (m,) they begin in; ``inflation`` on the standard errors of gravity after a move and of the velocity over
-    it; ``force_up`` as in :class:`SessionNoise`.
+    it; ``force_up``, ``force_scatter`` as in :class:`SessionNoise`.
     """
 
     gravity_m_s2: float
@@ -40,6 +40,7 @@ class Observed:
     nominal_step_s: float
     inflation: tuple[float, float] = (1.0, 1.0)
     force_up: Along | None = None
+    force_scatter: float = 0.0
 
     def model(self) -> _core.SessionModel:
         """The Rust model; zeros may scatter from pose to pose as far as the evidence goes."""
@@ -53,13 +54,14 @@ class Observed:
             rate_density=self.rate_density,
             force_along=self.force_up,
         )
+        unit = scatter_unit(self.hold_force_sigma, self.hold_rate_sigma, self.force_up)
         return _core.SessionModel(
             gravity_m_s2=self.gravity_m_s2,
             poses=poses,
             moves=self.moves,
             noise=(self.sigma_time_s, self.nominal_step_s, self.inflation),
             prior=None,
-            scatter=(scatter_unit(self.hold_force_sigma, self.hold_rate_sigma, self.force_up), False),
+            scatter=(unit, False, self.force_scatter / float(unit[0, 0])),
         )
 
 
@@ -115,4 +117,5 @@ def arranged(
         sigma_time_s=measured.sigma_time_s,
         nominal_step_s=measured.nominal_step_s,
         force_up=noise.force_up,
+        force_scatter=noise.force_scatter,
     )

@@ -1,0 +1,87 @@
+"""Whether poses and moves of a scenario miss as the recording's do: chance is told from difference."""
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.pipeline.comparing_moved import AIMED_AT, FEW, MANY, missed_alike
+from trihedron.probability import bdtrc
+from trihedron.simulate import hand_session, profile_by_name
+from trihedron.simulate.scenario import Scenario
+
+ALPHA = 0.01
+
+
+class Drawn:
+    """Mean squares of n poses and n moves, χ² over their degrees of freedom, simulations ``ratio`` times as far."""
+
+    def __init__(self, rng, n, ratio=1.0, refused=()):
+        self.rng, self.n, self.ratio, self.refused = rng, n, ratio, refused
+        self.poses, self.moves = self.of_one(), self.of_one()
+        self.drawn = 0
+
+    def of_one(self):
+        return self.rng.chisquare(self.n) / self.n
+
+    def missed_by(self, _scenario, _seed):
+        self.drawn += 1
+        if self.drawn in self.refused:
+            return None, None
+        return self.ratio**2 * self.of_one(), self.of_one()
+
+
+@pytest.mark.parametrize("n", [6, 20, 100])
+def test_chance_is_called_a_difference_no_more_often_than_alpha(n):
+    rng = np.random.default_rng(4711 + n)
+    trials = 300
+    rows = [row for _ in range(trials) for row in missed_alike(None, Drawn(rng, n), ALPHA)]
+    wrong = sum(row.significant for row in rows)
+    # Seen by chance once in a thousand runs if the rate is alpha.
+    assert bdtrc(wrong - 1, 2 * trials, ALPHA) > 1e-3, wrong
+
+
+@pytest.mark.parametrize(("n", "ratio"), [(20, 2.5), (20, 0.4), (100, 1.6)])
+def test_a_ratio_beyond_chance_is_told_of_poses_and_not_of_moves(n, ratio):
+    rng = np.random.default_rng(int(100 * ratio) + n)
+    trials = 60
+    found = [missed_alike(None, Drawn(rng, n, ratio), ALPHA) for _ in range(trials)]
+    told = sum(poses.significant for poses, _ in found)
+    assert told > 0.9 * trials
+    assert sum(moves.significant for _, moves in found) <= 4
+    one = next(poses for poses, _ in found if poses.significant)
+    assert one.interval[1] < AIMED_AT[0] or one.interval[0] > AIMED_AT[1]
+    assert one.p_value < ALPHA
+    assert "simulations" in one.remark
+
+
+def test_what_is_called_different_is_what_its_interval_leaves_out():
+    rng = np.random.default_rng(8)
+    for _ in range(200):
+        for row in missed_alike(None, Drawn(rng, 12, float(rng.uniform(0.4, 2.5))), ALPHA):
+            outside = row.interval[1] < AIMED_AT[0] or row.interval[0] > AIMED_AT[1]
+            assert row.significant == outside == (row.p_value < ALPHA)
+
+
+def test_more_simulations_are_drawn_only_where_few_leave_it_open():
+    alike = Drawn(np.random.default_rng(3), 50)
+    alike.poses = alike.moves = 1.0
+    missed_alike(None, alike, ALPHA)
+    assert alike.drawn == FEW
+    apart = Drawn(np.random.default_rng(3), 50, 2.0)
+    missed_alike(None, apart, ALPHA)
+    assert apart.drawn == MANY
+
+
+def test_simulations_that_cannot_be_calibrated_say_nothing():
+    assert missed_alike(None, Drawn(np.random.default_rng(1), 20, 3.0, refused=range(1, 30)), ALPHA) == ()
+
+
+def test_the_scenario_that_made_a_log_shows_both_ratios_and_is_consistent():
+    a, g = profile_by_name("mpu").unit(12)
+    scenario = Scenario(hand_session(14), "unit", a, g)
+    log, _ = trihedron.simulate(scenario, 5)
+    found = trihedron.diagnose(log, against=scenario, gravity_m_s2=scenario.environment.gravity)
+    rows = {n.term: n for n in found.noise_compared if n.term in ("poses", "moves")}
+    assert found.verdict == "consistent"
+    assert set(rows) == {"poses", "moves"}
+    assert all(row.interval[0] < 1.1 and row.interval[1] > 0.9 for row in rows.values())
