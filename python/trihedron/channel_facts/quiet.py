@@ -93,7 +93,7 @@ def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -
 def is_integer(array: FloatArray) -> bool:
     """All readings (of a sample of up to about 20000 rows) are whole numbers."""
     probe = array[:: max(1, len(array) // 20000)]
-    # In pieces: most logs show in their first rows that they are none, and memory for all at once costs more than a look.
+    # In pieces: most logs show in their first rows that they are none, and memory for all at once costs time too.
     pieces = (probe[k : k + _ROWS_AT_ONCE] for k in range(0, len(probe), _ROWS_AT_ONCE))
     return all(_is_whole(piece) for piece in pieces) and bool(np.isfinite(probe).any())
 

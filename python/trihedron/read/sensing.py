@@ -10,7 +10,6 @@ import numpy as np
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.quiet import Windows, is_integer, look
-from trihedron.quantiles import median
 from trihedron.read.errors import ReadError
 from trihedron.read.turning import Turning, unit_by_turning
 from trihedron.read.turning import turn_ratio as gyroscope_turns
@@ -62,8 +61,7 @@ def rest_norm(readings: FloatArray, windows: Windows | None) -> float:
     if windows is None:
         return math.nan
     index = windows.start[windows.quiet][:, None] + np.arange(windows.length)
-    lengths = np.linalg.norm(readings[index], axis=2)
-    return median(lengths[~np.isnan(lengths)])
+    return float(np.nanmedian(np.linalg.norm(readings[index], axis=2)))
 
 
 def judge_accelerometer(

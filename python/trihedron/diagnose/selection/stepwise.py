@@ -35,7 +35,10 @@ LEFT_OVER = 0.5
 N_REFITS = 4
 """Candidates fitted jointly at each step: the leaders of the score test."""
 FAR_AHEAD = 4.0
-"""A sound candidate whose score is this many times another's is not caught up by a joint fit."""
+"""A sound candidate whose score is this many times another's is not caught up by a joint fit, if that leaves little."""
+LITTLE_LEFT = 1.5
+"""Dispersion of every domain beside such a candidate. Where more stays, another may explain what its score, a straight
+line at no effect, does not promise: a gyro's low-pass turns gravity by degrees, a late accelerometer by none."""
 
 
 def scores(model: StepwiseModel, exclude: Collection[str] = ()) -> tuple[list[Scored], list[tuple[str, str]]]:
@@ -95,7 +98,7 @@ def with_next(model: StepwiseModel, scored: list[Scored], alpha: float) -> Stepw
     refits: list[Refit] = []
     sound: list[Refit] = []
     for s in leaders:
-        if any(r.scored.merit > FAR_AHEAD * s.merit for r in sound):
+        if any(r.scored.merit > FAR_AHEAD * s.merit and r.against.stays.max() < LITTLE_LEFT for r in sound):
             break
         refits.append(refit(model, s))
         if is_sound(refits[-1].against, s.effect, context) and s.effect.withstands(context):
