@@ -177,7 +177,7 @@ def test_joints_of_a_motion_are_found_as_array_by_array(channels):
     counts = np.zeros(3, dtype=int)
     for seed in range(6):
         readings = jolted_motion(seed, channels)
-        found = missing_samples._steps(readings)
+        found = missing_samples._steps(readings, np.ones(channels), [(4, len(readings) - 5)])
         ours = found.is_sharp, found.is_long, found.is_short
         for mine, theirs in zip(ours, joints_twin(readings), strict=True):
             np.testing.assert_array_equal(mine, theirs)
@@ -186,7 +186,8 @@ def test_joints_of_a_motion_are_found_as_array_by_array(channels):
 
 
 def test_a_motion_without_an_inner_step_has_no_joints():
-    assert all(len(flags) == 0 for flags in vars(missing_samples._steps(np.zeros((9, 6)))).values())
+    none = missing_samples._steps(np.zeros((9, 6)), np.ones(6), [(4, 4)])
+    assert all(len(flags) == 0 for flags in vars(none).values())
 
 
 @pytest.mark.parametrize("chosen", [[0], [0, 1], [0, 2], [0, 1, 2]])
