@@ -19,7 +19,7 @@ pub fn usual_step(time: &[f64]) -> f64 {
 }
 
 /// Steps between which the median of all lies but by mishap, from some of them; none where these are few.
-fn asked(time: &[f64]) -> Option<(u64, u64)> {
+fn asked(time: &[f64]) -> Option<(f64, f64)> {
     if time.len() <= ASKED {
         return None;
     }
@@ -44,7 +44,7 @@ fn asked(time: &[f64]) -> Option<(u64, u64)> {
         clippy::cast_sign_loss,
         reason = "a rank among the steps"
     )]
-    let at = |part: f64| steps[((steps.len() - 1) as f64 * part) as usize];
+    let at = |part: f64| f64::from_bits(steps[((steps.len() - 1) as f64 * part) as usize]);
     Some((at(0.5 - MARGIN), at(0.5 + MARGIN)))
 }
 
@@ -58,21 +58,26 @@ struct About {
 }
 
 /// The median in one pass, if it lies between two steps.
-fn between(time: &[f64], low: u64, high: u64) -> Option<f64> {
+#[allow(clippy::float_cmp)] // the same step is the same to the last bit
+fn between(time: &[f64], low: f64, high: f64) -> Option<f64> {
     let parts = of_each_share(time, |stamps| {
-        let mut inside = Vec::new();
-        let (mut below, mut at_low, mut at_high, mut all) = (0, 0, 0, 0);
+        // Counted without branches, so that a whole vector of steps is looked at together.
+        let (mut below, mut at_low, mut at_high, mut above, mut all) = (0, 0, 0, 0, 0);
         for pair in stamps.windows(2) {
             let step = pair[1] - pair[0];
-            let bits = step.to_bits();
-            let is_forward = step > 0.0;
-            all += usize::from(is_forward);
-            below += usize::from(is_forward && bits < low);
-            at_low += usize::from(bits == low);
-            at_high += usize::from(bits == high && high > low);
-            if is_forward && bits > low && bits < high {
-                inside.push(bits);
-            }
+            all += usize::from(step > 0.0);
+            below += usize::from(step > 0.0 && step < low);
+            at_low += usize::from(step == low);
+            at_high += usize::from(step == high);
+            above += usize::from(step > high);
+        }
+        if high <= low {
+            at_high = 0;
+        }
+        let mut inside = Vec::new();
+        if below + at_low + at_high + above < all {
+            let between = |&bits: &u64| bits > low.to_bits() && bits < high.to_bits();
+            inside.extend(forward(stamps).filter(between));
         }
         About {
             below,
@@ -89,13 +94,13 @@ fn between(time: &[f64], low: u64, high: u64) -> Option<f64> {
     let mut ranked = |rank: usize| {
         let rank = rank.checked_sub(below)?;
         if rank < at_low {
-            return Some(low);
+            return Some(low.to_bits());
         }
         let rank = rank - at_low;
         if rank < inside.len() {
             return Some(*inside.select_nth_unstable(rank).1);
         }
-        (rank - inside.len() < at_high).then_some(high)
+        (rank - inside.len() < at_high).then_some(high.to_bits())
     };
     let upper = f64::from_bits(ranked(n / 2)?);
     if n % 2 == 1 {
@@ -214,7 +219,7 @@ mod tests {
                 assert!(same(usual_step(&time)) && same(by_digits(&time)) || steps.is_empty());
                 // Between any two steps: the median, or the answer that it does not lie there.
                 for (low, high) in [(0, k), (k, k), (k / 2, k + k / 3), (k + 1, k + 2)] {
-                    let at = |i: usize| steps.get(i).copied().map(f64::to_bits);
+                    let at = |i: usize| steps.get(i).copied();
                     if let (Some(low), Some(high)) = (at(low), at(high)) {
                         assert!(between(&time, low, high).is_none_or(same));
                     }
