@@ -18,10 +18,12 @@ MEDIAN_OF_SQUARE = 0.4549
 FAR = 9.0
 """Squares beyond so many variances are a hand's, not the noise's."""
 SEEN = 1.0
-"""Standard errors of the mean square of the halves by which it must exceed white noise's."""
+"""Standard errors of the mean square of the halves by which it must exceed white noise's, where it widens bars only."""
+SURELY_SEEN = 2.0
+"""The same where poses are believed less for it: one session in forty without flicker."""
 
 
-def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> float:
+def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray, seen: float = SEEN) -> float:
     """Standard deviation [raw] of a pose's zero about that of the session by flicker alone, along the vertical.
 
     Means of neighbouring parts of length t differ by a variance 2N²/t + 4 ln 2 h of white noise N² and a flicker of
@@ -36,30 +38,55 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> f
         Half-open ranges of the poses.
     up : (h, 3)
         Raw unit verticals; NaN where unknown.
+    seen
+        Standard errors by which halves must differ by more.
     """
     size = spans[:, 1] - spans[:, 0]
     usable = (size >= FEWEST_READINGS) & np.isfinite(up).all(axis=1)
     if np.count_nonzero(usable) < FEWEST_POSES:
         return 0.0
     spans, size, up = spans[usable], size[usable], up[usable]
-    halves = _steps(readings, spans, up, 2)[:, 0]
-    parts = _steps(readings, spans, up, PARTS).ravel()
-    of_halves, of_parts = _mean_square(halves), _mean_square(parts)
-    white = 2.0 * of_parts / PARTS  # what halves would differ by if the parts' were white
-    if not of_halves > white * (1.0 + SEEN * math.sqrt(2.0 / len(halves))):
-        return 0.0  # of readings that are missing as well
-    level = (of_halves - white) / (4.0 * math.log(2.0) * (1.0 - 2.0 / PARTS))
-    octaves = float(np.ptp(spans)) / (2.0 * float(np.median(size)))
-    return math.sqrt(level * math.log(octaves)) if octaves > 1.0 else 0.0
+    halves = _steps(readings, spans, up[:, None, :], 2)
+    parts = _steps(readings, spans, up[:, None, :], PARTS)
+    return float(_between_poses(halves, parts, spans, seen)[0])
 
 
-def _steps(readings: FloatArray, spans: IntArray, up: FloatArray, n: int) -> FloatArray:
-    """(h, n - 1) differences of the means of ``n`` neighbouring parts of every pose, along its vertical."""
+def expected_rate_scatter(readings: FloatArray, spans: IntArray) -> FloatArray:
+    """(3,) the same [raw] of each axis of a gyro, whose poses ``spans`` (h, 2) of readings (n, 3) stand still.
+
+    All axes together say whether halves of poses differ by more than white noise, each in units of its own.
+    """
+    usable = spans[:, 1] - spans[:, 0] >= FEWEST_READINGS
+    if np.count_nonzero(usable) < FEWEST_POSES:
+        return np.zeros(3)
+    spans = spans[usable]
+    axes = np.broadcast_to(np.eye(3), (len(spans), 3, 3))
+    return _between_poses(_steps(readings, spans, axes, 2), _steps(readings, spans, axes, PARTS), spans, SURELY_SEEN)
+
+
+def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray, seen: float) -> FloatArray:
+    """(k,) scatter along each direction from steps of halves (h, 1, k) and of parts (h, PARTS - 1, k) of poses."""
+    k = halves.shape[2]
+    of_halves = np.array([_mean_square(halves[:, :, i].ravel()) for i in range(k)])
+    # What halves would differ by if what makes the parts differ were white.
+    white = np.array([_mean_square(parts[:, :, i].ravel()) for i in range(k)]) * (2.0 / PARTS)
+    if not (white > 0.0).all():
+        return np.zeros(k)  # readings are missing, or never change
+    excess = float(np.mean(of_halves / white)) - 1.0
+    if not excess > seen * math.sqrt(2.0 / halves.size):
+        return np.zeros(k)
+    level = excess * white / (4.0 * math.log(2.0) * (1.0 - 2.0 / PARTS))
+    octaves = float(np.ptp(spans)) / (2.0 * float(np.median(spans[:, 1] - spans[:, 0])))
+    out: FloatArray = np.sqrt(level * max(math.log(octaves), 0.0))
+    return out
+
+
+def _steps(readings: FloatArray, spans: IntArray, along: FloatArray, n: int) -> FloatArray:
+    """(h, n - 1, k) differences of the means of ``n`` neighbouring parts of every pose along directions (h, k, 3)."""
     edges = spans[:, :1] + (spans[:, 1:] - spans[:, :1]) * np.arange(n + 1) // n
     ranges = np.stack([edges[:, :-1], edges[:, 1:]], axis=2).reshape(-1, 2)
     means, _ = _core.means_by_owner(readings, ranges, np.arange(len(ranges)), len(ranges))
-    along = np.einsum("hkc,hc->hk", means.reshape(len(spans), n, 3), up)
-    out: FloatArray = np.diff(along, axis=1)
+    out: FloatArray = np.diff(np.einsum("hnc,hkc->hnk", means.reshape(len(spans), n, 3), along), axis=1)
     return out
 
 
