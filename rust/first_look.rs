@@ -1,5 +1,9 @@
 //! A first look at readings: how quiet short windows are, and in how few rows gravity turned.
 
+use rayon::prelude::*;
+
+use crate::order_statistics::median;
+
 /// Mean, noise and spread of every window of a triad.
 #[derive(Debug, Clone, Default)]
 pub struct Windows {
@@ -18,8 +22,7 @@ pub fn windows(rows: &[[f64; 3]], starts: &[usize], length: usize) -> Option<Win
     if length < 2 {
         return None;
     }
-    let mut out = Windows::default();
-    for &start in starts {
+    let of_one = |&start: &usize| {
         let block = rows.get(start..start.checked_add(length)?)?;
         let steps: Vec<[f64; 3]> = block
             .windows(2)
@@ -27,14 +30,51 @@ pub fn windows(rows: &[[f64; 3]], starts: &[usize], length: usize) -> Option<Win
             .collect();
         let (mean, variance) = moments(block);
         let (_, of_steps) = moments(&steps);
-        if !mean.iter().chain(&variance).all(|v| v.is_finite()) {
-            return None;
-        }
+        let is_number = mean.iter().chain(&variance).all(|v| v.is_finite());
+        is_number.then(|| {
+            let noise = of_steps.map(|v| v.sqrt() / 2.0_f64.sqrt());
+            (mean, noise, variance.iter().sum::<f64>().sqrt())
+        })
+    };
+    let found: Option<Vec<_>> = starts.par_iter().map(of_one).collect();
+    let mut out = Windows::default();
+    for (mean, noise, spread) in found? {
         out.mean.push(mean);
-        out.noise.push(of_steps.map(|v| v.sqrt() / 2.0_f64.sqrt()));
-        out.spread.push(variance.iter().sum::<f64>().sqrt());
+        out.noise.push(noise);
+        out.spread.push(spread);
     }
     Some(out)
+}
+
+/// Median length of the readings in windows `[start, start + length)`, those that are no numbers left out; NaN of none.
+/// `None` where a window does not lie in the readings.
+#[must_use]
+pub fn median_length(rows: &[[f64; 3]], starts: &[usize], length: usize) -> Option<f64> {
+    let of_one = |&start: &usize| Some(rows.get(start..start.checked_add(length)?)?.iter());
+    let blocks: Option<Vec<_>> = starts.iter().map(of_one).collect();
+    let mut lengths: Vec<f64> = blocks?.into_iter().flatten().map(|r| norm(*r)).collect();
+    lengths.retain(|length| !length.is_nan());
+    Some(median(&mut lengths))
+}
+
+/// Means of the first `count` blocks of `length` rows; `None` where there are fewer rows, or none in a block.
+#[must_use]
+pub fn block_means(rows: &[[f64; 3]], length: usize, count: usize) -> Option<Vec<[f64; 3]>> {
+    let rows = rows.get(..length.checked_mul(count)?)?;
+    let of_one = |block: &[[f64; 3]]| {
+        let mut sum = [0.0; 3];
+        for row in block {
+            for k in 0..3 {
+                sum[k] += row[k];
+            }
+        }
+        sum.map(|s| s / length as f64)
+    };
+    (length > 0).then(|| rows.par_chunks_exact(length).map(of_one).collect())
+}
+
+fn norm(row: [f64; 3]) -> f64 {
+    (row[0] * row[0] + row[1] * row[1] + row[2] * row[2]).sqrt()
 }
 
 fn moments(rows: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {

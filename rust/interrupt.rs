@@ -2,6 +2,7 @@
 //!
 //! What a stopped kernel returns is worthless; whoever called [`request`] must not use it.
 
+use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 static REQUESTS: AtomicUsize = AtomicUsize::new(0);
@@ -21,11 +22,31 @@ pub fn request() -> Request {
     Request(())
 }
 
+thread_local! {
+    static WATCH: Cell<Option<fn() -> bool>> = const { Cell::new(None) };
+}
+
 /// Whether somebody waits for the running kernels to stop.
 #[inline]
 #[must_use]
 pub fn is_requested() -> bool {
-    PENDING.load(Ordering::Relaxed) > 0
+    PENDING.load(Ordering::Relaxed) > 0 || WATCH.get().is_some_and(|look| look())
+}
+
+/// Have this thread's kernels look for such a wish themselves, until the answer is dropped: nobody else does.
+#[must_use]
+pub fn watch(look: fn() -> bool) -> Watch {
+    Watch(WATCH.replace(Some(look)))
+}
+
+/// A thread that looks for itself as long as this lives.
+#[derive(Debug)]
+pub struct Watch(Option<fn() -> bool>);
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        WATCH.set(self.0);
+    }
 }
 
 /// A request that stands as long as this lives.

@@ -1,31 +1,45 @@
 //! Order statistics of a window that runs over numbers.
 
+use rayon::prelude::*;
+
+/// Numbers whose window a thread moves on, in windows: sorting the first one is soon paid for.
+const WINDOWS_OF_A_SHARE: usize = 16;
+
 /// Median of the `size` (odd) numbers about each; beyond the ends the last number stands.
 #[must_use]
 pub fn running_median(values: &[f64], size: usize) -> Vec<f64> {
-    let (n, half) = (values.len(), size / 2);
-    if n == 0 {
-        return Vec::new();
-    }
+    let half = size / 2;
+    let share = (WINDOWS_OF_A_SHARE * size).max(4096);
+    let mut out = vec![0.0; values.len()];
+    out.par_chunks_mut(share)
+        .enumerate()
+        .for_each(|(k, out)| medians_from(values, half, k * share, out));
+    out
+}
+
+/// Medians of the windows from the one about number `first` on.
+fn medians_from(values: &[f64], half: usize, first: usize, out: &mut [f64]) {
+    let n = values.len();
     let at = |i: usize| values[i.saturating_sub(half).min(n - 1)];
     // `i` counts from half a window before the first number.
-    let mut window: Vec<f64> = (0..=2 * half).map(at).collect();
+    let mut window: Vec<f64> = (first..=first + 2 * half).map(at).collect();
     window.sort_unstable_by(f64::total_cmp);
-    let mut out = vec![window[half]];
-    for i in 1..n {
-        let (old, new) = (at(i - 1), at(i + 2 * half));
-        let from = window.partition_point(|v| v.total_cmp(&old).is_lt());
-        let to = window.partition_point(|v| v.total_cmp(&new).is_lt());
-        if from < to {
-            window.copy_within(from + 1..to, from);
-            window[to - 1] = new;
-        } else {
-            window.copy_within(to..from, to + 1);
-            window[to] = new;
+    for (k, median) in out.iter_mut().enumerate() {
+        if k > 0 {
+            let i = first + k;
+            let (old, new) = (at(i - 1), at(i + 2 * half));
+            let from = window.partition_point(|v| v.total_cmp(&old).is_lt());
+            let to = window.partition_point(|v| v.total_cmp(&new).is_lt());
+            if from < to {
+                window.copy_within(from + 1..to, from);
+                window[to - 1] = new;
+            } else {
+                window.copy_within(to..from, to + 1);
+                window[to] = new;
+            }
         }
-        out.push(window[half]);
+        *median = window[half];
     }
-    out
 }
 
 /// Greatest of the numbers up to `half` away from each.

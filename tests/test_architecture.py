@@ -17,6 +17,7 @@ COMPOSERS = {"pipeline", "cli", "fleet", "__init__", "__main__"}
 LOOKS_UP = {"records/presented.py", "records/recording.py"}
 # Where numbers are made.
 MAY_USE_CORE = {"read", "segment", "estimate", "diagnose", "simulate", "session", "channel_facts"} | {
+    "arrays.py",
     "probability.py",
     "quantiles.py",
     "refused.py",

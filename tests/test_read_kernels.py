@@ -60,8 +60,11 @@ def test_an_even_clock_is_laid_and_left_as_its_formula_says(kind):
     n, period = 150_001, 0.0051
     tick = np.cumsum(rng.integers(1, 3, n)).astype(kind)
     time = period * tick + 1e-4 * rng.standard_normal(n)
-    np.testing.assert_array_equal(_core.stamp_lateness(time, tick, period), tick * -period + time)
-    np.testing.assert_array_equal(_core.stamp_lateness(time, None, period), np.arange(n) * -period + time)
+    late = np.empty(n)
+    _core.stamp_lateness(time, tick, period, late)
+    np.testing.assert_array_equal(late, tick * -period + time)
+    _core.stamp_lateness(time, None, period, late)
+    np.testing.assert_array_equal(late, np.arange(n) * -period + time)
     late = time - period * tick
     cut = n // 38 * 38
     np.testing.assert_array_equal(_core.block_medians(late[:cut], 38), np.median(late[:cut].reshape(-1, 38), axis=1))

@@ -6,6 +6,7 @@ from scipy import fft, ndimage
 
 from trihedron import _core
 from trihedron.estimate.gyroscope import missing_samples
+from trihedron.read import read_recording
 from trihedron.segment.noise import _fit, _fit_open
 
 WITH_GAPS = [np.nan, np.inf, -0.0, 0.0]
@@ -89,6 +90,48 @@ def test_statistics_of_windows_are_those_of_numpy():
     readings[120, 1] = np.nan
     assert _core.window_statistics(readings, starts, 50) is None
     assert _core.window_statistics(readings, np.array([980]), 50) is None
+
+
+def test_lengths_in_windows_and_means_of_blocks_are_those_of_numpy():
+    readings = np.random.default_rng(5).normal(3.0, 2.0, (1000, 3))
+    np.testing.assert_array_equal(
+        _core.block_mean_readings(readings, 7, 140), readings[:980].reshape(140, 7, 3).mean(axis=1)
+    )
+    starts = np.array([0, 100, 950])
+    readings[120, 1] = np.nan
+    lengths = np.linalg.norm(readings[starts[:, None] + np.arange(50)], axis=2)
+    assert _core.median_length(readings, starts, 50) == np.nanmedian(lengths)
+    assert np.isnan(_core.median_length(np.full((9, 3), np.nan), np.array([0]), 9))
+    with pytest.raises(ValueError, match="windows must lie"):
+        _core.median_length(readings, np.array([980]), 50)
+    with pytest.raises(ValueError, match="blocks must hold rows"):
+        _core.block_mean_readings(readings, 7, 143)
+
+
+def test_room_is_zeros_or_a_refusal():
+    room = _core.room(1000, 3)
+    assert room.shape == (1000, 3)
+    assert room.flags.c_contiguous
+    assert not room.any()
+    assert _core.room(0, 3).shape == (0, 3)
+    for rows in (1 << 61, 1 << 46):  # more than can be counted, more than there is
+        with pytest.raises(MemoryError, match="no room for"):
+            _core.room(rows, 3)
+
+
+def test_readings_of_a_text_log_are_not_copied(tmp_path):
+    rows = np.random.default_rng(6).normal(0.0, 1.0, (500, 7)).round(6)
+    rows[:, 0] = 3.0 + 0.01 * np.arange(500)
+    path = tmp_path / "log.csv"
+    np.savetxt(path, rows, delimiter=",", header="t,ax,ay,az,gx,gy,gz", comments="", fmt="%.6f")
+    recording = read_recording(path)
+    np.testing.assert_array_equal(recording.accelerometer, rows[:, 1:4])
+    np.testing.assert_allclose(recording.time_s, rows[:, 0] - 3.0, atol=1e-12)
+    for array in (recording.time_s, recording.accelerometer, recording.gyroscope):
+        # A view of the room made for it, which nobody can write to.
+        assert array.base is not None
+        assert not array.flags.writeable
+        assert not array.base.flags.writeable
 
 
 def turns_twin(readings, side, turn):

@@ -22,12 +22,12 @@ LOADED = 4.0
 
 @pytest.fixture(scope="module")
 def long_log(tmp_path_factory):
-    """Three million rows: every command on it takes seconds."""
+    """Twelve million rows: every command on it takes seconds."""
     import polars
 
     path = tmp_path_factory.mktemp("long") / "long.csv"
     rng = np.random.default_rng(1)
-    n = 6_000_000
+    n = 12_000_000
     columns = {"t": np.arange(n) / 1000.0}
     columns |= {name: np.round(rng.normal(0, 0.01, n) + 9.8 * (name == "az"), 4) for name in ("ax", "ay", "az")}
     columns |= {name: np.round(rng.normal(0, 0.01, n), 4) for name in ("gx", "gy", "gz")}
@@ -100,6 +100,45 @@ def test_a_long_kernel_ends_between_blocks_when_python_is_interrupted():
     assert time.monotonic() - began < 0.4 + LOADED
     # And the next one is not harmed.
     assert _core.simulate_noise(5, 0.01, [[1.0, 1.0, 1.0, 1.0, 0.0]] * 3, [[1, 2, 3, 4]] * 3).shape == (5, 3)
+
+
+def test_a_thread_that_works_alone_looks_for_signals_itself():
+    # With one thread for kernels the caller's own does the work, from the second kernel on.
+    code = (
+        "import os, signal, threading, time\n"
+        "from trihedron import _core\n"
+        "terms, seeds = [[1.0, 1.0, 1.0, 1.0, 0.0]] * 3, [[1, 2, 3, 4]] * 3\n"
+        "_core.simulate_noise(5, 0.01, terms, seeds)\n"
+        "threading.Timer(0.4, lambda: os.kill(os.getpid(), signal.SIGINT)).start()\n"
+        "start = time.monotonic()\n"
+        "try:\n"
+        "    for _ in range(40): _core.simulate_noise(20_000_000, 0.01, terms, seeds)\n"
+        "except KeyboardInterrupt:\n"
+        "    print(time.monotonic() - start)\n"
+        "assert _core.simulate_noise(5, 0.01, terms, seeds).shape == (5, 3)\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "RAYON_NUM_THREADS": "1"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 0.4 + LOADED
+
+
+def test_threads_with_one_thread_for_kernels_get_the_same_answers_side_by_side():
+    code = (
+        "import threading\n"
+        "import numpy as np, trihedron\n"
+        "x = np.random.default_rng(1).normal(size=100_000)\n"
+        "found = {}\n"
+        "def work(k): found[k] = trihedron.allan_deviation(x, 100.0).deviation.tobytes()\n"
+        # More threads one after the other than keep rayon's only thread for themselves.
+        "for first in range(0, 300, 4):\n"
+        "    threads = [threading.Thread(target=work, args=(first + k,)) for k in range(4)]\n"
+        "    [t.start() for t in threads]; [t.join() for t in threads]\n"
+        "assert len(found) == 300 and len(set(found.values())) == 1\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p), "RAYON_NUM_THREADS": "1"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=environment)
+    assert done.returncode == 0, done.stderr
 
 
 def test_nothing_is_said_about_an_interruption_that_was_told_to_be_ignored():

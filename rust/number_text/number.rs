@@ -63,8 +63,8 @@ fn leading_digits(word: u64) -> (u64, usize) {
     // A byte above nine sets its highest bit; what it carries over goes to bytes behind it.
     let others = (ones.wrapping_add(0x7676_7676_7676_7676) | ones) & 0x8080_8080_8080_8080;
     let n = others.trailing_zeros() as usize / 8;
-    if n == 0 {
-        return (0, 0);
+    if n <= 1 {
+        return (ones & 0xFF & 0xFF_u64.wrapping_mul(n as u64), n);
     }
     // The digits move to the end of the word, zeros in front of them.
     (of_eight(ones << (64 - 8 * n)), n)

@@ -1,11 +1,12 @@
 //! How a kernel is run: without the interpreter, on threads that exist, stopped by Ctrl-C, its panics kept quiet.
 
 use std::any::Any;
+use std::cell::{Cell, OnceCell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -36,6 +37,9 @@ pub(crate) fn run_long<T: Send>(
     kernel: impl FnOnce() -> KernelResult<T> + Send,
 ) -> PyResult<T> {
     let before = interrupt::requests();
+    if is_alone() {
+        return run_watched(py, kernel, before);
+    }
     std::thread::scope(|scope| {
         let (done, mut waiting) = channel::<()>();
         let worker = std::thread::Builder::new().spawn_scoped(scope, move || {
@@ -70,6 +74,48 @@ pub(crate) fn run_long<T: Send>(
     })
 }
 
+thread_local! {
+    static LOOKED: Cell<Option<Instant>> = const { Cell::new(None) };
+    static STOPPED: RefCell<Option<(PyErr, interrupt::Request)>> = const { RefCell::new(None) };
+}
+
+/// As [`run_long`] where the caller's thread is the only one there is: it works itself, and looks for signals between
+/// blocks.
+fn run_watched<T: Send>(
+    py: Python<'_>,
+    kernel: impl FnOnce() -> KernelResult<T> + Send,
+    before: usize,
+) -> PyResult<T> {
+    LOOKED.set(Some(Instant::now()));
+    let out = py.detach(|| {
+        let _watch = interrupt::watch(look_for_signals);
+        guarded(kernel, Threads::Shared)
+    });
+    match STOPPED.take() {
+        Some((signal, _request)) => Err(signal),
+        None => finish(out, before),
+    }
+}
+
+/// Whether a signal ends what this thread does; asked of the interpreter now and then only.
+fn look_for_signals() -> bool {
+    let now = Instant::now();
+    if LOOKED.get().is_some_and(|last| now - last < PATIENCE) {
+        return false;
+    }
+    LOOKED.set(Some(now));
+    // Runs the handlers of Python where this is its main thread, and does nothing elsewhere.
+    #[expect(
+        clippy::redundant_closure_for_method_calls,
+        reason = "the method is of one lifetime"
+    )]
+    let Err(signal) = Python::attach(|py| py.check_signals()) else {
+        return false;
+    };
+    STOPPED.set(Some((signal, interrupt::request())));
+    true
+}
+
 type Guarded<T> = Result<KernelResult<T>, Failure>;
 
 enum Failure {
@@ -80,7 +126,7 @@ enum Failure {
 /// Whose threads a kernel works on where rayon has only one.
 #[derive(Clone, Copy, PartialEq)]
 enum Threads {
-    /// Those of all callers: a short kernel is done before another thread has begun.
+    /// Those of all callers, or the caller's own: a short kernel is done before another thread has begun.
     Shared,
     /// One that no other caller has.
     Own,
@@ -151,7 +197,10 @@ fn with_threads<T: Send>(kernel: impl FnOnce() -> T + Send, on: Threads) -> Resu
         home if home == here && on == Threads::Own && rayon::current_num_threads() == 1 => {
             on_one_thread(kernel)
         }
-        home if home == here => Ok(kernel()),
+        home if home == here => {
+            is_alone();
+            Ok(kernel())
+        }
         0 => {
             // Made now, where a system without threads can be reported; rayon would panic at its first use.
             let made = ThreadPoolBuilder::new().build_global();
@@ -165,6 +214,32 @@ fn with_threads<T: Send>(kernel: impl FnOnce() -> T + Send, on: Threads) -> Resu
         }
         _ => Ok(pool_of_child(here)?.install(kernel)),
     }
+}
+
+/// Callers' threads that may work for themselves: what rayon keeps of each (some kilobytes) stays when it ends.
+const SETTLED: u32 = 256;
+static FREE_TO_SETTLE: AtomicU32 = AtomicU32::new(SETTLED);
+thread_local! {
+    static HERE: OnceCell<Option<ThreadPool>> = const { OnceCell::new() };
+}
+
+/// Where rayon has one thread only: let that be, as far as this caller is concerned, the caller's own, and say so.
+/// Nothing is handed over, which took two callers side by side a third of their time, and neither waits for the other.
+fn is_alone() -> bool {
+    if HOME.load(Ordering::Acquire) != std::process::id() || rayon::current_num_threads() > 1 {
+        return false;
+    }
+    HERE.with(|pool| {
+        let here = pool.get_or_init(|| {
+            let taken = FREE_TO_SETTLE.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |free| {
+                free.checked_sub(1)
+            });
+            taken.ok()?;
+            let here = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
+            here.build().ok()
+        });
+        here.is_some()
+    })
 }
 
 /// Pools of one thread that nobody uses now.

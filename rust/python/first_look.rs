@@ -11,6 +11,8 @@ pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(levels_of, module)?)?;
     module.add_function(wrap_pyfunction!(converter_grid, module)?)?;
     module.add_function(wrap_pyfunction!(window_statistics, module)?)?;
+    module.add_function(wrap_pyfunction!(median_length, module)?)?;
+    module.add_function(wrap_pyfunction!(block_mean_readings, module)?)?;
     module.add_function(wrap_pyfunction!(quickest_turns, module)?)?;
     module.add_function(wrap_pyfunction!(running_median, module)?)
 }
@@ -55,12 +57,7 @@ fn window_statistics<'py>(
     length: usize,
 ) -> PyResult<Option<WindowArrays<'py>>> {
     let flat = flat3("readings", &readings)?;
-    let starts: Result<Vec<usize>, _> = starts
-        .as_array()
-        .iter()
-        .map(|&s| usize::try_from(s))
-        .collect();
-    let starts = starts.map_err(|_| PyValueError::new_err("starts must not be negative"))?;
+    let starts = places(&starts)?;
     let found = super::run(py, || {
         Ok(first_look::windows(as_rows(&flat), &starts, length))
     })?;
@@ -76,6 +73,44 @@ fn window_statistics<'py>(
         stack(found.noise)?,
         found.spread.to_pyarray(py),
     )))
+}
+
+fn places(starts: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
+    let starts = starts.as_array();
+    let places: Result<Vec<usize>, _> = starts.iter().map(|&s| usize::try_from(s)).collect();
+    places.map_err(|_| PyValueError::new_err("starts must not be negative"))
+}
+
+/// Median length of the readings in windows, those that are no numbers left out.
+#[pyfunction]
+fn median_length(
+    py: Python<'_>,
+    readings: PyReadonlyArray2<'_, f64>,
+    starts: PyReadonlyArray1<'_, i64>,
+    length: usize,
+) -> PyResult<f64> {
+    let flat = flat3("readings", &readings)?;
+    let starts = places(&starts)?;
+    super::run(py, || {
+        Ok(first_look::median_length(as_rows(&flat), &starts, length))
+    })?
+    .ok_or_else(|| PyValueError::new_err("windows must lie in the readings"))
+}
+
+/// Means `(count, 3)` of the first blocks of `length` rows.
+#[pyfunction]
+fn block_mean_readings<'py>(
+    py: Python<'py>,
+    readings: PyReadonlyArray2<'py, f64>,
+    length: usize,
+    count: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let flat = flat3("readings", &readings)?;
+    let means = super::run(py, || {
+        Ok(first_look::block_means(as_rows(&flat), length, count))
+    })?
+    .ok_or_else(|| PyValueError::new_err("blocks must hold rows and lie in the readings"))?;
+    PyArray1::from_vec(py, bytemuck::cast_vec::<[f64; 3], f64>(means)).reshape([count, 3])
 }
 
 /// Rows in which a direction at its quickest turned by `turn` [rad]: between two stretches at rest, and at all.

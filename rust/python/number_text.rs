@@ -1,14 +1,18 @@
 //! Tables of numbers in text across the seam.
 
+use std::alloc::{self, Layout};
+
 use numpy::PyUntypedArrayMethods;
+use numpy::ndarray::Array2;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray2};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::number_text::{self, Block};
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(plain_table, module)?)?;
+    module.add_function(wrap_pyfunction!(room, module)?)?;
     module.add_function(wrap_pyfunction!(plain_table_into, module)?)
 }
 
@@ -45,6 +49,38 @@ fn plain_table<'py>(
             PyArray1::from_vec(py, flat).reshape([n_columns, rows])
         })
         .transpose()
+}
+
+/// Zeros `(rows, width)` whose memory is taken in small pages, as they are written to.
+///
+/// An array of `NumPy`'s own asks for huge pages, which a machine shared by others may first have to find: then half of
+/// the time of reading a long log went into that.
+#[pyfunction]
+fn room(py: Python<'_>, rows: usize, width: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let refused = || PyMemoryError::new_err(format!("no room for {rows} rows of {width} numbers"));
+    let count = rows.checked_mul(width).ok_or_else(refused)?;
+    let layout = Layout::array::<f64>(count).map_err(|_| refused())?;
+    let flat = if count == 0 {
+        Vec::new()
+    } else {
+        // SAFETY: the layout has a size; zero bytes are numbers; and it is that of the Vec which gives the memory back.
+        unsafe {
+            let first = alloc::alloc_zeroed(layout);
+            if first.is_null() {
+                return Err(refused());
+            }
+            #[expect(clippy::cast_ptr_alignment, reason = "the layout is that of f64")]
+            let first = first.cast::<f64>();
+            #[expect(
+                clippy::same_length_and_capacity,
+                reason = "all of it is written: zeros"
+            )]
+            let all = Vec::from_raw_parts(first, count, count);
+            all
+        }
+    };
+    let array = Array2::from_shape_vec((rows, width), flat).map_err(|_| refused())?;
+    Ok(PyArray2::from_owned_array(py, array))
 }
 
 /// `(lines, whether they were read)`: a plain table of numbers, written to `blocks` `(rows, width)`; column `i` goes to

@@ -1,8 +1,6 @@
 //! Time stamps across the seam.
 
-use numpy::{
-    PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1, PyUntypedArrayMethods, ToPyArray,
-};
+use numpy::{PyArray1, PyReadonlyArray1, PyReadwriteArray1, PyUntypedArrayMethods, ToPyArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -96,32 +94,31 @@ fn inside_steps(
     ))
 }
 
-/// `time - period tick` `(n,)`; ticks are rows where there are none.
+/// Write `time - period tick` `(n,)` to `late`; ticks are rows where there are none.
 #[pyfunction]
-#[pyo3(signature = (time, ticks, period))]
+#[pyo3(signature = (time, ticks, period, late))]
 fn stamp_lateness<'py>(
     py: Python<'py>,
     time: PyReadonlyArray1<'py, f64>,
     ticks: Option<Ticks<'py>>,
     period: f64,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    mut late: PyReadwriteArray1<'py, f64>,
+) -> PyResult<()> {
     let time = flat1(&time);
-    // NumPy asks the system for large pages.
-    let out = PyArray1::<f64>::zeros(py, time.len(), false);
-    let mut writable = out.try_readwrite()?;
-    let late = writable.as_slice_mut()?;
+    let late = late.as_slice_mut()?;
+    same_length("late", time.len(), late.len())?;
     match &ticks {
         None => super::run(py, || {
             stamps::lateness::<i64>(&time, None, period, late);
             Ok(())
-        })?,
+        }),
         Some(Ticks::Short(ticks)) => {
             same_length("ticks", time.len(), ticks.len())?;
             let ticks = flat1(ticks);
             super::run(py, || {
                 stamps::lateness(&time, Some(&ticks), period, late);
                 Ok(())
-            })?;
+            })
         }
         Some(Ticks::Long(ticks)) => {
             same_length("ticks", time.len(), ticks.len())?;
@@ -129,11 +126,9 @@ fn stamp_lateness<'py>(
             super::run(py, || {
                 stamps::lateness(&time, Some(&ticks), period, late);
                 Ok(())
-            })?;
+            })
         }
     }
-    drop(writable);
-    Ok(out)
 }
 
 /// Row of the earliest of every block of `width` stamps.

@@ -84,34 +84,55 @@ pub struct Inside {
 /// Steps above `above` and not above `limit`.
 #[must_use]
 pub fn inside(time: &[f64], above: f64, limit: f64) -> Inside {
-    let kept = |pair: &[f64]| Some(pair[1] - pair[0]).filter(|&s| s > above && s <= limit);
-    let parts: Vec<(usize, f64, f64, f64)> = shares(time)
+    let kept = |step: f64| step > above && step <= limit;
+    // About its own mean while a share is near: the log is walked through once.
+    let parts: Vec<(Inside, f64)> = shares(time)
         .map(|(_, stamps)| {
-            let mut out = (0, 0.0, f64::INFINITY, f64::NEG_INFINITY);
-            for step in stamps.windows(2).filter_map(kept) {
-                out = (out.0 + 1, out.1 + step, out.2.min(step), out.3.max(step));
+            let (mut count, mut sum) = (0, 0.0);
+            let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+            for pair in stamps.windows(2) {
+                let step = pair[1] - pair[0];
+                let is_kept = kept(step);
+                count += usize::from(is_kept);
+                sum += if is_kept { step } else { 0.0 };
+                least = if is_kept && step < least { step } else { least };
+                most = if is_kept && step > most { step } else { most };
             }
-            out
+            let mean = sum / count as f64;
+            let squares = in_lanes(stamps, |step| {
+                let far = if kept(step) { step - mean } else { 0.0 };
+                far * far
+            });
+            let out = Inside {
+                count,
+                sum,
+                deviation: 0.0,
+                least,
+                most,
+            };
+            (out, squares)
         })
+        .filter(|(part, _)| part.count > 0)
         .collect();
-    let count: usize = parts.iter().map(|p| p.0).sum();
-    let sum: f64 = parts.iter().map(|p| p.1).sum();
+    let count: usize = parts.iter().map(|(p, _)| p.count).sum();
+    let sum: f64 = parts.iter().map(|(p, _)| p.sum).sum();
     let mean = sum / count as f64;
-    let squares: Vec<f64> = shares(time)
-        .map(|(_, stamps)| {
-            stamps
-                .windows(2)
-                .filter_map(kept)
-                .map(|step| (step - mean) * (step - mean))
-                .sum()
-        })
-        .collect();
+    let squares = parts.iter().map(|(part, squares)| {
+        let n = part.count as f64;
+        squares + n * (part.sum / n - mean).powi(2)
+    });
     Inside {
         count,
         sum,
-        deviation: (squares.iter().sum::<f64>() / count as f64).sqrt(),
-        least: parts.iter().map(|p| p.2).fold(f64::INFINITY, f64::min),
-        most: parts.iter().map(|p| p.3).fold(f64::NEG_INFINITY, f64::max),
+        deviation: (squares.sum::<f64>() / count as f64).sqrt(),
+        least: parts
+            .iter()
+            .map(|(p, _)| p.least)
+            .fold(f64::INFINITY, f64::min),
+        most: parts
+            .iter()
+            .map(|(p, _)| p.most)
+            .fold(f64::NEG_INFINITY, f64::max),
     }
 }
 
@@ -126,19 +147,31 @@ fn shares(time: &[f64]) -> impl IndexedParallelIterator<Item = (usize, &[f64])> 
         })
 }
 
-/// What `visit` makes of the steps of each share that are longer than zero, in the order of their size as integers.
+/// The sum of what is made of each step, eight sums side by side: an addition need not wait for the one before.
+fn in_lanes(stamps: &[f64], of: impl Fn(f64) -> f64) -> f64 {
+    let mut sums = [0.0; 8];
+    let n = stamps.len().saturating_sub(1);
+    let whole = n / sums.len() * sums.len();
+    for first in (0..whole).step_by(sums.len()) {
+        let row: &[f64] = &stamps[first..=first + sums.len()];
+        for (k, sum) in sums.iter_mut().enumerate() {
+            *sum += of(row[k + 1] - row[k]);
+        }
+    }
+    let rest = stamps[whole..].windows(2).map(|pair| of(pair[1] - pair[0]));
+    sums.iter().sum::<f64>() + rest.sum::<f64>()
+}
+
+/// What `visit` makes of the stamps of each share, with the one before.
 pub(super) fn of_each_share<R: Send>(
     time: &[f64],
-    visit: impl Fn(&mut dyn Iterator<Item = u64>) -> R + Sync + Send,
+    visit: impl Fn(&[f64]) -> R + Sync + Send,
 ) -> Vec<R> {
-    shares(time)
-        .map(|(_, stamps)| {
-            let mut forward = stamps
-                .windows(2)
-                .map(|pair| pair[1] - pair[0])
-                .filter(|&step| step > 0.0)
-                .map(f64::to_bits);
-            visit(&mut forward)
-        })
-        .collect()
+    shares(time).map(|(_, stamps)| visit(stamps)).collect()
+}
+
+/// Steps that are longer than zero, in the order of their size as integers.
+pub(super) fn forward(stamps: &[f64]) -> impl Iterator<Item = u64> {
+    let steps = stamps.windows(2).map(|pair| pair[1] - pair[0]);
+    steps.filter(|&step| step > 0.0).map(f64::to_bits)
 }

@@ -55,22 +55,22 @@ def look(sensors: dict[str, FloatArray], rate_hz: float, *, in_a_row: int = 1) -
     first = np.linspace(0, max(n_windows - in_a_row, 0), -(-min(n_windows, MAX_WINDOWS) // in_a_row)).astype(np.int64)
     picked = np.unique(first[:, None] + np.arange(in_a_row)) if n_windows > MAX_WINDOWS else np.arange(n_windows)
     start = picked * length
-    index = start[:, None] + np.arange(length)
     mean: dict[str, FloatArray] = {}
     noise: dict[str, FloatArray] = {}
     spread: dict[str, FloatArray] = {}
-    enough = np.ones(len(start), dtype=bool)
-    for array in sensors.values():
+    found = {name: _core.window_statistics(array, start, length) for name, array in sensors.items()}
+    if any(whole is None for whole in found.values()):
         # Half of a window may be missing; fewer readings tell nothing about its noise.
-        if not np.isfinite(array).all():
-            block = array[index]
-            pairs = np.isfinite(np.diff(block, axis=1)).all(axis=2)
+        enough = np.ones(len(start), dtype=bool)
+        for array in sensors.values():
+            pairs = np.isfinite(np.diff(array[start[:, None] + np.arange(length)], axis=1)).all(axis=2)
             enough &= pairs.sum(axis=1) >= max(1, length // 2 if length > 2 else 1)
-    if not enough.any():
-        return None
-    start = start[enough]
+        if not enough.any():
+            return None
+        start = start[enough]
+        found = {name: _core.window_statistics(array, start, length) for name, array in sensors.items()}
     for name, array in sensors.items():
-        whole = _core.window_statistics(array, start, length)
+        whole = found[name]
         if whole is not None:
             mean[name], noise[name], spread[name] = whole
             continue

@@ -192,6 +192,7 @@ def audited(
             windows,
             sensors.gyroscope_unit,
             gyroscope_unit,
+            extremes["gyroscope"],
         )
         gyr_unit = RateUnit(judged.unit)
         findings += judged.findings
@@ -209,11 +210,10 @@ def audited(
     if progress is not None:
         progress(1.0, f"read {n} samples")
     temperature, supply = sensors.columns.temperature, sensors.columns.supply
-    for triad in present.values():
-        triad.setflags(write=False)
-        if isinstance(triad.base, np.ndarray):
-            triad.base.setflags(write=False)
-    time_s.setflags(write=False)
+    for array in (time_s, *present.values()):
+        array.setflags(write=False)
+        if isinstance(array.base, np.ndarray):
+            array.base.setflags(write=False)
     return Recording(
         time_s=time_s,
         accelerometer=sensors.accelerometer,

@@ -9,6 +9,7 @@ import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
+from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, is_integer, look
 from trihedron.read.errors import ReadError
 from trihedron.read.turning import Turning, unit_by_turning
@@ -60,8 +61,7 @@ def rest_norm(readings: FloatArray, windows: Windows | None) -> float:
     """
     if windows is None:
         return math.nan
-    index = windows.start[windows.quiet][:, None] + np.arange(windows.length)
-    return float(np.nanmedian(np.linalg.norm(readings[index], axis=2)))
+    return _core.median_length(readings, windows.start[windows.quiet], windows.length)
 
 
 def judge_accelerometer(
@@ -141,6 +141,7 @@ def judge_gyroscope(
     windows: Windows | None,
     named: str,
     given: str | RateUnit | None,
+    extremes: Extremes,
 ) -> Judged:
     """Unit of the gyro: as given, else as named, else by turning gravity, else by magnitude (a warning)."""
     turning: Turning | None = None
@@ -184,7 +185,7 @@ def judge_gyroscope(
                 ),
             ),
         )
-    return _gyroscope_by_magnitude(readings, windows)
+    return _gyroscope_by_magnitude(extremes, windows)
 
 
 def _rate_contradiction(unit: RateUnit, turns: tuple[float, int], *, is_given: bool) -> Finding | None:
@@ -204,9 +205,7 @@ def _rate_contradiction(unit: RateUnit, turns: tuple[float, int], *, is_given: b
     )
 
 
-def _gyroscope_by_magnitude(readings: FloatArray, windows: Windows | None) -> Judged:
-    # What was infinite is missing (NaN) by now.
-    extremes = _core.triad_extremes(readings)
+def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judged:
     largest = float(np.nanmax([max(high, -low) for low, _, high, _ in extremes]))
     rest = largest
     if windows is not None:

@@ -258,7 +258,9 @@ def _time_base(table: Table, chosen: Columns, options: Options, findings: list[F
         named = chosen.time_unit
         if named == "100us" and not table.clock.unit:
             named = _sample_time_fine(table, chosen.time, findings)
-        clock = build_clock(table, chosen.time, named, options.time_unit, chosen.nanoseconds, _witness(table, chosen))
+        clock = build_clock(
+            table, chosen.time, named, options.time_unit, chosen.nanoseconds, _witness(table, chosen), table.is_private
+        )
         findings += _with_rows_left_out(clock, table.n_rows)
         rate = mean_rate_hz(clock.time_s)
         told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts.quiet import Windows
 from trihedron.units import RateUnit, rate_to_si
@@ -100,8 +101,8 @@ def turn_slopes(
     n = min(len(accelerometer) // length, _MAX_BLOCKS)
     if n < 3:
         return [UNSEEN] * len(scales)
-    a = accelerometer[: n * length].reshape(n, length, 3).mean(axis=1)
-    w = gyroscope[: n * length].reshape(n, length, 3).mean(axis=1)
+    a = _core.block_mean_readings(accelerometer, length, n)
+    w = _core.block_mean_readings(gyroscope, length, n)
     finite = np.isfinite(w).all(axis=1)
     if not finite.any():
         return [UNSEEN] * len(scales)

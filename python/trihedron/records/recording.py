@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import CORE_MEMORY, FloatArray
 from trihedron.printable import one_line
 from trihedron.records.channel_facts import Limit, LowPass, RecordingFacts
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
@@ -26,7 +26,7 @@ def _is_frozen(array: object) -> bool:
     """Whether nobody can write to an array: neither through it nor through what it is a view of."""
     while isinstance(array, np.ndarray) and not array.flags.writeable:
         array = array.base
-    return array is None
+    return array is None or isinstance(array, CORE_MEMORY)
 
 
 def _readonly(array: npt.ArrayLike, name: str, shape: tuple[int | None, ...]) -> FloatArray:

@@ -39,10 +39,12 @@ def build_clock(
     given: str | None,
     nanoseconds: int | None = None,
     witness: Witness = NOBODY,
+    in_place: bool = False,
 ) -> Clock:
     """Seconds from a time column, or from whole seconds and a column of ``nanoseconds`` beside them.
 
-    ``witness`` holds readings that limit how long a row can have lasted, where nothing states the unit.
+    ``witness`` holds readings that limit how long a row can have lasted, where nothing states the unit. The clock may
+    be ``in_place`` of the column where nobody asks for that again.
 
     Raises
     ------
@@ -95,7 +97,8 @@ def build_clock(
         )
     first = float(raw[0])
     # In its own place where it is a copy: a long log has no room for another.
-    time_s = raw - first if order is None else np.subtract(raw, first, out=raw)
+    is_own = order is not None or rows is not None or nanoseconds is not None or in_place
+    time_s = np.subtract(raw, first, out=raw if is_own else None)
     if scale != 1.0:
         time_s *= scale
     return Clock(time_s, float(base + first) * scale, rows, tuple(findings))

@@ -53,6 +53,9 @@ class EvenClock:
     @property
     def lost_behind(self) -> IntArray:
         """(n - 1,) samples lost behind each row; those of pauses too, as far as the clock tells."""
+        if int(self.tick[-1] - self.tick[0]) == len(self.tick) - 1:
+            # Ticks ascend: nothing is lost, and nothing is written down.
+            return np.broadcast_to(np.zeros(1, self.tick.dtype), len(self.tick) - 1)
         lost = np.diff(self.tick)
         lost -= 1
         return lost
@@ -79,6 +82,8 @@ def find_even_clock(time_s: FloatArray, counter: IntArray | None = None) -> Even
 def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> EvenClock:
     """The clock of stamps (n,) whose period was ``found``."""
     n, period, sees = len(time_s), found.period_s, found.is_seen
+    # Lateness, clock and error one after the other: a long log has no room for two, and asking for it anew takes time.
+    room = _core.room(n, 1).reshape(-1)
     if counter is not None:
         tick, pauses, width, moved_back = (
             counter,
@@ -90,8 +95,8 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         period = _long_run(time_s, counter)
     else:
         width = block_rows(time_s, period, found.coherence)
-        period, tick, pauses, moved_back = track(time_s, period, width, sees, found.coherence > 0.9)
-    even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False)
+        period, tick, pauses, moved_back = track(time_s, period, width, sees, found.coherence > 0.9, room)
+    even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, room)
     error = _error(time_s, even)
     for _ in range(3 if counter is None and sees else 0):
         # Followed loosely: a loss counted too early makes a dip that the clock must not follow.
@@ -99,12 +104,10 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
         if moved is tick:
             break
         tick = moved
-        del error
-        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False)
+        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, room)
         error = _error(time_s, even)
     if wanders:
-        del error
-        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, CLOSE_PIECES)
+        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, False, room, CLOSE_PIECES)
         error = _error(time_s, even)
     on_grid = 0.0 < found.grid_s < 1.3 * period and _range(error) < 1.3 * found.grid_s
     growth = 0.0 if on_grid else _growth(error, pauses, UNSEEN * period)
@@ -113,8 +116,7 @@ def _clock_of(time_s: FloatArray, counter: IntArray | None, found: Period) -> Ev
     kind = _kind(error, period, found.grid_s)
     if kind is not StampKind.LATE:
         # Two-sided errors have their middle, not their edge, on the clock.
-        del error
-        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, True, CLOSE_PIECES)
+        even, mean_period, sigma, wanders = _lay(time_s, tick, period, pauses, width, True, room, CLOSE_PIECES)
         error = _error(time_s, even)
     rms = _core.errors_deviation(error)
     even = _error(time_s, error)
@@ -146,13 +148,14 @@ def _lay(
     pauses: IntArray,
     least: int,
     through_middle: bool,
+    room: FloatArray,
     pieces: int = 12,
 ) -> tuple[FloatArray, float, float, bool]:
     """The even clock (n,) under the earliest stamps, or through the middle of all; its mean period over the
     longest stretch and the standard error of that; whether its rate wanders, followed in so many ``pieces``.
 
-    ``least`` rows make a block at least."""
-    late = lateness(time_s, tick, period)
+    ``least`` rows make a block at least; ``room`` (n,) takes the clock."""
+    late = lateness(time_s, tick, period, room)
     # Each stretch of the clock takes the place of the lateness that it was found from.
     even = late
     edges = np.concatenate([[0], pauses + 1, [len(late)]])

@@ -44,9 +44,10 @@ def earliest(late: FloatArray, width: int) -> IntArray:
     return _core.earliest_stamps(late, width)
 
 
-def lateness(time_s: FloatArray, tick: IntArray | None, period: float) -> FloatArray:
-    """``time_s - period * tick``; without ticks each row is its own."""
-    return _core.stamp_lateness(time_s, tick, period)
+def lateness(time_s: FloatArray, tick: IntArray | None, period: float, room: FloatArray) -> FloatArray:
+    """``time_s - period * tick`` in ``room`` (n,); without ticks each row is its own."""
+    _core.stamp_lateness(time_s, tick, period, room)
+    return room
 
 
 def ahead(values: FloatArray, reach: int) -> FloatArray:
@@ -61,9 +62,9 @@ def ahead(values: FloatArray, reach: int) -> FloatArray:
 
 
 def track(
-    time_s: FloatArray, period: float, width: int, sees: bool, is_sharp: bool
+    time_s: FloatArray, period: float, width: int, sees: bool, is_sharp: bool, room: FloatArray
 ) -> tuple[float, IntArray, IntArray, float]:
-    """Period, tick of every row, pauses, and the share of blocks that moved back by a period.
+    """Period, tick of every row, pauses, and the share of blocks that moved back by a period; works in ``room`` (n,).
 
     The earliest stamp of every block, a stall of the link looked past, moves by whole periods where samples are lost
     and by a little where the period is not quite right; a period that was not seen comes from first and last stamp.
@@ -73,7 +74,7 @@ def track(
     edges = np.concatenate([[0], pauses + 1, [n]])
     reach = STALL_STEPS // width + 1
     for _ in range(0 if sees else 3):
-        late = lateness(time_s, None, period)
+        late = lateness(time_s, None, period, room)
         slopes, weights = [], []
         for a, b in pairwise(edges):
             if b - a >= 4 * width:
@@ -82,7 +83,7 @@ def track(
                 weights.append(b - a)
         if slopes:
             period += float(np.average(slopes, weights=weights))
-    late = lateness(time_s, None, period)
+    late = lateness(time_s, None, period, room)
     late /= period
     # Half the room where the ticks allow it, and the same numbers.
     is_short = n + float(time_s[-1] - time_s[0]) / period < 0.5 * np.iinfo(np.int32).max
@@ -96,7 +97,6 @@ def track(
     for k in pauses:
         # How many a pause cost is told no better than its own length.
         lost[k + 1] += max(round(float(time_s[k + 1] - time_s[k]) / period) - 1, 0)
-    del late
     if not lost.any():
         return period, np.arange(n, dtype=lost.dtype), pauses, back / max(blocks, 1)
     # The ticks in the place of the losses: a log of 1e8 rows has no room for both.

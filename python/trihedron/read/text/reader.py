@@ -203,16 +203,16 @@ class TextReader:
         """Whether the block was nothing but rows of numbers, and is read: all but a few logs are."""
         if not self.may_be_plain or self.text_columns or layout.decimal_comma or self.true_lines is not None:
             return False
-        text = np.frombuffer(data, dtype=np.uint8)
-        separator = ord(layout.separator)
-        # Asked for nothing, it counts the lines.
-        rows, _ = _core.plain_table_into(text, separator, [], [])
-        if not rows:
-            return False
+        text, separator = np.frombuffer(data, dtype=np.uint8), ord(layout.separator)
         if self.n_rows == 0:
             self.store = Store(layout.n_fields, self._triads(layout, [np.zeros(1)] * layout.n_fields))
-        places, blocks = self.store.lend(rows, self._expected(rows, len(data), layout))
-        rows, is_read = _core.plain_table_into(text, separator, places, blocks)
+        places, room = self.store.lend(0, 0)
+        rows, is_read = _core.plain_table_into(text, separator, places, room)
+        if not rows:
+            return False
+        expected = self._expected(rows, len(data), layout)
+        if rows > len(room[0]):  # it counted the lines and read none
+            rows, is_read = _core.plain_table_into(text, separator, *self.store.lend(rows, expected))
         if is_read:
             self.store.keep(rows)
             self.lines.append(range(self.cursor.lines + 1, self.cursor.lines + 1 + rows))

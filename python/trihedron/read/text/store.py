@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from trihedron import _core
 from trihedron.arrays import FloatArray
 
 _SPARE = 1.02
@@ -63,7 +64,7 @@ class Store:
         """A block with room for ``need`` rows, for the ``expected`` ones if it has to be made anew."""
         array = self._arrays[b]
         if len(array) < need:
-            grown = np.empty((max(need, int(expected * _SPARE), int(len(array) * _GROWTH)), array.shape[1]))
+            grown = _core.room(max(need, int(expected * _SPARE), int(len(array) * _GROWTH)), array.shape[1])
             grown[: self.n_rows] = array[: self.n_rows]
             self._arrays[b] = array = grown
         return array
