@@ -4,12 +4,14 @@ import gzip
 import hashlib
 import importlib
 import os
+import threading
 
 import numpy as np
 import polars as pl
 import pytest
 
 from trihedron.read import ReadError, read_recording
+from trihedron.read.digest import LateSha256
 from trihedron.records import FindingCode, Recording, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -213,6 +215,39 @@ def test_other_columns_are_kept_aside_untouched(tmp_path):
 def test_the_hash_is_that_of_the_file(tmp_path):
     path = write(tmp_path / "log.csv", readings())
     assert read_recording(path).sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_a_late_digest_is_of_the_bytes_that_were_read(tmp_path):
+    path = tmp_path / "log.csv"
+    data = bytes(range(256)) * 10_000
+    path.write_bytes(data)
+    first = 2_000_001
+    late = LateSha256(path, path.open("rb", buffering=0), first)
+    with path.open("ab") as stream:
+        stream.write(b"appended")
+    assert late.hexdigest() == hashlib.sha256(data[:first]).hexdigest() == late.hexdigest()
+    short = LateSha256(path, path.open("rb", buffering=0), len(data) + 100)
+    with pytest.raises(ReadError, match="became shorter"):
+        short.hexdigest()
+    closed = path.open("rb", buffering=0)
+    closed.close()
+    with pytest.raises(ValueError, match="closed"):
+        LateSha256(path, closed, first).hexdigest()
+
+
+def test_nobody_waits_for_the_digest_of_a_refused_log(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"")
+    os.truncate(path, 1 << 33)
+    stream = path.open("rb", buffering=0)
+    late = LateSha256(path, stream, 1 << 33)
+    threads = [thread for thread in threading.enumerate() if thread.name == "digest"]
+    assert threads
+    del late
+    for thread in threads:
+        thread.join(5.0)
+        assert not thread.is_alive()
+    assert stream.closed
 
 
 @pytest.mark.parametrize(

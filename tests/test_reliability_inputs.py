@@ -1,6 +1,8 @@
 """Whatever lies behind the name of an input, a command ends in a sentence; a forked child computes or says why not."""
 
+import contextlib
 import gzip
+import inspect
 import io
 import multiprocessing
 import os
@@ -20,6 +22,8 @@ from trihedron.files.diagnosis import DiagnosisFileError, read_diagnosis
 from trihedron.files.noise import NoiseFileError, read_noise
 from trihedron.printable import printable, printable_json
 from trihedron.read import ReadError, read_recording
+from trihedron.refused import RefusedError
+from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.scenario_file import read_scenario
 
 READERS = [
@@ -150,6 +154,28 @@ def test_a_log_read_in_pieces_that_becomes_shorter_is_a_sentence(tmp_path):
 def test_a_session_of_a_thousand_million_poses_is_refused(tmp_path):
     (tmp_path / "s.toml").write_text('[session]\nkind = "hand"\nn_poses = 999999999\n')
     with pytest.raises(ValueError, match="a session has at most"):
+        read_scenario(tmp_path / "s.toml")
+
+
+_ODD = ["0", "-1", "-1e9", "1.5", "1e300", "nan", "inf", '"x"', "true", "[]", "[1]", "[[1,2]]", "[[0,0,0]]", "{a=1}"]
+
+
+@pytest.mark.parametrize("kind", sorted(SESSIONS))
+def test_a_session_of_odd_values_is_made_or_refused(tmp_path, kind):
+    path = tmp_path / "s.toml"
+    for key in inspect.signature(SESSIONS[kind]).parameters:
+        for value in _ODD:
+            path.write_text(f'[session]\nkind = "{kind}"\n{key} = {value}\n')
+            with contextlib.suppress(RefusedError), np.errstate(all="ignore"):
+                read_scenario(path)
+
+
+@pytest.mark.parametrize("key", ["hand:n_poses", "six-faces:repeats", "table-turns:faces"])
+def test_a_session_of_nothing_is_refused(tmp_path, key):
+    kind, key = key.split(":")
+    value = "[]" if key == "faces" else "0"
+    (tmp_path / "s.toml").write_text(f'[session]\nkind = "{kind}"\n{key} = {value}\n')
+    with pytest.raises(RefusedError, match="at least"):
         read_scenario(tmp_path / "s.toml")
 
 

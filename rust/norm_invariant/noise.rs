@@ -59,42 +59,51 @@ fn write_predictions_lanes<const FUSED: bool>(
     sigma: &mut [f64],
     excess: &mut [f64],
 ) {
-    let (s, g) = (&at.model.s, at.settings.gravity);
+    let s = &at.model.s;
     let metric = s.transpose() * s;
+    let per_two_g = 0.5 / at.settings.gravity;
     let is_norm = at.settings.objective == Objective::Norm;
     let (mut u, mut noise) = ([ZERO; 3], [ZERO; 9]);
     let (mut found_sigma, mut found_excess) = (ZERO, ZERO);
-    let is_common = readings.noise.len() == 1;
+    let common = (readings.noise.len() == 1).then(|| {
+        let spread = s * readings.noise_of(first) * s.transpose();
+        let rows = [0, 1, 2].map(|i| [spread[(i, 0)], spread[(i, 1)], spread[(i, 2)]]);
+        (rows, spread.trace())
+    });
     let values = &readings.values[first..first + sigma.len()];
     let values = Eights::of(values, filler(values));
     let parts = sigma.chunks_mut(LANES).zip(excess.chunks_mut(LANES));
     for (chunk, (sigma, excess)) in parts.enumerate() {
         let (here, n) = (first + chunk * LANES, sigma.len());
         load(values.at(chunk), &at.standard, &mut u);
-        if chunk == 0 || !is_common {
+        if common.is_none() {
             load_noise(readings, here, n, &mut noise);
         }
         for l in 0..LANES {
             let f = force::<FUSED>(&at.model, &u, l);
-            let scale = 1.0 / dot::<FUSED>(f, f).sqrt();
-            // uᵀ S Σ Sᵀ u = vᵀ Σ v with v = Sᵀ u, and tr S Σ Sᵀ = Σ_jk (SᵀS)_jk Σ_jk.
-            let mut v = [0.0; 3];
-            for j in 0..3 {
-                v[j] = dot::<FUSED>(f, [s[(0, j)], s[(1, j)], s[(2, j)]]) * scale;
-            }
-            let (mut along, mut trace) = (0.0, 0.0);
-            for j in 0..3 {
-                for k in 0..3 {
-                    let n = noise[3 * j + k][l];
-                    along = fma::<FUSED>(v[j] * v[k], n, along);
-                    trace = fma::<FUSED>(metric[(j, k)], n, trace);
+            let per_square = 1.0 / dot::<FUSED>(f, f);
+            // uᵀ S Σ Sᵀ u, and tr S Σ Sᵀ = Σ_jk (SᵀS)_jk Σ_jk.
+            let (along, trace) = if let Some((spread, trace)) = &common {
+                let seen = [0, 1, 2].map(|i| dot::<FUSED>(spread[i], f));
+                (dot::<FUSED>(f, seen) * per_square, *trace)
+            } else {
+                // = vᵀ Σ v with v = Sᵀ u.
+                let v = [0, 1, 2].map(|j| dot::<FUSED>(f, [s[(0, j)], s[(1, j)], s[(2, j)]]));
+                let (mut along, mut trace) = (0.0, 0.0);
+                for j in 0..3 {
+                    for k in 0..3 {
+                        let n = noise[3 * j + k][l];
+                        along = fma::<FUSED>(v[j] * v[k], n, along);
+                        trace = fma::<FUSED>(metric[(j, k)], n, trace);
+                    }
                 }
-            }
+                (along * per_square, trace)
+            };
             let across = if is_norm { trace - along } else { trace };
             // A pose whose noisy axes all lie across gravity still has the noise of the quietest direction, not none.
             let floor = 1e-6 * trace;
             found_sigma[l] = if along > floor { along } else { floor }.sqrt();
-            found_excess[l] = across / (2.0 * g);
+            found_excess[l] = across * per_two_g;
         }
         store(&found_sigma, sigma);
         store(&found_excess, excess);

@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
+from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.room import check_memory, check_unpacked
-from trihedron.read.table import Table, file_sha256
+from trihedron.read.table import Table
 from trihedron.refused import RefusedError
 
 _BLOCK_NAMES = ("counts", "data", "imu", "raw", "samples", "arr_0")

@@ -12,9 +12,10 @@ from typing import Any
 
 from trihedron.read.columns import Columns, find_columns, sensor_of_file_name
 from trihedron.read.devices import Choice
+from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError
 from trihedron.read.memory import columns_table, frame_columns
-from trihedron.read.table import Table, file_sha256
+from trihedron.read.table import Table
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 
 _AXES = {"x", "y", "z"}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from pathlib import Path
 from types import MappingProxyType
@@ -19,6 +18,7 @@ from trihedron.read.audit import audit_counter, audit_readings, audit_steps, aud
 from trihedron.read.clock import mean_rate_hz
 from trihedron.read.columns import Sensor
 from trihedron.read.devices import Choice, by_sensor
+from trihedron.read.digest import LateSha256, hexdigest
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
@@ -101,13 +101,13 @@ def read_recording(
         else:
             sensors = of_tables(by_sensor(table_of(path)), None, options)
             source = "memory"
-        sha256 = sensors.table.sha256
+        sha256: str | LateSha256 = sensors.table.sha256
     elif accelerometer_path is not None and gyroscope_path is not None:
         accelerometer = _of_file(Path(accelerometer_path), "accelerometer", options)
         gyroscope = _of_file(Path(gyroscope_path), "gyroscope", options)
         sensors = merge_sensors(accelerometer, gyroscope)
         source = f"{accelerometer_path} + {gyroscope_path}"
-        sha256 = hashlib.sha256((accelerometer.table.sha256 + gyroscope.table.sha256).encode()).hexdigest()
+        sha256 = hexdigest(accelerometer.table.sha256, gyroscope.table.sha256)
     elif accelerometer_path is not None or gyroscope_path is not None:
         only: Sensor = "accelerometer" if accelerometer_path is not None else "gyroscope"
         one = Path(accelerometer_path if accelerometer_path is not None else gyroscope_path or "")
@@ -158,7 +158,7 @@ def _accounted(sensors: Sensors, findings: list[Finding]) -> None:
 def audited(
     sensors: Sensors,
     source: str,
-    sha256: str,
+    sha256: str | LateSha256,
     accelerometer_unit: str | AccelerationUnit | None,
     gyroscope_unit: str | RateUnit | None,
     progress: Progress | None,
@@ -225,7 +225,7 @@ def audited(
         supply_v=None if supply is None else _kept(sensors, supply, n),
         start_epoch_s=sensors.start_s,
         source=source,
-        sha256=sha256,
+        sha256=hexdigest(sha256),
         findings=tuple(findings),
         sampling=sensors.sampling,
         auxiliary=MappingProxyType(_auxiliary(sensors, n)),

@@ -10,8 +10,9 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.read.devices import Choice
+from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError
-from trihedron.read.table import Table, file_sha256
+from trihedron.read.table import Table
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.records.progress import Progress
 

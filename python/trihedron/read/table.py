@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -11,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.read.errors import from_os_error
+from trihedron.read.digest import LateSha256
 from trihedron.records import Finding
 from trihedron.records.words import Words, words
 
@@ -45,7 +44,7 @@ class Table:
     path: Path
     names: tuple[str, ...] | None
     columns: tuple[FloatArray, ...]
-    sha256: str = ""
+    sha256: str | LateSha256 = ""
     metadata: dict[str, str] = field(default_factory=dict)
     first_line: int = 0
     line_of_row: npt.NDArray[np.int64] | None = None
@@ -103,15 +102,3 @@ class Table:
         if self.names is not None and self.names[column]:
             return f"'{self.names[column]}'"
         return f"{column + 1}"
-
-
-def file_sha256(path: Path) -> str:
-    """SHA-256 of the bytes of a file, hexadecimal."""
-    digest = hashlib.sha256()
-    try:
-        with path.open("rb") as stream:
-            while block := stream.read(1 << 22):
-                digest.update(block)
-    except OSError as error:
-        raise from_os_error(path, error) from None
-    return digest.hexdigest()

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from trihedron.read.devices import Choice
+from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError
-from trihedron.read.table import StatedClock, Table, file_sha256
+from trihedron.read.table import StatedClock, Table
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.read.ulog_fifo import SUFFIX, expanded
 from trihedron.records import Finding, FindingCode

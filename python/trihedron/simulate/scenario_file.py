@@ -58,7 +58,7 @@ def read_scenario(path: str | Path) -> Scenario:
         raise RefusedError(f"{path.name} is not a TOML file: {error}") from None
     try:
         return scenario_from_table(table, path.stem)
-    except (TypeError, OverflowError):
+    except (TypeError, OverflowError, LookupError):
         kinds = "unit is a whole number, table_tilt_deg two numbers, an effect a table"
         raise RefusedError(f"{path.name}: a value is of another kind than its key takes ({kinds}).") from None
     except ValueError as error:

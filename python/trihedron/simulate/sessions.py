@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from trihedron.refused import RefusedError
 from trihedron.simulate.motion import Hold, Motion, MoveTo, Step, Turn, attitude_with_up
 from trihedron.simulate.noise import stream
 
@@ -42,6 +43,8 @@ def hand_session(
     ``layout`` seeds the order, the tilts, durations and headings: the protocol, apart from the noise. ``arm_m`` puts
     the wrist that far behind the case.
     """
+    if not (isinstance(n_poses, int) and n_poses >= 1):
+        raise RefusedError(f"n_poses must be a whole number of at least 1 pose, got {n_poses!r}")
     rng = stream(layout, "hand session")
     fixed = [*FACES, *(EDGES[i] for i in rng.permutation(len(EDGES)))]
     directions = [np.array(d) for d in fixed[:n_poses]]
@@ -77,6 +80,8 @@ def poses_in_order(
     arrive: bool = False,
 ) -> Motion:
     """Hold each of the directions up in turn; ``arrive`` puts a move in front of the first as well."""
+    if len(ups) == 0:
+        raise RefusedError("a session of poses needs at least one direction that is held up")
     steps: list[Step] = []
     for count, up in enumerate(ups):
         if count or arrive:
@@ -87,6 +92,8 @@ def poses_in_order(
 
 def six_faces(repeats: int = 1, hold_s: float = 5.0, move_s: float = 3.0) -> Motion:
     """The cube on each of its faces in turn, ``repeats`` times round."""
+    if not (isinstance(repeats, int) and repeats >= 1):
+        raise RefusedError(f"repeats must be a whole number of at least 1 round, got {repeats!r}")
     return poses_in_order(FACES * repeats, hold_s, move_s)
 
 
@@ -102,6 +109,10 @@ def table_turns(
 
     ``error_deg`` is the standard deviation of the true angle about the stated one, drawn by ``layout``.
     """
+    if len(faces) == 0:
+        raise RefusedError("turns on a table need at least one face that the case stands on")
+    if not speed_deg_s > 0.0:
+        raise RefusedError(f"speed_deg_s must be positive, got {speed_deg_s!r}")
     rng = stream(layout, "table turns")
     steps: list[Step] = [Hold(10.0, name="rest")]
     for count, face in enumerate(faces):

@@ -231,6 +231,8 @@ def assemble(
     inner = inflation * (np.asarray(fit.covariance) + _unseen(fit, S, k))
     narrower = np.ones(p)
     narrower[k : k + 9] = _narrowing(fit, measured)
+    # The core's offset acts on whole moves.
+    narrower[k + 9 :] = _narrowing(fit, measured) / (1.0 - min(0.5, float(measured.still.max())))
     inner = inner * np.outer(narrower, narrower)
     cov_accelerometer = accelerometer.model.covariance if accelerometer.is_given else np.zeros((12, 12))
     response = np.asarray(fit.wrt_accelerometer)

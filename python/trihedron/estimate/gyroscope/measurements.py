@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -47,7 +47,8 @@ class MoveMeasurements:
     session's zero reading ``zero_mean`` (3,) of variance ``var_zero_mean`` (3,). ``is_undithered`` (3,) are the axes
     whose zero lies hidden inside a step of the converter. ``zero_read``, ``var_zero_read`` (n, 3) are the zeros as each
     hold alone shows them, ``var_reading_noise`` (n, 3) the variance of the hold means by noise alone,
-    ``reading_variance`` (samples, 3) that of gyro readings which were bridged or rounded.
+    ``reading_variance`` (samples, 3) that of gyro readings which were bridged or rounded; ``still`` (3,) the part of
+    the moves' samples in which an axis stands at its zero, so that an offset fitted to moves does not act there.
     """
 
     moves: Moves
@@ -75,6 +76,7 @@ class MoveMeasurements:
     var_zero_read: FloatArray
     var_reading_noise: FloatArray
     reading_variance: FloatArray | None
+    still: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     @property
     def is_lost(self) -> BoolArray:

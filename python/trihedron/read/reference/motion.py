@@ -12,6 +12,7 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.read.clock import build_clock, settle_clock
 from trihedron.read.devices import Choice
+from trihedron.read.digest import hexdigest
 from trihedron.read.errors import ReadError
 from trihedron.read.reference.attitude import attitude_of
 from trihedron.read.reference.roles import WAYS, Role, roles_of
@@ -127,7 +128,7 @@ def _settled(
         is_stepwise=stepwise,
         start_epoch_s=start_s,
         source=str(table.path),
-        sha256=table.sha256,
+        sha256=hexdigest(table.sha256),
     )
     said = tuple(replace(f, seen=f"Reference: {f.seen[0].lower()}{f.seen[1:]}") for f in findings)
     return replace(motion, findings=said)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Generator
 from concurrent.futures import ThreadPoolExecutor
+from io import FileIO
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +22,8 @@ _TAIL = 1 << 12
 """Bytes among which a block's last line nearly always ends."""
 
 
-def blocks_ahead(path: Path, cursor: Cursor, digest: hashlib._Hash) -> Generator[Bytes, None, None]:
-    """Blocks (k,) that end with a complete line, valid until the next is asked for; ``digest`` takes in every byte.
+def blocks_ahead(path: Path, stream: FileIO, cursor: Cursor) -> Generator[Bytes, None, None]:
+    """Blocks (k,) of ``stream`` that end with a complete line, valid until the next is asked for.
 
     Raises
     ------
@@ -32,13 +32,12 @@ def blocks_ahead(path: Path, cursor: Cursor, digest: hashlib._Hash) -> Generator
     """
     most = blocks.BLOCK_BYTES
     try:
-        with path.open("rb", buffering=0) as stream, ThreadPoolExecutor(1) as reader:
+        with ThreadPoolExecutor(1) as reader:
 
             def fill(buffer: Bytes) -> int:
                 view, size = buffer.data[_ROOM:], 0
                 while size < most and (count := stream.readinto(view[size:])):
                     size += count
-                digest.update(view[:size])
                 return size
 
             buffers = [np.empty(_ROOM + most, dtype=np.uint8) for _ in range(2)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable
 from contextlib import closing
 from itertools import islice
@@ -14,10 +13,11 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.read.columns import find_columns
+from trihedron.read.digest import LateSha256, file_sha256, kept_open
 from trihedron.read.errors import ReadError
 from trihedron.read.names import parse_name
 from trihedron.read.room import check_memory
-from trihedron.read.table import Table, file_sha256
+from trihedron.read.table import Table
 from trihedron.read.text.ahead import Bytes, blocks_ahead
 from trihedron.read.text.blocks import Cursor, as_utf8, blocks, has_semicolon_remarks, with_hash_remarks
 from trihedron.read.text.cells import (
@@ -59,7 +59,8 @@ class TextReader:
         sha256: str | None = None,
     ) -> None:
         self.path, self.compression, self.size, self.progress = path, compression, size, progress
-        self.content, self.true_lines, self.sha256 = content, lines, sha256
+        self.content, self.true_lines = content, lines
+        self.sha256: str | LateSha256 | None = sha256
         self.cursor = Cursor()
         self.store = Store(0)
         self.lines = RowLines()
@@ -76,10 +77,9 @@ class TextReader:
         """The whole file as a table."""
         # Closed whatever is raised in between: a refusal must not leave the file open until the next collection.
         if self.content is None and self.compression is None:
-            digest = hashlib.sha256()
-            with closing(blocks_ahead(self.path, self.cursor, digest)) as ahead:
+            with kept_open(self.path) as stream, closing(blocks_ahead(self.path, stream, self.cursor)) as ahead:
                 layout = self._read(ahead)
-            self.sha256 = self.sha256 or digest.hexdigest()
+            self.sha256 = LateSha256(self.path, stream, self.n_bytes)
         else:
             with closing(blocks(self.path, self.compression, self.cursor, self.content)) as parts:
                 layout = self._read(parts)

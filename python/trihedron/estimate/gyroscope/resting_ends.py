@@ -1,0 +1,51 @@
+"""Where a coarse gyro is still, or not yet beyond a step, at the ends of a move: its reading there is the zero's."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron import _core
+from trihedron.arrays import BoolArray, FloatArray, IntArray
+from trihedron.estimate.gyroscope.rounding import CHATTER
+
+HIDDEN = (0.50, 0.68, 1.0), (0.91, 0.68, 0.50)
+"""Of a body that settles as exp(-t/τ), one that starts as t² and one that starts as t: time for the second step beside
+its zero's in that for the first, and how long its place inside the step would have to act, as a rate, to turn what is
+hidden there (first order in the place), in units of the first: τ of τ ln 3; √½/2 of √(3/2) - √½; ½ of 1."""
+STEPS = 0.75, 1.75, 2.75
+"""Distance from the reading at rest, in steps, up to which a reading is at rest, one step beside, two."""
+
+
+def resting_ends(
+    readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray, edges: IntArray
+) -> BoolArray:
+    """Readings (n, 3) of ``axes`` (3,) at the ends of moves ``edges`` (m, 2) at which the body does not turn yet, or no
+    more: the same for all, until the first leaves the step ``quantum`` (3,) of its reading at ``rest`` (3,).
+
+    Before it leaves, it turns unseen, by more against its place inside the step than with it: on the mean of both ways
+    as if that place, read as a rate, had acted for a while, and for so long it is not still.
+    """
+    out = np.zeros(readings.shape, dtype=np.bool_)
+    for first, last in edges.tolist():
+        part = readings[first:last]
+        if not np.isfinite(part).all():
+            continue
+        away = np.column_stack(
+            [np.abs(_core.running_median(np.ascontiguousarray(part[:, k]), CHATTER) - rest[k]) for k in range(3)]
+        )
+        for ends, inside in ((out[first:last], away), (out[first:last][::-1], away[::-1])):
+            seen = [_still(inside[:, k] / quantum[k]) for k in range(3) if axes[k]]
+            ends[: min((n for n in seen if n is not None), default=0), axes] = True
+    return out
+
+
+def _still(away: FloatArray) -> int | None:
+    """Readings before a move that ``away`` (n,) [steps] from rest shows; ``None`` where it shows none."""
+    left = [int(np.argmax(away >= step)) if np.any(away >= step) else None for step in STEPS]
+    begin, second, third = left
+    if begin is None:
+        return None
+    if second is None or third is None:
+        return begin
+    took = max(second - begin, 1)
+    return max(begin - round(took * float(np.interp((third - second) / took, *HIDDEN))), 0)

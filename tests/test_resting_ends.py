@@ -1,0 +1,54 @@
+"""A coarse gyro's zero inside its step, told by moves: what stands still at their ends says nothing of it."""
+
+import numpy as np
+import pytest
+
+from trihedron.estimate.gyroscope.resting_ends import resting_ends
+
+AXES = np.array([True, True, True])
+
+
+def codes_of(rate, zero):
+    """Codes (n, 3) of rates (n, 3) [steps]."""
+    return np.round(rate + zero)
+
+
+LAWS = {
+    "settles": lambda n, scale: scale * np.exp(-n / 12.0),
+    "as the square of time": lambda n, scale: scale * np.maximum(1.0 - n / 60.0, 0.0) ** 2,
+    "as time": lambda n, scale: scale * np.maximum(1.0 - n / 60.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_what_a_zero_inside_its_step_turns_at_an_end_is_that_of_the_readings_left(law):
+    """Sum of rate - (code at rest) over an end, both ways: the zero times what is not still, to first order."""
+    n, zero, lasted, told = np.arange(200.0), 0.1, 0.0, 0.0
+    for way in (1.0, -1.0):
+        for scale in np.linspace(20.0, 40.0, 41):
+            rate = way * LAWS[law](n, scale)
+            codes = np.round(rate + zero)
+            still = resting_ends(np.repeat(codes[:, None], 3, 1), np.ones(3), np.zeros(3), AXES, np.array([[0, 200]]))
+            # An offset of -zero on readings that are not still must make up for what the codes miss.
+            told += np.sum(codes - rate)
+            lasted += np.count_nonzero(~still[:, 0])
+            assert not still[:5, 0].any()
+    # The mean over the ways; 200 readings all along would tell a zero a fifth to four fifths too small.
+    assert told / lasted == pytest.approx(zero, rel=0.15)
+
+
+def test_an_axis_that_never_leaves_its_step_is_as_still_as_the_body():
+    rate = np.zeros((300, 3))
+    rate[100:200, 0] = 30.0 * np.sin(np.pi * np.arange(100) / 100.0)
+    still = resting_ends(codes_of(rate, 0.2), np.ones(3), np.zeros(3), AXES, np.array([[80, 220]]))
+    assert np.array_equal(still[:, 0], still[:, 1])
+    assert still[80:98].all()
+    assert still[203:220].all()
+    assert not still[102:198].any()
+    assert not still[:80].any()
+    assert not still[220:].any()
+
+
+def test_a_move_in_which_nothing_is_seen_to_turn_is_not_said_to_be_still():
+    still = resting_ends(np.zeros((100, 3)), np.ones(3), np.zeros(3), AXES, np.array([[10, 90]]))
+    assert not still.any()
