@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.words import Words, words
 from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, acceleration_to_si
@@ -98,3 +99,19 @@ def check_sufficient(faces: IntArray, *, all_six: bool) -> None:
             "these faces do not determine the accelerometer's twelve parameters; missing: "
             + ", ".join(face_in_words(face) for face in missing)
         )
+
+
+def left_out(faces: IntArray, values: FloatArray) -> list[Finding]:
+    """Poses that are no faces, said."""
+    left = np.flatnonzero(faces == 0)
+    if len(left) == 0:
+        return []
+    return [
+        Finding.of(
+            FindingCode.POSE_NOT_A_FACE,
+            n_left_out=len(left),
+            n_poses=len(values),
+            largest_tilt_deg=LARGEST_TILT_DEG,
+            poses=left.tolist(),
+        )
+    ]
