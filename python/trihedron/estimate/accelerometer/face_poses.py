@@ -63,6 +63,19 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
     return np.where(is_face & (norm > 0), faces, 0)
 
 
+def faces_up(means: FloatArray, raw_unit: AccelerationUnit, up: Sequence[int] | None) -> IntArray:
+    """Face (n,) of each mean reading (n, 3): as stated, or as they show it.
+
+    Raises
+    ------
+    ValueError
+        When there are no poses, or as :func:`identify` and :func:`given`.
+    """
+    if len(means) == 0:
+        raise RefusedError("there are no still poses: hold each of the six faces still for some seconds")
+    return identify(means, raw_unit) if up is None else given(up, len(means))
+
+
 def given(up: Sequence[int], n: int) -> IntArray:
     """Faces as the user states them: ±1, ±2, ±3, or 0 for a pose to leave out.
 

@@ -90,9 +90,7 @@ def calibrate_faces(
     g, unit = inputs.gravity(gravity_m_s2), AccelerationUnit(raw_unit)
     if method not in ("least-squares", "closed-form"):
         raise RefusedError(f"method must be 'least-squares' or 'closed-form', got {method!r}")
-    if len(values) == 0:
-        raise RefusedError("there are no still poses: hold each of the six faces still for some seconds")
-    faces = face_poses.identify(values, unit) if up is None else face_poses.given(up, len(values))
+    faces = face_poses.faces_up(values, unit, up)
     used = np.flatnonzero(faces)
     closed = method == "closed-form"
     face_poses.check_sufficient(faces[used], all_six=closed)
