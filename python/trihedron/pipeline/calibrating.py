@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, get_args
@@ -16,7 +15,6 @@ from trihedron.estimate.accelerometer.face_poses import identify
 from trihedron.estimate.accelerometer.shapes import with_shapes
 from trihedron.estimate.gyroscope import (
     MoveOptions,
-    Turn,
     calibrate_moves,
     calibrate_turns,
     scale_by_gravity,
@@ -30,6 +28,7 @@ from trihedron.estimate.joint import calibrate_joint
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
 from trihedron.pipeline.results import CalibrationResult
+from trihedron.pipeline.turns_on_faces import opposite_on_faces, turns_on_faces
 from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.progress import Progress
@@ -263,11 +262,14 @@ def _by_faces(
     assert sigma_mean is not None
     up = identify(mean, unit) if faces is None else np.asarray(faces, dtype=np.int64)
     shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
-    accelerometer, found = calibrate_faces(mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared)
+    opposite = opposite_on_faces(recording, segments, up, turns_deg)
+    accelerometer, found = calibrate_faces(
+        mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared, opposite=opposite
+    )
     alone = _alone(accelerometer, found, "case", gravity, source, recording)
     if recording.gyroscope is None:
         return alone
-    turns = _turns_on_faces(segments, up, turns_deg)
+    turns = turns_on_faces(segments, up, turns_deg)
     scale: float | np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None = nominal
     tolerance = SCALE_TOLERANCE
     if nominal is None and turns_deg is None and rate_to_si(recording.gyroscope_unit) is None:
@@ -287,34 +289,6 @@ def _by_faces(
 
 def _zero_turns(segments: Segments) -> list[tuple[int, int]]:
     return [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2]
-
-
-def _turns_on_faces(
-    segments: Segments, up: np.ndarray[tuple[int], np.dtype[np.int64]], turns_deg: Sequence[float] | None
-) -> list[Turn]:
-    """The moves that begin and end on the same face, as turns about the axis that points up."""
-    moves = [
-        move
-        for move in segments.moves
-        if move.stop - move.start >= 2 and up[move.hold_before] == up[move.hold_after] != 0
-    ]
-    if turns_deg is None:
-        return [Turn(move.start, move.stop) for move in moves]
-    if len(turns_deg) != len(moves):
-        raise RefusedError(
-            f"{len(turns_deg)} turns were given and {len(moves)} were found between poses on the same face: "
-            "give one angle in degrees for each, 0 to leave it out."
-        )
-    return [
-        Turn(
-            move.start,
-            move.stop,
-            abs(int(up[move.hold_before])) - 1,
-            math.radians(angle) * np.sign(up[move.hold_before]),
-        )
-        for move, angle in zip(moves, turns_deg, strict=True)
-        if angle != 0.0
-    ]
 
 
 def _alone(

@@ -52,6 +52,8 @@ def plan(
     for name, value in (("turn time", turn_s), ("hold", hold_s), ("accelerometer noise", accelerometer_density)):
         if not value > 0.0:
             raise RefusedError(f"the {name} must be a positive number, got {value:g}")
+        if not 1e-15 < value < 1e9:
+            raise RefusedError(f"a {name} of {value:g} is that of no experiment")
     angles = [radians_from_degrees(angle) for angle in turns_deg if angle != 0.0] * 3
     axes = [axis for axis in range(3) for angle in turns_deg if angle != 0.0]
     arguments = (axes, angles, [turn_s] * len(angles), hold_s, gyroscope_density, sigma_turn_rad)
@@ -84,7 +86,7 @@ def _poses(name: str, sigma: float, gravity_m_s2: float) -> PosePlan:
     if name.startswith("6"):
         up = CANDIDATES[kinds == 1]
     elif name.startswith("9"):
-        up = _best(9, sigma)
+        up = _best(9)
     elif name.startswith("12"):
         up = CANDIDATES[kinds == 2]
     else:
@@ -112,11 +114,15 @@ def _poses(name: str, sigma: float, gravity_m_s2: float) -> PosePlan:
     )
 
 
-def _best(n: int, sigma: float) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+_SOME_SIGMA = 1e-4
+"""Of a pose, in g: which poses are best does not depend on it."""
+
+
+def _best(n: int) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """n of the 26 poses: taken one after another, then exchanged as long as the worst standard error falls."""
 
     def score(rows: list[int]) -> float:
-        design = PoseDesign.of(CANDIDATES[rows], np.full(len(rows), sigma))
+        design = PoseDesign.of(CANDIDATES[rows], np.full(len(rows), _SOME_SIGMA))
         # What is not seen yet is as uncertain as the thing itself; among equals the smaller sum.
         covariance = np.linalg.inv(design.information + np.eye(9))
         return float(covariance.diagonal().max() + 1e-3 * np.trace(covariance))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from trihedron.arrays import FloatArray, IntArray
+from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.words import Words, words
 from trihedron.refused import RefusedError
 from trihedron.units import AccelerationUnit, acceleration_to_si
@@ -62,6 +63,19 @@ def identify(means: FloatArray, raw_unit: AccelerationUnit) -> IntArray:
     return np.where(is_face & (norm > 0), faces, 0)
 
 
+def faces_up(means: FloatArray, raw_unit: AccelerationUnit, up: Sequence[int] | None) -> IntArray:
+    """Face (n,) of each mean reading (n, 3): as stated, or as they show it.
+
+    Raises
+    ------
+    ValueError
+        When there are no poses, or as :func:`identify` and :func:`given`.
+    """
+    if len(means) == 0:
+        raise RefusedError("there are no still poses: hold each of the six faces still for some seconds")
+    return identify(means, raw_unit) if up is None else given(up, len(means))
+
+
 def given(up: Sequence[int], n: int) -> IntArray:
     """Faces as the user states them: ±1, ±2, ±3, or 0 for a pose to leave out.
 
@@ -98,3 +112,19 @@ def check_sufficient(faces: IntArray, *, all_six: bool) -> None:
             "these faces do not determine the accelerometer's twelve parameters; missing: "
             + ", ".join(face_in_words(face) for face in missing)
         )
+
+
+def left_out(faces: IntArray, values: FloatArray) -> list[Finding]:
+    """Poses that are no faces, said."""
+    left = np.flatnonzero(faces == 0)
+    if len(left) == 0:
+        return []
+    return [
+        Finding.of(
+            FindingCode.POSE_NOT_A_FACE,
+            n_left_out=len(left),
+            n_poses=len(values),
+            largest_tilt_deg=LARGEST_TILT_DEG,
+            poses=left.tolist(),
+        )
+    ]

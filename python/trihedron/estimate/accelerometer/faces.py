@@ -14,6 +14,7 @@ from trihedron.arrays import FloatArray, IntArray
 from trihedron.estimate.accelerometer import face_poses, face_tilt, inputs, verdict
 from trihedron.estimate.accelerometer.face_placements import placements
 from trihedron.estimate.accelerometer.norm import norm_residual
+from trihedron.estimate.accelerometer.whole_turns import OppositeHeadings, with_opposite
 from trihedron.records.calibration import FitQuality, Frame, Observability, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.words import words
@@ -47,6 +48,7 @@ def calibrate_faces(
     method: Literal["least-squares", "closed-form"] = "least-squares",
     frame: Frame = "case",
     shared: FloatArray | None = None,
+    opposite: OppositeHeadings | None = None,
 ) -> tuple[SensorCalibration, tuple[Finding, ...]]:
     """Accelerometer triad from poses with one axis of the case along the vertical.
 
@@ -76,6 +78,8 @@ def calibrate_faces(
         Of the answer.
     shared : (3,), optional
         Part of the means' variance, raw², that equal readings share (rounding).
+    opposite : OppositeHeadings, optional
+        What whole turns show of the readings at half a turn.
 
     Raises
     ------
@@ -86,17 +90,15 @@ def calibrate_faces(
     g, unit = inputs.gravity(gravity_m_s2), AccelerationUnit(raw_unit)
     if method not in ("least-squares", "closed-form"):
         raise RefusedError(f"method must be 'least-squares' or 'closed-form', got {method!r}")
-    if len(values) == 0:
-        raise RefusedError("there are no still poses: hold each of the six faces still for some seconds")
-    faces = face_poses.identify(values, unit) if up is None else face_poses.given(up, len(values))
+    faces = face_poses.faces_up(values, unit, up)
     used = np.flatnonzero(faces)
     closed = method == "closed-form"
     face_poses.check_sufficient(faces[used], all_six=closed)
-    estimate = _estimate_placements(values[used], noise[used], faces[used], g, shared, closed=closed)
+    estimate = _estimate_placements(values, noise, faces, g, shared, opposite, closed=closed)
     S, b = other_form(estimate.S_a, estimate.b_a)
     quality, apart = _quality(values, noise, faces, g, estimate, closed=closed)
     findings = [
-        *_left_out(faces, values),
+        *face_poses.left_out(faces, values),
         *_tilt_findings(estimate, S, faces[used], used),
         *verdict.model_findings(S, unit, signs_are_known=up is not None),
         *verdict.held_out_findings(apart[:, 0], apart[:, 1], np.ones(len(values)), estimate.dof),
@@ -118,22 +120,34 @@ def calibrate_faces(
 
 
 def _estimate_placements(
-    values: FloatArray, noise: FloatArray, faces: IntArray, g: float, shared: FloatArray | None, *, closed: bool
+    values: FloatArray,
+    noise: FloatArray,
+    faces: IntArray,
+    g: float,
+    shared: FloatArray | None,
+    opposite: OppositeHeadings | None,
+    *,
+    closed: bool,
 ) -> _Estimate:
     """Fit with one mean for each time that the case was set down: holds between turns on one face share their tilt."""
-    placed = placements(values, noise, faces, shared)
-    if len(placed.means) == len(faces):
-        return _estimate(values, noise, faces, g, closed=closed)
+    used = np.flatnonzero(faces)
+    seen = with_opposite(values, noise, faces, opposite)
+    placed = placements(*seen, shared)
+    if len(placed.means) == len(used):
+        return _estimate(values[used], noise[used], faces[used], g, closed=closed)
     spread = placed.noise
+    # Readings half a turn apart have opposite tilts: none is in their mean.
+    is_cancelled = opposite is not None and len(opposite.hold) == len(placed.means)
     if placed.scatter is not None:
         S_a, _, _ = _least_squares(placed.means, placed.noise, placed.faces, g)
         tilt2 = placed.scatter / (g**2 * float(np.mean(np.sum(S_a**2, axis=0))))
         # Through the misalignments a tilt reaches the reading of the axis that is up as well.
-        spread = face_tilt.tilted(placed.noise, placed.faces, S_a, g, np.sqrt(tilt2 / placed.n_headings))
+        if not is_cancelled:
+            spread = face_tilt.tilted(placed.noise, placed.faces, S_a, g, np.sqrt(tilt2 / placed.n_headings))
     estimate = _estimate(placed.means, spread, placed.faces, g, closed=closed)
     if placed.scatter is not None:
-        estimate = _with_doubt(estimate, tilt2, g)
-    residual = values - g * face_poses.direction_of(faces) @ estimate.S_a.T - estimate.b_a
+        estimate = _with_doubt(estimate, tilt2, 0.0 if is_cancelled else g)
+    residual = values[used] - g * face_poses.direction_of(faces[used]) @ estimate.S_a.T - estimate.b_a
     return replace(estimate, residual=residual)
 
 
@@ -294,21 +308,6 @@ def _left_out_pose(
     up = f / np.linalg.norm(f)
     slope = np.concatenate([np.outer(up, values[pose]).ravel(), up]) @ other_form_jacobian(S_a, b_a)
     return float(error[0]), float(np.sqrt(sigma[0] ** 2 + slope @ covariance @ slope))
-
-
-def _left_out(faces: IntArray, values: FloatArray) -> list[Finding]:
-    left = np.flatnonzero(faces == 0)
-    if len(left) == 0:
-        return []
-    return [
-        Finding.of(
-            FindingCode.POSE_NOT_A_FACE,
-            n_left_out=len(left),
-            n_poses=len(values),
-            largest_tilt_deg=face_poses.LARGEST_TILT_DEG,
-            poses=left.tolist(),
-        )
-    ]
 
 
 def _tilt_findings(estimate: _Estimate, S: FloatArray, faces: IntArray, used: IntArray) -> list[Finding]:

@@ -1,0 +1,110 @@
+"""What a whole turn on a table shows of its tilt: gravity goes once round the case while it turns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.records.recording import Recording
+from trihedron.records.segments import Move, Segments
+
+HARMONICS = (2, 3, 4, 5)
+"""Of the turn: a tilt has none of them, and vibration, shocks and an uneven table have them as they have the first."""
+FEWEST = 60
+"""Readings of a turn: ten for each cosine and sine."""
+
+
+@dataclass(frozen=True, eq=False)
+class OppositeHeadings:
+    """Readings (k, 3), raw, that a case would show half a turn from hold ``hold`` (k,), and their covariances."""
+
+    values: FloatArray
+    noise: FloatArray
+    hold: IntArray
+
+
+def opposite_headings(
+    recording: Recording, segments: Segments, moves: list[Move], turns_deg: list[float]
+) -> OppositeHeadings | None:
+    """Of every placement that was turned by whole turns, from the first harmonic of its level axes over them.
+
+    With a the reading, φ the angle turned and ā that at rest, ``a - ā = c + A (cos φ - 1) + B sin φ + P ω² + Q ω'``:
+    P and Q are what a sensor beside the axis feels. Half a turn on the case would read ā - 2A.
+    """
+    force, gyro = recording.accelerometer, recording.gyroscope
+    mean, sigma = segments.accelerometer_mean, segments.accelerometer_sigma_mean
+    if force is None or gyro is None or mean is None or sigma is None or segments.gyroscope_mean is None:
+        return None
+    found: dict[int, list[tuple[FloatArray, FloatArray]]] = {}
+    last, placed = -1, -1
+    for move, angle in zip(moves, turns_deg, strict=True):
+        # Turns that follow each other without the case being set down anew are of one placement.
+        placed = placed if move.hold_before == last else move.hold_before
+        last = move.hold_after
+        if angle == 0.0 or angle % 360.0 != 0.0 or move.stop - move.start < FEWEST:
+            continue
+        rows = slice(move.start, move.stop)
+        zero = 0.5 * (segments.gyroscope_mean[move.hold_before] + segments.gyroscope_mean[move.hold_after])
+        rest = 0.5 * (mean[move.hold_before] + mean[move.hold_after])
+        one = _first_harmonic(recording.time_s[rows], force[rows] - rest, gyro[rows] - zero, np.radians(angle))
+        if one is not None:
+            found.setdefault(placed, []).append(one)
+    if not found:
+        return None
+    holds = np.array(list(found), dtype=np.int64)
+    lean = np.array([np.mean([a for a, _ in found[k]], axis=0) for k in holds.tolist()])
+    # Turns of one placement hear one uneven table: their errors are not averaged.
+    variance = np.array([np.mean([v for _, v in found[k]], axis=0) for k in holds.tolist()])
+    at_rest = np.asarray(sigma)[holds] ** 2
+    # The mean of both headings is as uncertain as the hold and A: it stands in both.
+    noise = 3.0 * at_rest + 4.0 * variance
+    return OppositeHeadings(mean[holds] - 2.0 * lean, np.einsum("ni,ij->nij", noise, np.eye(3)), holds)
+
+
+def _first_harmonic(
+    time_s: FloatArray, force: FloatArray, rate: FloatArray, angle_rad: float
+) -> tuple[FloatArray, FloatArray] | None:
+    """A (3,) and its variance (3,), from readings (n, 3) of a turn without those at rest; ``None`` where they fail."""
+    if not (np.isfinite(force).all() and np.isfinite(rate).all()):
+        return None
+    step = np.diff(time_s)
+    about = rate[:, int(np.argmax(np.abs(rate.sum(axis=0))))]
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * step * (about[1:] + about[:-1]))])
+    if turned[-1] == 0.0:
+        return None
+    phase = turned / turned[-1] * angle_rad
+    speed = np.gradient(phase, time_s)
+    design = np.column_stack(
+        [np.cos(phase) - 1.0, np.ones(len(phase)), np.sin(phase), speed**2, np.gradient(speed, time_s)]
+        + [f(k * phase) for k in HARMONICS for f in (np.cos, np.sin)]
+    )
+    design = design / np.linalg.norm(design, axis=0)
+    size = np.linalg.norm(np.cos(phase) - 1.0)
+    solution, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
+    if rank < design.shape[1]:
+        return None
+    inverse = np.linalg.inv(design.T @ design)
+    # Columns of one length: what stands in the other harmonics, in units of their own leverage, is what A hears.
+    others = np.arange(design.shape[1] - 2 * len(HARMONICS), design.shape[1])
+    heard = np.mean(solution[others] ** 2 / np.diag(inverse)[others, None], axis=0)
+    left = force - design @ solution
+    white = np.sum(left**2, axis=0) / (len(force) - design.shape[1])
+    lean, variance = solution[0] / size, np.maximum(heard, white) * inverse[0, 0] / size**2
+    return lean, variance
+
+
+def with_opposite(
+    values: FloatArray, noise: FloatArray, faces: IntArray, opposite: OppositeHeadings | None
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Poses that are faces (``faces`` not 0), each followed by the opposite heading that its turns show."""
+    used = np.flatnonzero(faces)
+    if opposite is None:
+        return values[used], noise[used], faces[used]
+    at = np.searchsorted(used, opposite.hold, side="right")
+    return (
+        np.insert(values[used], at, opposite.values, axis=0),
+        np.insert(noise[used], at, opposite.noise, axis=0),
+        np.insert(faces[used], at, faces[opposite.hold]),
+    )

@@ -1,0 +1,59 @@
+"""Moves that begin and end on one face of the case: turns of method 1."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from trihedron.estimate.accelerometer import OppositeHeadings, opposite_headings
+from trihedron.estimate.gyroscope import Turn
+from trihedron.records import Recording, Segments
+from trihedron.records.segments import Move
+from trihedron.refused import RefusedError
+
+
+def _moves_on_faces(segments: Segments, up: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[Move]:
+    return [
+        move
+        for move in segments.moves
+        if move.stop - move.start >= 2 and up[move.hold_before] == up[move.hold_after] != 0
+    ]
+
+
+def opposite_on_faces(
+    recording: Recording,
+    segments: Segments,
+    up: np.ndarray[tuple[int], np.dtype[np.int64]],
+    turns_deg: Sequence[float] | None,
+) -> OppositeHeadings | None:
+    """What stated whole turns show of the headings that they pass."""
+    moves = _moves_on_faces(segments, up)
+    if turns_deg is None or len(turns_deg) != len(moves):
+        return None
+    return opposite_headings(recording, segments, moves, [float(angle) for angle in turns_deg])
+
+
+def turns_on_faces(
+    segments: Segments, up: np.ndarray[tuple[int], np.dtype[np.int64]], turns_deg: Sequence[float] | None
+) -> list[Turn]:
+    """The moves that begin and end on the same face, as turns about the axis that points up."""
+    moves = _moves_on_faces(segments, up)
+    if turns_deg is None:
+        return [Turn(move.start, move.stop) for move in moves]
+    if len(turns_deg) != len(moves):
+        raise RefusedError(
+            f"{len(turns_deg)} turns were given and {len(moves)} were found between poses on the same face: "
+            "give one angle in degrees for each, 0 to leave it out."
+        )
+    return [
+        Turn(
+            move.start,
+            move.stop,
+            abs(int(up[move.hold_before])) - 1,
+            math.radians(angle) * np.sign(up[move.hold_before]),
+        )
+        for move, angle in zip(moves, turns_deg, strict=True)
+        if angle != 0.0
+    ]
