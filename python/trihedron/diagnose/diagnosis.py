@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
@@ -30,7 +31,8 @@ from trihedron.diagnose.selection.score import Scored
 from trihedron.diagnose.selection.stages import held_out_stages
 from trihedron.diagnose.selection.stepwise import MAX_EFFECTS, MAX_STEPS, candidates_of, scores, set_apart, with_next
 from trihedron.diagnose.selection.verdict import accounted_for, verdict_of
-from trihedron.diagnose.session.observations import Observations, observe
+from trihedron.diagnose.session.observations import Observations, observe, with_flicker
+from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
 from trihedron.diagnose.session.twin import Prior, Twin
 from trihedron.records import Calibration, Recording, Segments
@@ -84,11 +86,11 @@ def diagnose_recording(
     if widened is not obs:
         # Moves that nothing explains would bend everything beside them: once more, with their noise as it is.
         run = _run(widened, start, prior, alpha, lambda done, text: tell(0.6 + 0.4 * done, text))
+    if not calibration_is_given:
+        obs, run = _as_flicker(obs, start, prior, alpha, run)
     laws = laws_of_rest(run.model.context, run.remaining)
     model = run.model
-    twin = model.fitted.twin
     (numbered, final), base = final_numbers(model, run.remaining), linear_numbers(run.bare, run.domains)
-    accel_hidden, gyro_hidden = hidden_zeros(model.fitted)
     result = Diagnosis(
         verdict=verdict_of(model, run.domains, run.remaining, has_laws=bool(laws)),
         domains=run.domains,
@@ -97,20 +99,7 @@ def diagnose_recording(
         candidates=tuple(run.candidates[key] for key in sorted(run.candidates)),
         baseline=with_covariance(linear_model(base), base),
         extended=with_covariance(linear_model(final), final),
-        noise=MappingProxyType(
-            {
-                "accelerometer_density": (np.sqrt((twin.accel_S**2) @ obs.force_density**2)).tolist(),
-                "accelerometer_unit": "m/s^2/sqrt(Hz)",
-                "accelerometer_corner_s": twin.accel_corner_s,
-                "accelerometer_zero": asdict(accel_hidden),
-                "gyroscope_density": None
-                if obs.rate_density is None
-                else (np.sqrt((twin.gyro_S**2) @ obs.rate_density**2)).tolist(),
-                "gyroscope_unit": "rad/s/sqrt(Hz)",
-                "gyroscope_corner_s": twin.gyro_corner_s,
-                "gyroscope_zero": None if gyro_hidden is None else asdict(gyro_hidden),
-            }
-        ),
+        noise=_noise(obs, model.fitted),
         gravity_m_s2=calibration.gravity_m_s2,
         alpha=alpha,
         recording_source=recording.source,
@@ -122,6 +111,33 @@ def diagnose_recording(
     )
     tell(1.0, "done")
     return result
+
+
+def _noise(obs: Observations, fitted: Fit) -> MappingProxyType[str, object]:
+    """White noise, and what zeros do, of both sensors."""
+    twin = fitted.twin
+    accel, gyro = hidden_zeros(fitted)
+    return MappingProxyType(
+        {
+            "accelerometer_density": np.sqrt((twin.accel_S**2) @ obs.force_density**2).tolist(),
+            "accelerometer_unit": "m/s^2/sqrt(Hz)",
+            "accelerometer_corner_s": twin.accel_corner_s,
+            "accelerometer_zero": asdict(accel) | _flicker(obs, twin.accel_S, 0),
+            "gyroscope_density": None
+            if obs.rate_density is None
+            else np.sqrt((twin.gyro_S**2) @ obs.rate_density**2).tolist(),
+            "gyroscope_unit": "rad/s/sqrt(Hz)",
+            "gyroscope_corner_s": twin.gyro_corner_s,
+            "gyroscope_zero": None if gyro is None else asdict(gyro) | _flicker(obs, twin.gyro_S, 1),
+        }
+    )
+
+
+def _flicker(obs: Observations, S: FloatArray, k: int) -> dict[str, float]:
+    """How far flicker carries zeros from pose to pose, SI, where the errors of their means hold it."""
+    if obs.flicker is None or not obs.flicker[k].any():
+        return {}
+    return {"flicker": float(np.sqrt(np.mean(S**2 @ obs.flicker[k] ** 2)))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +177,29 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
     sought = {one.id for one in catalogue() if isinstance(one, DirectEffect) and one.is_sought_again}
     remaining = _all_domains(judged.context, alpha, judged.refused | (sought - named))
     return _Run(bare, judged, domains, accounted_for(judged, remaining), candidates)
+
+
+def _as_flicker(
+    obs: Observations, start: Twin, prior: Prior | None, alpha: float, run: _Run
+) -> tuple[Observations, _Run]:
+    """The session asked again where only wandering zeros are missing and flicker is seen inside poses.
+
+    What flicker accounts for altogether is noise. Where anything is left the first answer stands: it tells more.
+    """
+    is_quiet = not run.model.accepted and not any(d.disagrees for d in run.domains)
+    if is_quiet or any(one.effect.id not in WANDERS for one in run.model.accepted):
+        return obs, run
+    flickering = with_flicker(obs)
+    if flickering is obs:
+        return obs, run
+    again = _run(flickering, start, prior, alpha, lambda _done, _text: None)
+    has_laws = bool(laws_of_rest(again.model.context, again.remaining))
+    is_noise = verdict_of(again.model, again.domains, again.remaining, has_laws=has_laws) == "consistent"
+    return (flickering, again) if is_noise else (obs, run)
+
+
+WANDERS = frozenset({"accel-hidden-drift", "gyro-hidden-drift", "accel-zero-scatter", "gyro-zero-scatter"})
+"""Effects of zeros that wander in no particular way, as flicker makes them."""
 
 
 def _with_creep(bare: StepwiseModel) -> StepwiseModel:

@@ -50,6 +50,8 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             unit = "m/s^2" if name == "accelerometer" else "rad/s"
             words = f"{size_in_words(hidden['rms'], unit)} rms from pose to pose taken up by its walk"
             words += f"; a pose's mean is good to {size_in_words(hidden['noise'], unit)}"
+            if "flicker" in hidden:
+                words += f", {size_in_words(hidden['flicker'], unit)} of it by flicker, which shows inside poses"
             words += "; the walk is as strong as the model allows" if hidden["is_at_edge"] else ""
             facts.append((f"{name} zero", words))
     blocks.append(Facts(tuple(facts)))

@@ -15,7 +15,7 @@ from trihedron.records import Recording, Segments
 from trihedron.refused import RefusedError
 from trihedron.session.flicker import SURELY_SEEN, expected_rate_scatter, expected_scatter
 from trihedron.session.lines_at_rest import means_beside_lines
-from trihedron.session.noise import Along, SessionNoise, along_gradient, measure_noise
+from trihedron.session.noise import Along, along_gradient, measure_noise
 
 UNSTEADY = 2.0
 """Error of a pose's mean over that of the session's usual pose, from which the pose itself was not still: errors of
@@ -42,7 +42,8 @@ class Observations:
     accelerometer and gyro, raw units. ``hold_creep`` (h, 3), once it was seen: by how much (one sigma,
     raw units) poses turn that settle; it is in ``hold_rate_sigma``.
     ``force_up`` are verticals (h, 3), raw unit vectors, and the errors (h,) of the means along them; ``force_scatter``
-    is how far flicker lets the accelerometer's zero scatter, raw.
+    is how far flicker lets the accelerometer's zero scatter, raw; ``flicker`` (2, 3), raw, what of it, and of the
+    gyro's, is in the errors of the means (:func:`with_flicker`).
     The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
     """
 
@@ -72,6 +73,7 @@ class Observations:
     hold_creep: FloatArray | None = None
     force_up: Along | None = None
     force_scatter: float = 0.0
+    flicker: FloatArray | None = None
 
     @property
     def n_holds(self) -> int:
@@ -209,7 +211,6 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         lasts = np.array([t[hold.stop - 1] - t[hold.start] for hold in segments.holds])
         swing = swing + np.stack([np.zeros_like(noise.rate_sigma), _turned_at_ends(noise.rate_sigma, lasts)], axis=1)
     unresolved = [own + swing[list(ends)].sum(axis=0) for own, ends in zip(noise.unresolved, holds, strict=True)]
-    noise = _between_poses(recording, segments, noise)
     return Observations(
         recording=recording,
         segments=segments,
@@ -235,24 +236,6 @@ def observe(recording: Recording, segments: Segments) -> Observations:
     )
 
 
-def _between_poses(recording: Recording, segments: Segments, noise: SessionNoise) -> SessionNoise:
-    """Noise with means of poses that are good to what flicker, seen inside them, does between them too (11.12d).
-
-    Without it zeros of a consumer part (0.3 mg, 20 °/h) are found to drift or scatter in every fourth session.
-    """
-    spans = np.array([(hold.start, hold.stop) for hold in segments.holds], dtype=np.int64).reshape(-1, 2)
-    if noise.force_up is not None:
-        up, error = noise.force_up
-        force = expected_scatter(np.asarray(recording.accelerometer), spans, up, SURELY_SEEN)
-        if force > 0.0:
-            wider = np.hypot(noise.force_sigma, force), (up, np.hypot(error, force))
-            noise = replace(noise, force_sigma=wider[0], force_up=wider[1], force_scatter=0.0)
-    if noise.rate_sigma is not None and recording.gyroscope is not None:
-        rate = expected_rate_scatter(recording.gyroscope, spans)
-        noise = replace(noise, rate_sigma=np.hypot(noise.rate_sigma, rate))
-    return noise
-
-
 def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:
     """(holds, 3) variance, (raw unit · s)², of the angle between a pose's mean and its end where it was not still.
 
@@ -262,3 +245,23 @@ def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:
     usual = np.median(rate_sigma**2 * lasts_s[:, None], axis=0) / lasts_s[:, None]
     out: FloatArray = np.maximum(rate_sigma**2 - UNSTEADY**2 * usual, 0.0) * (0.5 * lasts_s[:, None]) ** 2
     return out
+
+
+def with_flicker(obs: Observations) -> Observations:
+    """Means of poses good to what flicker, seen inside them, does between them too (11.12d); ``obs`` where none is."""
+    spans = np.array([(hold.start, hold.stop) for hold in obs.segments.holds], dtype=np.int64).reshape(-1, 2)
+    force, rate = 0.0, np.zeros(3)
+    if obs.force_up is not None:
+        force = expected_scatter(np.asarray(obs.recording.accelerometer), spans, obs.force_up[0], SURELY_SEEN)
+    if obs.hold_rate_sigma is not None and obs.recording.gyroscope is not None:
+        rate = expected_rate_scatter(obs.recording.gyroscope, spans)
+    if force == 0.0 and not rate.any():
+        return obs
+    return replace(
+        obs,
+        hold_force_sigma=np.hypot(obs.hold_force_sigma, force),
+        force_up=None if obs.force_up is None else (obs.force_up[0], np.hypot(obs.force_up[1], force)),
+        force_scatter=0.0 if force > 0.0 else obs.force_scatter,
+        hold_rate_sigma=None if obs.hold_rate_sigma is None else np.hypot(obs.hold_rate_sigma, rate),
+        flicker=np.stack([np.full(3, force), rate]),
+    )
