@@ -126,7 +126,9 @@ def simulate(
     typer.echo(f"{output}: {recording.n_samples} samples, {recording.duration_s:.1f} s at {recording.rate_hz:.4g} Hz")
     typer.echo(f"{len(known.holds)} holds, {len(known.moves)} moves, |g| {known.gravity_m_s2:.6g} m/s²")
     for name, parameters in known.effects.items():
-        typer.echo(f"effect {name}: " + ", ".join(f"{key} {value}" for key, value in parameters.items()))
+        from trihedron.report.simulation import in_rows
+
+        typer.echo(f"effect {name}: " + ", ".join(f"{key} {in_rows(value)}" for key, value in parameters.items()))
     if calibration is not None:
         from trihedron.files.calibration import read_calibration
         from trihedron.pipeline.applying import doubted

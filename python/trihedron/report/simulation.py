@@ -52,16 +52,20 @@ def simulation_report(recording: Recording, truth: Truth) -> Document:
 def _effects(effects: Mapping[str, Mapping[str, object]]) -> Block:
     if not effects:
         return Paragraph("None is switched on.")
-    rows = tuple((name, key, _said(value)) for name, parameters in effects.items() for key, value in parameters.items())
+    rows = tuple(
+        (name, key, in_rows(value)) for name, parameters in effects.items() for key, value in parameters.items()
+    )
     return Table(("effect", "parameter", "value"), rows, "Mechanisms that are switched on, with their true sizes")
 
 
-def _said(value: Any) -> str:
+def in_rows(value: Any) -> str:
+    """Numbers of an effect in words: a matrix row by row."""
     try:
-        flat = np.ravel(np.asarray(value, dtype=np.float64))
+        numbers = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         return str(value)
-    return ", ".join(plain_number(float(v), 4) for v in flat)
+    rows = np.atleast_2d(numbers.reshape(-1, numbers.shape[-1]) if numbers.ndim else numbers)
+    return "; ".join(", ".join(f"{float(v):.6g}" for v in row) for row in rows)
 
 
 def _linear(recording: Recording, truth: Truth) -> Table:

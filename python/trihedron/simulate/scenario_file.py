@@ -15,11 +15,13 @@ from typing import Any
 from trihedron.documents import DocumentError, check_values, of_path, read_text
 from trihedron.printable import meant
 from trihedron.refused import RefusedError
+from trihedron.simulate.accelerometer import Accelerometer
 from trihedron.simulate.effects import with_effect
+from trihedron.simulate.gyroscope import Gyroscope
 from trihedron.simulate.motion import LEVEL, Disturb, Hold, Motion, MoveTo, Oscillate, Turn, Vibrate, attitude_with_up
 from trihedron.simulate.named import SESSIONS
 from trihedron.simulate.profiles import profile_by_name
-from trihedron.simulate.scenario import Environment, Scenario
+from trihedron.simulate.scenario import Clock, Environment, Scenario
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -65,6 +67,8 @@ def read_scenario(path: str | Path) -> Scenario:
         raise RefusedError(f"{path.name}: {error}") from None
 
 
+_TABLES = {"clock": Clock, "environment": Environment, "accelerometer": Accelerometer, "gyroscope": Gyroscope}
+
 _MOST_POSES = 100_000
 """Poses of a session: three days of holds of two seconds."""
 
@@ -82,15 +86,25 @@ def scenario_from_table(table: Mapping[str, Any], name: str = "scenario") -> Sce
         accelerometer=_changed(accelerometer, table.get("accelerometer", {}), "accelerometer"),
         gyroscope=_changed(gyroscope, table.get("gyroscope", {}), "gyroscope"),
         clock=_changed(profile.clock, table.get("clock", {}), "clock"),
-        environment=_changed(Environment(), table.get("environment", {}), "environment"),
+        environment=_environment(table.get("environment", {})),
     )
     effects = table.get("effect", [])
     if not isinstance(effects, list):
         raise RefusedError("effects are written as [[effect]], each with its id")
     for effect in effects:
         size = dict(effect)
-        scenario = with_effect(scenario, str(size.pop("id", "")), **size)
+        if "id" not in size:
+            raise RefusedError('an [[effect]] needs its id, such as id = "gyro-g-sensitivity"')
+        scenario = with_effect(scenario, str(size.pop("id")), **size)
     return scenario
+
+
+def _environment(table: Any) -> Environment:
+    """Who states a latitude or a height and no gravity means the gravity there."""
+    given = _changed(Environment(), table, "environment")
+    if {"latitude_deg", "height_m"} & set(table) and "gravity_m_s2" not in table:
+        given = dataclasses.replace(given, gravity_m_s2=0.0)
+    return typing.cast(Environment, given)
 
 
 def _motion(table: Mapping[str, Any]) -> Motion:
@@ -136,7 +150,10 @@ def _tupled(value: Any) -> Any:
 def _refuse_unknown(values: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
     for key in values:
         if key not in known:
-            raise RefusedError(f"{where} has no key {key!r}{meant(key, known)}; it knows {', '.join(known)}")
+            tables = ("clock", "environment", "accelerometer", "gyroscope") if where == "the file" else ()
+            homes = [t for t in tables if key in {f.name for f in dataclasses.fields(_TABLES[t])}]
+            hint = f" (it belongs in {' or '.join(f'[{t}]' for t in homes)})" if homes else meant(key, known)
+            raise RefusedError(f"{where} has no key {key!r}{hint}; it knows {', '.join(known)}")
 
 
 def _changed(base: Any, values: Mapping[str, Any], where: str) -> Any:

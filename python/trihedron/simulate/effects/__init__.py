@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 from trihedron.printable import meant
@@ -66,6 +67,12 @@ def with_effect(scenario: Scenario, effect_id: str, **size: Any) -> Scenario:
         raise RefusedError(
             f"no effect is called {effect_id!r}{meant(effect_id, _EFFECTS)}; there are {', '.join(_EFFECTS)}"
         )
+    takes = dict(list(inspect.signature(_EFFECTS[effect_id]).parameters.items())[1:])
+    words = ", ".join(name if p.default is p.empty else f"{name} (may be left out)" for name, p in takes.items())
+    if unknown := [name for name in size if name not in takes]:
+        raise RefusedError(f"effect {effect_id} has no {unknown[0]!r}{meant(unknown[0], takes)}; it takes {words}")
+    if missing := [name for name, p in takes.items() if p.default is p.empty and name not in size]:
+        raise RefusedError(f"effect {effect_id} needs {', '.join(missing)}; it takes {words}")
     try:
         return _EFFECTS[effect_id](scenario, **size)
     except TypeError as error:
