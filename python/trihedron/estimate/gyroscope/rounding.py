@@ -19,6 +19,8 @@ in that for the first, and the samples over which what it still turns, rms over 
 a step's uniform error, for each sample that the first step took."""
 CHATTER = 9
 """Readings whose median is free of toggling between neighbouring codes."""
+QUIETEST = 0.2
+"""Quantile of the variances of steady stretches that is their noise's."""
 LEAST_WHITE = 1e-2
 """Part of the rounding's variance that an undithered axis is given as white noise: it shows none of its own."""
 
@@ -45,11 +47,49 @@ def rounding_variance(
     out = np.zeros(readings.shape)
     for axis in np.flatnonzero(axes):
         codes = np.where(np.isfinite(readings[:, axis]), readings[:, axis], np.inf)
-        out[:, axis] = _of_runs(codes, float(quantum[axis]), float(rest[axis]))
+        # A little noise makes readings toggle where they pass from code to code: the runs there say nothing of the time.
+        steady = _core.running_median(codes, CHATTER)
+        size = float(quantum[axis])
+        of_runs = _of_runs(codes, steady, size, float(rest[axis]))
+        out[:, axis] = np.maximum(of_runs, _of_plateaus(codes, steady, size, float(rest[axis])))
     return out
 
 
-def _of_runs(codes: FloatArray, quantum: float, rest: float) -> FloatArray:
+def _of_plateaus(codes: FloatArray, steady: FloatArray, quantum: float, rest: float) -> FloatArray:
+    """Variance (n,) of readings that toggle between two codes about a steady rate, and go back where they came from.
+
+    Toggling cuts such a stretch into short runs, but its readings share the error of one rate. Noise σ leaves of its
+    variance ``exp(-4π²σ²/q²)`` (the first harmonic of the rounding's error); σ is read off the quietest fifth of all
+    steady stretches, for those whose rate lies between two codes toggle most with the least noise.
+    """
+    begins = np.concatenate([[0], np.flatnonzero(steady[1:] != steady[:-1]) + 1, [len(codes)]])
+    level = steady[begins[:-1]]
+    out = np.zeros(len(codes))
+    plateaus, scatters = [], []
+    first = 0
+    while first < len(level):
+        low = high = level[first]
+        last = first
+        while last + 1 < len(level) and max(high, level[last + 1]) - min(low, level[last + 1]) < 1.5 * quantum:
+            last += 1
+            low, high = min(low, level[last]), max(high, level[last])
+        a, b = int(begins[first]), int(begins[last + 1])
+        if b - a >= 2 * CHATTER and np.isfinite(low):
+            inside = codes[a + CHATTER // 2 : b - CHATTER // 2]
+            scatters.append(float(np.var(inside[np.isfinite(inside)])))
+            goes_back = 0 < first and last + 1 < len(level) and (level[first - 1] < low) == (level[last + 1] < low)
+            if goes_back and not (low < rest + 0.75 * quantum and high > rest - 0.75 * quantum):
+                plateaus.append((a, b))
+        first = last + 1
+    if plateaus:
+        white2 = max(float(np.quantile(scatters, QUIETEST)) - quantum**2 / 12.0, 0.0)
+        hidden = math.exp(-4.0 * math.pi**2 * white2 / quantum**2)
+        for a, b in plateaus:
+            out[a:b] = (b - a) * hidden
+    return out * quantum**2 / 12.0
+
+
+def _of_runs(codes: FloatArray, steady: FloatArray, quantum: float, rest: float) -> FloatArray:
     begins = np.concatenate([[0], np.flatnonzero(codes[1:] != codes[:-1]) + 1])
     count = np.diff(np.concatenate([begins, [len(codes)]]))
     level = codes[begins]
@@ -58,8 +98,6 @@ def _of_runs(codes: FloatArray, quantum: float, rest: float) -> FloatArray:
     is_passed = np.zeros(len(level), dtype=bool)
     is_passed[1:-1] = step[1:] * step[:-1] > 0.0
     out = np.repeat(np.where(is_passed, 1.0 / count, count).astype(np.float64), count)
-    # A little noise makes readings toggle where they pass from code to code: the runs there say nothing of the time.
-    steady = _core.running_median(codes, CHATTER)
     away = np.abs(steady - rest)
     # Between the two nearest codes a zero may toggle.
     is_rest, is_next = away < 0.75 * quantum, away < 1.75 * quantum
