@@ -30,3 +30,30 @@ def test_settling_inside_a_step_is_charged_whichever_way_the_moves_go(noise, way
     # A tail e exp(-t/τ) below an edge e that may be anywhere in the step hides e τ, charged as if it were uniform.
     assert np.sqrt(np.mean(scores**2)) < 1.5
     assert np.abs(scores).max() < 6.0
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.2, 0.3, 0.4])
+def test_steady_rates_that_toggle_between_two_codes_share_one_error(noise):
+    # Axis after axis at one speed behind ramps: what is read of the other axes, too, stands still for a second.
+    rng = np.random.default_rng(11)
+    scores, white = [], []
+    for _ in range(150):
+        # Beside the zero's own step, whose error is the zero's.
+        levels = rng.uniform(3.0, 30.0, 12) * rng.choice([-1.0, 1.0], 12)
+        up = np.linspace(0.0, 1.0, 20)
+        still = np.zeros(60)
+        rate = np.concatenate([np.concatenate([still, x * up, np.full(120, x), x * up[::-1]]) for x in levels])
+        zero = rng.uniform(-0.5, 0.5)
+        codes = np.round(rate + zero + noise * rng.normal(size=len(rate)))
+        wanted = np.repeat(codes[:, None], 3, 1)
+        variance = rounding_variance(wanted, np.ones(3), np.zeros(3), np.array([True] * 3))[:, 0]
+        for k in range(len(levels)):
+            plateau = slice(220 * k + 80, 220 * k + 200)
+            error = (codes - rate - zero)[plateau].sum()
+            # Beside what noise of its own adds, which is charged elsewhere.
+            scores.append(error / np.sqrt(variance[plateau].sum() + 120 * noise**2))
+            white.append(error / np.sqrt(120 / 12.0 + 120 * noise**2))
+    assert np.sqrt(np.mean(np.square(scores))) < 1.15
+    assert np.abs(scores).max() < 5.5
+    if noise <= 0.1:
+        assert np.sqrt(np.mean(np.square(white))) > 3.0, "as if independent it would be far too little"

@@ -201,7 +201,7 @@ def _may_be_made(name: str, named: set[str]) -> bool:
     """An output that was asked for, or a companion of one (a header beside a source, a demonstration's folder)."""
     stems = {os.path.splitext(word)[0] for word in named if word}
     top = name.split("/")[0]
-    return any(top.startswith(stem) for stem in stems) or top.startswith("trihedron-demo")
+    return any(top.startswith(stem) or name.startswith(stem) for stem in stems) or top.startswith("trihedron-demo")
 
 
 def _content(folder: Path) -> dict[str, str]:

@@ -47,7 +47,7 @@ def rounding_variance(
     out = np.zeros(readings.shape)
     for axis in np.flatnonzero(axes):
         codes = np.where(np.isfinite(readings[:, axis]), readings[:, axis], np.inf)
-        # A little noise makes readings toggle where they pass from code to code: the runs there say nothing of the time.
+        # A little noise makes readings toggle where they pass from code to code: runs there say nothing of the time.
         steady = _core.running_median(codes, CHATTER)
         size = float(quantum[axis])
         of_runs = _of_runs(codes, steady, size, float(rest[axis]))
@@ -63,8 +63,7 @@ def _of_plateaus(codes: FloatArray, steady: FloatArray, quantum: float, rest: fl
     steady stretches, for those whose rate lies between two codes toggle most with the least noise.
     """
     begins = np.concatenate([[0], np.flatnonzero(steady[1:] != steady[:-1]) + 1, [len(codes)]])
-    level = steady[begins[:-1]]
-    out = np.zeros(len(codes))
+    level = steady[begins[:-1]].tolist()
     plateaus, scatters = [], []
     first = 0
     while first < len(level):
@@ -74,19 +73,30 @@ def _of_plateaus(codes: FloatArray, steady: FloatArray, quantum: float, rest: fl
             last += 1
             low, high = min(low, level[last]), max(high, level[last])
         a, b = int(begins[first]), int(begins[last + 1])
-        if b - a >= 2 * CHATTER and np.isfinite(low):
+        if b - a >= 2 * CHATTER and math.isfinite(low):
             inside = codes[a + CHATTER // 2 : b - CHATTER // 2]
             scatters.append(float(np.var(inside[np.isfinite(inside)])))
-            goes_back = 0 < first and last + 1 < len(level) and (level[first - 1] < low) == (level[last + 1] < low)
-            if goes_back and not (low < rest + 0.75 * quantum and high > rest - 0.75 * quantum):
+            is_zero = low < rest + 0.75 * quantum and high > rest - 0.75 * quantum
+            if not is_zero and _goes_back(level, first, last, low, high):
                 plateaus.append((a, b))
         first = last + 1
+    out = np.zeros(len(codes))
     if plateaus:
         white2 = max(float(np.quantile(scatters, QUIETEST)) - quantum**2 / 12.0, 0.0)
         hidden = math.exp(-4.0 * math.pi**2 * white2 / quantum**2)
         for a, b in plateaus:
             out[a:b] = (b - a) * hidden
     return out * quantum**2 / 12.0
+
+
+def _goes_back(level: list[float], first: int, last: int, low: float, high: float) -> bool:
+    """Whether what stands within ``low`` and ``high`` came from the side to which it leaves."""
+    before, behind = first - 1, last + 1
+    while before >= 0 and low <= level[before] <= high:
+        before -= 1
+    while behind < len(level) and low <= level[behind] <= high:
+        behind += 1
+    return before >= 0 and behind < len(level) and (level[before] < low) == (level[behind] < low)
 
 
 def _of_runs(codes: FloatArray, steady: FloatArray, quantum: float, rest: float) -> FloatArray:
