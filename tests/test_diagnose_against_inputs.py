@@ -57,3 +57,36 @@ def test_a_simulated_log_that_is_none_or_holds_no_poses_is_refused(tmp_path, cap
     said = refused(still, capsys)
     assert "the simulated recording cannot be calibrated" in said
     assert "pose" in said
+
+
+def without_gyro(path, log):
+    """The log's time and accelerometer alone."""
+    path.write_text("\n".join(",".join(line.split(",")[:4]) for line in log.read_text().splitlines()) + "\n")
+    return path
+
+
+def test_a_gyro_that_one_side_lacks_is_said_in_the_verdict_and_found(tmp_path, capsys):
+    log = made_once() / "log.csv"
+    bare = without_gyro(tmp_path / "bare.csv", log)
+    for recording, model, lacks in ((log, bare, "the simulated log has none"), (bare, log, "the recording has none")):
+        assert main(["diagnose", str(recording), "--gravity", G, "--against", str(model), "--full"]) == 0
+        said = " ".join(capsys.readouterr().out.split())
+        assert "the gyro was not compared." in said
+        assert lacks in said
+    assert main(["diagnose", str(log), "--gravity", G, "--against", str(log)]) == 0
+    assert "not compared" not in capsys.readouterr().out
+
+
+def test_a_scenario_needs_a_gyro_to_be_moved_by(tmp_path, capsys):
+    bare = without_gyro(tmp_path / "bare.csv", made_once() / "log.csv")
+    given = tmp_path / "mine.toml"
+    given.write_text(GOOD)
+    assert main(["diagnose", str(bare), "--gravity", G, "--against", str(given)]) == 1
+    assert "this recording has no gyro to tell how" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_calibration_in_place_of_a_simulated_log_is_told_where_it_belongs(tmp_path, capsys):
+    made = tmp_path / "cal.json"
+    assert main(["calibrate", str(made_once() / "log.csv"), "--gravity", G, "-o", str(made)]) == 0
+    capsys.readouterr()
+    assert "this is a trihedron calibration, no log; name it with --calibration" in refused(made, capsys)

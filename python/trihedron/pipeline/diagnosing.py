@@ -130,11 +130,9 @@ def _of_poses(
         return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
     simulated: _Free | None = None
     if against is not None:
-        tell(0.05, "diagnosing the simulated recording")
-        logged = _simulated_log(against, recording, segments, gravity)
-        simulated = _simulation(logged, gravity, alpha, lambda fraction, text: tell(0.05 + 0.4 * fraction, text))
+        simulated, recording, segments, more = _simulated(against, recording, segments, gravity, alpha, tell)
         known = simulated.calibration
-        findings += _protocol(simulated.segments, segments)
+        findings += more
     begun = 0.05 if simulated is None else 0.45
     tell(begun, "calibrating")
     used, free = _start(calibrated, gravity, known, is_simulation=simulated is not None)
@@ -234,8 +232,24 @@ def _simulated_log(
         if Path(against).suffix.lower() != ".toml":
             return read(against), None
         against = read_scenario(Path(against))
+    if recording.gyroscope is None:
+        raise RefusedError(
+            "a scenario is moved as the recording was, and this recording has no gyro to tell how: log both sensors, "
+            "or simulate a log of your own and hold that against it"
+        )
     own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
     return driven(against, recording, segments, own), against
+
+
+def _simulated(
+    against: GivenModel, recording: Recording, segments: Segments, gravity: float, alpha: float, tell: Progress
+) -> tuple[_Free, Recording, Segments, tuple[Finding, ...]]:
+    """The simulation diagnosed on its own, the recording with the sensors of both, and what is to be said of them."""
+    tell(0.05, "diagnosing the simulated recording")
+    logged = _simulated_log(against, recording, segments, gravity)
+    logged, recording, segments, one_sided = _both_sensors(logged, recording, segments)
+    simulated = _simulation(logged, gravity, alpha, lambda fraction, text: tell(0.05 + 0.4 * fraction, text))
+    return simulated, recording, segments, (*_protocol(simulated.segments, segments), *one_sided)
 
 
 def _simulation(logged: tuple[Recording, Scenario | None], gravity: float, alpha: float, tell: Progress) -> _Free:
@@ -266,6 +280,20 @@ def _protocol(simulated: Segments, segments: Segments) -> tuple[Finding, ...]:
         return ()
     finding = Finding.of(FindingCode.PROTOCOL_DIFFERS, n_simulated=n, n_real=m)
     return (finding,)
+
+
+def _both_sensors(
+    logged: tuple[Recording, Scenario | None], recording: Recording, segments: Segments
+) -> tuple[tuple[Recording, Scenario | None], Recording, Segments, tuple[Finding, ...]]:
+    """Both sides without their gyro where one side has none."""
+    theirs, scenario = logged
+    if (theirs.gyroscope is None) == (recording.gyroscope is None):
+        return logged, recording, segments, ()
+    if recording.gyroscope is None:
+        finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "recording-has-none")
+        return (replace(theirs, gyroscope=None), scenario), recording, segments, (finding,)
+    finding = Finding.of(FindingCode.GYROSCOPE_LEFT_OUT, "simulation-has-none")
+    return logged, *_accelerometer_only(recording, segments), (finding,)
 
 
 def _gyroscope_left_out() -> Finding:

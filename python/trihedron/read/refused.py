@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from trihedron.read.errors import ReadError
@@ -43,6 +44,11 @@ def refuse_foreign(path: Path, magic: bytes) -> None:
             f"{path}: this is a video, which is not read here; extract its motion data (GoPro's GPMF) as CSV."
         )
     text = magic.removeprefix(b"\xef\xbb\xbf").lstrip()
+    own = re.match(rb'\{\s*"format":\s*"(trihedron [a-z ]+)"', text)
+    if own is not None:
+        kind = own[1].decode()
+        remedy = "name it with --calibration" if kind.endswith("calibration") else "name a log"
+        raise ReadError(f"{path}: this is a {kind}, no log; {remedy}.")
     if text[:1] in (b"{", b"[") and _is_json(text):
         raise ReadError(
             f"{path}: this is JSON, which is not read here because every program nests it otherwise; write its "

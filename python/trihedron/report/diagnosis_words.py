@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from trihedron.records.diagnosis import Diagnosis
 from trihedron.records.domains import DomainTest
+from trihedron.records.finding import FindingCode
 from trihedron.report.diagnosis_numbers import differing_in_short
 from trihedron.report.numbers import listed, plain_number, unit_in_print, with_sigma
 from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
@@ -29,7 +30,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "consistent":
         return (
             "CONSISTENT: the model and its noise account for this recording; nothing is missing that it could show"
-            f"{_footnotes(diagnosis)}."
+            f"{_footnotes(diagnosis)}{_not_compared(diagnosis)}."
         )
     if diagnosis.verdict == "unexplained":
         named = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
@@ -48,7 +49,8 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
             "more poses of 3 to 5 s in different directions."
         )
     if diagnosis.verdict == "parameters-differ":
-        return f"PARAMETERS DIFFER: {listed(numbers)}; nothing else, no physics is missing{_footnotes(diagnosis)}."
+        beside = _footnotes(diagnosis) + _not_compared(diagnosis)
+        return f"PARAMETERS DIFFER: {listed(numbers)}; nothing else, no physics is missing{beside}."
     missing = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "recording"))
     surplus = list(dict.fromkeys(effect.id for effect in diagnosis.effects if effect.side == "model"))
     tail = (
@@ -64,6 +66,13 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if numbers:
         said.append(f"numbers differ ({listed(numbers)})")
     return f"MISSING PHYSICS: {'; '.join(said)}{tail}"
+
+
+def _not_compared(diagnosis: Diagnosis) -> str:
+    """A gyro that one side lacks is no agreement."""
+    found = getattr(diagnosis, "findings", ())
+    is_out = any(f.code is FindingCode.GYROSCOPE_LEFT_OUT for f in found)
+    return "; the gyro was not compared" if is_out else ""
 
 
 def _footnotes(diagnosis: Diagnosis) -> str:

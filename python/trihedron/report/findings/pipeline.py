@@ -87,6 +87,22 @@ _USE = (
         "Give a calibration of both sensors.",
     ),
     Entry(
+        Code.GYROSCOPE_LEFT_OUT,
+        "simulation-has-none",
+        WARNING,
+        "The gyro was not compared: the simulated log has none.",
+        "Only the accelerometer was simulated, or only its columns were found.",
+        "Simulate both sensors, or leave the gyro's columns out of the recording.",
+    ),
+    Entry(
+        Code.GYROSCOPE_LEFT_OUT,
+        "recording-has-none",
+        WARNING,
+        "The simulated gyro was not compared: the recording has none.",
+        "Only the accelerometer was logged, or only its columns were found.",
+        "Log both sensors.",
+    ),
+    Entry(
         Code.CALIBRATION_DOUBTED,
         "",
         SERIOUS,
