@@ -76,8 +76,11 @@ STATIC = {
         1e-12,
     ),
     "gyro-hidden-drift": (
-        {"amplitude": (0.005, 0.0, -0.02), "tau_s": 7.0},
-        lambda f, w, _t: (f, w + np.exp(-_t / 7.0)[:, None] * [0.005, 0, -0.02]),
+        {"amplitude": (0.005, 0.0, -0.02), "tau_s": 7.0, "change": (0.0, 0.03, 0.01), "length_s": 40.0},
+        lambda f, w, t: (
+            f,
+            w + np.exp(-t / 7.0)[:, None] * [0.005, 0, -0.02] + (t / 40.0 - 0.5)[:, None] * [0, 0.03, 0.01],
+        ),
         1e-12,
     ),
     "periodic-interference": (
@@ -366,6 +369,10 @@ def test_a_wrong_question_is_answered_in_one_sentence():
         with_effect(IDEAL, "accel-cubed")
     with pytest.raises(ValueError, match="has no 'k9'; it takes k3"):
         with_effect(IDEAL, "accel-cubic", k9=1.0)
+    with pytest.raises(ValueError, match="a drift needs an amplitude that dies away, or a change"):
+        with_effect(IDEAL, "accel-hidden-drift", tau_s=3.0)
+    with pytest.raises(ValueError, match="positive tau_s and length_s"):
+        with_effect(IDEAL, "accel-hidden-drift", change=0.1, length_s=0.0)
     with pytest.raises(ValueError, match="hits its stop"):
         simulate(with_effect(IDEAL, "accel-cubic", k3=0.1))
     with pytest.raises(ValueError, match="three numbers"):

@@ -77,7 +77,9 @@ def improve(
     physics = [effect for effect in found.effects if effect.side == "recording" and effect.id not in ranged]
     shared = {p.id for p in found.parameters if p.significant}
     shared -= ranged
-    sizes, left_out = diagnosed_sizes([e.to_dict() for e in (*physics, *_shared(found, shared))])
+    sizes, left_out = diagnosed_sizes(
+        [e.to_dict() for e in (*physics, *_shared(found, shared))], float(np.ptp(found.recording.time_s))
+    )
     surplus = [*(effect.id for effect in found.effects if effect.side == "model"), *ranged]
     text = improved_scenario(scenario, tables, sizes, surplus)
     own = found.updated

@@ -33,13 +33,24 @@ def with_diagnosed_effects(
     return scenario, tuple(dict.fromkeys(done)), left_out
 
 
-def diagnosed_sizes(effects: Sequence[Mapping[str, Any]]) -> tuple[list[tuple[str, Size]], dict[str, str]]:
-    """Accepted effects as ids and sizes of mechanisms (keys of :func:`with_effect`), and why others were left out."""
+LENGTH = "length of the session"
+"""Beside an effect's parameters: what a straight drift went on for, s."""
+
+
+def diagnosed_sizes(
+    effects: Sequence[Mapping[str, Any]], length_s: float | None = None
+) -> tuple[list[tuple[str, Size]], dict[str, str]]:
+    """Accepted effects as ids and sizes of mechanisms (keys of :func:`with_effect`), and why others were left out.
+
+    ``length_s`` is that of the recording they were found in.
+    """
     out: list[tuple[str, Size]] = []
     left_out: dict[str, str] = {}
     for effect in effects:
         effect_id = str(effect["id"])
         values = {str(p["name"]): float(p["value"]) for p in effect["parameters"] if p["value"] is not None}
+        if length_s is not None:
+            values[LENGTH] = length_s
         variant = str(effect.get("model", {}).get("variant", ""))
         try:
             out += [(effect_id, size) for size in _sizes(effect_id, values, variant)]
@@ -68,7 +79,9 @@ def _hysteresis(values: Parameters, variant: str) -> Size:
 
 def _drift(values: Parameters, variant: str) -> Size:
     if variant == "line":
-        raise _NotSimulated("a straight drift has no end; a simulated one dies away")
+        if LENGTH not in values:
+            raise _NotSimulated("a straight drift needs the length of its session, which the diagnosis does not say")
+        return {"change": _axis(values, "drift"), "length_s": values[LENGTH]}
     if variant != "warm-up":
         raise _NotSimulated("a slow curve of any shape belongs to that session")
     return {"amplitude": _axis(values, "warm_up"), "tau_s": values["time_constant"]}

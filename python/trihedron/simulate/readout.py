@@ -61,10 +61,22 @@ class Thermal:
 
 @dataclass(frozen=True)
 class Drift:
-    """Offset that dies away after power-on: ``amplitude · exp(-t/tau_s)``, SI."""
+    """Offset that dies away after power-on, and one that goes on.
+
+    ``amplitude exp(-t/tau_s) + change (t/length_s - 1/2)``, SI: a session of ``length_s`` sees the second about its
+    own mean.
+    """
 
     amplitude: Triple = NONE
     tau_s: float = 300.0
+    change: Triple = NONE
+    length_s: float = 300.0
+
+    def at(self, time_s: FloatArray) -> FloatArray:
+        """(n, 3) offsets at times (n,) from power-on."""
+        dies = np.exp(-np.maximum(time_s, 0.0) / self.tau_s)[:, None] * np.asarray(self.amplitude)
+        out: FloatArray = dies + (time_s / self.length_s - 0.5)[:, None] * np.asarray(self.change)
+        return out
 
 
 @dataclass(frozen=True)
@@ -174,9 +186,8 @@ class Electronics:
                 signal = signal * (1.0 + t * (np.asarray(thermal.scale_per_k) + t * np.asarray(thermal.scale_per_k2)))
             if any(thermal.bias_per_k) or any(thermal.bias_per_k2):
                 signal = signal + t * (np.asarray(thermal.bias_per_k) + t * np.asarray(thermal.bias_per_k2))
-        if any(self.drift.amplitude):
-            decay = np.exp(-np.maximum(time_s, 0.0) / self.drift.tau_s)
-            signal = signal + decay[:, None] * np.asarray(self.drift.amplitude)
+        if any(self.drift.amplitude) or any(self.drift.change):
+            signal = signal + self.drift.at(time_s)
         for line in self.interference:
             wave = np.sin(2.0 * np.pi * line.frequency_hz * time_s + line.phase_rad)
             signal = signal + wave[:, None] * np.asarray(line.amplitude)

@@ -82,10 +82,21 @@ def thermal(sensor: Sensor, kind: Literal["bias", "scale"]) -> Change:
 
 
 def drift(sensor: Sensor) -> Change:
-    def change(scenario: Scenario, amplitude: Values, tau_s: float = 120.0) -> Scenario:
-        return electronics(scenario, sensor, drift=Drift(triple(amplitude), tau_s))
+    def drifting(
+        scenario: Scenario,
+        amplitude: Values = 0.0,
+        tau_s: float = 120.0,
+        change: Values = 0.0,
+        length_s: float = 300.0,
+    ) -> Scenario:
+        if not (tau_s > 0.0 and length_s > 0.0):
+            raise RefusedError(f"a drift needs a positive tau_s and length_s, got {tau_s} and {length_s}")
+        drift = Drift(triple(amplitude), tau_s, triple(change), length_s)
+        if not (any(drift.amplitude) or any(drift.change)):
+            raise RefusedError("a drift needs an amplitude that dies away, or a change over length_s")
+        return electronics(scenario, sensor, drift=drift)
 
-    return change
+    return drifting
 
 
 def saturation(sensor: Sensor) -> Change:

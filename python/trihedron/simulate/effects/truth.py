@@ -88,8 +88,11 @@ def _note_electronics(
                 note(f"{prefix}-thermal-{kind}", per_k=linear, per_k2=quadratic, logged=temperature.logged)
     if any(electronics.asymmetry):
         note(f"{prefix}-scale-asymmetry", asymmetry=electronics.asymmetry)
-    if any(electronics.drift.amplitude):
-        note(f"{prefix}-hidden-drift", amplitude=electronics.drift.amplitude, tau_s=electronics.drift.tau_s)
+    drift = electronics.drift
+    if any(drift.amplitude) or any(drift.change):
+        dies = {"amplitude": drift.amplitude, "tau_s": drift.tau_s} if any(drift.amplitude) else {}
+        goes_on = {"change": drift.change, "length_s": drift.length_s} if any(drift.change) else {}
+        note(f"{prefix}-hidden-drift", **dies, **goes_on)
     if any(electronics.zero_scatter) or any(electronics.zero_in_moves):
         in_moves = {"in_moves": electronics.zero_in_moves} if any(electronics.zero_in_moves) else {}
         note(f"{prefix}-zero-scatter", sigma=electronics.zero_scatter, **in_moves)
