@@ -7,9 +7,18 @@ from dataclasses import replace
 import numpy as np
 
 from trihedron._core import Moves
-from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions, align_screened
+from trihedron.estimate.gyroscope.alignment import (
+    AccelerometerPart,
+    Aligned,
+    MoveOptions,
+    align,
+    align_screened,
+    finished,
+)
+from trihedron.estimate.gyroscope.lost_turns import is_asked_for_losses
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.resting_ends import resting_ends
+from trihedron.estimate.gyroscope.rounding import plateau_variance
 from trihedron.estimate.gyroscope.start import starts, turned_starts
 from trihedron.estimate.gyroscope.verification import is_astray, missed_deg, predict
 from trihedron.quantiles import medians
@@ -83,7 +92,41 @@ def _with_still_ends(
         )
         measured = replace(measured, moves=moves, rate=read, still=still)
         aligned = align_screened(measured, part, gravity_m_s2, S[None], options)
-    return measured, aligned, options
+    if is_asked_for_losses(recording.time_s, measured, aligned, aligned.fit.chi2, aligned.fit.dof):
+        return measured, aligned, options
+    return *_with_plateaus(recording, segments, measured, aligned, part, gravity_m_s2, options), options
+
+
+def _with_plateaus(
+    recording: Recording,
+    segments: Segments,
+    measured: MoveMeasurements,
+    aligned: Aligned,
+    part: AccelerometerPart,
+    gravity_m_s2: float,
+    options: MoveOptions,
+) -> tuple[MoveMeasurements, Aligned]:
+    """Once moves agree among themselves: what they share where their rate stands still inside a step."""
+    assert recording.gyroscope is not None
+    assert segments.gyroscope_mean is not None
+    quantum, rest = recording.facts.of("gyroscope").step, medians(segments.gyroscope_mean)
+    shared = plateau_variance(recording.gyroscope, quantum, rest, measured.is_undithered)
+    if shared is None:
+        return measured, aligned
+    variance = shared if measured.reading_variance is None else np.maximum(measured.reading_variance, shared)
+    moves = Moves(
+        recording.time_s,
+        np.ascontiguousarray(measured.rate),
+        measured.edges,
+        np.ascontiguousarray(segments.time_mid_s[measured.links]),
+        measured.links,
+        options.rate_degree,
+        variance,
+    )
+    measured = replace(measured, moves=moves, reading_variance=variance)
+    start = np.asarray(aligned.fit.gyroscope_scale)[None]
+    fit = align(measured, part, gravity_m_s2, start, options, aligned.used)
+    return measured, finished(fit, measured, part, aligned.used, aligned.outliers)
 
 
 def _denies_cut(plain: Aligned, bridged: MoveMeasurements, measured: MoveMeasurements) -> bool:

@@ -162,6 +162,17 @@ def align_screened(
         starts = np.concatenate([np.asarray(screen.gyroscope_scale)[None], starts])
         is_near = screen.is_converged
     fit = _core_align(measured, accelerometer, gravity_m_s2, starts, options, used, None, is_near)
+    return finished(fit, measured, accelerometer, used, outliers)
+
+
+def finished(
+    fit: AlignmentFit,
+    measured: MoveMeasurements,
+    accelerometer: AccelerometerPart,
+    used: BoolArray,
+    outliers: tuple[int, ...],
+) -> Aligned:
+    """The alignment of a fit, its covariance widened where the residual is beyond the noise."""
     inflation = 1.0
     if fit.dof > 0 and chdtrc(fit.dof, fit.chi2) < FALSE_ALARM:
         inflation = fit.chi2 / fit.dof

@@ -46,13 +46,30 @@ def rounding_variance(
         return None
     out = np.zeros(readings.shape)
     for axis in np.flatnonzero(axes):
-        codes = np.where(np.isfinite(readings[:, axis]), readings[:, axis], np.inf)
-        # A little noise makes readings toggle where they pass from code to code: runs there say nothing of the time.
-        steady = _core.running_median(codes, CHATTER)
-        size = float(quantum[axis])
-        of_runs = _of_runs(codes, steady, size, float(rest[axis]))
-        out[:, axis] = np.maximum(of_runs, _of_plateaus(codes, steady, size, float(rest[axis])))
+        codes, steady = _steady(readings[:, axis])
+        out[:, axis] = _of_runs(codes, steady, float(quantum[axis]), float(rest[axis]))
     return out
+
+
+def plateau_variance(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> FloatArray | None:
+    """The same of readings that toggle between two codes about a steady rate; ``None`` where none do.
+
+    It makes moves at one speed uncertain in common, and is left out where they are held against each other: what single
+    moves miss by a knock or by lost samples would be lost in it.
+    """
+    out = np.zeros(readings.shape)
+    for axis in np.flatnonzero(axes):
+        out[:, axis] = _of_plateaus(*_steady(readings[:, axis]), float(quantum[axis]), float(rest[axis]))
+    return out if np.any(out) else None
+
+
+def _steady(readings: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Codes (n,), missing ones infinite, and their running median.
+
+    A little noise makes readings toggle where they pass from code to code: runs there say nothing of the time.
+    """
+    codes = np.where(np.isfinite(readings), readings, np.inf)
+    return codes, _core.running_median(codes, CHATTER)
 
 
 def _of_plateaus(codes: FloatArray, steady: FloatArray, quantum: float, rest: float) -> FloatArray:
