@@ -23,7 +23,7 @@ from trihedron.diagnose.residuals.timing import judge_timing
 from trihedron.diagnose.residuals.within_holds import judge_within_holds
 from trihedron.diagnose.selection.accepted import accepted_effects
 from trihedron.diagnose.selection.evidence import spread_anew, with_evidence
-from trihedron.diagnose.selection.model import StepwiseModel, begin
+from trihedron.diagnose.selection.model import StepwiseModel, begin, with_only
 from trihedron.diagnose.selection.numbers import final_numbers, linear_numbers
 from trihedron.diagnose.selection.prune import judged_again
 from trihedron.diagnose.selection.rivals import chosen_again
@@ -35,6 +35,7 @@ from trihedron.diagnose.session.observations import Observations, observe, with_
 from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
 from trihedron.diagnose.session.twin import Prior, Twin
+from trihedron.diagnose.zeros.flicker import accel_flicker, gyro_flicker
 from trihedron.records import Calibration, Recording, Segments
 from trihedron.records.diagnosis import Candidate, Diagnosis
 from trihedron.records.domains import DomainTest
@@ -135,7 +136,7 @@ def _noise(obs: Observations, fitted: Fit) -> MappingProxyType[str, object]:
 
 def _flicker(obs: Observations, S: FloatArray, k: int) -> dict[str, float]:
     """How far flicker carries zeros from pose to pose, SI, where the errors of their means hold it."""
-    if obs.flicker is None or not obs.flicker[k].any():
+    if obs.flicker is None or not obs.flickers(k):
         return {}
     return {"flicker": float(np.sqrt(np.mean(S**2 @ obs.flicker[k] ** 2)))}
 
@@ -182,20 +183,35 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
 def _as_flicker(
     obs: Observations, start: Twin, prior: Prior | None, alpha: float, run: _Run
 ) -> tuple[Observations, _Run]:
-    """The session asked again where only wandering zeros are missing and flicker is seen inside poses.
+    """The session asked again where zeros wander, or disagree at rest, and do so as flicker does (Z.11).
 
-    What flicker accounts for altogether is noise. Where anything is left the first answer stands: it tells more.
+    What flicker accounts for altogether is noise. Where anything else is left, or another effect would go, the first
+    answer stands: it tells more.
     """
-    is_quiet = not run.model.accepted and not any(d.disagrees for d in run.domains)
-    if is_quiet or any(one.effect.id not in WANDERS for one in run.model.accepted):
+    others = tuple(one for one in run.model.accepted if one.effect.id not in WANDERS)
+    wanders = len(others) < len(run.model.accepted)
+    if not wanders and (others or not any(d.disagrees for d in run.domains)):
         return obs, run
-    flickering = with_flicker(obs)
+    without = with_only(run.model, others) if others else run.bare
+    flickering = _flickering(obs, without.context)
     if flickering is obs:
         return obs, run
     again = _run(flickering, start, prior, alpha, lambda _done, _text: None)
-    has_laws = bool(laws_of_rest(again.model.context, again.remaining))
-    is_noise = verdict_of(again.model, again.domains, again.remaining, has_laws=has_laws) == "consistent"
+    if others:
+        named = {one.effect.id for one in again.model.accepted} == {one.effect.id for one in others}
+        is_noise = named and not any(d.disagrees for d in again.remaining)
+    else:
+        has_laws = bool(laws_of_rest(again.model.context, again.remaining))
+        is_noise = verdict_of(again.model, again.domains, again.remaining, has_laws=has_laws) == "consistent"
     return (flickering, again) if is_noise else (obs, run)
+
+
+def _flickering(obs: Observations, context: Context) -> Observations:
+    """Observations whose poses' means are as uncertain as flicker makes them, in the sensors that have it."""
+    raw = []
+    for sensor, found in (("accelerometer", accel_flicker(context)), ("gyroscope", gyro_flicker(context))):
+        raw.append(np.zeros(3) if found is None else found / context.si_per_raw(sensor))
+    return with_flicker(obs, *raw)
 
 
 WANDERS = frozenset({"accel-hidden-drift", "gyro-hidden-drift", "accel-zero-scatter", "gyro-zero-scatter"})

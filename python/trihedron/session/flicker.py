@@ -19,11 +19,9 @@ FAR = 9.0
 """Squares beyond so many variances are a hand's, not the noise's."""
 SEEN = 1.0
 """Standard errors of the mean square of the halves by which it must exceed white noise's, where it widens bars only."""
-SURELY_SEEN = 2.0
-"""The same where poses are believed less for it: one session in forty without flicker."""
 
 
-def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray, seen: float = SEEN) -> float:
+def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> float:
     """Standard deviation [raw] of a pose's zero about that of the session by flicker alone, along the vertical.
 
     Means of neighbouring parts of length t differ by a variance 2N²/t + 4 ln 2 h of white noise N² and a flicker of
@@ -38,8 +36,6 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray, seen
         Half-open ranges of the poses.
     up : (h, 3)
         Raw unit verticals; NaN where unknown.
-    seen
-        Standard errors by which halves must differ by more.
     """
     size = spans[:, 1] - spans[:, 0]
     usable = (size >= FEWEST_READINGS) & np.isfinite(up).all(axis=1)
@@ -48,23 +44,10 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray, seen
     spans, size, up = spans[usable], size[usable], up[usable]
     halves = _steps(readings, spans, up[:, None, :], 2)
     parts = _steps(readings, spans, up[:, None, :], PARTS)
-    return float(_between_poses(halves, parts, spans, seen)[0])
+    return float(_between_poses(halves, parts, spans)[0])
 
 
-def expected_rate_scatter(readings: FloatArray, spans: IntArray) -> FloatArray:
-    """(3,) the same [raw] of each axis of a gyro, whose poses ``spans`` (h, 2) of readings (n, 3) stand still.
-
-    All axes together say whether halves of poses differ by more than white noise, each in units of its own.
-    """
-    usable = spans[:, 1] - spans[:, 0] >= FEWEST_READINGS
-    if np.count_nonzero(usable) < FEWEST_POSES:
-        return np.zeros(3)
-    spans = spans[usable]
-    axes = np.broadcast_to(np.eye(3), (len(spans), 3, 3))
-    return _between_poses(_steps(readings, spans, axes, 2), _steps(readings, spans, axes, PARTS), spans, SURELY_SEEN)
-
-
-def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray, seen: float) -> FloatArray:
+def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray) -> FloatArray:
     """(k,) scatter along each direction from steps of halves (h, 1, k) and of parts (h, PARTS - 1, k) of poses."""
     k = halves.shape[2]
     of_halves = np.array([_mean_square(halves[:, :, i].ravel()) for i in range(k)])
@@ -73,7 +56,7 @@ def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray, seen:
     if not (white > 0.0).all():
         return np.zeros(k)  # readings are missing, or never change
     excess = float(np.mean(of_halves / white)) - 1.0
-    if not excess > seen * math.sqrt(2.0 / halves.size):
+    if not excess > SEEN * math.sqrt(2.0 / halves.size):
         return np.zeros(k)
     level = excess * white / (4.0 * math.log(2.0) * (1.0 - 2.0 / PARTS))
     octaves = float(np.ptp(spans)) / (2.0 * float(np.median(spans[:, 1] - spans[:, 0])))

@@ -26,6 +26,7 @@ class AccelHiddenDrift(HiddenDrift):
 
     id = "accel-hidden-drift"
     leaves_open = ("accel-zero",)
+    sensor = 0
     domain, unit = "static-accel", "m/s^2"
     fewest_poses = 18
 

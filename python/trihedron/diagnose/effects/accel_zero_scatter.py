@@ -27,6 +27,8 @@ class AccelZeroScatter(DirectEffect):
     is_late = True
 
     def unavailable(self, context: Context) -> str | None:
+        if context.obs.flickers(0):
+            return why_not("flickers")
         few = context.obs.n_holds < FEWEST_NORM_POSES
         return why_not("few-poses", fewest=FEWEST_NORM_POSES) if few else None
 

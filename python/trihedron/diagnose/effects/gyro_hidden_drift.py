@@ -12,11 +12,9 @@ from trihedron.diagnose.effects.contract import Variant, per_axis, rate_only
 from trihedron.diagnose.effects.hidden_drift import HiddenDrift
 from trihedron.diagnose.session.twin import Distortion
 from trihedron.diagnose.zeros.curve import DriftCurve
+from trihedron.diagnose.zeros.evidence import beats_walk
 from trihedron.diagnose.zeros.of_session import SessionEvidence, gyro_evidence, share_of_curve, walk_of_noise
 from trihedron.records.words import why_not
-
-BEYOND_NOISE = 3.0
-"""Range of the curve over the largest rms that the noise identified in the holds could walk in such a session."""
 
 
 class GyroHiddenDrift(HiddenDrift):
@@ -25,6 +23,7 @@ class GyroHiddenDrift(HiddenDrift):
     id = "gyro-hidden-drift"
     leaves_open = ("gyro-zero",)
     is_proof = True
+    sensor = 1
     domain, unit = "static-gyro", "rad/s"
     fewest_poses = 15
 
@@ -41,7 +40,7 @@ class GyroHiddenDrift(HiddenDrift):
         return gyro_evidence(context)
 
     def is_beyond_noise(self, context: Context, found: SessionEvidence, curve: DriftCurve) -> bool:  # noqa: ARG002
-        return not bool((curve.rms < BEYOND_NOISE * walk_of_noise(context)).all())
+        return beats_walk(found.evidence, walk_of_noise(context))
 
     def share(self, found: SessionEvidence, curve: DriftCurve) -> float:
         return share_of_curve(found, curve.rms)

@@ -33,6 +33,8 @@ class GyroZeroScatter(DirectEffect):
     def unavailable(self, context: Context) -> str | None:
         if context.obs.raw_rate is None:
             return why_not("no-gyro")
+        if context.obs.flickers(1):
+            return why_not("flickers")
         return why_not("few-poses", fewest=FEWEST_FOR_SIZE) if context.obs.n_holds < FEWEST_FOR_SIZE else None
 
     def find(self, context: Context) -> Evidence | None:

@@ -29,6 +29,7 @@ class HiddenDrift(DirectEffect):
     """Warm-up exponential, straight line or slow curve per axis; where none of them fits, a free smooth curve."""
 
     is_late = True
+    sensor: ClassVar[int]
     domain: ClassVar[Domain]
     unit: ClassVar[str]
     fewest_poses: ClassVar[int]
@@ -59,6 +60,8 @@ class HiddenDrift(DirectEffect):
         """The curve itself, one column an axis: its factor is 1 where session and poses agree."""
 
     def unavailable(self, context: Context) -> str | None:
+        if context.obs.flickers(self.sensor):
+            return why_not("flickers")
         return why_not("six-poses") if context.obs.n_holds < FEWEST_HOLDS else None
 
     def variants(self, context: Context) -> list[Variant]:

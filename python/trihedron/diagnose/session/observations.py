@@ -13,7 +13,6 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.records import Recording, Segments
 from trihedron.refused import RefusedError
-from trihedron.session.flicker import SURELY_SEEN, expected_rate_scatter, expected_scatter
 from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.noise import Along, along_gradient, measure_noise
 
@@ -93,6 +92,10 @@ class Observations:
         out: FloatArray = np.sqrt(self.hold_rate_sigma**2 - self.hold_creep**2)
         return out
 
+    def flickers(self, sensor: int) -> bool:
+        """Whether errors of poses' means hold what flicker does to the zero of the accelerometer (0), the gyro (1)."""
+        return self.flicker is not None and bool(self.flicker[sensor].any())
+
     def norm_sigma(self, gradient: FloatArray) -> FloatArray:
         """(h,) standard errors of the length of gravity, SI, that grows with the raw means by ``gradient`` (h, 3)."""
         return along_gradient(self.hold_force_sigma, self.force_up, gradient)
@@ -134,10 +137,14 @@ class Observations:
     @cached_property
     def half_means(self) -> tuple[FloatArray, FloatArray | None]:
         """(holds, 2, 3) raw means over the first and the second half of every hold, accelerometer and gyro."""
+        return self.part_means(2)
+
+    def part_means(self, parts: int) -> tuple[FloatArray, FloatArray | None]:
+        """(holds, parts, 3) the same over that many equal parts."""
 
         def of(raw: FloatArray) -> FloatArray:
-            parts = [np.array_split(raw[hold.start : hold.stop], 2) for hold in self.segments.holds]
-            return np.array([[np.nanmean(half, axis=0) for half in halves] for halves in parts])
+            every = [np.array_split(raw[hold.start : hold.stop], parts) for hold in self.segments.holds]
+            return np.array([[np.nanmean(part, axis=0) for part in of_hold] for of_hold in every])
 
         return of(self.raw_force), None if self.raw_rate is None else of(self.raw_rate)
 
@@ -247,21 +254,16 @@ def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:
     return out
 
 
-def with_flicker(obs: Observations) -> Observations:
-    """Means of poses good to what flicker, seen inside them, does between them too (11.12d); ``obs`` where none is."""
-    spans = np.array([(hold.start, hold.stop) for hold in obs.segments.holds], dtype=np.int64).reshape(-1, 2)
-    force, rate = 0.0, np.zeros(3)
-    if obs.force_up is not None:
-        force = expected_scatter(np.asarray(obs.recording.accelerometer), spans, obs.force_up[0], SURELY_SEEN)
-    if obs.hold_rate_sigma is not None and obs.recording.gyroscope is not None:
-        rate = expected_rate_scatter(obs.recording.gyroscope, spans)
-    if force == 0.0 and not rate.any():
+def with_flicker(obs: Observations, force: FloatArray, rate: FloatArray) -> Observations:
+    """Means of poses good to what flicker moves zeros by from pose to pose, raw (3,) each; 0 for none."""
+    if not force.any() and not rate.any():
         return obs
+    vertical = float(np.sqrt(np.mean(force**2)))
     return replace(
         obs,
         hold_force_sigma=np.hypot(obs.hold_force_sigma, force),
-        force_up=None if obs.force_up is None else (obs.force_up[0], np.hypot(obs.force_up[1], force)),
-        force_scatter=0.0 if force > 0.0 else obs.force_scatter,
+        force_up=None if obs.force_up is None else (obs.force_up[0], np.hypot(obs.force_up[1], vertical)),
+        force_scatter=0.0 if force.any() else obs.force_scatter,
         hold_rate_sigma=None if obs.hold_rate_sigma is None else np.hypot(obs.hold_rate_sigma, rate),
-        flicker=np.stack([np.full(3, force), rate]),
+        flicker=np.stack([force, rate]),
     )

@@ -40,7 +40,7 @@ CONTRADICTED = 0.5e-3
 
 @dataclass(frozen=True, eq=False)
 class ZeroReadings:
-    """Zeros of one sensor, two means a pose, in the order of time.
+    """Zeros of one sensor, two means a pose or more, in the order of time.
 
     ``values``, ``sigma`` (axes, n) the means and their standard errors; ``time_s`` (n,) their middles, ``length_s``
     (n,) how long each was averaged, ``pose`` (n,) number of the pose; ``design`` (n, p) columns of the mean, the

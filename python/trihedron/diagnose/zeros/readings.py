@@ -1,4 +1,4 @@
-"""The zeros of a session as the process takes them: two means a pose, along the sensor's own axes or of a length."""
+"""Zeros of a session as the process takes them: means of parts of poses, along the sensor's axes or of a length."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class SessionZeros:
 
 
 @dataclass(frozen=True, eq=False)
-class _Halves:
+class _Parts:
     pose: npt.NDArray[np.int64]
     time_s: FloatArray
     length_s: FloatArray
@@ -39,12 +39,12 @@ class _Halves:
     temperature: FloatArray | None
 
 
-def _halves(obs: Observations, temperature: FloatArray | None) -> _Halves:
-    """Means over both halves of every pose."""
+def _parts(obs: Observations, temperature: FloatArray | None, parts: int) -> _Parts:
+    """Means over equal parts of every pose."""
     pose, time_s, length_s, force, rate, heat = [], [], [], [], [], []
-    of_force, of_rate = obs.half_means
+    of_force, of_rate = obs.half_means if parts == 2 else obs.part_means(parts)
     for i, hold in enumerate(obs.segments.holds):
-        for k, part in enumerate(np.array_split(hold.samples(), 2)):
+        for k, part in enumerate(np.array_split(hold.samples(), parts)):
             if len(part) < 2:
                 continue
             pose.append(i)
@@ -56,7 +56,7 @@ def _halves(obs: Observations, temperature: FloatArray | None) -> _Halves:
                 rate.append(of_rate[i, k])
             if temperature is not None:
                 heat.append(float(np.nanmean(temperature[part])))
-    return _Halves(
+    return _Parts(
         np.array(pose, dtype=np.int64), np.array(time_s), np.array(length_s), np.array(force),
         np.array(rate) if rate else None, np.array(heat) if heat else None,
     )  # fmt: skip
@@ -71,12 +71,12 @@ def _temperature(context: Context) -> FloatArray | None:
     return None if np.ptp(of_holds) < LEAST_SWING_K else filled
 
 
-def gyro_zeros(context: Context) -> SessionZeros | None:
+def gyro_zeros(context: Context, parts: int = 2) -> SessionZeros | None:
     """Rates at rest along the gyros' own axes, rad/s, accepted effects taken off; ``None`` without a gyro."""
     obs, twin, line = context.obs, context.fitted.twin, context.fitted.line
     if obs.hold_rate_sigma is None:
         return None
-    halves = _halves(obs, _temperature(context))
+    halves = _parts(obs, _temperature(context), parts)
     assert halves.rate is not None
     si = context.si_per_raw("gyroscope")
     values = halves.rate * si
@@ -84,7 +84,7 @@ def gyro_zeros(context: Context) -> SessionZeros | None:
     if line.distortion.rate is not None:
         added = (line.distortion.rate[: obs.n_holds] @ twin.effect) @ np.linalg.inv(context.gyro_axes).T
         values = values - added[halves.pose]
-    sigma = np.sqrt(2.0) * obs.hold_rate_sigma[halves.pose] * si
+    sigma = np.sqrt(parts) * obs.hold_rate_sigma[halves.pose] * si
     columns: list[FloatArray] = [np.ones(len(values))]
     thermal: tuple[int, ...] = ()
     gravity: tuple[int, ...] = ()
@@ -101,20 +101,20 @@ def gyro_zeros(context: Context) -> SessionZeros | None:
     return SessionZeros(readings, thermal, gravity, varied)
 
 
-def accel_zeros(context: Context) -> SessionZeros | None:
+def accel_zeros(context: Context, parts: int = 2) -> SessionZeros | None:
     """|f| - g at rest, m/s², against the nine numbers of S and b, accepted effects taken off.
 
     ``None`` where the poses are too few for so many columns.
     """
     obs, twin, line = context.obs, context.fitted.twin, context.fitted.line
-    halves = _halves(obs, _temperature(context))
+    halves = _parts(obs, _temperature(context), parts)
     force = halves.force @ twin.accel_S.T + twin.accel_b
     varied = np.array([np.linalg.norm(force, axis=1).var()])
     if line.distortion.force is not None:
         force = force - (line.distortion.force[: obs.n_holds] @ twin.effect)[halves.pose]
     up = force / np.linalg.norm(force, axis=1, keepdims=True)
     values = np.linalg.norm(force, axis=1) - twin.gravity
-    sigma = np.sqrt(2.0) * obs.norm_sigma(twin.up @ twin.accel_S)[halves.pose]
+    sigma = np.sqrt(parts) * obs.norm_sigma(twin.up @ twin.accel_S)[halves.pose]
     a = halves.force / np.abs(halves.force).max()
     columns = [up[:, i] * a[:, j] for i in range(3) for j in range(i + 1)] + list(up.T)
     thermal: tuple[int, ...] = ()
