@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 import trihedron
+from trihedron.diagnose.context import Context
 from trihedron.diagnose.residuals.creep import settling, with_settling
 from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
-from trihedron.diagnose.selection.model import begin
 from trihedron.diagnose.session.observations import _turned_at_ends, observe
+from trihedron.diagnose.session.solve import tune_noise
 from trihedron.diagnose.session.starting_point import start_twin
+from trihedron.diagnose.session.twin import NO_DISTORTION
 from trihedron.records import Recording
 from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import hand_session, simulate
@@ -44,7 +46,7 @@ def session(seed, lean_rad, scatter_rad_s):
     segments = segment_recording(log)
     calibration = trihedron.calibrate(log, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
     obs = observe(log, resegment(log, segments))
-    return begin(obs, start_twin(obs, calibration), None).context
+    return Context(obs, tune_noise(obs, start_twin(obs, calibration), NO_DISTORTION, None))
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -75,7 +77,10 @@ def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree(seed
     assert 0.5 < found.rate_rad_s * found.tau_s / 0.006 < 2.0
     before, after = (
         {one.domain: one for one in judge_rows(fitted, 0.01)}
-        for fitted in (context.fitted, begin(with_settling(context, found), context.fitted.twin, None).fitted)
+        for fitted in (
+            context.fitted,
+            tune_noise(with_settling(context, found), context.fitted.twin, NO_DISTORTION, None),
+        )
     )
     assert before["moves"].disagrees
     assert not after["moves"].disagrees

@@ -9,9 +9,9 @@ import pytest
 
 import trihedron
 from trihedron.channel_facts.limits import find_limits
+from trihedron.diagnose import verdict
 from trihedron.diagnose.effects.table_tilt import _error_of_mean
 from trihedron.diagnose.residuals.jumps import JUMPS, jumps_in_poses
-from trihedron.diagnose.selection import verdict
 from trihedron.pipeline import extending
 from trihedron.records import Hold
 from trihedron.records.diagnosis import Stage, StageDomain
@@ -111,14 +111,13 @@ def test_the_error_of_a_mean_of_few_turns_covers_it():
     assert 0.934 < inside / 1000 < 0.975
 
 
-def test_footnotes_are_no_answer_while_something_else_disagrees(monkeypatch):
+def test_footnotes_are_no_answer_while_something_else_disagrees():
     left = DomainTest("static-gyro", 9.0, 30.0, 1e-9, True)
-    model = SimpleNamespace(accepted=("a bump",))
-    monkeypatch.setattr(verdict, "are_footnotes", lambda _model: True)
-    assert verdict.verdict_of(model, (left,), (left,)) == "unexplained"
-    assert verdict.verdict_of(model, (left,), ()) == "missing-physics"
-    monkeypatch.setattr(verdict, "are_footnotes", lambda _model: False)
-    assert verdict.verdict_of(model, (left,), (left,)) == "missing-physics"
+    footnote = SimpleNamespace(ids={"disturbed-pose"}, are_footnotes=True)
+    assert verdict.verdict_of(footnote, (left,), (left,)) == "unexplained"
+    assert verdict.verdict_of(footnote, (left,), ()) == "missing-physics"
+    answer = SimpleNamespace(ids={"accel-cubic"}, are_footnotes=False)
+    assert verdict.verdict_of(answer, (left,), (left,)) == "missing-physics"
 
 
 def test_channels_of_one_part_share_one_exact_limit():

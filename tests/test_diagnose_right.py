@@ -8,16 +8,8 @@ import pytest
 
 from trihedron.channel_facts.limits import find_limits
 from trihedron.diagnose.effects import lever_arm
-from trihedron.diagnose.effects.contract import Variant, force_only, per_axis
-from trihedron.diagnose.effects.disturbed_pose import DisturbedPose
 from trihedron.diagnose.effects.lever_arm import LeverArm
-from trihedron.diagnose.selection import prune
-from trihedron.diagnose.selection.model import Accepted, begin, observed_with, with_only
-from trihedron.diagnose.session.observations import observe
-from trihedron.diagnose.session.starting_point import start_twin
-from trihedron.diagnose.session.twin import Distortion
-from trihedron.diagnose.zeros.levels import two_levels
-from trihedron.pipeline.calibrating import calibrate
+from trihedron.diagnose.sample_evidence import _changed
 from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
@@ -96,26 +88,6 @@ def small_session(seed=3, hold_s=3.0):
     return simulate(Scenario(motion, "session", accelerometer, gyroscope, profile.clock), seed)
 
 
-def test_an_effect_that_other_observations_do_not_show_goes_with_what_changed_them():
-    recording, truth = small_session()
-    segments = segment_recording(recording)
-    calibration = calibrate(recording, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
-    obs = observe(recording, resegment(recording, segments))
-    model = begin(obs, start_twin(obs, calibration), None)
-    # A pose called pushed in changed observations, of which the bare ones know nothing.
-    columns = np.zeros((model.context.n_points, 3, 3))
-    columns[4] = np.eye(3)
-    pushed = Variant(force_only(columns), per_axis("push"), ("m/s^2",) * 3, {"pose": (4.0, "index")}, "pose 4")
-    plain = {"p_adjusted": 1e-9, "delta_bic": 99.0, "gain": 1.0, "held_out": ()}
-    changes = Accepted(
-        DisturbedPose(), None, SimpleNamespace(reweigh=lambda old: replace(old), variant=None, touched=None), **plain
-    )
-    one = Accepted(DisturbedPose(), pushed, None, **plain)
-    left = with_only(replace(model, accepted=(changes, one)), (one,))
-    assert left.accepted == ()
-    assert left.fitted.twin.effect.size == 0
-
-
 def test_samples_are_put_back_before_moves_are_left_out():
     def put_back(old):
         return replace(old, move_ranges=((0, 60), (70, 120), (130, 180)), move_holds=((0, 1), (1, 2), (2, 3)))
@@ -131,7 +103,7 @@ def test_samples_are_put_back_before_moves_are_left_out():
     clipped = SimpleNamespace(reweigh=left_out, touched=None)
     lost = SimpleNamespace(reweigh=put_back, touched=(0,))
     for order in ([clipped, lost], [lost, clipped]):
-        assert observed_with(Observed(), order).move_ranges == ((0, 60),)
+        assert _changed(Observed(), order).move_ranges == ((0, 60),)
 
 
 def test_a_short_pose_on_a_machine_that_shakes_is_a_pose():
@@ -146,40 +118,3 @@ def test_a_short_pose_on_a_machine_that_shakes_is_a_pose():
     holds = resegment(shaken, segment_recording(shaken)).holds
     middle = 0.5 * (part.start + part.stop)
     assert any(hold.start < middle < hold.stop for hold in holds)
-
-
-def test_zeros_that_take_two_values_are_told_from_zeros_that_scatter():
-    rng = np.random.default_rng(7)
-    two, scatter = 0, 0
-    for _ in range(40):
-        n = int(rng.integers(15, 40))
-        noise = rng.normal(size=n)
-        # A pose in three lies between the values: the zero jumped in it.
-        between = np.where(rng.random(n) < 0.33, rng.uniform(-1.0, 1.0, n), rng.choice([-1.0, 1.0], n))
-        two += two_levels(10.0 * between + noise, np.ones(n)).is_clear
-        scatter += two_levels(rng.normal(0.0, 10.0, n) + noise, np.ones(n)).is_clear
-    assert two >= 32
-    # A g-sensitivity of poses that lie on faces has two values too, and gravity is known.
-    faces = np.repeat([-1.0, 1.0], 10)
-    assert two_levels(10.0 * faces + rng.normal(size=20), np.ones(20)).is_clear
-    assert not two_levels(10.0 * faces + rng.normal(size=20), np.ones(20), faces[:, None]).is_clear
-    # One normal session in some 500 (480 drawn): two of 40 are one chance in 300.
-    assert scatter <= 1
-
-
-def test_a_gyro_effect_that_leaves_gravity_unexplained_does_not_live_on_velocity(monkeypatch):
-    before = {prune.STATIC_GYRO: (70.0, 67.0), prune.MOVES: (155.0, 41.0), prune.DYNAMICS: (96.0, 53.0)}
-    after = {prune.STATIC_GYRO: (75.0, 67.0), prune.MOVES: (117.0, 41.0), prune.DYNAMICS: (57.0, 53.0)}
-    monkeypatch.setattr(prune, "domain_chi2", lambda fitted: {"before": before, "after": after}[fitted])
-    monkeypatch.setattr(prune, "in_the_scatter_of", lambda base, _fitted: base)  # nothing scatters
-    column = np.ones((4, 3, 1))
-
-    def against(force, rate):
-        return SimpleNamespace(
-            base="before", fitted="after", variant=SimpleNamespace(distortion=Distortion(force, rate))
-        )
-
-    assert not prune.explains(against(None, column))
-    # A delay moves velocity alone, and gravity's misfit is another's.
-    after[prune.MOVES] = (154.0, 41.0)
-    assert prune.explains(against(None, column))

@@ -13,7 +13,6 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.search import threshold
 from trihedron.diagnose.session.hypothesis import ANYTHING, Bounds, Hypothesis, again
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
@@ -22,6 +21,9 @@ from trihedron.session.noise import scatter_unit
 NOISE_CORNER_S = 20.0
 """Shortest corner time, where white noise and bias walk meet: Allan deviations of consumer parts turn up there or
 later. A walk of any strength is allowed in every hypothesis; a stronger one than this is called drift."""
+LEAST_WALK = 1.5
+"""Rms of a bias over the error of a pose's mean from which its walk is called drift: of 120 healthy sessions, half of
+them with 1/f noise as consumer parts have it, 1.3 was the most."""
 FLICKER_WITHIN = 1.5
 """Factor within which the scatter that 1/f noise makes is told from inside the poses."""
 
@@ -29,7 +31,7 @@ FLICKER_WITHIN = 1.5
 @dataclass(frozen=True, eq=False)
 class BiasStrength:
     """One process that is stronger than noise makes it: ``gain`` in twice the log-evidence over the strongest that
-    noise makes, ``score`` what is left after the catalogue is paid for, ``size`` and ``std`` (3,) SI by axis."""
+    noise makes, ``score`` what counts of that, ``size`` and ``std`` (3,) SI by axis."""
 
     effect: BiasProcess
     gain: float
@@ -39,16 +41,20 @@ class BiasStrength:
     parameters: tuple[EffectParameter, ...]
     statement: Words
     without: Hypothesis
+    is_large: bool
+    """Whether it carries the bias farther than 1/f noise does that no pose shows."""
 
 
 def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength], dict[str, BiasStrength]]:
     """The processes that are called by a name, largest gain first; and all that could be asked, by id."""
     held = {term.effect.id for term in model.terms}
+    # Twice the logarithm of odds of (1 - α)/α: a strength is there or is not, and nothing else was searched for.
+    limit = 2.0 * float(np.log((1.0 - alpha) / alpha))
     asked = {}
     for effect in catalogue():
         if isinstance(effect, BiasProcess) and effect.id not in held and effect.unavailable(model.context) is None:
             asked[effect.id] = _asked(model, effect)
-    named = [one for one in asked.values() if one.score > threshold(alpha)]
+    named = [one for one in asked.values() if one.score > limit and one.is_large]
     return sorted(named, key=lambda one: -one.gain), asked
 
 
@@ -72,9 +78,10 @@ def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
     without = again(model, model.terms, within)
     gain = 2.0 * (model.log_evidence - without.log_evidence)
     size, std = _size(model, effect)
+    is_large = not effect.walks or _walked(model, s) > LEAST_WALK
     parameters, statement = effect.of_strength(size, std)
-    paid = 2.0 * float(np.log(len(catalogue())))
-    return BiasStrength(effect, gain, gain - paid, size, std, parameters, statement, without)
+    # Strengths of noise are in every hypothesis: none is searched for among mechanisms.
+    return BiasStrength(effect, gain, gain, size, std, parameters, statement, without, is_large)
 
 
 def _flicker(model: Hypothesis) -> FloatArray:
@@ -83,6 +90,14 @@ def _flicker(model: Hypothesis) -> FloatArray:
     unit = _units(model)
     expected = np.array([obs.force_scatter, obs.rate_scatter])
     return np.asarray(FLICKER_WITHIN * expected / unit[:, 0])
+
+
+def _walked(model: Hypothesis, sensor: int) -> float:
+    """Rms of a bias about its mean over the poses, over the usual error of a pose's mean."""
+    twin, obs = model.fitted.twin, model.obs
+    path = (twin.accel_bias, twin.gyro_bias)[sensor]
+    unit = _units(model)[sensor] * model.context.si_per_raw(("accelerometer", "gyroscope")[sensor])
+    return float(np.sqrt(np.mean(path.var(axis=0)) / np.mean(unit**2))) if obs.n_holds else 0.0
 
 
 def _units(model: Hypothesis) -> FloatArray:

@@ -24,7 +24,7 @@ from trihedron.diagnose.residuals.timing import judge_timing
 from trihedron.diagnose.residuals.within_holds import judge_within_holds
 from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import Found, search, with_shapes
-from trihedron.diagnose.session.hypothesis import Bounds, Hypothesis, again, hypothesis
+from trihedron.diagnose.session.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin
@@ -160,7 +160,7 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
     tell(0.8, "asking what biases do by themselves")
     biases, asked = bias_strengths(found.model, alpha)
     tell(0.9, "checking what remains")
-    judged = again(found.model, found.model.terms, _as_predicted(found.model, biases))
+    judged = again(found.model, found.model.terms, noise_bounds(found.model, tuple(one.effect for one in biases)))
     answer = Answer(found, with_shapes(found.model), biases, observed.seen, judged.fitted)
     named = {one.effect.id for one in observed.seen}
     remaining = _all_domains(judged.context, alpha, observed.refused | (sought - named))
@@ -176,12 +176,6 @@ def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hy
     loud = hypothesis(observed.obs, first.fitted.twin, prior, strengths=LOUD)
     bare = max(first, loud, key=lambda one: one.log_evidence)
     return bare, search(bare, alpha)
-
-
-def _as_predicted(model: Hypothesis, biases: list[BiasStrength]) -> Bounds:
-    """Strengths that the part's noise makes at most, but for what has a name; moves no worse than their noise."""
-    corner, scatter, _ = noise_bounds(model, tuple(one.effect for one in biases))
-    return corner, scatter, (1.0, 1.0)
 
 
 def _with_creep(predicted: Fit, start: Twin, prior: Prior | None) -> Fit:

@@ -10,6 +10,7 @@ import numpy as np
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.direct import DirectEffect, Evidence
+from trihedron.diagnose.residuals.goodness_of_fit import ROW_DOMAINS
 from trihedron.diagnose.session.observations import Observations
 from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out, tune_noise
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, NO_DISTORTION, Prior, Twin
@@ -89,10 +90,26 @@ def _with_one(
         fitted = tune_noise(obs, replace(begin, effect=np.zeros(0)), NO_DISTORTION, prior)
         if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.touched):
             return replace(observed, refused=observed.refused | {effect.id})
-        gain = max(gain, observed.fitted.chi2 - fitted.chi2)
+        gain = max(gain, _explained(observed.fitted, fitted))
         if evidence.restate is not None:
             evidence = replace(evidence, parameters=evidence.restate(Context(obs, fitted)))
     return replace(observed, fitted=fitted, seen=(*observed.seen, Seen(effect, evidence, gain)))
+
+
+def _explained(before: Fit, after: Fit) -> float:
+    """Twice the log-likelihood gained by readings that were changed, every domain's noise being of free strength."""
+    gain = 0.0
+    for domain in ROW_DOMAINS:
+        (was, n), (now, _) = (_per_row(fitted, domain) for fitted in (before, after))
+        gain += n * float(np.log(max(was, 1.0) / max(now, 1.0)))
+    return max(gain, 0.0)
+
+
+def _per_row(fitted: Fit, domain: int) -> tuple[float, float]:
+    """Chi-square per degree of freedom of one domain, and those degrees."""
+    rows = fitted.system.domain == domain
+    dof = float((1.0 - fitted.used[rows]).sum())
+    return float((fitted.system.residual[rows] ** 2).sum()) / max(dof, 1.0), dof
 
 
 def _changed(bare: Observations, found: list[Evidence]) -> Observations:

@@ -52,7 +52,9 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
         dof = float((1.0 - used[rows]).sum())
         if dof < LEAST_DOF:
             continue
-        chi2 = float(((fitted.system.residual[rows] * _unsettled(fitted, label, rows)) ** 2).sum())
+        # Where moves miss by more than their noise they count by what they show: judged they are by what was predicted.
+        excess = dict(zip((MOVES, DYNAMICS), fitted.line.core.strengths[3], strict=True)).get(label, 1.0)
+        chi2 = float(((fitted.system.residual[rows] * _unsettled(fitted, label, rows)) ** 2).sum()) * excess**2
         per_dof = chi2 / dof
         p = float(fdtrc(dof, NOISE_DOF, per_dof))
         disagrees = p < alpha / N_DOMAINS_TESTED
@@ -105,7 +107,7 @@ with consumer 1/f noise), in which it is there for 57 gyros and 74 accelerometer
 def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
     """p (0 or 1), ratio of variances: a walk as strong as the model allows stands in for something else."""
     k = 0 if label == STATIC_ACCEL else 1
-    stray = hidden_zeros(fitted)[k]
+    stray = None if fitted.has_free_strengths else hidden_zeros(fitted)[k]
     if stray is None or not stray.is_strayed:
         return 1.0, 1.0, Where()
     return 0.0, (stray.rms / stray.noise) ** 2, Where(_CHANNELS[label])
