@@ -142,7 +142,7 @@ def test_moves_that_are_believed_less_cost_their_normalisation():
     moves = (fitted.system.domain == MOVES) | (fitted.system.domain == DYNAMICS)
     bare = [(None, None, [])]
     corner, scatter, between, _ = core.strengths
-    gain = [core.evidence(bare, (corner, scatter, between, (w, w)), None)[0][0] for w in (1.0, 3.0)]
+    gain = core.evidence_at(bare, [(corner, scatter, between, (w, w)) for w in (1.0, 3.0)])[0]
     n, chi2 = int(moves.sum()), float((fitted.system.residual[moves] ** 2).sum())
     # Gaussian: chi-square gained less n log 3; the other unknowns' determinant moves it by far less.
     expected = 0.5 * chi2 * (1.0 - 1.0 / 9.0) - n * np.log(3.0)

@@ -22,7 +22,10 @@ const SCATTER: (f64, f64) = (-6.9, 9.2);
 const BETWEEN: (f64, f64) = (-3.0, 1.6);
 const EXCESS: (f64, f64) = (0.0, 9.2);
 /// Scatter, and excess of moves, that are sought from nothing begin at these: near nothing the evidence is flat.
-const FROM_NOTHING: [f64; 4] = [0.5, 1.5, 5.0, 20.0];
+const FROM_NOTHING: [f64; 2] = [1.0, 6.0];
+/// What a walk and a scatter are exchanged for one another by: a bias that wanders may be either, and the evidence has an
+/// optimum at both.
+const EXCHANGED: [(f64, f64); 4] = [(600.0, 3.0), (600.0, 10.0), (3.0, NO_SCATTER), (0.6, NO_SCATTER)];
 /// Scatter below which how far zeros stray between poses shows nowhere.
 const LEAST_SCATTER: f64 = 0.2;
 /// A pass over all strengths that gains less than this ends the search.
@@ -192,12 +195,28 @@ impl Hypothesis {
             })
     }
 
-    /// The strengths that make the rows likeliest, sought from some, and all that follows there.
+    /// Log-evidence at each of some strengths.
+    #[must_use]
+    pub fn at_each(&self, strengths: &[Strengths]) -> Vec<f64> {
+        let one = |s: &Strengths| {
+            let heard = self.heard(s);
+            heard.map_or(f64::NEG_INFINITY, |heard| self.beside(s, &heard))
+        };
+        strengths.iter().map(one).collect()
+    }
+
+    /// The strengths that make the rows likeliest, sought from the best of some, and all that follows there.
     ///
     /// # Errors
-    /// When nothing determines the session there.
-    pub fn tuned(&self, start: &Strengths, within: &Within) -> Result<Found> {
-        let mut search = Search::new(self, start, within);
+    /// When there are none, or nothing determines the session there.
+    pub fn tuned(&self, starts: &[Strengths], within: &Within) -> Result<Found> {
+        let values = self.at_each(starts);
+        let best = starts
+            .iter()
+            .zip(values)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .ok_or_else(|| Error::bad_input("strengths to begin from are missing"))?;
+        let mut search = Search::new(self, best.0, within);
         search.run();
         self.found(&search.strengths())
     }
@@ -344,15 +363,37 @@ impl<'a> Search<'a> {
 
     fn run(&mut self) {
         let mut step = [FIRST_STEP; N_STRENGTHS];
-        for _ in 0..MOST_PASSES {
+        for pass in 0..MOST_PASSES {
             let before = self.value;
             for i in 0..N_STRENGTHS {
                 if self.is_free(i) {
                     self.along(i, &mut step[i]);
                 }
             }
+            if pass == 0 {
+                self.exchange();
+            }
             if self.value - before < ENOUGH {
                 break;
+            }
+        }
+    }
+
+    /// Tries a walk for a scatter, and a scatter for a walk, of either sensor.
+    fn exchange(&mut self) {
+        for sensor in 0..2 {
+            if !(self.is_free(sensor) && self.is_free(sensor + 2)) {
+                continue;
+            }
+            for (corner, scatter) in EXCHANGED {
+                let mut x = self.x;
+                for (i, value) in [(sensor, corner.ln()), (sensor + 2, scatter.ln())] {
+                    x[i] = value.clamp(self.bounds[i].0, self.bounds[i].1);
+                }
+                let value = self.at(&x);
+                if value > self.value {
+                    (self.x, self.value) = (x, value);
+                }
             }
         }
     }

@@ -18,28 +18,20 @@ from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import Variant
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
 from trihedron.diagnose.session.hypothesis import Asked, Hypothesis, Term, again, hypothesis
-from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.session.twin import (
     DYNAMICS,
     MOVES,
     STATIC_ACCEL,
     STATIC_GYRO,
     Distortion,
-    Linearisation,
-    contiguous,
-    core_model,
-    core_state,
-    stacked,
-    twin_of,
 )
 from trihedron.session.noise import Strengths
 
 PRIOR_SCALES = (1.0, 0.3, 0.1)
 """Parts differ by ten from what data sheets of their kind say: the size expected is one of these times that."""
-QUIET: Strengths = ((640.0, 640.0), (1e-3, 1e-3), (1.0, 1.0), (1.0, 1.0))
-"""Noise of a good part: where the strengths have swallowed an effect, it is still seen in this."""
-N_LEADERS = 4
-"""Effects taken from either look at the whole catalogue to the full evidence."""
+RESCALED = (3.0, 0.3)
+N_LEADERS = 3
+"""Effects taken from every look at the whole catalogue to the full evidence."""
 SHAPES_KEPT = 2
 """Shapes of one effect that go along."""
 NEAR = 6.0
@@ -126,11 +118,10 @@ def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
         larger, chosen = _with_best(judged.model, standing)
         if chosen is None:
             break
-        before, (judged, gone) = judged, _pruned(larger, limit)
-        state.dropped.update(gone)
-        if chosen.effect.id in gone:
-            judged = before
+        if not _is_shown(larger, judged.model, len(larger.terms) - 1):
+            state.dropped.add(chosen.effect.id)
             continue
+        judged = _Judged(larger, (*judged.without, judged.model))
         others = [one for one in standing if one.term.effect is not chosen.effect]
         state.rivals[chosen.effect.id] = others[:N_RIVALS]
         state.against.update({one.term.effect.id: chosen.effect.id for one in standing})
@@ -142,8 +133,12 @@ def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
 
 def _concluded(state: _State, alpha: float) -> Found:
     """Every effect the best of its rivals; and what all that was tried comes to beside the answer."""
-    swapped, named = _swapped(state.judged, state.rivals)
-    judged = state.judged if swapped is state.judged.model else _pruned(swapped, threshold(alpha))[0]
+    judged = state.judged
+    if len(judged.model.terms) > 1:
+        judged = _pruned(judged.model, threshold(alpha))
+    swapped, named = _swapped(judged, state.rivals)
+    if swapped is not judged.model:
+        judged = _pruned(swapped, threshold(alpha))
     model = judged.model
     tried, missing = _tried(model, ()) if model.terms else (list(state.tried.values()), state.missing)
     held = {term.effect.id for term in model.terms}
@@ -180,8 +175,7 @@ def _tried(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Tried], di
     terms, missing = _terms(model, exclude)
     if not terms:
         return [], missing
-    leaders = list(dict.fromkeys([*_leaders(model.fitted, terms), *_leaders(_quiet(model), terms)]))
-    leading = [terms[k] for k in leaders]
+    leading = _leaders(model, terms)
     asked = model.asked(leading)
     # Columns made for one size (a delay) are made again for the size that they come out with.
     sized = {
@@ -191,22 +185,24 @@ def _tried(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Tried], di
     }
     for k, one in zip(sized, model.asked(list(sized.values())), strict=True):
         leading[k], asked[k] = sized[k], one
+    plain = model.plain([one.strengths for one in asked])
+    best = _best_of_each(leading, asked, plain)
+    # What leads may be larger or smaller than the look at fixed strengths took it to be.
+    first = [one.term for one in best[:N_RIVALS]]
+    other = [replace(t, sizes=t.sizes * scale) for t in first for scale in RESCALED]
+    found = _best_of_each([*leading, *other], [*asked, *(model.asked(other) if other else [])], plain)
+    return found, missing
+
+
+def _best_of_each(terms: Sequence[Term], asked: Sequence[Asked], plain: float) -> list[Tried]:
+    """The best shape of every effect that is a possible one, best effect first."""
     best: dict[str, Tried] = {}
-    plain = _without_columns(model, asked)
-    for term, one in zip(leading, asked, strict=True):
+    for term, one in zip(terms, asked, strict=True):
         score = 2.0 * (one.log_evidence - plain) - term.paid
         known = best.get(term.effect.id)
         if (known is None or score > known.score) and _is_possible(term, one):
             best[term.effect.id] = Tried(term, score, one)
-    return sorted(best.values(), key=lambda one: -one.score), missing
-
-
-def _without_columns(model: Hypothesis, asked: Sequence[Asked]) -> float:
-    """Log-evidence of a hypothesis at the best of all strengths known: a candidate's may be better for it too."""
-    best = max(asked, key=lambda one: one.log_evidence)
-    core = model.fitted.line.core
-    ((found, *_),) = core.evidence([(None, None, [])], best.strengths, model.within)
-    return max(model.log_evidence, float(found))
+    return sorted(best.values(), key=lambda one: -one.score)
 
 
 def _terms(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dict[str, str]]:
@@ -230,45 +226,20 @@ def _terms(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dic
     return terms, missing
 
 
-def _leaders(fitted: Fit, terms: list[Term]) -> list[int]:
-    """The candidates that gain most one linear step from a fit, in its noise, their sizes what fits best."""
-    core, merits = fitted.line.core, []
-    residual = fitted.system.residual
-    for k, term in enumerate(terms):
-        columns = core.columns(contiguous(term.distortion.force), contiguous(term.distortion.rate))
-        projected = core.project(np.ascontiguousarray(columns)) * term.sizes
-        merits.append((_merit(projected.T @ projected, projected.T @ residual), k))
-    kept: list[int] = []
-    count: dict[str, int] = {}
-    for _, k in sorted(merits, key=lambda pair: -pair[0]):
-        effect_id = terms[k].effect.id
-        if count.get(effect_id, 0) < SHAPES_KEPT and (effect_id in count or len(count) < N_LEADERS):
-            count[effect_id] = count.get(effect_id, 0) + 1
-            kept.append(k)
-    return kept
-
-
-def _merit(normal: FloatArray, gradient: FloatArray) -> float:
-    """Log-evidence gained by columns in units of their expected size, at the best of its scales."""
-    best = -np.inf
-    for scale in PRIOR_SCALES:
-        inner = np.eye(len(gradient)) + scale**2 * normal
-        explained = scale**2 * float(gradient @ np.linalg.solve(inner, gradient))
-        best = max(best, 0.5 * explained - 0.5 * float(np.linalg.slogdet(inner)[1]))
-    return best
-
-
-def _quiet(model: Hypothesis) -> Fit:
-    """The same effects fitted in the noise of a good part."""
-    distortion = stacked([term.distortion for term in model.terms])
-    sizes = [float(size) for term in model.terms for size in term.sizes]
-    twin = model.fitted.twin
-    core = core_model(model.obs, twin.gravity, model.prior, is_scatter_free=True).fit(
-        state=core_state(twin), strengths=QUIET, force_effect=contiguous(distortion.force),
-        rate_effect=contiguous(distortion.rate), is_tuned=False, sizes=sizes,
-    )  # fmt: skip
-    twin = twin_of(core, twin.gravity)
-    return Fit(twin, Linearisation(model.obs, twin, distortion, model.prior, core), has_free_strengths=True)
+def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
+    """The candidates that gain most one linear step from the fit, at its strengths and at others, as large as fits."""
+    scaled = [[replace(t, sizes=t.sizes * scale) for t in terms] for scale in PRIOR_SCALES]
+    gains = np.array([model.looked_at(some) for some in scaled])
+    kept: dict[int, int] = {}
+    for look in range(gains.shape[2]):
+        best = gains[:, :, look].max(axis=0)
+        count: dict[str, int] = {}
+        for k in np.argsort(-best).tolist():
+            effect_id = terms[k].effect.id
+            if count.get(effect_id, 0) < SHAPES_KEPT and (effect_id in count or len(count) < N_LEADERS):
+                count[effect_id] = count.get(effect_id, 0) + 1
+                kept.setdefault(k, int(gains[:, k, look].argmax()))
+    return [scaled[scale][k] for k, scale in kept.items()]
 
 
 def _is_possible(term: Term, asked: Asked) -> bool:
@@ -301,10 +272,6 @@ def _beside(model: Hypothesis, term: Term, strengths: Strengths) -> Hypothesis:
 def _fitting(model: Hypothesis, tried: Tried) -> Term:
     """A candidate with its expected size, its own size and its shape as they fit best."""
     term, asked = tried.term, tried.asked
-    scaled = [replace(term, sizes=term.sizes * scale) for scale in PRIOR_SCALES]
-    found = model.asked(scaled)
-    k = int(np.argmax([one.log_evidence for one in found]))
-    term, asked = scaled[k], found[k]
     for _ in range(N_RESHAPED):
         made = term.effect.rescaled(model.context, term.variant, asked.value)
         if made is None:
@@ -340,9 +307,8 @@ def _reshaped(model: Hypothesis, term: Term) -> Term:
     return replace(term, variant=replace(final, shape={name: (value, unit)}, shape_sigma=value * min(sigma, 10.0)))
 
 
-def _pruned(model: Hypothesis, limit: float) -> tuple[_Judged, set[str]]:
+def _pruned(model: Hypothesis, limit: float) -> _Judged:
     """The hypothesis without terms that the others have made needless, the one with least to show first."""
-    gone: set[str] = set()
     while True:
         n = len(model.terms)
         without = tuple(again(model, [t for j, t in enumerate(model.terms) if j != k]) for k in range(n))
@@ -351,10 +317,8 @@ def _pruned(model: Hypothesis, limit: float) -> tuple[_Judged, set[str]]:
             for k, (term, one) in enumerate(zip(model.terms, without, strict=True))
         ]
         if not scores or min(scores) > limit:
-            return _Judged(model, without), gone
-        k = int(np.argmin(scores))
-        gone.add(model.terms[k].effect.id)
-        model = without[k]
+            return _Judged(model, without)
+        model = without[int(np.argmin(scores))]
 
 
 def _is_shown(model: Hypothesis, without: Hypothesis, k: int) -> bool:

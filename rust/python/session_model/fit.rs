@@ -16,12 +16,14 @@ use super::{AllStrengths, Corners, all_strengths, distortion, sizes_fit, strengt
 use crate::error::Result;
 use crate::python::arrays::{dmatrix, matrix, of3, vector3, vectors};
 use crate::python::{run, run_long};
-use crate::session_model::Session;
+use crate::session_model::{Session, Strengths};
 use crate::session_model::fit::{Fit, widened};
 use crate::session_model::hypothesis::{Hypothesis, Within};
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
+/// Columns of force and rate of further effects, and their sizes beforehand.
+type Asked<'py> = (Option<Array3<'py>>, Option<Array3<'py>>, Vec<f64>);
 /// `S_a`, `b_a`, `S_w`, covariance.
 type Rest<'py> = (
     Bound<'py, PyArray2<f64>>,
@@ -46,6 +48,38 @@ impl SessionFit {
             fit: Arc::new(fit),
             leverage: OnceLock::new(),
         }
+    }
+}
+
+impl SessionFit {
+    /// What is asked of every hypothesis, side by side.
+    fn each<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        hypotheses: &[Asked<'_>],
+        ask: impl Fn(&Hypothesis) -> Result<T> + Send + Sync + 'static,
+    ) -> PyResult<Vec<T>> {
+        let n_points = self.session.n_points();
+        let mut asked = Vec::with_capacity(hypotheses.len());
+        for (force, rate, sizes) in hypotheses {
+            let effects = distortion(force.as_ref(), rate.as_ref(), n_points)?;
+            sizes_fit(sizes, effects.k)?;
+            asked.push((effects, sizes.clone()));
+        }
+        let (fit, session) = (Arc::clone(&self.fit), Arc::clone(&self.session));
+        run_long(py, || {
+            let each = asked.par_iter().map(|(effects, sizes)| {
+                let columns = session.columns(
+                    &fit.state,
+                    &fit.groups,
+                    &fit.weights,
+                    &fit.passed,
+                    effects,
+                )?;
+                ask(&Hypothesis::of(&session, &fit, &columns, sizes)?)
+            });
+            each.collect::<Result<Vec<_>>>()
+        })
     }
 }
 
@@ -232,16 +266,15 @@ impl SessionFit {
     }
 
     /// Log-evidence of every hypothesis (force, rate, sizes beforehand of further effects), all but the strengths of the
-    /// noise integrated out; strengths are sought from those given, `within` shortest
-    /// corner times, largest scatter and largest excess, or are those given where that is nothing. With each its strengths, its parameters
-    /// one linear step from here, and their covariance.
+    /// noise integrated out; strengths are sought from the best of those given, `within` shortest corner times, largest
+    /// scatter and largest excess. With each its strengths, its parameters one linear step from here, their covariance.
     #[allow(clippy::type_complexity)]
     fn evidence<'py>(
         &self,
         py: Python<'py>,
-        hypotheses: Vec<(Option<Array3<'py>>, Option<Array3<'py>>, Vec<f64>)>,
-        strengths: AllStrengths,
-        within: Option<(Corners, Corners, Corners)>,
+        hypotheses: Vec<Asked<'py>>,
+        strengths: Vec<AllStrengths>,
+        within: (Corners, Corners, Corners),
     ) -> PyResult<
         Vec<(
             f64,
@@ -250,37 +283,14 @@ impl SessionFit {
             Bound<'py, PyArray2<f64>>,
         )>,
     > {
-        let n_points = self.session.n_points();
-        let mut asked = Vec::with_capacity(hypotheses.len());
-        for (force, rate, sizes) in &hypotheses {
-            let effects = distortion(force.as_ref(), rate.as_ref(), n_points)?;
-            sizes_fit(sizes, effects.k)?;
-            asked.push((effects, sizes.clone()));
-        }
-        let (fit, session) = (Arc::clone(&self.fit), Arc::clone(&self.session));
-        let strengths = strengths_of(strengths);
-        let within = within.map(|(corner, scatter, excess)| Within {
-            corner_s: [corner.0, corner.1],
-            scatter: [scatter.0, scatter.1],
-            excess: [excess.0, excess.1],
-        });
-        let found = run_long(py, || {
-            let each = asked.par_iter().map(|(effects, sizes)| {
-                let columns = session.columns(
-                    &fit.state,
-                    &fit.groups,
-                    &fit.weights,
-                    &fit.passed,
-                    effects,
-                )?;
-                let one = Hypothesis::of(&session, &fit, &columns, sizes)?;
-                within.as_ref().map_or_else(
-                    || one.found(&strengths),
-                    |within| one.tuned(&strengths, within),
-                )
-            });
-            each.collect::<Result<Vec<_>>>()
-        })?;
+        let starts: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
+        let ((a, b), (c, d), (e, f)) = within;
+        let within = Within {
+            corner_s: [a, b],
+            scatter: [c, d],
+            excess: [e, f],
+        };
+        let found = self.each(py, &hypotheses, move |one| one.tuned(&starts, &within))?;
         let lent = found.iter().map(|one| {
             Ok((
                 one.log_evidence,
@@ -290,6 +300,20 @@ impl SessionFit {
             ))
         });
         lent.collect()
+    }
+
+    /// `(hypotheses, strengths)` log-evidence of every hypothesis at each of some strengths.
+    fn evidence_at<'py>(
+        &self,
+        py: Python<'py>,
+        hypotheses: Vec<Asked<'py>>,
+        strengths: Vec<AllStrengths>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let at: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
+        let n = at.len();
+        let found = self.each(py, &hypotheses, move |one| Ok(one.at_each(&at)))?;
+        let flat: Vec<f64> = found.concat();
+        flat.to_pyarray(py).reshape([found.len(), n])
     }
 
     /// `(rows,)` share of every row that the fit used up.

@@ -29,6 +29,13 @@ from trihedron.session.noise import START_STRENGTHS, Strengths
 Bounds = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
 """Shortest corner times [s], largest scatter, largest excess of moves: accelerometer and gyro, gravity and velocity."""
 ANYTHING: Bounds = ((0.0, 0.0), (np.inf, np.inf), (np.inf, np.inf))
+NOTHING: tuple[None, None, list[float]] = (None, None, [])
+ELSEWHERE: tuple[Strengths, ...] = (
+    ((640.0, 640.0), (1e-3, 1e-3), (1.0, 1.0), (1.0, 1.0)),
+    ((300.0, 300.0), (3.0, 3.0), (0.5, 0.5), (2.0, 2.0)),
+    ((2.0, 2.0), (1e-3, 1e-3), (1.0, 1.0), (5.0, 5.0)),
+)
+"""A quiet part, biases that scatter, that walk: where strengths have swallowed an effect it is seen elsewhere."""
 MOST_ROUNDS = 4
 """Rounds of fit and strengths: each finds the other almost where it left it."""
 SETTLED_LOG = 0.25
@@ -91,11 +98,20 @@ class Hypothesis:
         """Blocks of poses and moves predicted from all others."""
         return predict_held_out(self.fitted, folds_of(self.fitted))
 
-    def asked(self, terms: Sequence[Term], within: Bounds | None = None) -> list[Asked]:
+    def asked(self, terms: Sequence[Term]) -> list[Asked]:
         """What every one of some terms would come to beside those that are there."""
-        columns = [(contiguous(t.distortion.force), contiguous(t.distortion.rate), t.sizes.tolist()) for t in terms]
-        found = self.fitted.line.core.evidence(columns, self.strengths, self.within if within is None else within)
+        found = self.fitted.line.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], self.within)
         return [Asked(*one) for one in found]
+
+    def looked_at(self, terms: Sequence[Term]) -> FloatArray:
+        """(terms, looks) log-evidence gained by each of some terms at the strengths found here and elsewhere."""
+        looks, core = [self.strengths, *ELSEWHERE], self.fitted.line.core
+        return np.asarray(core.evidence_at(_columns(terms), looks) - core.evidence_at([NOTHING], looks))
+
+    def plain(self, strengths: Sequence[Strengths]) -> float:
+        """Log-evidence without another term, at the best of its strengths sought from some."""
+        ((found, *_),) = self.fitted.line.core.evidence([NOTHING], [self.strengths, *strengths], self.within)
+        return max(self.log_evidence, float(found))
 
     def span(self, k: int) -> slice:
         """Where the parameters of term ``k`` lie among those of all effects."""
@@ -108,6 +124,10 @@ class Hypothesis:
         n, at = self.fitted.n_effect, self.span(k)
         own = covariance[len(covariance) - n :, len(covariance) - n :]
         return self.fitted.twin.effect[at], own[at, at]
+
+
+def _columns(terms: Sequence[Term]) -> list[tuple[FloatArray | None, FloatArray | None, list[float]]]:
+    return [(contiguous(t.distortion.force), contiguous(t.distortion.rate), t.sizes.tolist()) for t in terms]
 
 
 def hypothesis(
@@ -129,7 +149,7 @@ def hypothesis(
             state=state, strengths=strengths, force_effect=contiguous(distortion.force),
             rate_effect=contiguous(distortion.rate), is_tuned=False, sizes=sizes.tolist(),
         )  # fmt: skip
-        ((log_evidence, found, _, _),) = core.evidence([(None, None, [])], strengths, within)
+        ((log_evidence, found, _, _),) = core.evidence([NOTHING], [strengths], within)
         twin = twin_of(core, start.gravity)
         moved = float(np.abs(np.log(found) - np.log(strengths)).max())
         strengths, state = found, core_state(twin)
