@@ -193,8 +193,10 @@ def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ..
         if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
             continue
         gain = float(np.log(rms_before[d] / max(rms_after[d], LEAST_P)))
-        chi2 = float(was.chi2[d] / was.n_rows[d]), float(now.chi2[d] / now.n_rows[d])
-        out.append((gain, HeldOut(name, *chi2, rms_before[d], rms_after[d], unit[d])))
+        # Both over one noise: strengths that are free would take up what the effect explains.
+        left = float(now.chi2[d] / now.n_rows[d])
+        before_over_it = left * (rms_before[d] / max(rms_after[d], LEAST_P)) ** 2
+        out.append((gain, HeldOut(name, before_over_it, left, rms_before[d], rms_after[d], unit[d])))
     return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))
 
 

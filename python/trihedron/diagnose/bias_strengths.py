@@ -6,7 +6,7 @@ with that strength no larger than the part's own noise makes it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,21 @@ def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength],
         if isinstance(effect, BiasProcess) and effect.id not in held and effect.unavailable(model.context) is None:
             asked[effect.id] = _asked(model, effect)
     named = [one for one in asked.values() if one.score > limit and one.is_large]
+    for sensor in range(2):
+        both = [one for one in asked.values() if one.effect.sensor == sensor and one.is_large]
+        if len(both) == 2 and not any(one in named for one in both):
+            # Each makes up for the other: which of them it is the session does not tell, that it is one of them it may.
+            corner, scatter, excess = model.within
+            bounds = noise_bounds(model)
+            of = [
+                [b[k] if k == sensor else w[k] for k in range(2)]
+                for b, w in ((bounds[0], corner), (bounds[1], scatter))
+            ]
+            without = again(model, model.terms, ((of[0][0], of[0][1]), (of[1][0], of[1][1]), excess))
+            gain = 2.0 * (model.log_evidence - without.log_evidence)
+            if gain > limit:
+                likelier = max(both, key=lambda one: one.gain)
+                named.append(replace(likelier, gain=gain, score=gain, without=without))
     return sorted(named, key=lambda one: -one.gain), asked
 
 

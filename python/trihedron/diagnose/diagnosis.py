@@ -17,6 +17,7 @@ from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.sample_steps import step_errors
 from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
 from trihedron.diagnose.laws.find import find_laws
+from trihedron.diagnose.relations import with_room_field
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
 from trihedron.diagnose.residuals.creep import settling, with_settling
 from trihedron.diagnose.residuals.goodness_of_fit import hidden_zeros, judge_rows
@@ -158,13 +159,17 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
         observed = more
         bare, found = _searched(observed, prior, alpha)
     tell(0.8, "asking what biases do by themselves")
-    biases, asked = bias_strengths(found.model, alpha)
+    # What follows a direction of the room is no bias that wanders.
+    biases, asked = bias_strengths(with_room_field(found.model, alpha), alpha)
     tell(0.9, "checking what remains")
     judged = again(found.model, found.model.terms, noise_bounds(found.model, tuple(one.effect for one in biases)))
     answer = Answer(found, with_shapes(found.model), biases, observed.seen, judged.fitted)
     named = {one.effect.id for one in observed.seen}
     remaining = _all_domains(judged.context, alpha, observed.refused | (sought - named))
-    return _Run(predicted, bare, answer, domains, accounted_for(answer, remaining), known, asked)
+    remaining = accounted_for(answer, remaining)
+    if not answer.ids and not any(one.disagrees for one in remaining):
+        domains = remaining  # what 1/f noise inside the poses accounts for is noise
+    return _Run(predicted, bare, answer, domains, remaining, known, asked)
 
 
 LOUD: Strengths = ((2.0, 2.0), (5.0, 5.0), (1.0, 1.0), (5.0, 5.0))

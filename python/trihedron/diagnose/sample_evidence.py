@@ -90,7 +90,7 @@ def _with_one(
         fitted = tune_noise(obs, replace(begin, effect=np.zeros(0)), NO_DISTORTION, prior)
         if not effect.is_proof and not _mends(observed.fitted, fitted, evidence.touched):
             return replace(observed, refused=observed.refused | {effect.id})
-        gain = max(gain, _explained(observed.fitted, fitted))
+        gain = _explained(observed.fitted, fitted)
         if evidence.restate is not None:
             evidence = replace(evidence, parameters=evidence.restate(Context(obs, fitted)))
     return replace(observed, fitted=fitted, seen=(*observed.seen, Seen(effect, evidence, gain)))
@@ -100,8 +100,10 @@ def _explained(before: Fit, after: Fit) -> float:
     """Twice the log-likelihood gained by readings that were changed, every domain's noise being of free strength."""
     gain = 0.0
     for domain in ROW_DOMAINS:
-        (was, n), (now, _) = (_per_row(fitted, domain) for fitted in (before, after))
-        gain += n * float(np.log(max(was, 1.0) / max(now, 1.0)))
+        (was, n), (now, left) = (_per_row(fitted, domain) for fitted in (before, after))
+        # Rows that were left out speak for themselves alone.
+        of = n - left if n - left >= 1.0 else n
+        gain += of * float(np.log(max(was, 1.0) / max(now, 1.0)))
     return max(gain, 0.0)
 
 

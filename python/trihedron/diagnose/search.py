@@ -16,6 +16,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import Variant
+from trihedron.diagnose.relations import without_doubtful
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
 from trihedron.diagnose.session.hypothesis import Asked, Hypothesis, Term, again, hypothesis
 from trihedron.diagnose.session.twin import (
@@ -39,7 +40,6 @@ NEAR = 6.0
 WORTH_FITTING = 20.0
 """Difference of scores, one linear step from the fit, within which rivals are fitted in full."""
 N_RIVALS = 3
-ORDINARY_ALPHA = 0.01
 MOST_EFFECTS = 4
 """Mechanisms of one session at most; poses that were pushed are none."""
 MOST_STEPS = 8
@@ -92,11 +92,12 @@ class Found:
 
 
 def threshold(alpha: float) -> float:
-    """Score from which an effect stands: where it is likelier than not at a rate of false alarms of 1 %.
+    """Score from which an effect stands: twice the logarithm of odds of 1/2α, half of the false alarms being the
+    search's.
 
-    In 80 sessions with every small fault of real ones but no effect none came above -7 (benches/blind_nuisances.py).
+    In 40 sessions with every small fault of real ones but no effect none came above -7 (benches/blind_nuisances.py).
     """
-    return float(2.0 * np.log(ORDINARY_ALPHA / alpha))
+    return float(-2.0 * np.log(2.0 * alpha))
 
 
 def search(base: Hypothesis, alpha: float) -> Found:
@@ -139,8 +140,11 @@ def _concluded(state: _State, alpha: float) -> Found:
     swapped, named = _swapped(judged, state.rivals)
     if swapped is not judged.model:
         judged = _pruned(swapped, threshold(alpha))
+    doubted = without_doubtful(judged.model, alpha)
+    if doubted is not judged.model:
+        judged = _pruned(doubted, threshold(alpha))
     model = judged.model
-    tried, missing = _tried(model, ()) if model.terms else (list(state.tried.values()), state.missing)
+    tried, missing = _tried(model, (), len(catalogue()))
     held = {term.effect.id for term in model.terms}
     return Found(
         model, {one.term.effect.id: one for one in reversed(tried)},
@@ -170,12 +174,14 @@ class _State:
     missing: dict[str, str] = field(default_factory=dict)
 
 
-def _tried(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Tried], dict[str, str]]:
+def _tried(
+    model: Hypothesis, exclude: Collection[str], n_leaders: int = N_LEADERS
+) -> tuple[list[Tried], dict[str, str]]:
     """Candidates beside a hypothesis, best first, one an effect; and why others do not apply."""
     terms, missing = _terms(model, exclude)
     if not terms:
         return [], missing
-    leading = _leaders(model, terms)
+    leading = _leaders(model, terms, n_leaders)
     asked = model.asked(leading)
     # Columns made for one size (a delay) are made again for the size that they come out with.
     sized = {
@@ -226,7 +232,7 @@ def _terms(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dic
     return terms, missing
 
 
-def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
+def _leaders(model: Hypothesis, terms: list[Term], n: int) -> list[Term]:
     """The candidates that gain most one linear step from the fit, at its strengths and at others, as large as fits."""
     scaled = [[replace(t, sizes=t.sizes * scale) for t in terms] for scale in PRIOR_SCALES]
     gains = np.array([model.looked_at(some) for some in scaled])
@@ -236,7 +242,9 @@ def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
         count: dict[str, int] = {}
         for k in np.argsort(-best).tolist():
             effect_id = terms[k].effect.id
-            if count.get(effect_id, 0) < SHAPES_KEPT and (effect_id in count or len(count) < N_LEADERS):
+            if count.get(effect_id, 0) < (SHAPES_KEPT if n == N_LEADERS else 1) and (
+                effect_id in count or len(count) < n
+            ):
                 count[effect_id] = count.get(effect_id, 0) + 1
                 kept.setdefault(k, int(gains[:, k, look].argmax()))
     return [scaled[scale][k] for k, scale in kept.items()]

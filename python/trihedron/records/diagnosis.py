@@ -152,8 +152,8 @@ class Candidate(Plain):
     """One catalogue effect that was tried, accepted or not, or why it does not apply.
 
     ``score`` is twice the log-evidence that it gains beside what was accepted, the search paid for; ``size`` what its
-    parameters come to there, ``limit95`` what the largest of them is at most (95 %), in its unit; ``stands_against`` the
-    accepted effect beside which it is needless, where it would stand without that one.
+    parameters come to there, ``limit95`` what the largest of them is at most (95 %), in its unit; ``stands_against``
+    the accepted effect beside which it is needless, where it would stand without that one.
     """
 
     id: str

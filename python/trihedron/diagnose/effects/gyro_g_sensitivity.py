@@ -8,6 +8,8 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import AXES, Effect, Variant, rate_only
 from trihedron.records.words import why_not
 
+UNIT = "(rad/s)/(m/s^2)"
+
 
 class GyroGSensitivity(Effect):
     """Rate bias linear in specific force: ω reads G f more."""
@@ -24,4 +26,10 @@ class GyroGSensitivity(Effect):
         eye = np.eye(9).reshape(9, 3, 3)
         columns = np.einsum("kij,nj->nik", eye, context.force)
         names = tuple(f"G_{i}{j}" for i in AXES for j in AXES)
-        return [Variant(rate_only(columns), names, ("(rad/s)/(m/s^2)",) * 9)]
+        whole = Variant(rate_only(columns), names, (UNIT,) * 9)
+        # One gyro of three may have it, or show it.
+        rows = [
+            Variant(rate_only(columns[:, :, 3 * k : 3 * k + 3]), names[3 * k : 3 * k + 3], (UNIT,) * 3, label=axis)
+            for k, axis in enumerate(AXES)
+        ]
+        return [whole, *rows]
