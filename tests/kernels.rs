@@ -30,4 +30,3 @@ mod allan;
 mod simulate;
 
 #[path = "kernels/hostile.rs"]
-mod hostile;

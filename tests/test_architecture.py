@@ -162,10 +162,6 @@ def test_everything_that_is_named_is_used():
     assert unused == set()
 
 
-def test_no_function_of_the_package_looks_like_a_test():
-    assert not {name for name, _ in functions() if name.rpartition(":")[2].startswith("test_")}
-
-
 # Ours, with a letter before the point where a page numbers its own; a number of three parts is another book's.
 NUMBER = r"(?:\d+|[A-Z])\.\d+[a-z]?(?!\.?\d)"
 CITED = re.compile(rf"\b(?:eqs?|equations?)\.? ?\(?({NUMBER}(?:(?:-|, | to | and ){NUMBER})*)", re.IGNORECASE)

@@ -7,12 +7,6 @@ import pytest
 
 import trihedron
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.diagnosis import _with_late
-from trihedron.diagnose.selection.model import Accepted, Alternative, begin, with_only
-from trihedron.diagnose.selection.rivals import chosen_again
-from trihedron.diagnose.selection.score import score_all
-from trihedron.diagnose.session.observations import observe
-from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.segment import resegment, segment_recording
@@ -39,7 +33,7 @@ def diagnosed(effect_id, seed, **size):
     return diagnose_recording(recording, resegment(recording, segments), calibration)
 
 
-@pytest.mark.parametrize("delay_s", [0.04, -0.025])
+@pytest.mark.parametrize("delay_s", [0.04, pytest.param(-0.025, marks=pytest.mark.slow)])
 def test_a_long_delay_is_a_delay_of_that_length(delay_s):
     d = diagnosed("accel-gyro-time-offset", 4, offset_s=delay_s)
     first = d.effects[0]
@@ -81,7 +75,7 @@ def scattering(effect_id, seed, gyro_deg_s, **size):
     return replace(recording, gyroscope=recording.gyroscope + zero), truth.gravity_m_s2
 
 
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter(seed):
     recording, gravity = scattering("gyro-scale-nonlinearity", seed, 0.07, c3=(3e-3, -3e-3, 3e-3))
     found = trihedron.diagnose(recording, gravity_m_s2=gravity)
@@ -89,39 +83,3 @@ def test_a_flaw_of_moves_is_not_swallowed_by_zeros_that_scatter(seed):
     # The scatter may stray between poses as far as moves show: without its cost it explained the moves alone.
     assert names[0] == "gyro-scale-nonlinearity"
     assert "gyro-zero-scatter" in names
-
-
-def test_what_was_too_little_without_the_scatter_is_asked_again_beside_it():
-    recording, gravity = scattering("accel-scale-asymmetry", 5, 0.07, asymmetry=(6e-3, -6e-3, 6e-3))
-    obs = observe(recording, resegment(recording, segment_recording(recording)))
-    calibration = trihedron.calibrate(recording, gravity_m_s2=gravity).calibration
-    model = begin(obs, start_twin(obs, calibration), None)
-    for refused in ("accel-scale-asymmetry", "accel-quadratic", "dropped-samples"):
-        model = model.refusing(refused)
-    late, _ = _with_late(model, {}, 0.01)
-    names = {one.effect.id for one in late.accepted}
-    assert "gyro-zero-scatter" in names
-    assert names & {"accel-scale-asymmetry", "accel-quadratic"}
-    assert late.refused == {"dropped-samples"}  # its own test of the samples said no
-
-
-def test_an_effect_chosen_too_early_gives_way_to_the_one_that_explains_more_beside_all_others():
-    scenario = _of(profile_by_name("mpu"), hand_session(20, layout=2), "session", 2)
-    recording, truth = simulate(with_effect(scenario, "accel-quadratic", k2=(6e-4, -6e-4, 6e-4)), 2)
-    segments = resegment(recording, segment_recording(recording))
-    calibration = trihedron.calibrate(recording, gravity_m_s2=truth.gravity_m_s2).calibration
-    obs = observe(recording, segments)
-    model = begin(obs, start_twin(obs, calibration), None)
-    scored = {s.effect.id: s for s in score_all(model.context, ())[0]}
-    asymmetry, quadratic, gyro = (
-        scored[i] for i in ("accel-scale-asymmetry", "accel-quadratic", "gyro-scale-nonlinearity")
-    )
-    other = Alternative(quadratic.effect, quadratic.variant, quadratic.rank)
-    accepted = tuple(
-        Accepted(s.effect, s.variant, None, 1e-9, 50.0, 50.0, (), rank=s.rank, alternatives=given)
-        for s, given in ((asymmetry, (other,)), (gyro, ()))
-    )
-    chosen = chosen_again(with_only(model, accepted)).accepted[0]
-    assert chosen.effect.id == "accel-quadratic"
-    assert chosen.delta_bic > 10.0
-    assert chosen_again(replace(model, accepted=accepted[:1])).accepted == accepted[:1]  # nothing came after it
