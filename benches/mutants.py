@@ -5,8 +5,8 @@
     python benches/mutants.py --only rust --count 5            # needs cargo; each is built anew
     python benches/mutants.py --at python/trihedron/units.py:14 --count 4
 
-Works on a copy of the checkout. Nearest tests first: those that name the file's module, then those of its stage. A mutant
-that changes only a sentence, a default nobody takes, or speed is not told from one that matters: read what survives.
+Works on a copy of the checkout. The nearest tests are run: those that name the file's module, then those of its stage.
+A change of a sentence, of a default nobody takes, or of speed alone is not told from one that matters: read what lives.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import io
 import os
 import random
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -24,6 +25,7 @@ import tempfile
 import time
 import tokenize
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -36,7 +38,7 @@ UNITS = {
 RUST_TOKEN = re.compile(
     r"(?<= )(<=|>=|==|!=|[<>+*/-]=?)(?= )|\b\d[\d_]*(?:\.\d+)?(?:e-?\d+)?\b|\bto_(?:radians|degrees)\b"
 )
-NEAREST = 12
+NEAREST = 6
 """Test files that a mutant is shown to before it counts as a survivor of the short way."""
 
 
@@ -148,11 +150,13 @@ def is_noticed(mutant: Mutant, copy: Path, tests: list[str], seconds: float) -> 
             folder = Path(os.environ.get("CARGO_TARGET_DIR", copy / "target"))
             core.write_bytes((folder / "release/libtrihedron.so").read_bytes())
         words = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-q", "-p", "no:cacheprovider", *tests]
+        # Seconds of processor time, which other work on the machine does not lengthen.
+        limit = partial(resource.setrlimit, resource.RLIMIT_CPU, (int(seconds), int(seconds) + 5))
         done = subprocess.run(
-            words, cwd=copy, env=environment, capture_output=True, text=True, timeout=seconds, check=False
+            words, cwd=copy, env=environment, capture_output=True, text=True, preexec_fn=limit, check=False
         )
-    except subprocess.TimeoutExpired:
-        return "the clock"
+        if done.returncode < 0:
+            return "the clock"
     finally:
         target.write_text(source)
         core.write_bytes(kept)
@@ -167,7 +171,9 @@ def main() -> None:
     parser.add_argument("--only", choices=["python", "rust"], default="")
     parser.add_argument("--at", help="FILE:LINE, every place of it up to COUNT")
     parser.add_argument("--whole", action="store_true", help="show survivors to the whole suite")
-    parser.add_argument("--seconds", type=float, default=900.0, help="after which a hanging mutant counts as noticed")
+    parser.add_argument(
+        "--seconds", type=float, default=300.0, help="of processor time, after which a mutant counts as noticed"
+    )
     asked = parser.parse_args()
     if asked.at:
         path, line = asked.at.split(":")

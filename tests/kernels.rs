@@ -28,5 +28,3 @@ mod kalman;
 mod allan;
 #[path = "kernels/simulate.rs"]
 mod simulate;
-
-#[path = "kernels/hostile.rs"]
