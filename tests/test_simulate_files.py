@@ -10,7 +10,6 @@ from trihedron.files.truth import read_truth, write_truth
 from trihedron.pipeline import read
 from trihedron.simulate import (
     Hold,
-    Scenario,
     Turn,
     profile_by_name,
     read_scenario,
@@ -64,7 +63,7 @@ def written(tmp_path, text):
 
 
 def test_a_scenario_file_says_the_same_as_python(tmp_path):
-    scenario = Scenario.from_toml(written(tmp_path, EXAMPLE))
+    scenario = read_scenario(written(tmp_path, EXAMPLE))
     assert scenario.name == "bench"
     assert scenario.motion.steps == (Hold(2.0), Turn((0.0, 0.0, 1.0), 90.0, 1.5))
     assert scenario.motion.table_tilt_deg == (0.1, -0.2)
