@@ -28,3 +28,6 @@ mod kalman;
 mod allan;
 #[path = "kernels/simulate.rs"]
 mod simulate;
+
+#[path = "kernels/hostile.rs"]
+mod hostile;

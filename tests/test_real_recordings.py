@@ -1,6 +1,7 @@
 """Real recordings end to end, through the command line and the public interface."""
 
 import json
+import math
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -10,10 +11,12 @@ from scipy import stats
 
 import trihedron
 from trihedron.cli import main
+from trihedron.estimate.gyroscope import Turn, calibrate_turns
 from trihedron.pipeline.demonstrating import compare_with_truth, truth_of_the_day
-from trihedron.records import Calibration, Hold, Segments, SensorCalibration
+from trihedron.records import Calibration, FindingCode, Hold, Recording, Segments, SensorCalibration
 from trihedron.sensor_model import other_form
 from trihedron.simulate import scenario_by_name, simulate
+from trihedron.units import RateUnit
 
 
 def calibrated(capsys, *arguments, status=0):
@@ -221,3 +224,29 @@ def test_a_calibration_of_xsens_refuses_the_readings_of_another_sensor(xsens, re
     capsys.readouterr()
     assert main(["apply", str(known), str(real_data / "kim" / "kim_imu_good1.txt")]) == 1
     assert "maps counts" in capsys.readouterr().err
+
+
+def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data):
+    windows = {"x": (2420, 2910), "y": (2565, 3120), "z": (2975, 3500)}
+    angles = {"x": 361.338, "y": 367.160, "z": 363.6703}
+    blocks, turns, zeros, start = [], [], [], 0
+    for axis, name in enumerate("xyz"):
+        block = np.genfromtxt(real_data / "ctu" / f"{name}_rotation.csv", delimiter=",", skip_header=1)
+        first, last = windows[name]
+        rough = block[first:last, axis].sum() / 100.0
+        zeros.append((start, start + 2000))
+        turns.append(Turn(start + first, start + last, axis, math.copysign(math.radians(angles[name]), rough)))
+        blocks.append(block)
+        start += len(block)
+    gyroscope = np.concatenate(blocks)
+    recording = Recording(np.arange(len(gyroscope)) / 100.0, None, gyroscope, 100.0, gyroscope_unit=RateUnit.DEG_S)
+    found, findings = calibrate_turns(recording, turns, zeros)
+    # The readings are in deg/s already, so each scale is the ratio of the reference angle to the integrated one.
+    scale = np.diag(found.S) * 180.0 / math.pi
+    assert np.abs(scale - 1.0).max() < 0.02
+    assert not any(f.code is FindingCode.TURN_NOT_A_MULTIPLE for f in findings)
+    for turn, zero in zip(turns, zeros, strict=True):
+        rest = gyroscope[zero[0] : zero[1]].mean(axis=0)
+        seen = (gyroscope[turn.start : turn.stop] - rest).sum(axis=0) / 100.0
+        # Back through the calibration: the reference angle, within the drift of the zero over 5 s.
+        assert abs((found.S @ seen)[turn.axis] - turn.angle_rad) < math.radians(0.5)
