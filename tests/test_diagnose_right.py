@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from trihedron.channel_facts.limits import find_limits
-from trihedron.diagnose.zeros.levels import two_levels
 from trihedron.segment import resegment, segment_recording
 from trihedron.simulate import Scenario, hand_session, profile_by_name, simulate
 
@@ -55,22 +54,3 @@ def test_a_short_pose_on_a_machine_that_shakes_is_a_pose():
     holds = resegment(shaken, segment_recording(shaken)).holds
     middle = 0.5 * (part.start + part.stop)
     assert any(hold.start < middle < hold.stop for hold in holds)
-
-
-def test_zeros_that_take_two_values_are_told_from_zeros_that_scatter():
-    rng = np.random.default_rng(7)
-    two, scatter = 0, 0
-    for _ in range(40):
-        n = int(rng.integers(15, 40))
-        noise = rng.normal(size=n)
-        # A pose in three lies between the values: the zero jumped in it.
-        between = np.where(rng.random(n) < 0.33, rng.uniform(-1.0, 1.0, n), rng.choice([-1.0, 1.0], n))
-        two += two_levels(10.0 * between + noise, np.ones(n)).is_clear
-        scatter += two_levels(rng.normal(0.0, 10.0, n) + noise, np.ones(n)).is_clear
-    assert two >= 32
-    # A g-sensitivity of poses that lie on faces has two values too, and gravity is known.
-    faces = np.repeat([-1.0, 1.0], 10)
-    assert two_levels(10.0 * faces + rng.normal(size=20), np.ones(20)).is_clear
-    assert not two_levels(10.0 * faces + rng.normal(size=20), np.ones(20), faces[:, None]).is_clear
-    # One normal session in some 500 (480 drawn): two of 40 are one chance in 300.
-    assert scatter <= 1

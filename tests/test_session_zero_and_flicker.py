@@ -11,8 +11,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 from confidence.motion import G
 from confidence.sessions import hand
 from trihedron import _core, diagnose
-from trihedron.diagnose.zeros.flicker import flicker_of
-from trihedron.diagnose.zeros.process import ZeroReadings
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.gyroscope import MoveOptions
 from trihedron.estimate.joint import calibrate_joint
@@ -95,70 +93,6 @@ def test_white_noise_and_a_hand_that_shakes_single_poses_let_expect_nothing():
     assert np.mean(said) < 0.31
     assert expected_scatter(readings, spans[:4], UP[:4]) == 0.0
     assert expected_scatter(readings, spans, np.full_like(UP, np.nan)) == 0.0
-
-
-PARTS = 8
-
-
-def parts_of(readings, poses=POSES):
-    """Means of eighths of every pose, as the process of the zeros takes them."""
-    edges = (np.arange(poses)[:, np.newaxis] * (HOLD + MOVE) + np.arange(PARTS + 1) * HOLD // PARTS).astype(int)
-    start, stop = edges[:, :-1].ravel(), edges[:, 1:].ravel()
-    values = np.array([readings[a:b].mean(axis=0) for a, b in zip(start, stop, strict=True)]).T
-    n = len(start)
-    return ZeroReadings(
-        values, np.ones_like(values), 0.5 * (start + stop) / RATE_HZ, (stop - start) / RATE_HZ,
-        np.repeat(np.arange(poses), PARTS), np.ones((n, 1)), np.ones((n, 1)),
-    )  # fmt: skip
-
-
-def test_zeros_that_flicker_are_told_from_zeros_that_do_anything_else():
-    rng = np.random.default_rng(8)
-    size = np.array([1.0, 3.0, 0.2])  # axes of noises of their own
-    said, true = [], []
-    for _ in range(40):
-        readings, spans, slow = noisy(rng, flicker=1.0)
-        found = flicker_of(parts_of(readings * size), [0])
-        if found is not None:
-            said.append(found / size)
-            means, _ = _core.means_by_owner(slow, spans, np.arange(POSES), POSES)
-            true.append(np.std(means, axis=0, ddof=1))
-    # Halves of poses differ by 2.2 times what white noise makes them; all parts together tell that in nine of ten.
-    assert len(said) >= 34
-    # 34 sessions of three axes, each size known to 17 % from its own poses.
-    assert 0.8 < np.sqrt(np.mean(np.square(said))) / np.sqrt(np.mean(np.square(true))) < 1.25
-
-
-def drawn(kind, rng):
-    """Zeros (n, 3) of a session that are no flicker, as large against white noise of 1/√Hz as matters."""
-    n = POSES * (HOLD + MOVE)
-    part = np.linspace(0.0, 1.0, n)[:, np.newaxis]
-    if kind == "scatter":
-        return np.repeat(2.0 * rng.normal(size=(POSES, 3)), HOLD + MOVE, axis=0)
-    if kind == "walk":
-        return 8.0 * np.cumsum(rng.normal(size=(n, 3)), axis=0) / np.sqrt(n)
-    if kind == "warm-up":
-        return 6.0 * np.exp(-3.0 * part) * rng.normal(size=3)
-    return 0.0 * part
-
-
-@pytest.mark.parametrize("kind", ["scatter", "walk", "warm-up", "nothing"])
-def test_what_is_no_flicker_is_not_taken_for_it(kind):
-    rng = np.random.default_rng(9)
-    taken = []
-    for _ in range(12):
-        readings, _, _ = noisy(rng, flicker=0.0)
-        found = flicker_of(parts_of(readings + drawn(kind, rng)), [0])
-        # White noise alone is the flicker of strength 0, or one that is small beside the errors of the means, 0.5.
-        taken.append(found is not None and np.sqrt(np.mean(found**2)) > 0.5)
-    # Two of 12 where one in fifty is to be expected: once in forty.
-    assert sum(taken) <= 1
-
-
-def test_flicker_beside_scatter_is_not_all_there_is():
-    rng = np.random.default_rng(10)
-    found = [flicker_of(parts_of(noisy(rng, flicker=0.3)[0] + 2.0 * drawn("scatter", rng)), [0]) for _ in range(20)]
-    assert sum(one is not None for one in found) <= 1
 
 
 @pytest.mark.parametrize("seed", [9002, 9031])

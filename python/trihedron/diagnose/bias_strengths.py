@@ -1,0 +1,122 @@
+"""Bias drift and bias repeatability, from the strengths of the session's noise (eq. 11.20).
+
+Both are processes that every hypothesis allows, of any strength: what is asked is whether the session is less likely
+with that strength no larger than the part's own noise makes it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.bias_process import BiasProcess
+from trihedron.diagnose.session.hypothesis import ANYTHING, Bounds, Hypothesis, again
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.words import Words
+from trihedron.session.noise import scatter_unit
+
+NOISE_CORNER_S = 20.0
+"""Shortest corner time, where white noise and bias walk meet: Allan deviations of consumer parts turn up there or
+later. A walk of any strength is allowed in every hypothesis; a stronger one than this is called drift."""
+LEAST_WALK = 1.5
+"""Rms of a bias over the error of a pose's mean from which its walk is called drift: of 120 healthy sessions, half of
+them with 1/f noise as consumer parts have it, 1.3 was the most."""
+FLICKER_WITHIN = 1.5
+"""Factor within which the scatter that 1/f noise makes is told from inside the poses."""
+
+
+@dataclass(frozen=True, eq=False)
+class BiasStrength:
+    """One process that is stronger than noise makes it: ``gain`` in twice the log-evidence over the strongest that
+    noise makes, ``score`` what counts of that, ``size`` and ``std`` (3,) SI by axis."""
+
+    effect: BiasProcess
+    gain: float
+    score: float
+    size: FloatArray
+    std: FloatArray
+    parameters: tuple[EffectParameter, ...]
+    statement: Words
+    without: Hypothesis
+    is_large: bool
+    """Whether it carries the bias farther than 1/f noise does that no pose shows."""
+
+
+def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength], dict[str, BiasStrength]]:
+    """The processes that are called by a name, largest gain first; and all that could be asked, by id."""
+    held = {term.effect.id for term in model.terms}
+    # Twice the logarithm of odds of (1 - α)/α: a strength is there or is not, and nothing else was searched for.
+    limit = 2.0 * float(np.log((1.0 - alpha) / alpha))
+    asked = {}
+    for effect in catalogue():
+        if isinstance(effect, BiasProcess) and effect.id not in held and effect.unavailable(model.context) is None:
+            asked[effect.id] = _asked(model, effect)
+    named = [one for one in asked.values() if one.score > limit and one.is_large]
+    return sorted(named, key=lambda one: -one.gain), asked
+
+
+def noise_bounds(model: Hypothesis, but: tuple[BiasProcess, ...] = ()) -> Bounds:
+    """The strengths that the part's noise makes at most, but for some processes."""
+    free = {(one.sensor, one.walks) for one in but}
+    expected = _flicker(model)
+    corner = [ANYTHING[0][s] if (s, True) in free else NOISE_CORNER_S for s in range(2)]
+    scatter = [ANYTHING[1][s] if (s, False) in free else float(expected[s]) for s in range(2)]
+    return (corner[0], corner[1]), (scatter[0], scatter[1]), ANYTHING[2]
+
+
+def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
+    s = effect.sensor
+    corner, scatter = list(model.within[0]), list(model.within[1])
+    if effect.walks:
+        corner[s] = NOISE_CORNER_S
+    else:
+        scatter[s] = float(_flicker(model)[s])
+    within: Bounds = ((corner[0], corner[1]), (scatter[0], scatter[1]), model.within[2])
+    without = again(model, model.terms, within)
+    gain = 2.0 * (model.log_evidence - without.log_evidence)
+    size, std = _size(model, effect)
+    is_large = not effect.walks or _walked(model, s) > LEAST_WALK
+    parameters, statement = effect.of_strength(size, std)
+    # Strengths of noise are in every hypothesis: none is searched for among mechanisms.
+    return BiasStrength(effect, gain, gain, size, std, parameters, statement, without, is_large)
+
+
+def _flicker(model: Hypothesis) -> FloatArray:
+    """(2,) the scatter from pose to pose that 1/f noise inside the poses lets expect, in the session's units."""
+    obs = model.obs
+    unit = _units(model)
+    expected = np.array([obs.force_scatter, obs.rate_scatter])
+    return np.asarray(FLICKER_WITHIN * expected / unit[:, 0])
+
+
+def _walked(model: Hypothesis, sensor: int) -> float:
+    """Rms of a bias about its mean over the poses, over the usual error of a pose's mean."""
+    twin, obs = model.fitted.twin, model.obs
+    path = (twin.accel_bias, twin.gyro_bias)[sensor]
+    unit = _units(model)[sensor] * model.context.si_per_raw(("accelerometer", "gyroscope")[sensor])
+    return float(np.sqrt(np.mean(path.var(axis=0)) / np.mean(unit**2))) if obs.n_holds else 0.0
+
+
+def _units(model: Hypothesis) -> FloatArray:
+    obs = model.obs
+    return scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma, obs.force_up)
+
+
+def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArray]:
+    """(3,) SI by axis, and its standard error: one sigma of a scatter, the range that a drift runs through."""
+    sensor = ("accelerometer", "gyroscope")[effect.sensor]
+    n = model.obs.n_holds
+    if not effect.walks:
+        raw = model.strengths[1][effect.sensor] * _units(model)[effect.sensor]
+        size = raw * model.context.si_per_raw(sensor)
+        return size, size / np.sqrt(2.0 * max(n - 1, 1))
+    twin = model.fitted.twin
+    path = twin.accel_bias if effect.sensor == 0 else twin.gyro_bias
+    obs = model.obs
+    sigma = obs.hold_force_sigma if effect.sensor == 0 else obs.hold_rate_sigma
+    assert sigma is not None
+    error = np.median(sigma, axis=0) * model.context.si_per_raw(sensor)
+    return np.ptp(path, axis=0), np.asarray(np.sqrt(2.0) * error)

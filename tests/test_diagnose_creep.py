@@ -1,0 +1,99 @@
+"""Rates at rest that are motion: supports that give are no zeros that scatter."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.residuals.creep import settling, with_settling
+from trihedron.diagnose.residuals.goodness_of_fit import judge_rows
+from trihedron.diagnose.session.observations import _turned_at_ends, observe
+from trihedron.diagnose.session.solve import tune_noise
+from trihedron.diagnose.session.starting_point import start_twin
+from trihedron.diagnose.session.twin import NO_DISTORTION
+from trihedron.records import Recording
+from trihedron.segment import resegment, segment_recording
+from trihedron.simulate import hand_session, simulate
+from trihedron.simulate.named import _of
+from trihedron.simulate.profiles import profile_by_name
+
+
+@cache
+def session(seed, lean_rad, scatter_rad_s):
+    """Poses that lean by ``lean_rad`` within seconds of being set down, gyro zeros drawn anew in each."""
+    recording, truth = simulate(_of(profile_by_name("tactical"), hand_session(24, layout=seed), "session", seed), seed)
+    rng = np.random.default_rng(seed)
+    force, rate = recording.accelerometer.copy(), recording.gyroscope.copy()
+    to_raw = np.linalg.inv(np.asarray(truth.accelerometer_S)), np.linalg.inv(np.asarray(truth.gyroscope_S))
+    for part in truth.segments:
+        if part.kind != "hold":
+            continue
+        here = slice(part.start, part.stop)
+        since = recording.time_s[here] - recording.time_s[part.start]
+        direction = lean_rad * rng.normal(size=3)
+        up = truth.specific_force_m_s2[part.start]
+        # f' = f x w for a body that turns by w: the vertical of the body goes the other way.
+        force[here] += (1.0 - np.exp(-since / 2.0))[:, None] * (to_raw[0] @ np.cross(up, direction))
+        turning = (np.exp(-since / 2.0) / 2.0)[:, None] * direction + rng.normal(size=3) * scatter_rad_s
+        rate[here] += turning @ to_raw[1].T
+    stamps = recording.time_s
+    log = Recording(
+        time_s=stamps, rate_hz=recording.rate_hz, accelerometer=force, gyroscope=rate,
+        accelerometer_unit=recording.accelerometer_unit, gyroscope_unit=recording.gyroscope_unit,
+    )  # fmt: skip
+    segments = segment_recording(log)
+    calibration = trihedron.calibrate(log, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
+    obs = observe(log, resegment(log, segments))
+    return Context(obs, tune_noise(obs, start_twin(obs, calibration), NO_DISTORTION, None))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_supports_that_give_are_told_from_zeros_that_scatter(seed):
+    for lean_rad in (0.006, 0.001):
+        assert settling(session(seed, lean_rad, 0.0)).is_motion
+    # Scatter alone, and scatter that a support beneath it would hide from gravity.
+    for lean_rad in (0.0, 0.003, 0.006):
+        assert not settling(session(seed, lean_rad, 1e-3)).is_motion
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_scatter_under_supports_that_give_is_still_found_and_creep_alone_is_none(seed):
+    gives = settling(session(seed, 0.001, 0.0))
+    # The accelerometer hardly sees so little; the shape in time and what it does see say the same.
+    assert gives.is_motion
+    assert gives.creep - gives.scatter > 9.0
+    assert not settling(session(seed, 0.0, 1e-3)).is_motion
+    assert not settling(session(seed, 0.006, 1e-3)).is_motion
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_moves_allow_for_poses_that_settle_and_rates_at_rest_still_disagree(seed):
+    context = session(seed, 0.006, 0.0)
+    found = settling(context)
+    assert found.is_seen
+    # Drawn with 0.006 rad about each axis, gone in 2 s; the fit has a grid of factors of two for that time.
+    assert 0.5 < found.rate_rad_s * found.tau_s / 0.006 < 2.0
+    before, after = (
+        {one.domain: one for one in judge_rows(fitted, 0.01)}
+        for fitted in (
+            context.fitted,
+            tune_noise(with_settling(context, found), context.fitted.twin, NO_DISTORTION, None),
+        )
+    )
+    assert before["moves"].disagrees
+    assert not after["moves"].disagrees
+    assert after["static-gyro"].disagrees
+    for lean_rad, scatter in ((0.0, 0.0), (0.0, 1e-3)):
+        assert not settling(session(seed, lean_rad, scatter)).is_seen
+
+
+def test_a_pose_that_was_not_still_is_turned_at_its_ends_and_a_noisy_session_is_not():
+    lasts = np.array([2.0, 8.0, 2.0, 4.0])
+    sigma = 1e-4 / np.sqrt(lasts)[:, None] * np.ones(3)
+    np.testing.assert_array_equal(_turned_at_ends(sigma, lasts), 0.0)
+    sigma[2] = 5e-3
+    turned = _turned_at_ends(sigma, lasts)
+    np.testing.assert_array_equal(turned[[0, 1, 3]], 0.0)
+    np.testing.assert_allclose(turned[2], (5e-3 * 1.0) ** 2, rtol=0.01)  # half of 2 s
