@@ -2,12 +2,10 @@
 
 python benches/fuzz.py inputs 100000 [SEED]     every reader of a file that is ours or binary
 python benches/fuzz.py commands 5000 [SEED]     command lines, in forked children of one loaded process
-python benches/fuzz.py faults 1000 [SEED]       kill -9 at random instants, full disks, full devices and slow pipes
 
-Every case is made from SEED and its number alone; `case inputs|commands|faults NUMBER [SEED]` repeats it. A failure is
+Every case is made from SEED and its number alone; `case inputs|commands NUMBER [SEED]` repeats it. A failure is
 a traceback, an exception that is no refusal, an internal error, text of a panic, a control character on a terminal,
-a wait of more than ten seconds, rows that are not accounted for, an input harmed, a file left, an output that is
-neither the old one nor the new one.
+a wait of more than ten seconds, rows that are not accounted for, an input harmed or a file left.
 """
 
 from __future__ import annotations
@@ -22,7 +20,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from attacks.cases import Attack
 from attacks.commands import Commands
-from attacks.faults import Faults
 from attacks.inputs import Inputs
 
 BATCH = 100
@@ -53,7 +50,7 @@ def main() -> None:
 
 def _attack(kind: str, seed: int) -> Attack:
     os.environ.setdefault("COLUMNS", "80")
-    return {"inputs": Inputs, "commands": Commands, "faults": Faults}[kind](seed)
+    return {"inputs": Inputs, "commands": Commands}[kind](seed)
 
 
 if __name__ == "__main__":

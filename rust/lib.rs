@@ -32,6 +32,7 @@ pub mod ranges;
 pub mod rotation;
 pub mod running;
 pub mod screening;
+pub mod sensor_model;
 pub mod session_model;
 pub mod simd;
 pub mod simulate;

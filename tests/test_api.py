@@ -1,7 +1,6 @@
 """The package as people call it from Python: names, arguments, results in notebooks and in other processes."""
 
 import copy
-import inspect
 import json
 import multiprocessing
 import pickle
@@ -51,24 +50,12 @@ def test_dir_shows_the_public_names_and_nothing_else():
     assert all(getattr(trihedron, name) is not None for name in trihedron.__all__)
 
 
-def test_there_is_a_version():
-    assert re.match(r"\d+\.\d+", trihedron.__version__)
-
-
 def test_every_command_is_a_verb():
     names = {command.__name__ for command in COMMANDS}
     # What the command calls by its method, Python calls by what it finds.
     verbs = {"noise" if name == "allan" else name for name in names}
     assert verbs <= set(trihedron.__all__)
     assert {"report", "plot", "twin"} <= set(trihedron.__all__)
-
-
-def test_verbs_have_signatures_and_words():
-    for name in trihedron.__all__:
-        value = getattr(trihedron, name)
-        if inspect.isfunction(value):
-            assert value.__doc__
-            assert inspect.signature(value).parameters or name == "ports"
 
 
 def test_import_loads_neither_numpy_nor_anything_else_heavy():

@@ -151,23 +151,6 @@ def test_what_is_no_calibration_is_refused_in_one_sentence(tmp_path, content):
     assert "\n" not in str(caught.value)
 
 
-def test_missing_binary_and_directory_are_told_apart(tmp_path):
-    with pytest.raises(CalibrationFileError, match="no such file"):
-        read_calibration(tmp_path / "none.json")
-    with pytest.raises(CalibrationFileError, match="directory"):
-        read_calibration(tmp_path)
-    (tmp_path / "b.json").write_bytes(b"\xff\xfe\x00\x01")
-    with pytest.raises(CalibrationFileError, match="not text"):
-        read_calibration(tmp_path / "b.json")
-
-
-def test_a_covariance_that_disagrees_with_a_sensor_is_not_written(session):
-    calibration = session[1].calibration
-    other = replace(calibration, covariance=2.0 * calibration.covariance)
-    with pytest.raises(ValueError, match="not its block"):
-        calibration_document(other)
-
-
 def test_unknown_extensions_survive(session):
     calibration = replace(
         session[1].calibration, extensions={"temperature": {"at_degc": 21.5, "rows": [[1, 2], [3, 4]]}}

@@ -1,6 +1,5 @@
 """Bytes to a log over a real pseudo-terminal, a socket, a file and a pipe; faults, clocks, gaps, refusals."""
 
-import errno
 import os
 import re
 import signal
@@ -16,7 +15,6 @@ from board import Board, counts_recording
 from trihedron.capture import (
     CaptureError,
     ClockFit,
-    DiskError,
     GrowingLog,
     Recorder,
     decoder_factory,
@@ -201,18 +199,6 @@ def test_a_full_disk_says_what_is_saved_and_leaves_a_whole_file(tmp_path):
     assert trihedron.read(log).n_samples == saved > 500
 
 
-def test_a_write_that_fails_for_another_reason_is_named(tmp_path):
-    log = GrowingLog(tmp_path / "log.csv")
-    log.begin({}, ["a"])
-    handle, log._handle = log._handle, os.open(tmp_path / "log.csv", os.O_RDONLY)
-    os.close(handle)
-    log.row("1", 0.0)
-    with pytest.raises(DiskError, match="refuses to write"):
-        log.flush(force=True)
-    log.abandon()
-    assert errno.EBADF
-
-
 def test_kill_9_loses_at_most_a_second_and_the_file_reads(tmp_path):
     log = tmp_path / "log.csv"
     with Board(counts_recording(6000, 1000.0), "xsens-mtdata2", speed=1.0, link=tmp_path / "tty") as board:
@@ -260,13 +246,6 @@ def test_bad_input_is_refused_in_one_sentence_with_status_1(words, sentence, tmp
     assert not (tmp_path / "log.csv").exists()
 
 
-def test_the_protocols_are_listed_without_a_port(capsys):
-    assert main(["capture", "--list"]) == 0
-    assert "xsens-mtdata2" in capsys.readouterr().out
-    assert main(["capture", "-o", "log.csv"]) == 1
-    assert "say what to read" in capsys.readouterr().err
-
-
 def test_a_silent_board_is_told_from_a_wrong_protocol():
     import pty
 
@@ -291,23 +270,6 @@ def test_a_busy_port_is_named_as_busy():
     os.close(slave)
 
 
-def test_a_port_without_permission_names_the_group_to_join(monkeypatch):
-    import pty
-
-    master, slave = pty.openpty()
-    name = os.ttyname(slave)
-
-    def refuse(*_args, **_options):
-        raise PermissionError(errno.EACCES, "Permission denied", name)
-
-    # The module itself: as an attribute `trihedron.capture` is the verb.
-    monkeypatch.setattr(sys.modules[open_source.__module__], "import_serial", lambda: refuse)
-    with pytest.raises(CaptureError, match=r"no permission to open .*usermod -aG \w+"):
-        open_source(name)
-    os.close(master)
-    os.close(slave)
-
-
 def test_what_a_board_says_at_start_is_no_frame(tmp_path):
     raw = tmp_path / "raw.txt"
     device = Device(counts_recording(100, 100.0), "lines-label", parse_faults("text"))
@@ -315,22 +277,3 @@ def test_what_a_board_says_at_start_is_no_frame(tmp_path):
     recorder, _ = capture(str(raw), tmp_path / "log.csv")
     assert recorder.count.tally.saved == 100
     assert recorder.count.corrupt <= 1
-
-
-@pytest.mark.parametrize(
-    ("names", "rows", "time", "unit"),
-    [
-        (None, [[str(10 * i), "1", "2", "3", "4", "5", "6"] for i in range(12)], 0, 1e-3),
-        (None, [[str(10_000 * i), "1", "2", "3", "4", "5", "6"] for i in range(12)], 0, 1e-6),
-        (("ax", "ay", "az", "t"), [["1", "2", "3", f"{0.01 * i:.2f}"] for i in range(12)], 3, 1.0),
-        (("micros", "ax", "ay", "az"), [[str(1000 * i), "1", "2", "3"] for i in range(12)], 0, 1e-6),
-    ],
-)
-def test_columns_of_lines_are_recognised_as_in_a_log(names, rows, time, unit):
-    found = column_namer()(names, rows)
-    assert (found.time, found.time_unit_s) == (time, pytest.approx(unit))
-
-
-def test_a_decoder_is_made_for_every_known_name_and_no_other():
-    with pytest.raises(CaptureError, match="no protocol 'x'"):
-        decoder_factory("x")

@@ -1,9 +1,6 @@
 """Facts of a channel, each found by one rule: the step of the converter, its noise, the limits it ends at."""
 
-import ast
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +8,6 @@ import pytest
 from trihedron.channel_facts.step import converter_step, converter_steps
 from trihedron.records import Recording
 
-PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
 SCALE = 9.80665 / 16384
 
 
@@ -198,60 +194,3 @@ def test_a_level_under_noise_is_a_possible_limit_unless_everything_stands_still_
     found = [one for one in possible if one.axis == 0 and one.is_high]
     assert len(found) == (0 if are_still else 1)
     assert all(abs(one.value - 1.0) < 5.0 * one.sigma for one in found)
-
-
-# Differences of distinct values that are not readings of a converter, or places on a grid whose step is known.
-OF_SOMETHING_ELSE = {
-    "estimate/noise/curve_covariance.py:_nodes",
-    "estimate/noise/planning.py:relative_sigma",
-    "diagnose/effects/quantisation.py:missing_codes",
-}
-
-
-def test_nobody_else_looks_for_a_step():
-    """Differences of sorted distinct values are how a step is found."""
-    elsewhere = {
-        f"{path.relative_to(PACKAGE)}:{node.name}"
-        for path in PACKAGE.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.FunctionDef) and is_difference_of_levels(node)
-    }
-    assert elsewhere == OF_SOMETHING_ELSE
-    # And the kernel that does is asked in one place.
-    asking = [path for path in PACKAGE.rglob("*.py") if "_core.converter_grid(" in path.read_text()]
-    assert [str(path.relative_to(PACKAGE)) for path in asking] == ["channel_facts/step.py"]
-
-
-def is_difference_of_levels(function):
-    """Whether a function takes differences of distinct values."""
-    named = {"levels"}
-    for node in ast.walk(function):
-        if isinstance(node, ast.Assign) and "np.unique(" in ast.unparse(node.value):
-            named |= {n.id for target in node.targets for n in ast.walk(target) if isinstance(n, ast.Name)}
-    for node in ast.walk(function):
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "np.diff" and node.args:
-            used = {n.id for n in ast.walk(node.args[0]) if isinstance(n, ast.Name)}
-            if used & named or "np.unique(" in ast.unparse(node.args[0]):
-                return True
-    return False
-
-
-def test_limits_are_decided_in_one_room_and_read_by_all_others():
-    def using(*words):
-        texts = ((str(path.relative_to(PACKAGE)), path.read_text()) for path in PACKAGE.rglob("*.py"))
-        return {name for name, text in texts if any(re.search(rf"\b{word}\b", text) for word in words)}
-
-    assert {name.split("/")[0] for name in using("readings_near", "find_limits", "is_end_of_word")} == {"channel_facts"}
-    outside = using(r"(facts|\))\.limits", "share_at_limits", "possible_limits")
-    assert {name for name in outside if not name.startswith(("channel_facts/", "records/"))} == {
-        "read/audit/readings.py",
-        "segment/recording.py",
-        "estimate/gyroscope/aligned_moves.py",
-        "estimate/gyroscope/clipping.py",
-        "estimate/noise/screening.py",
-        "diagnose/effects/plateaus.py",
-        "diagnose/effects/saturation.py",
-        "report/channels.py",
-        "pipeline/improving.py",
-        "simulate/unclipped.py",
-    }

@@ -110,15 +110,6 @@ def test_the_log_itself_is_never_overwritten_by_a_forgotten_argument(session, ca
     capsys.readouterr()
 
 
-def test_an_output_folder_that_is_missing_is_named(session, tmp_path, capsys):
-    assert "there is no folder" in refused(capsys, "calibrate", session / "log.csv", "-o", tmp_path / "no" / "c.json")
-
-
-def test_two_outputs_of_one_name_are_refused(session, tmp_path, capsys):
-    path = tmp_path / "x.json"
-    assert "two outputs" in refused(capsys, "calibrate", session / "log.csv", "-o", path, "--json", path)
-
-
 def test_units_that_a_calibration_does_not_map_are_refused(session, recording, tmp_path, capsys):
     other = tmp_path / "si.csv"
     in_si = replace(recording, accelerometer=recording.accelerometer * 6e-4, gyroscope=recording.gyroscope * 1.3e-4)

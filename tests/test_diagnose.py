@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from trihedron.diagnose import diagnose_recording
-from trihedron.diagnose.effects import catalogue
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.segment import resegment, segment_recording
@@ -64,43 +63,6 @@ def test_parameters_come_with_honest_errors_and_the_fit_improves_held_out():
     assert np.max(np.abs(z)) < 4.0
     held = effect.held_out[0]
     assert held.chi2_per_dof_after < 1.3 < held.chi2_per_dof_before
-
-
-def test_ids_of_the_catalogue_are_unique_and_published():
-    ids = [effect.id for effect in catalogue()]
-    assert len(ids) == len(set(ids))
-    published = [
-        "accel-quadratic",
-        "accel-cubic",
-        "accel-scale-asymmetry",
-        "accel-hysteresis",
-        "accel-thermal-bias",
-        "accel-thermal-scale",
-        "gyro-thermal-bias",
-        "gyro-thermal-scale",
-        "accel-hidden-drift",
-        "gyro-hidden-drift",
-        "gyro-g-sensitivity",
-        "gyro-scale-nonlinearity",
-        "gyro-saturation",
-        "accel-saturation",
-        "lever-arm",
-        "accel-size-effect",
-        "accel-gyro-time-offset",
-        "sensor-lag",
-        "dropped-samples",
-        "timing-jitter",
-        "earth-rate",
-        "vibration-rectification",
-        "periodic-interference",
-        "quantisation",
-        "supply-sensitivity",
-        "disturbed-pose",
-        "turn-angle-error",
-        "table-tilt",
-        "axis-handedness",
-    ]
-    assert set(published) <= set(ids)
 
 
 def test_missing_codes_are_counted_and_lost_ones_by_chance_are_not():

@@ -64,13 +64,6 @@ def said(folder):
     return status, json.loads(target.read_text()), page.read_text()
 
 
-def test_the_command_ends_with_zero_and_names_the_effect_though_physics_is_missing(said):
-    status, document, _ = said
-    assert status == 0
-    assert document["verdict"] == "missing-physics"
-    assert document["effects"][0]["id"] == "accel-quadratic"
-
-
 def test_the_json_follows_the_published_schema_and_has_the_fields_of_the_contract(said):
     _, document, _ = said
     assert complaint_about(document) == ""
@@ -121,11 +114,6 @@ def test_print_reads_as_a_short_report_and_python_gives_a_diagnosis(folder):
     assert "0x" not in repr(found)
 
 
-def test_json_alone_goes_to_stdout_and_nothing_else_does(folder, capsys):
-    assert main(["diagnose", str(folder / "healthy.csv"), *GRAVITY, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["verdict"] == "consistent"
-
-
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
@@ -146,9 +134,6 @@ def test_a_question_that_cannot_be_answered_is_refused_in_one_sentence(folder, c
 
 
 def test_the_users_own_simulation_is_the_model_and_its_difference_is_named(folder):
-    same = trihedron.diagnose(folder / "healthy.csv", against=folder / "simulated.csv", gravity_m_s2=9.80665)
-    assert same.model_is_given
-    assert same.verdict == "consistent"
     other = trihedron.diagnose(folder / "bent.csv", against=folder / "simulated.csv", gravity_m_s2=9.80665)
     assert other.effects[0].id == "accel-quadratic"
 
@@ -186,12 +171,6 @@ def test_an_extended_calibration_holds_on_another_session_where_the_linear_one_d
     capsys.readouterr()
     assert main(["export", str(extended), "--to", "c"]) == 0
     assert "cannot hold it: accel-quadratic" in capsys.readouterr().err
-
-
-def test_extended_is_refused_in_another_frame(folder, capsys):
-    status = main(["calibrate", str(folder / "bent.csv"), *GRAVITY, "--extended", "--frame", "symmetric"])
-    assert status == 1
-    assert "lower" in capsys.readouterr().err
 
 
 def test_what_cannot_be_taken_off_is_said(folder):
@@ -269,6 +248,7 @@ def test_every_accepted_effect_is_simulated_or_left_out_with_a_reason():
         assert done == (effect.id,) or left_out[effect.id]
 
 
+@pytest.mark.slow
 def test_the_worked_example_of_adding_an_effect_runs_as_it_stands(tmp_path):
     text = (Path(__file__).parents[1] / "docs" / "adding-an-effect.md").read_text()
     effect_file, script = re.findall(r"```python\n(.*?)```", text, re.S)
@@ -285,14 +265,6 @@ def test_the_worked_example_of_adding_an_effect_runs_as_it_stands(tmp_path):
     assert len(rows) == 3
     # Three standard normal numbers, one fixed seed: 4 sigma is passed by chance once in 5000.
     assert max(abs(float(value) - float(true)) / float(std) for _, _, value, std, true in rows) < 4.0
-
-
-def test_every_effect_the_documentation_says_is_taken_off_elsewhere_is_and_no_other():
-    text = (Path(__file__).parents[1] / "docs" / "diagnosis.md").read_text()
-    part = text.split("can be taken off another log:")[1].split("Effects\nof one session")[0]
-    named = set(re.findall(r"`([a-z-]+)`", part))
-    thermal = {f"{sensor}-thermal-{kind}" for sensor in ("accel", "gyro") for kind in ("bias", "scale")}
-    assert named | thermal == {effect.id for effect in catalogue() if effect.applies_elsewhere}
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,12 @@
 """Mistakes that simulators have made in noise and sampling, each told by its numbers."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from trihedron.diagnose.against import FittedModel, compare_numbers
-from trihedron.diagnose.against.mechanisms import ComparedEffects
 from trihedron.pipeline.comparing_correlation import correlation_times
 from trihedron.pipeline.comparing_noise import compare_noise, sampled
 from trihedron.records import Hold, Recording
@@ -112,27 +110,6 @@ def test_the_root_of_the_rate_is_that_of_the_model(real):
     assert "√400" in said(at_400_hz, real)["gyroscope", "N"]
 
 
-def test_scales_of_counts_and_of_si_are_compared_up_to_their_common_part_and_that_is_said():
-    si = numbers()
-    k = 820.0 * np.array([1.01, 0.99, 1.0])
-    sigma = np.r_[np.full(9, 1e-8), np.full(3, 1e-3), np.full(9, 1e-5), np.full(3, 1e-5)]
-    counts = replace(si, accel_S=np.diag(1.0 / k), accel_unit="counts", covariance=np.diag(sigma**2))
-    rows = [p for p in compare_numbers(si, counts, alpha=0.01).parameters if p.id == "accel-scale"]
-    relative = np.log(k) - np.log(k).mean()
-    assert [p.difference for p in rows] == pytest.approx(relative.tolist(), abs=1e-9)
-    assert all("relative to the mean of its three axes" in p.remark and "per g" in p.remark for p in rows)
-    assert not any(p.remark for p in compare_numbers(si, si, alpha=0.01).parameters)
-
-
-def test_an_arm_of_the_motion_is_no_difference_of_instruments_unless_a_misfit_asks_for_it():
-    def missing(id, share):
-        return ComparedEffects((SimpleNamespace(id=id, share=share),), (), ()).differ
-
-    assert not missing("lever-arm", 0.0)
-    assert missing("lever-arm", 0.4)
-    assert missing("sensor-lag", 0.0)
-
-
 def test_readings_without_steps_are_named_where_the_recordings_steps_matter():
     coarse = log(7, step=3e-3)
     found = said(log(8, step=0.0), coarse)
@@ -189,18 +166,3 @@ def test_a_step_of_a_quarter_of_the_noise_is_another_converter_and_digits_of_a_f
     assert said(counts(3, 1.0), fine) == {}
     # Readings that somebody corrected lie on no codes.
     assert said(counts(4, 1e-4, 0.1234), fine) == {}
-
-
-def test_a_distance_of_readings_far_below_the_noise_is_no_converter_of_theirs(real):
-    # Resampled readings: what two of them happen to differ by. The other log has steps of half its noise.
-    def with_steps(log, step):
-        noise = {s: tuple(replace(one, step=step * SENSORS[s]) for one in axes) for s, axes in log.noise.items()}
-        return replace(log, noise=noise)
-
-    coarse = with_steps(real, 0.5)
-    for chance in (0.0, 1e-8, 5e-5):
-        for pair in ((coarse, with_steps(real, chance)), (with_steps(real, chance), coarse)):
-            found = compare_noise(*pair, alpha=0.01)
-            assert not [n for n in found if n.term == "resolution" and n.significant], chance
-    finer = compare_noise(coarse, with_steps(real, 0.05), alpha=0.01)
-    assert [n for n in finer if n.term == "resolution" and n.significant]

@@ -12,8 +12,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 import trihedron
 from nuisance_trial.draw import G, draw
 from trihedron.diagnose.effects.quantisation import before_converter, missing_codes
-from trihedron.diagnose.residuals.within_holds import _dies_away
-from trihedron.diagnose.zeros.evidence import examine
 from trihedron.diagnose.zeros.process import ZeroReadings
 
 
@@ -32,28 +30,6 @@ def zeros(rng, temperature, scatter, walk, per_kelvin, n=24):
     )  # fmt: skip
 
 
-RISES = pytest.mark.parametrize("temperature", [lambda u: 12.0 * u, lambda u: 6.0 * (1.0 - np.cos(2.0 * np.pi * u))])
-
-
-def thermal_p(seed, temperature, **sizes):
-    found = examine(zeros(np.random.default_rng(seed), temperature, **sizes), [1])
-    return found.groups["thermal"].p_value
-
-
-@RISES
-def test_a_temperature_is_seen_among_scatter_though_a_drift_could_take_its_place(temperature):
-    # rms 3.5 per axis among 3 of scatter, 24 poses: about six standard errors on each of three axes.
-    p = [thermal_p(seed, temperature, scatter=3.0, walk=0.0, per_kelvin=[1.0, -1.0, 0.8]) for seed in range(8)]
-    assert max(p) < 1e-4
-
-
-@RISES
-def test_a_zero_that_walks_is_no_temperature(temperature):
-    p = [thermal_p(seed, temperature, scatter=1.0, walk=1.5, per_kelvin=[0.0, 0.0, 0.0]) for seed in range(24)]
-    # At 2 % (two looks at 1 %) four or more of 24 come by chance in 0.2 % of runs.
-    assert sum(v < 0.01 for v in p) <= 3
-
-
 @pytest.mark.parametrize(("flaw", "seed"), [("accel-thermal-bias", 8111100603), ("gyro-thermal-bias", 8111100504)])
 def test_a_straight_line_among_zeros_that_scatter_is_no_curve(flaw, seed, tmp_path):
     # Called quadratic, or with its rate of change, it paid for three numbers more and lost to a drift in time.
@@ -63,31 +39,12 @@ def test_a_straight_line_among_zeros_that_scatter_is_no_curve(flaw, seed, tmp_pa
     assert (first.id, first.model["variant"]) == (flaw, "linear")
 
 
-def still(rng, size_of, n=400, poses=20, rate_hz=200.0):
-    """Poses of 2 s, white noise of 1; in each a sinusoid of its own phase, at 4 ± 1 Hz where it dies away."""
-    t, out = np.arange(n) / rate_hz, []
-    for k in range(poses):
-        f = rng.uniform(3.0, 5.0) if size_of is ring else 4.0
-        wave = size_of(t) * np.sin(2.0 * np.pi * (f * t + rng.random()))
-        out.append((k * n, (wave + rng.normal(size=n))[:, None]))
-    return out
-
-
 def ring(t):
     return 2.0 * np.exp(-t / 0.4)
 
 
 def line(t):
     return np.full(len(t), 0.35)
-
-
-def test_the_ring_of_a_support_dies_away_and_a_faint_line_does_not():
-    rng = np.random.default_rng(8)
-    rings, lines = (
-        sum(_dies_away(still(rng, size_of), 0, 4.0 / 200.0, 1.0) for _ in range(30)) for size_of in (ring, line)
-    )
-    # The line carries 6 % of the variance (0.03 is the least that is named), 12 times the noise in its band.
-    assert (rings, lines) == (30, 0)
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,13 @@
 """The catalogue of findings is closed: stages give codes and values, every sentence stands under report/."""
 
 import ast
-import re
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from trihedron.records import Finding, FindingCode, Severity
-from trihedron.records.words import words
 from trihedron.report.findings.catalogue import CATALOGUE, ENTRIES
 from trihedron.report.findings.page import page
-from trihedron.report.findings.phrases import PHRASES
-from trihedron.report.findings.wording import filled
 
 PACKAGE = Path(__file__).parents[1] / "python" / "trihedron"
 
@@ -99,50 +94,6 @@ def test_no_finding_is_written_outside_the_report():
                 assert not isinstance(part, ast.JoinedStr), f"{name}:{node.lineno}"
 
 
-def test_a_sentence_ends_and_says_what_to_do_about_a_warning():
-    for entry in ENTRIES:
-        assert entry.seen.rstrip().endswith((".", "}", "--turns")), entry
-        if entry.severity is not Severity.NOTE:
-            assert entry.cause or entry.action, entry
-
-
-@pytest.mark.parametrize(
-    ("template", "value", "words"),
-    [
-        ("{x:.3g mm/s²}", 0.0123456, "12.3 mm/s²"),
-        ("{x:.2g !%} ± 1 %", 0.123, "12 ± 1 %"),
-        ("{x:.1f deg}", np.pi / 2, "90.0 deg"),
-        ("{x:abs .1f}", -2.04, "2.0"),
-        ("{x:# hold}", 1, "1 hold"),
-        ("{x:# hold}", 3, "3 holds"),
-        ("{x:# stretch}", 2, "2 stretches"),
-        ("{x:?once|{x} times}", 1, "once"),
-        ("{x:?once|{x} times}", 4, "4 times"),
-        ("{x:?as you said|by its names}", True, "as you said"),
-        ("{x:?as you said|by its names}", False, "by its names"),
-        ("{x:<below|above}", -0.1, "below"),
-        ("{x:<below|above}", 0.1, "above"),
-        ("{x:&, the }", ["a", "b"], "a, the b"),
-        ("{x:and}", ["x", "y", "z"], "x, y and z"),
-        ("{x:numbered}", ["tilt", "turn"], "(1) tilt; (2) turn"),
-        ("{x:first 3}", [1, 2, 3, 4], "1, 2, 3 ..."),
-        ("{x:first 3}", [1, 2, 3], "1, 2, 3"),
-        ("{x:each}", [("x", 1.25), ("z", 2.0)], "x at 1.2, z at 2.0"),
-        ("{x}", "as it is", "as it is"),
-    ],
-)
-def test_a_place_becomes_words_as_its_rule_says(template, value, words):
-    assert filled(template, {"x": value}, {"x": "{v0} at {v1:.1f}"}) == words
-
-
-def test_a_unit_that_a_place_leaves_out_stands_behind_a_later_number_of_the_same_sentence():
-    for text in [part for entry in ENTRIES for part in (entry.seen, entry.cause, entry.action)]:
-        for left_out in re.finditer(r" ![^}]+\}", text):
-            unit = left_out[0][2:-1]
-            near = text[left_out.end() : left_out.end() + 40]
-            assert f" {unit}" in near or near.startswith(unit), text
-
-
 def test_a_finding_carries_its_numbers_for_machines():
     found = Finding.of(FindingCode.FEW_POSES, holds=np.int64(1), duration_s=np.float64(12.5), needed=9)
     assert found.seen.startswith("1 still pose found in 12.5 s")
@@ -150,37 +101,6 @@ def test_a_finding_carries_its_numbers_for_machines():
     assert dict(found.numbers) == {"holds": 1.0, "duration_s": 12.5, "needed": 9.0}
 
 
-def test_what_is_not_a_number_is_no_figure_that_a_file_would_choke_on():
-    found = Finding.of(FindingCode.FEW_POSES, holds=np.inf, duration_s=np.nan, needed=9, numbers={"of_x": -np.inf})
-    assert dict(found.numbers) == {"needed": 9.0}
-
-
-def test_a_value_that_is_missing_or_a_case_that_is_not_there_is_refused():
-    with pytest.raises(KeyError):
-        Finding.of(FindingCode.FEW_POSES, holds=1)
-    with pytest.raises(KeyError):
-        Finding.of(FindingCode.FEW_POSES, "no such case", holds=1, duration_s=1.0, needed=9)
-
-
 def test_the_documents_list_the_catalogue_as_it_is():
     documented = (Path(__file__).parents[1] / "docs" / "findings.md").read_text()
     assert documented == page(), "python -m trihedron.report.findings.page > docs/findings.md"
-
-
-def test_every_phrase_is_chosen_somewhere_and_every_chosen_one_is_in_the_catalogue():
-    written = "\n".join(path.read_text() for path in PACKAGE.rglob("*.py") if path.name != "phrases.py")
-    rust = "\n".join(path.read_text() for path in (PACKAGE.parents[1] / "rust" / "gauss_newton").rglob("*.rs"))
-    assert {name for name in PHRASES if f'"{name}"' not in written + rust} == set()
-    chosen = set(re.findall(r'\b(?:words|phrase)\(\s*"([a-z-]+)"', written))
-    assert len(chosen) > 30
-    assert chosen <= set(PHRASES)
-
-
-def test_a_value_with_words_of_its_own_is_refused():
-    # What `stages_write_no_words` (conftest) watches in every test.
-    refused = pytest.raises(AssertionError, match="weakest")
-    with refused:
-        Finding.of(FindingCode.WEAKLY_OBSERVABLE, "kalman-norm", weakest="the second axis", condition=200.0)
-    chosen = words("zero-of-axis", axis=2)
-    seen = Finding.of(FindingCode.WEAKLY_OBSERVABLE, "kalman-norm", weakest=chosen, condition=200.0).seen
-    assert "zero of axis 2" in seen

@@ -13,10 +13,7 @@ import trihedron
 from hand_made_sessions import G, Instrument, recorded
 from trihedron.cli import main
 from trihedron.fleet import find_jobs, running, summarise
-from trihedron.fleet import work as fleet_work
 from trihedron.fleet.work import work
-from trihedron.records.checked import WrongTypeError
-from trihedron.refused import RefusedError
 
 
 @pytest.fixture(scope="module")
@@ -95,13 +92,6 @@ def test_devices_are_named_by_the_folder_or_by_an_expression(logs):
         find_jobs(logs / "nowhere", {})
 
 
-def test_an_archive_of_several_devices_is_one_log_a_device(tmp_path):
-    np.savez(tmp_path / "board.npz", counts=np.zeros((50, 3, 6), dtype=np.int16), t_s=np.arange(50) / 50.0)
-    jobs = find_jobs(tmp_path, {})
-    assert [job.serial for job in jobs] == ["device 1", "device 2", "device 3"]
-    assert len({job.key for job in jobs}) == 3
-
-
 def test_a_defect_of_the_program_is_a_row_and_is_tried_again(logs, tmp_path, monkeypatch):
     def defect(*_args, **_options):
         raise ZeroDivisionError("by nothing")
@@ -174,20 +164,3 @@ def test_the_command_writes_table_and_page_and_says_where(logs, done, capsys):
     assert "fleet.parquet" in said.err
     assert main(["fleet", str(Path(out) / "nothing*.csv"), "--out", str(out)]) == 1
     assert "no log was found" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("error", "status"),
-    [
-        (RefusedError("the log holds no still pose."), "refused"),
-        (WrongTypeError("rate_hz is a number."), "refused"),
-        (FileNotFoundError(2, "No such file"), "refused"),
-        (ValueError("operands could not be broadcast together"), "crashed"),
-    ],
-)
-def test_a_defect_met_in_one_log_is_not_called_a_refusal(monkeypatch, error, status):
-    def fails(*_):
-        raise error
-
-    monkeypatch.setattr(fleet_work, "_calibrated", fails)
-    assert fleet_work.work("a.csv", None, {})["status"] == status

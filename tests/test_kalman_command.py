@@ -8,8 +8,8 @@ import pytest
 import trihedron
 from trihedron.cli import main
 from trihedron.read import ReadError, read_axis_noise
-from trihedron.records import DIVIDING_HEAD_ANGLES_DEG, AxisNoise
-from trihedron.simulate import Accelerometer, Adc, Clock, NoiseTerms, Scenario, dividing_head, long_rest, simulate
+from trihedron.records import DIVIDING_HEAD_ANGLES_DEG
+from trihedron.simulate import Accelerometer, Clock, NoiseTerms, Scenario, dividing_head, long_rest, simulate
 
 S_TRUE = ((0.98, 0.01, -0.02), (0.005, 1.03, 0.008), (-0.01, 0.012, 0.99))
 B_TRUE = (0.2, -0.3, 0.1)
@@ -67,12 +67,6 @@ def test_without_angles_the_length_of_gravity_is_used_and_pictures_are_drawn(ses
     assert page.read_text().count("<figure id=") == 3
 
 
-def test_a_report_with_angles_has_a_picture_per_axis_and_three_more(session, tmp_path):
-    page = tmp_path / "report.html"
-    assert run(session, "--reference", session / "angles.csv", "--report", page) == 0
-    assert page.read_text().count("<figure id=") == 6
-
-
 def test_the_noise_may_be_a_log_of_rest(session, tmp_path, capsys):
     accelerometer = Accelerometer(noise=NoiseTerms(N=(0.01,) * 3, K=(0.001,) * 3))
     scenario = Scenario(motion=long_rest(1200.0), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
@@ -107,28 +101,6 @@ def test_a_log_of_rest_in_counts_of_another_range_is_refused(session, tmp_path, 
     assert "another converter, range or unit" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("noise", [0.01 / 28, 0.0025, 0.1])
-def test_a_log_of_rest_with_the_noise_of_another_converter_is_refused(session, tmp_path, capsys, noise):
-    rest = rest_log(tmp_path / "rest.csv", noise=NoiseTerms(N=(noise,) * 3))
-    assert run(session, "--reference", session / "angles.csv", "--noise", rest) == 1
-    said = capsys.readouterr().err
-    assert "another converter" in said
-    assert "accelerometer x" in said
-
-
-def test_a_log_of_rest_in_finer_steps_than_the_session_is_refused(session, tmp_path, capsys):
-    accelerometer = Accelerometer(S=S_TRUE, b=B_TRUE, noise=NoiseTerms(N=(1e-4,) * 3), adc=Adc(lsb=0.05))
-    scenario = Scenario(motion=dividing_head(), accelerometer=accelerometer, clock=Clock(rate_hz=25.0))
-    recording = simulate(scenario, seed=4)[0]
-    log = tmp_path / "coarse.csv"
-    rows = np.column_stack([recording.time_s, recording.accelerometer])
-    np.savetxt(log, rows, delimiter=",", header="t,ax,ay,az", comments="", fmt="%.7g")
-    rest = rest_log(tmp_path / "rest.csv", noise=NoiseTerms(N=(1e-4,) * 3))
-    words = ["kalman", log, "--reference", session / "angles.csv", "--gravity", "9.80665", "--noise", rest]
-    assert main([*map(str, words)]) == 1
-    assert "steps of 0.05" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -161,9 +133,3 @@ def test_a_noise_file_that_cannot_be_used_is_refused_in_plain_words(tmp_path, te
     path.write_text(text)
     with pytest.raises(ReadError, match=message):
         read_axis_noise(path)
-
-
-def test_a_noise_file_gives_one_number_or_three(tmp_path):
-    path = tmp_path / "noise.json"
-    path.write_text('{"white": 0.5, "walk": [1, 2, 3]}')
-    assert read_axis_noise(path)[2] == AxisNoise(white=0.5, walk=3.0)

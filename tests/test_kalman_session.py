@@ -91,15 +91,6 @@ def test_hold_numbers_pick_still_poses_and_a_mismatch_is_said(head, table):
         )
 
 
-def test_slow_noise_shows_only_when_it_is_not_modelled(table):
-    recording, segments = head_session(2, walk=0.001)
-    assumed = {f.code for f in calibrate_session(recording, segments, table).findings}
-    right = AxisNoise(white=0.005, walk=0.001)
-    modelled = calibrate_session(recording, segments, table, noise=right)
-    assert FindingCode.INNOVATIONS_COLOURED in assumed
-    assert FindingCode.INNOVATIONS_COLOURED not in {f.code for f in modelled.findings}
-
-
 def test_a_coarse_converter_is_charged_with_its_step():
     recording, segments = head_session(3, adc=0.37, noise=0.001)
     noise = noise_from_holds(recording, segments)
@@ -146,13 +137,6 @@ def test_the_filter_agrees_with_the_batch_fit_on_xsens_mti(real_data):
     assert_agrees_with_batch_fit(*poses_of(recording, segment_recording(recording)), 9.81744)
 
 
-def test_the_filter_agrees_with_the_batch_fit_on_ctu(real_data):
-    means = np.loadtxt(real_data / "ctu" / "measured_accelerations.csv", delimiter=",", skiprows=1)
-    # The residuals of the 24 published means are about 4 mm/s²; no noise is published.
-    sigma = np.full(means.shape, 4e-4)
-    assert_agrees_with_batch_fit(means, sigma, 10.0 * np.arange(24), np.full(24, 5.0), 9.81)
-
-
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -168,15 +152,6 @@ def test_a_pose_table_is_read_by_its_header(tmp_path, text, expected):
     path.write_text(text)
     table = read_pose_table(path, gravity_m_s2=GRAVITY)
     np.testing.assert_allclose(table.specific_force / GRAVITY, expected, atol=1e-12)
-
-
-def test_a_pose_table_may_say_which_pose_and_when(tmp_path):
-    path = tmp_path / "poses.csv"
-    path.write_text("hold,start_s,stop_s,pitch,roll\n1,0.0,2.0,0,0\n4,3.0,5.5,90,0\n")
-    table = read_pose_table(path, gravity_m_s2=GRAVITY, sigma_angle_deg=0.1)
-    np.testing.assert_array_equal(table.hold, [0, 3])
-    np.testing.assert_array_equal(table.stop_s, [2.0, 5.5])
-    assert table.sigma_m_s2 == pytest.approx(GRAVITY * np.radians(0.1))
 
 
 @pytest.mark.parametrize(
@@ -224,10 +199,3 @@ def test_identified_noise_is_taken_in_the_raw_unit():
     assert noise_from_identified(axes, "m/s^2")[1] == AxisNoise(
         white=0.02, walk=0.001, ramp=1e-6, resolution=0.001, sample_sigma=0.02
     )
-
-
-def test_identified_noise_in_another_unit_or_of_other_axes_is_refused():
-    with pytest.raises(ValueError, match="in m/s\\^2 and the log in counts"):
-        noise_from_identified([Identified(n, "m/s^2", {"N": 0.02}) for n in "xyz"], "counts")
-    with pytest.raises(ValueError, match="three accelerometer axes"):
-        noise_from_identified([Identified("only", "m/s^2", {"N": 0.02})], "m/s^2")

@@ -13,7 +13,6 @@ from trihedron.pipeline import noise as noise_of
 from trihedron.records import Recording
 from trihedron.report.noise import noise_report
 from trihedron.report.noise_files import curve_csv
-from trihedron.report.noise_units import customary
 from trihedron.units import RateUnit
 
 RATE = 50.0
@@ -118,25 +117,6 @@ def test_the_size_of_a_count_gives_a_log_in_counts_its_units(tmp_path, capsys):
     assert "number and a unit" in capsys.readouterr().err
 
 
-def test_what_the_axes_have_in_common_is_said_once(tmp_path, capsys):
-    rng = np.random.default_rng(34)
-    x = rng.normal(size=(60_000, 3))
-    x[1:] = 0.5 * (x[1:] + x[:-1])
-    path = tmp_path / "coloured.npy"
-    np.save(path, x)
-    main(["allan", str(path), "--columns", "gx,gy,gz", "--rate", "100", "--gyro-unit", "rad/s", "--stream"])
-    out, _ = capsys.readouterr()
-    assert out.index("coloured") < out.index("N  white")
-    assert out.count("a low-pass filter in the sensor") == 1
-
-
-def test_excluded_stretches_are_said_and_left_out(log, capsys):
-    assert main(["allan", str(log), "--exclude", "100:200", "--exclude", "150:300", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["excluded_s"] == [[100.0, 300.0]]
-    assert main(["allan", str(log), "--exclude", ":60", "--exclude", "3500:", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["excluded_s"] == [[0.0, 60.0], [3500.0, 3600.0]]
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -166,13 +146,3 @@ def test_lost_rows_become_missing_readings_not_shorter_time():
     assert found.axes[0].value("N") == pytest.approx(np.radians(1e-3), rel=0.02)
     assert "°/√h" in str(noise_report(found))
     assert curve_csv(found).startswith("tau_s,cluster,gyro_x_deviation[rad/s]")
-
-
-def test_customary_units_are_those_of_the_field():
-    # 0.1 °/√h is 2.909e-5 rad/s/√Hz; 100 µg/√Hz-class constants likewise by hand.
-    name, unit, factor = customary("N", "rad/s")
-    assert (name, unit) == ("angle random walk", "°/√h")
-    assert factor * 2.9088821e-5 == pytest.approx(0.1, rel=1e-7)
-    assert customary("B", "rad/s")[2] * np.radians(1.0) / 3600 == pytest.approx(1.0)
-    assert customary("B", "m/s^2")[2] * 9.80665e-6 == pytest.approx(1.0)
-    assert customary("N", "counts") is None

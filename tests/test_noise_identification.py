@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy.fft import dct
 from scipy.stats import chi2
 
 from noise_series import fractional, series
 from trihedron.estimate.noise import identify_noise
-from trihedron.estimate.noise.spectrum import cosine_transform, line_coefficients, ordinates
-from trihedron.estimate.noise.terms import gauss_markov_density
+from trihedron.estimate.noise.spectrum import ordinates
 from trihedron.records.finding import FindingCode, Severity
 from trihedron.records.noise import TermName
 
@@ -106,13 +104,6 @@ def test_a_gauss_markov_process_is_told_from_flicker_and_walk():
     assert axis.gauss_markov.sigma_process == pytest.approx(sigma, rel=0.25)
 
 
-def test_the_density_of_a_gauss_markov_process_keeps_its_digits_at_long_times():
-    step, time = 1e-3, 1e5
-    f = np.array([1e-6, 1e-3, 1.0])
-    # Far below Nyquist it is the continuous Lorentzian: relative error (step/time)² and (π f step)²/3.
-    assert gauss_markov_density(f, step, time) == pytest.approx(2 * time / (1 + (2 * np.pi * f * time) ** 2), rel=1e-5)
-
-
 @pytest.fixture(scope="module")
 def quiet():
     return series(np.random.default_rng(26), 300_000, RATE, N=1e-3, K=3e-5)
@@ -205,22 +196,6 @@ def test_excluded_stretches_do_not_count(quiet):
     assert not noise.axes[0].terms[TermName.RATE_RAMP].is_present
 
 
-def test_missing_readings_are_no_obstacle(quiet):
-    lossy = quiet.copy()
-    lossy[np.random.default_rng(2).random(len(lossy)) < 0.01] = np.nan
-    axis = identify_noise(lossy, RATE).axes[0]
-    assert present(axis) == {"N", "K"}
-    assert axis.value("N") == pytest.approx(1e-3, rel=0.02)
-
-
-def test_the_cosine_transform_is_the_orthonormal_one():
-    rng = np.random.default_rng(27)
-    for n in (2, 3, 16, 101):
-        x = rng.normal(size=(3, n))
-        assert cosine_transform(x) == pytest.approx(dct(x, norm="ortho", axis=1), abs=1e-12)
-    assert line_coefficients(50, np.arange(1, 50)) == pytest.approx(dct(np.arange(50.0), norm="ortho")[1:], abs=1e-11)
-
-
 def test_ordinates_have_the_expectations_of_the_basis():
     rng = np.random.default_rng(28)
     n, runs = 4096, 600
@@ -240,36 +215,6 @@ def test_ordinates_have_the_expectations_of_the_basis():
         for start in (16, 128, 1024):
             group = ratio[start : 2 * start]
             assert abs(group.mean() - 1.0) < 4.5 * np.sqrt(2.0 / runs / start), (k, start, group.mean())
-
-
-def test_variance_of_a_mean_is_what_means_scatter_by():
-    rng = np.random.default_rng(29)
-    n = 60_000
-    x = series(rng, n, RATE, N=1e-2, K=2e-3)
-    axis = identify_noise(x, RATE).axes[0]
-    window, session = 5.0, n / RATE
-    scatter = []
-    for _ in range(40):
-        means = series(rng, n, RATE, N=1e-2, K=2e-3).reshape(-1, int(window * RATE)).mean(axis=1)
-        scatter.append(np.mean((means - means.mean()) ** 2))
-    truth = 1e-4 * (1 / window - 1 / session) + 4e-6 * (session - window) / 6
-    assert np.mean(scatter) == pytest.approx(truth, rel=4 * np.std(scatter) / np.mean(scatter) / np.sqrt(40))
-    # The identified K is within 20 % here; its square enters.
-    assert axis.variance_of_mean(window, session) == pytest.approx(truth, rel=0.4)
-    assert axis.variance_of_mean(window) == pytest.approx(1e-4 / window + 4e-6 * window / 3, rel=0.4)
-
-
-def test_the_best_averaging_time_is_that_of_the_terms(published_setting):
-    # Of the most likely sum of all terms: one that is not named may still have a share in it.
-    times = np.geomspace(0.01, 5500.0, 20_000)
-    for axis in published_setting:
-        tau, deviation = axis.optimal_averaging()
-        Q, N, B, K = (axis.fitted(symbol) for symbol in "QNBK")
-        curve = 3 * (Q / times) ** 2 + N**2 / times + 2 * np.log(2) / np.pi * B**2 + K**2 * times / 3
-        assert tau == pytest.approx(times[np.argmin(curve)], rel=0.02)
-        assert deviation == pytest.approx(np.sqrt(curve.min()), rel=1e-3)
-        # The published N and K foretell it to what a tenth of K, and B within its interval, leave.
-        assert deviation == pytest.approx(np.sqrt(2 * 2.502e-3 * 6.972e-5 / np.sqrt(3)), rel=0.15)
 
 
 @pytest.mark.parametrize(

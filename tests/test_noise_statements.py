@@ -10,22 +10,11 @@ from scipy.optimize import brentq, minimize
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from noise_series import series
-from noise_trial.generator import agree, by_spectrum, in_time
+from noise_trial.generator import in_time
 from trihedron import _core
-from trihedron.estimate.noise import allan_deviation, identify_noise, stream_allan_deviation
+from trihedron.estimate.noise import identify_noise
 from trihedron.records.finding import FindingCode
 from trihedron.records.noise import TermName
-
-
-def test_both_generators_of_the_bench_have_one_spectrum():
-    rng = np.random.default_rng(60)
-    logs = [[make(rng, 2048, 100.0, N=1e-2, B=5e-3, K=3e-3) for _ in range(60)] for make in (in_time, by_spectrum)]
-    one, two = (np.mean([np.abs(np.fft.rfft(x * np.hanning(2048))) ** 2 for x in part], axis=0) for part in logs)
-    for start in (8, 64, 512):
-        ratio = one[start : 2 * start].sum() / two[start : 2 * start].sum()
-        # 60 spectra of `start` ordinates, half of them independent under the window; 1 % ripple of the bank.
-        assert ratio == pytest.approx(1.0, abs=4.5 * np.sqrt(4 / 60 / start) + 0.01)
-    assert callable(agree)
 
 
 def slow_deviance(bins, strength):
@@ -92,13 +81,6 @@ def test_the_inverted_likelihood_is_that_of_a_slow_search(small_bins):
     assert found.rise_without_pair == pytest.approx(pair, abs=2e-3)
 
 
-def test_the_ramp_is_a_mixture_over_the_walk(small_bins):
-    found = _core.SpectralBins(*small_bins).invert(4.6, (1, 2), 2, 0.025)
-    assert found.slope_lower < 2.0 < found.slope_upper
-    assert found.slope_lower < found.slope < found.slope_upper
-    assert 0.0 <= found.slope_tail <= 1.0
-
-
 def test_intervals_hold_whatever_is_named():
     rng = np.random.default_rng(62)
     truth = {"N": 1e-2, "B": 3e-3, "K": 6e-4}
@@ -127,19 +109,6 @@ def test_white_and_walk_near_their_limit_do_not_become_flicker_or_a_ramp():
     # Before: B or a ramp in 19 of 60. Four false names at 0.5 % each have a probability of 1e-3.
     assert invented <= 3
     assert slow >= 25
-
-
-@pytest.mark.parametrize("level", [1e6, -1e9])
-def test_a_large_level_costs_no_digits_but_those_it_rounds_away(level):
-    x = 1e-3 * np.random.default_rng(64).standard_normal(100_000)
-    clusters = [1, 30, 1000, 30_000]
-    there = allan_deviation(x + level, 100.0, clusters).deviation
-    here = allan_deviation((x + level) - level, 100.0, clusters).deviation
-    # The readings are the same to the last bit once the level is off: sums of 1e5 of them keep ten digits.
-    assert there == pytest.approx(here, rel=1e-9)
-    parts = np.array_split((x + level)[:, np.newaxis], 7)
-    assert stream_allan_deviation(parts, 100.0, clusters).deviation[:, 0] == pytest.approx(here, rel=1e-9)
-    assert identify_noise(x + level, 100.0).axes[0].value("N") == pytest.approx(1e-4, rel=0.01)
 
 
 @pytest.mark.parametrize("truth", [{"N": 1e-2, "K": 6e-4}, {"N": 1e-3, "B": 2e-2}, {"N": 1e-3, "K": 2e-2}])

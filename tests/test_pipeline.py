@@ -32,20 +32,6 @@ def result(recording):
     return trihedron.calibrate(recording, gravity_m_s2=STANDARD_GRAVITY_M_S2)
 
 
-def test_the_verbs_of_the_package_stay_verbs_when_rooms_of_that_name_are_imported():
-    importlib.import_module("trihedron.read")
-    importlib.import_module("trihedron.segment")
-    importlib.import_module("trihedron.simulate")
-    assert callable(trihedron.read)
-    assert callable(trihedron.segment)
-    from trihedron.read import ReadError
-
-    assert issubclass(ReadError, ValueError)
-    assert set(trihedron.__all__) <= set(dir(trihedron))
-    with pytest.raises(AttributeError, match="nonsense"):
-        _ = trihedron.nonsense
-
-
 def test_errors_over_their_error_bars_are_standard_normal(scenario):
     """12 sessions of 21 parameters each, every stage included: segmentation, both sensors, the joint fit.
 

@@ -4,14 +4,12 @@ import gzip
 import hashlib
 import importlib
 import os
-import threading
 
 import numpy as np
 import polars as pl
 import pytest
 
 from trihedron.read import ReadError, read_recording
-from trihedron.read.digest import LateSha256
 from trihedron.records import FindingCode, Recording, Severity
 from trihedron.units import AccelerationUnit, RateUnit
 
@@ -127,20 +125,6 @@ def test_numpy_files_give_the_numbers_that_were_saved(tmp_path):
     assert_same(read_recording(tmp_path / "c.npy"), table)
 
 
-def test_an_archive_of_several_devices_asks_which(tmp_path):
-    table = readings()
-    both = np.stack([table[:, 1:] + 1.0, table[:, 1:]], axis=1)
-    path = tmp_path / "two.npz"
-    np.savez(path, t_s=table[:, 0], counts=both)
-    with pytest.raises(ReadError, match=r"holds 2 devices .* --device, 1 to 2"):
-        read_recording(path)
-    assert_same(read_recording(path, device=2), table)
-    with pytest.raises(ReadError, match="no device 3"):
-        read_recording(path, device=3)
-    with pytest.raises(ReadError, match="leave --device out"):
-        read_recording(write(tmp_path / "log.csv", table), device=1)
-
-
 def test_comments_and_blank_lines_between_rows_are_passed_over_and_lines_still_counted(tmp_path):
     table = readings(40)
     rows = [",".join(map(repr, map(float, row))) for row in table]
@@ -215,39 +199,6 @@ def test_other_columns_are_kept_aside_untouched(tmp_path):
 def test_the_hash_is_that_of_the_file(tmp_path):
     path = write(tmp_path / "log.csv", readings())
     assert read_recording(path).sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def test_a_late_digest_is_of_the_bytes_that_were_read(tmp_path):
-    path = tmp_path / "log.csv"
-    data = bytes(range(256)) * 10_000
-    path.write_bytes(data)
-    first = 2_000_001
-    late = LateSha256(path, path.open("rb", buffering=0), first)
-    with path.open("ab") as stream:
-        stream.write(b"appended")
-    assert late.hexdigest() == hashlib.sha256(data[:first]).hexdigest() == late.hexdigest()
-    short = LateSha256(path, path.open("rb", buffering=0), len(data) + 100)
-    with pytest.raises(ReadError, match="became shorter"):
-        short.hexdigest()
-    closed = path.open("rb", buffering=0)
-    closed.close()
-    with pytest.raises(ValueError, match="closed"):
-        LateSha256(path, closed, first).hexdigest()
-
-
-def test_nobody_waits_for_the_digest_of_a_refused_log(tmp_path):
-    path = tmp_path / "log.csv"
-    path.write_bytes(b"")
-    os.truncate(path, 1 << 33)
-    stream = path.open("rb", buffering=0)
-    late = LateSha256(path, stream, 1 << 33)
-    threads = [thread for thread in threading.enumerate() if thread.name == "digest"]
-    assert threads
-    del late
-    for thread in threads:
-        thread.join(5.0)
-        assert not thread.is_alive()
-    assert stream.closed
 
 
 @pytest.mark.parametrize(

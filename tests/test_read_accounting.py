@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from test_read import HEADER, codes, finding, readings, write
+from test_read import HEADER, codes, readings, write
 from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.read import ReadError, read_recording
 from trihedron.records import FindingCode, Severity
@@ -59,13 +59,6 @@ def test_two_devices_in_one_table_are_listed_and_chosen_and_never_merged(tmp_pat
         read_recording(path, instance=7)
 
 
-def test_one_device_in_such_a_column_is_read_without_a_question(tmp_path):
-    table = readings(50)
-    lines = [f"{k * 10000},0,{','.join(map(repr, map(float, row[1:])))}" for k, row in enumerate(table)]
-    recording = read_recording(text(tmp_path, "TimeUS,I,AccX,AccY,AccZ,GyrX,GyrY,GyrZ\n" + "\n".join(lines) + "\n"))
-    assert recording.n_samples == 50
-
-
 @pytest.mark.parametrize("cut", [2999, 100, 30])
 @pytest.mark.parametrize("change", ["separator", "column"])
 def test_a_layout_that_changes_inside_the_file_is_refused_with_its_lines(tmp_path, cut, change):
@@ -78,45 +71,11 @@ def test_a_layout_that_changes_inside_the_file_is_refused_with_its_lines(tmp_pat
         read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
 
 
-def test_a_few_lines_of_numbers_above_the_table_are_reported_and_counted(tmp_path):
-    table = readings(100)
-    recording = read_recording(text(tmp_path, "1.0 0.0 0.0\n0.0 1.0 0.0\n" + HEADER + "\n".join(rows_of(table)) + "\n"))
-    assert recording.n_samples == 100
-    assert recording.rows_in_file == 102
-    assert finding(recording, FindingCode.ROWS_LEFT_OUT).numbers["rows_left_out"] == 2
-    assert accounts(recording)
-
-
-def test_a_damaged_first_row_is_not_taken_for_a_preamble(tmp_path):
-    lines = rows_of(readings(50))
-    lines[0] = "0.0;garbage"
-    recording = read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
-    assert recording.rows_in_file == 50
-    assert recording.rows_reported == 1
-    assert accounts(recording)
-
-
-@pytest.mark.parametrize("separator", [",", "\t"])
-def test_a_row_without_a_number_below_the_names_is_counted(tmp_path, separator):
-    lines = rows_of(readings(50), separator)
-    lines[0] = 6 * separator
-    recording = read_recording(text(tmp_path, HEADER.replace(",", separator) + "\n".join(lines) + "\n"))
-    assert recording.rows_in_file == 50
-    assert accounts(recording)
-
-
 def test_a_column_that_disappears_after_a_few_rows_is_refused(tmp_path):
     table = readings(50)
     lines = rows_of(table[:13]) + rows_of(table[13:, :6])
     with pytest.raises(ReadError, match="13 lines of numbers from line 2 on have another layout"):
         read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
-
-
-def test_rows_behind_a_remark_sign_are_counted(tmp_path):
-    lines = rows_of(readings(50))
-    lines[20] = "#" + lines[20]
-    recording = read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n"))
-    assert (recording.n_samples, recording.rows_reported, recording.rows_in_file) == (49, 1, 50)
 
 
 def test_a_quote_never_hides_a_missing_field(tmp_path):
@@ -167,15 +126,6 @@ def test_a_gyro_whose_time_base_is_a_hundred_times_off_is_not_believed():
     assert scale_findings(S, RateUnit.COUNTS) == []
 
 
-def test_an_incomplete_last_line_and_copied_rows_are_in_the_account(tmp_path):
-    lines = rows_of(readings(50))
-    lines.insert(20, lines[19])
-    recording = read_recording(text(tmp_path, HEADER + "\n".join(lines) + "\n0.5,1.0"))
-    assert recording.rows_in_file == 52
-    assert recording.n_samples == 50
-    assert accounts(recording)
-
-
 def test_two_files_account_for_the_rows_of_both(tmp_path):
     table = readings(200)
     acc = write(tmp_path / "acc.csv", table[:150, :4], "t,x,y,z\n")
@@ -206,23 +156,6 @@ def test_a_foreign_format_is_named_with_the_way_in(tmp_path, content, complaint)
     assert "\n" not in str(caught.value)
 
 
-def test_a_remark_behind_a_row_that_was_passed_over_is_counted(tmp_path):
-    rows = readings(20)
-    lines = [",".join(map(str, rows[0])), "# restarted", *(",".join(map(str, row[:6])) for row in rows[1:])]
-    path = tmp_path / "log.csv"
-    path.write_text("t,ax,ay,az,gx,gy,gz\n" + "\n".join(lines) + "\n")
-    recording = read_recording(path)
-    assert recording.rows_in_file == recording.rows_read + recording.rows_reported == len(lines)
-
-
-def test_a_row_made_a_remark_below_names_that_do_not_fit_is_counted(tmp_path):
-    lines = [",".join(map(str, row)) for row in readings(20)]
-    path = tmp_path / "log.csv"
-    path.write_text("t,ax,ay,az,gx,gy,gz,unix\n%" + "\n".join(lines) + "\n")
-    recording = read_recording(path)
-    assert (recording.rows_read, recording.rows_reported, recording.rows_in_file) == (19, 1, 20)
-
-
 def test_two_rows_glued_by_a_lone_carriage_return_are_two_rows(tmp_path):
     rows = [",".join(f"{v:.4f}" for v in row) for row in readings(60)]
     for first, last in ((0, 1), (30, 31)):
@@ -248,19 +181,6 @@ def test_readings_in_si_that_step_like_counts_say_their_step(tmp_path):
     assert FindingCode.RAW_STEP not in codes(read_recording(write(tmp_path / "fine.csv", fine)))
 
 
-def test_counts_that_were_interpolated_onto_the_other_clock_are_still_counts(tmp_path):
-    rng = np.random.default_rng(5)
-    time_s = np.arange(400) / 100
-    acc = np.column_stack([time_s, np.rint(rng.normal([0, 0, 8192], 20, (400, 3)))])
-    gyr = np.column_stack([time_s + 0.003, np.rint(rng.normal([300, -200, 40], 20, (400, 3)))])
-    recording = read_recording(
-        accelerometer_path=write(tmp_path / "a.csv", acc, "t,x,y,z\n"),
-        gyroscope_path=write(tmp_path / "g.csv", gyr, "t,x,y,z\n"),
-    )
-    assert recording.gyroscope_unit is RateUnit.COUNTS
-    assert recording.accelerometer_unit is AccelerationUnit.COUNTS
-
-
 def coarse_readings_on_arrival(n: int = 20_000, seed: int = 5):
     """Codes of one noise sigma at 1 kHz, stamped on arrival: stamps and readings agree with those before by chance."""
     rng = np.random.default_rng(seed)
@@ -276,12 +196,3 @@ def test_equal_readings_under_equal_stamps_are_samples_where_codes_are_coarse(tm
     recording = read_recording(text(tmp_path, HEADER + "\n".join(rows_of(table)) + "\n"))
     assert recording.n_samples == len(table)
     assert "repeated-rows" not in [f.code.value for f in recording.findings if "rows_left_out" in f.numbers]
-
-
-def test_rows_written_twice_are_left_out_of_coarse_codes_too(tmp_path):
-    table = coarse_readings_on_arrival()
-    twice = np.sort(np.random.default_rng(1).choice(np.arange(1, len(table)), 300, replace=False))
-    whole = np.insert(table, twice, table[twice], axis=0)
-    recording = read_recording(text(tmp_path, HEADER + "\n".join(rows_of(whole)) + "\n"))
-    assert 0 <= len(table) - recording.n_samples < 0.001 * len(table)  # the few that are alike by chance go too
-    assert accounts(recording)

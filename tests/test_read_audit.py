@@ -1,7 +1,5 @@
 """The audit finds what was put into a log, at its place and with its number, and nothing in a good one."""
 
-import importlib
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from test_read import HEADER, codes, finding, write
 from trihedron.channel_facts.limits import find_limits
 from trihedron.read import read_recording
 from trihedron.read.audit import audit_counter
-from trihedron.read.audit.repeats import Repeats
 from trihedron.records import FindingCode, Severity
 
 N = 4000
@@ -60,11 +57,6 @@ def test_gaps_are_counted_with_place_and_length(tmp_path):
     assert gap.severity is Severity.WARNING
 
 
-def test_many_lost_samples_are_serious(tmp_path):
-    table = np.delete(counts(), np.arange(0, N, 10), axis=0)
-    assert finding(read(tmp_path, table), FindingCode.TIME_GAP).severity is Severity.SERIOUS
-
-
 def test_jitter_is_given_in_milliseconds_and_does_not_change_the_rate(tmp_path):
     table = counts()
     table[:, 0] += 0.0008 * np.random.default_rng(2).standard_normal(N)
@@ -73,22 +65,6 @@ def test_jitter_is_given_in_milliseconds_and_does_not_change_the_rate(tmp_path):
     jitter = finding(recording, FindingCode.TIME_JITTER).numbers["jitter_s"]
     assert jitter == pytest.approx(0.0008 * np.sqrt(2), rel=0.05)
     assert recording.rate_hz == pytest.approx(100, rel=1e-3)
-
-
-def test_stamps_rounded_to_milliseconds_do_not_bias_the_rate(tmp_path):
-    table = counts()
-    table[:, 0] = np.round(np.arange(N) / 99.75, 3)
-    # The median step says 100 Hz; the log's length says 99.75.
-    assert read(tmp_path, table).rate_hz == pytest.approx(99.75, rel=1e-4)
-
-
-def test_batched_stamps_are_said_and_do_not_bias_the_rate(tmp_path):
-    table = counts()
-    table[:, 0] = np.floor(np.arange(N) / 10) / 10
-    recording = read(tmp_path, table)
-    assert finding(recording, FindingCode.TIME_DUPLICATE).numbers["fraction"] == pytest.approx(0.9, abs=0.01)
-    assert recording.rate_hz == pytest.approx(100, rel=1e-6)
-    assert FindingCode.TIME_GAP not in codes(recording)
 
 
 def test_rows_written_twice_are_dropped_and_said(tmp_path):
@@ -145,12 +121,6 @@ def test_clipping_is_found_from_the_data_whatever_the_range(tmp_path, limit):
     assert "accelerometer" not in clipped.seen
 
 
-def test_clipping_survives_a_change_of_unit(tmp_path):
-    table = counts()
-    table[:, 4:] = np.clip(table[:, 4:], -6000, 6000) / 131.0
-    assert finding(read(tmp_path, table), FindingCode.CLIPPING).numbers["x_high_value"] == pytest.approx(6000 / 131.0)
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_the_round_top_of_a_swing_is_not_clipping(seed):
     # A slow swing seen by a coarse converter stays at its top for many samples; nothing is cut off.
@@ -199,20 +169,3 @@ def test_a_packet_counter_tells_lost_samples_and_may_wrap(modulus):
     assert found.numbers["lost_samples"] == 3
     assert found.numbers["count"] == 2
     assert found.numbers["sample"] == 300
-
-
-def test_runs_are_the_same_whatever_the_chunk(monkeypatch):
-    rng = np.random.default_rng(8)
-    readings = rng.integers(0, 2, (997, 3)).astype(float)
-    whole = Repeats(readings)
-    monkeypatch.setattr(importlib.import_module("trihedron.read.audit.repeats"), "CHUNK", 10)
-    parts = Repeats(readings)
-    np.testing.assert_array_equal(parts.count, whole.count)
-    np.testing.assert_array_equal(parts.longest, whole.longest)
-    np.testing.assert_array_equal(parts.longest_start, whole.longest_start)
-    # The slow obvious way.
-    for k in range(3):
-        runs = np.split(np.arange(997), np.flatnonzero(np.diff(readings[:, k]) != 0) + 1)
-        longest = max(runs, key=len)
-        assert whole.longest[k] == len(longest)
-        assert whole.longest_start[k] == longest[0]

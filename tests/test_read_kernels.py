@@ -34,13 +34,6 @@ def test_steps_are_counted_and_their_median_found_as_by_sorting(n):
         np.testing.assert_allclose(numbers, [inside.sum(), inside.std(), inside.min(), inside.max()], rtol=1e-11)
 
 
-def test_a_median_of_an_even_number_is_the_middle_of_two_and_missing_stamps_are_of_no_kind():
-    assert _core.usual_step(np.array([0.0, 1.0, 3.0])) == 1.5
-    assert _core.usual_step(np.array([0.0, 1.0, 2.0, 5.0, 9.0])) == 2.0
-    assert np.isnan(_core.usual_step(np.array([1.0, 1.0])))
-    assert _core.stamp_steps(np.array([0.0, np.nan, 2.0, np.inf, 5.0])) == (1, 0, 1, 2)
-
-
 @pytest.mark.parametrize(("n", "width"), [(3, 8), (8, 8), (100, 7), (100_000, 38), (1003, 100)])
 def test_the_earliest_of_every_block_takes_in_what_is_left_over(n, width):
     late = np.random.default_rng(n).standard_normal(n).round(1)  # ties: the first counts
@@ -118,28 +111,6 @@ def test_repeated_and_missing_readings_are_found_as_row_by_row(n):
     np.testing.assert_array_equal(windows[: cut // 64], same[:cut].reshape(-1, 64, 4).sum(axis=1))
 
 
-@pytest.mark.parametrize("n", LENGTHS)
-def test_extremes_and_what_is_near_them(n):
-    readings = triad(n, n + 1)
-    for axis, (low, n_low, high, n_high) in enumerate(_core.triad_extremes(readings)):
-        values = readings[:, axis]
-        assert (low, high) == (np.nanmin(values), np.nanmax(values))
-        assert (n_low, n_high) == ((values == low).sum(), (values == high).sum())
-        within, width, at = _core.readings_near(readings, axis, high, 0.25)
-        distance = np.abs(values - high)
-        assert within == (distance <= 0.25).sum()
-        assert width == min(distance[distance > 0], default=np.inf)
-        np.testing.assert_array_equal(at, np.flatnonzero(values == high))
-
-
-def test_readings_that_are_no_numbers_have_no_extremes():
-    readings = np.full((100, 3), np.nan)
-    readings[:, 2] = 1.0
-    (low, n_low, *_), _, (_, _, high, n_high) = _core.triad_extremes(readings)
-    assert np.isnan(low)
-    assert (n_low, high, n_high) == (0, 1.0, 100)
-
-
 def test_numbers_short_and_long_stand_where_they_belong():
     cells = [
         ["-0.5", "12345678", "+7.", ".25", "1234567.1234567"],
@@ -154,10 +125,3 @@ def test_numbers_short_and_long_stand_where_they_belong():
     for column, (block, place) in enumerate(places):
         np.testing.assert_array_equal(blocks[block][:100, place], expected[:, column])
         assert np.isnan(blocks[block][100:, place]).all()
-
-
-def test_a_table_that_has_no_room_is_counted_and_not_read():
-    text = np.frombuffer(b"1,2\n3,4\n5,6", np.uint8)
-    assert _core.plain_table_into(text, ord(","), [], []) == (3, False)
-    assert _core.plain_table_into(text, ord(","), [(0, 0), (0, 1)], [np.zeros((2, 2))]) == (3, False)
-    assert _core.plain_table_into(text, ord(","), [(0, 0), (0, 1)], [np.zeros((3, 2))]) == (3, True)

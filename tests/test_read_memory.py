@@ -107,22 +107,3 @@ def test_what_is_no_log_is_a_value_error_in_the_words_of_python(data, complaint)
     with pytest.raises(ValueError, match=complaint) as caught:
         trihedron.read(data)
     assert "--" not in str(caught.value)
-
-
-def test_from_arrays_says_what_it_lacks():
-    table = readings()
-    with pytest.raises(ValueError, match="needs time_s"):
-        Recording.from_arrays(None, table[:, 1:4])
-    with pytest.raises(ValueError, match="needs accelerometer"):
-        Recording.from_arrays(table[:, 0])
-    with pytest.raises(ValueError, match=r"must have shape \(n, 3\), got \(200, 2\)"):
-        Recording.from_arrays(table[:, 0], table[:, 1:3])
-    with pytest.raises(ValueError, match="differ in length"):
-        Recording.from_arrays(table[:100, 0], table[:, 1:4])
-
-
-def test_findings_of_a_recording_name_parameters_and_not_flags():
-    table = readings()
-    recording = trihedron.read(table[:, 1:])
-    assert not any("--" in finding.action for finding in recording.findings)
-    assert any("rate_hz" in finding.action for finding in recording.findings)

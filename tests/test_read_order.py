@@ -1,15 +1,8 @@
 """Rows that overtook each other: put in order, nobody's array touched, and without room for a second log."""
 
-import tracemalloc
-from pathlib import Path
-
 import numpy as np
 
 import trihedron
-from trihedron.read.clock.order import PART
-from trihedron.read.devices import Choice
-from trihedron.read.sensors import Options, sensors_of
-from trihedron.read.table import Table
 
 NAMES = ("time [s]", "ax", "ay", "az", "gx", "gy", "gz")
 
@@ -40,27 +33,3 @@ def test_arrays_of_the_caller_stay_as_they_were():
     np.testing.assert_array_equal(force, before[0])
     np.testing.assert_array_equal(rate, before[1])
     np.testing.assert_array_equal(recording.accelerometer, ordered[:, 1:4])
-
-
-def table_of(rows, *, is_private):
-    force, rate = np.ascontiguousarray(rows[:, 1:4]), np.ascontiguousarray(rows[:, 4:])
-    columns = (rows[:, 0].copy(), *(a[:, k] for a in (force, rate) for k in range(3)))
-    return Table(Path("log.csv"), NAMES, columns, first_line=2, is_private=is_private)
-
-
-def test_putting_in_order_takes_little_room():
-    given, ordered = overtaken(PART)
-    table = table_of(given, is_private=True)
-    tracemalloc.start()
-    sensors = sensors_of(table, None, Options(None, None, None, Choice(), None))
-    peak = tracemalloc.get_traced_memory()[1] / len(given)
-    tracemalloc.stop()
-    # Stamps in order and rows (12 bytes), and one column (8) or the sorting (12) at a time; 48 for both triads anew.
-    assert peak < 36.0, f"{peak:.0f} bytes a row"
-    np.testing.assert_array_equal(sensors.accelerometer, ordered[:, 1:4])
-    np.testing.assert_array_equal(sensors.gyroscope, ordered[:, 4:])
-    np.testing.assert_array_equal(sensors.time_s, ordered[:, 0])
-    shared = table_of(given, is_private=False)
-    again = sensors_of(shared, None, Options(None, None, None, Choice(), None))
-    np.testing.assert_array_equal(shared.columns[1], given[:, 1])
-    np.testing.assert_array_equal(again.accelerometer, sensors.accelerometer)

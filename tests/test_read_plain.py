@@ -27,13 +27,6 @@ def test_every_number_is_the_double_nearest_to_its_digits(separator, ends):
         np.testing.assert_array_equal(found, expected)
 
 
-def test_many_shares_join_without_a_seam():
-    n = 400_000  # some seven shares of a megabyte
-    values = np.random.default_rng(1).standard_normal((n, 3)).round(6)
-    text = "".join(f"{a:.6f},{b:.6f},{c:.6f}\n" for a, b, c in values.tolist())
-    np.testing.assert_array_equal(_core.plain_table(text.encode(), ord(","), 3), values.T)
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -76,12 +69,3 @@ def test_a_log_is_read_alike_on_both_ways(tmp_path, monkeypatch):
     np.testing.assert_array_equal(quick.gyroscope, patient.gyroscope)
     assert [f.code for f in quick.findings] == [f.code for f in patient.findings]
     assert quick.rows_in_file == patient.rows_in_file
-
-
-def test_an_odd_line_is_named_as_before_wherever_it_stands(tmp_path):
-    lines = ["t,ax,ay,az"] + [f"{k / 100:.2f},0.1,0.2,9.{k % 10}" for k in range(500)]
-    lines[301] = "3.00,0.1,oops,9.8"
-    path = tmp_path / "odd.csv"
-    path.write_text("\n".join(lines))
-    with pytest.raises(ValueError, match="line 302"):
-        read_recording(path)

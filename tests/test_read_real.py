@@ -70,31 +70,6 @@ def test_phone_two_clocks_are_merged(real_data, stem):
     assert np.isfinite(recording.gyroscope).all()
 
 
-@pytest.mark.parametrize(
-    "stem",
-    [
-        "imu_rec_X_up_300_sec",
-        "imu_rec_X_down_300_sec",
-        "imu_rec_Y_up_300sec",
-        "imu_rec_Y_down_300_sec",
-        "imu_rec_z_up_310_sec",
-        "imu_rec_z_down_300_sec",
-    ],
-)
-def test_phone_faces_keep_every_accelerometer_sample(real_data, stem):
-    recording = pair(real_data, stem)
-    written = np.loadtxt(real_data / "phone" / f"{stem}__Acceleration.csv", delimiter=",", skiprows=1)
-    # At most one sample at either end lies outside the gyro's clock.
-    cut = len(written) - recording.n_samples
-    assert cut <= 2
-    assert finding(recording, FindingCode.CLOCKS_MERGED).numbers["cut_rows"] == cut
-    # An even clock starts within the rounding of the first stamp (1 ms).
-    first = np.searchsorted(written[:, 0], recording.start_epoch_s - 1e-3)
-    np.testing.assert_array_equal(recording.accelerometer, written[first : first + recording.n_samples, 1:])
-    # Local gravity is 9.7974; the phone's zero readings are a few hundredths.
-    assert np.linalg.norm(np.median(recording.accelerometer, axis=0)) == pytest.approx(9.797, abs=0.06)
-
-
 @pytest.mark.parametrize("unit", [0, 1, 2])
 def test_mpu9150_without_header_or_time(real_data, unit):
     path = real_data / "mpu9150" / f"imu{unit}.log"
@@ -124,18 +99,6 @@ def test_adis16405_puts_the_gyro_last_where_the_file_has_it_first(real_data, uni
     assert finding(recording, FindingCode.COLUMNS_ASSUMED).severity is Severity.WARNING
     assert FindingCode.CLIPPING not in codes(recording)
     assert FindingCode.STUCK_VALUES not in codes(recording)
-
-
-def test_galaxy_s5_repeats_rows_and_has_two_gyros(real_data):
-    recording = read_recording(real_data / "galaxy_s5" / "samsung_galaxy_s5.csv.gz", rate_hz=10)
-    assert recording.n_samples == 214800
-    assert "gx_measured" in finding(recording, FindingCode.COLUMNS_ASSUMED).seen
-    assert set(recording.auxiliary) == {"gx_output", "gy_output", "gz_output"}
-    repeated = [f for f in recording.findings if f.code is FindingCode.REPEATED_ROWS]
-    assert {f.seen.split()[1] for f in repeated} == {"accelerometer", "gyro"}
-    assert all(f.numbers["fraction"] == pytest.approx(0.065, abs=0.002) for f in repeated)
-    # A still log cannot tell rad/s from deg/s: it must be said to be a guess.
-    assert finding(recording, FindingCode.UNIT_ASSUMED).severity is Severity.WARNING
 
 
 def test_cats_tag_has_temperature_and_an_unusual_gyro_unit(real_data):
@@ -174,20 +137,6 @@ def test_analog6dof_has_its_gyro_axes_in_odd_order_and_a_coarse_converter(real_d
         assert stuck == []
 
 
-@pytest.mark.parametrize("name", ["imu_a_45_1", "imu_a_45_2", "imu_b_45_1", "imu_b_45_2"])
-def test_dual_xsens_ticks_of_100_microseconds(real_data, name):
-    recording = read_recording(real_data / "dual_xsens" / f"{name}.csv")
-    assert recording.rate_hz == pytest.approx(114.2, abs=0.1)
-    assert recording.accelerometer_unit is AccelerationUnit.M_S2
-    assert recording.gyroscope_unit is RateUnit.RAD_S
-    jitter = finding(recording, FindingCode.TIME_JITTER)
-    # Steps of 7.5 and 10 ms alternate.
-    assert jitter.numbers["jitter_s"] == pytest.approx(0.00125, rel=0.01)
-    # The packet counter runs with the inner 400 Hz and wraps at 65536; nothing was lost.
-    assert FindingCode.SAMPLES_LOST not in codes(recording)
-    assert {"PacketCounter", "Roll", "Pitch", "Yaw"} <= set(recording.auxiliary)
-
-
 def test_imucal_ferraris_units_and_missing_rate(real_data):
     path = real_data / "imucal_ferraris" / "example_ferraris_session.csv"
     recording = read_recording(path)
@@ -199,21 +148,6 @@ def test_imucal_ferraris_units_and_missing_rate(real_data):
     assert list(recording.auxiliary) == ["n_samples"]
     assert finding(recording, FindingCode.RATE_ASSUMED).severity is Severity.SERIOUS
     assert read_recording(path, rate_hz=102.4).gyroscope_unit is RateUnit.DEG_S
-
-
-@pytest.mark.parametrize("axis", "xyz")
-def test_ctu_turns_are_a_gyro_alone(real_data, axis):
-    recording = read_recording(real_data / "ctu" / f"{axis}_rotation.csv", rate_hz=100)
-    assert recording.accelerometer is None
-    assert recording.gyroscope.shape == (4001, 3)
-    assert recording.gyroscope_unit is RateUnit.DEG_S
-
-
-def test_ctu_pose_means_are_read_as_rows_in_g(real_data):
-    recording = read_recording(real_data / "ctu" / "measured_accelerations.csv")
-    assert recording.accelerometer.shape == (24, 3)
-    assert recording.accelerometer_unit is AccelerationUnit.G
-    assert FindingCode.UNIT_CONTRADICTED not in codes(recording)
 
 
 @pytest.mark.parametrize(

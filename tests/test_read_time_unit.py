@@ -59,6 +59,15 @@ def test_a_step_of_one_at_rest_is_a_second_and_the_doubt_is_said(tmp_path):
     assert "--time-unit" in found.action
 
 
+def test_whole_seconds_that_a_hundred_rows_share_are_seconds_beyond_doubt(tmp_path):
+    table = log(100.0, 1.0)
+    table[:, 0] = np.floor(table[:, 0])
+    recording = read_recording(write(tmp_path / "log.csv", table))
+    # A row lasts the span over the rows: 10 ms, which no other unit makes plausible. A row a second would be a doubt.
+    assert recording.rate_hz == pytest.approx(100.0, rel=0.02)
+    assert finding(recording, FindingCode.TIME_UNIT_DETECTED).severity is Severity.NOTE
+
+
 @pytest.mark.parametrize("rate_hz", [0.1, 0.5, 1.0, 5.0])
 def test_a_named_unit_holds_at_any_rate(tmp_path, rate_hz):
     recording = read_recording(write(tmp_path / "log.csv", log(rate_hz, 1.0), HEADER.replace("t,", "t_s,")))

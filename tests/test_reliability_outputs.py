@@ -5,7 +5,6 @@ import json
 import os
 import shutil
 import signal
-import socket
 import stat
 import threading
 import time
@@ -127,23 +126,6 @@ def test_a_pipe_that_nobody_reads_ends_in_a_sentence(tmp_path, monkeypatch):
         write_whole(pipe, b"x")
 
 
-def test_a_socket_is_written_to(tmp_path):
-    path = str(tmp_path / "s")
-    with socket.socket(socket.AF_UNIX) as server:
-        server.bind(path)
-        server.listen()
-        write_whole(path, "hello")
-        with server.accept()[0] as connection:
-            assert connection.recv(100) == b"hello"
-    assert stat.S_ISSOCK(os.stat(path).st_mode)
-
-
-def test_standard_output_by_its_device_name_is_the_pipe_behind_it(session):
-    status, out, err = run("export", session / "c.json", "--to", "python", "-o", "/dev/stdout")
-    assert status == 0, err
-    assert "def " in out
-
-
 def test_through_a_link_the_file_it_names_is_replaced_and_the_link_stays(tmp_path):
     real, link = tmp_path / "real", tmp_path / "link"
     real.write_text("old")
@@ -184,14 +166,6 @@ def test_impossible_places_end_in_a_sentence(tmp_path):
     assert locked.read_text() == "keep"
 
 
-def test_the_longest_name_that_a_folder_takes_is_written(tmp_path):
-    for name in ("n" * 255, "ü" * 127):
-        write_whole(tmp_path / name, "x")
-        write_whole(tmp_path / name, "y", overwrite=True)
-        assert (tmp_path / name).read_text() == "y"
-    assert leftovers(tmp_path) == []
-
-
 @pytest.mark.parametrize(
     "words",
     [
@@ -207,28 +181,6 @@ def test_standard_output_on_a_full_disk_is_status_1(session, words):
     assert status == 1, err
     assert len(err.strip().splitlines()) == 1, err
     assert "standard output" in err
-
-
-def test_without_a_standard_output_a_command_that_needs_one_says_so(session):
-    import subprocess
-    import sys
-
-    log = session / "log.csv"
-    for words, expected in ((f"segment {log}", 1), (f"convert {log} -o {session / 'x.csv'}", 0)):
-        done = subprocess.run(
-            f"{sys.executable} -m trihedron {words} >&-", shell=True, stderr=subprocess.PIPE, timeout=60, check=False
-        )
-        assert done.returncode == expected, done.stderr
-        assert b"Traceback" not in done.stderr
-
-
-def test_a_reader_that_leaves_early_is_no_failure(session):
-    with started("apply", session / "c.json", session / "log.csv") as process:
-        process.stdout.read(10)
-        process.stdout.close()
-        err = process.stderr.read()
-        assert process.wait(60) == 0
-        assert err == b""
 
 
 def test_a_reader_that_leaves_early_does_not_cost_the_files_that_were_asked_for(session):
@@ -287,7 +239,7 @@ def test_kill_9_at_any_instant_leaves_the_old_output_or_the_new_one(session):
     target = session / "out.csv"
     run("convert", session / "log.csv", "-o", target)
     whole = target.read_bytes()
-    for after_s in (0.1, 0.3, 0.4, 0.5):
+    for after_s in (0.2, 0.45):
         process = started("convert", session / "log.csv", "-o", target, "--force")
         time.sleep(after_s)
         process.kill()
@@ -351,17 +303,6 @@ def test_an_untrusted_calibration_ends_in_status_2_with_its_reason(session, caps
     err = capsys.readouterr().err
     assert "not to be trusted" in err
     assert "Scale 3 is not determined" in err
-
-
-def test_status_2_has_its_reason_on_stderr_and_0_has_none(session, capsys, monkeypatch):
-    monkeypatch.chdir(session)
-    for words in (["export", "untrusted.json", "--to", "c"], ["allan", "log.csv"]):
-        status = main(words)
-        err = capsys.readouterr().err
-        assert status == 2, (words, err)
-        assert "trihedron: not to be trusted: " in err, words
-    assert main(["segment", "log.csv"]) == 0
-    assert "not to be trusted" not in capsys.readouterr().err
 
 
 def test_outputs_are_checked_before_the_inputs_are_read(tmp_path):

@@ -5,10 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from trihedron import _core, probability
+from trihedron import _core
 from trihedron.ranges import ranges_of
 from trihedron.segment.channels import Channels
-from trihedron.segment.judge import _creep_sizes
 from trihedron.segment.noise import MeanNoise
 from trihedron.segment.runs import EDGE_BLOCKS, EdgeNoise, Run, trim_edges
 from trihedron.segment.turn_scale import LEAST_TURN_RAD, USUAL, radians_per_reading
@@ -64,17 +63,6 @@ def test_ends_are_trimmed_as_by_a_plain_loop(seed):
     assert (trimmed.outer_first, trimmed.outer_last) == (run.first, run.last)
 
 
-def test_twins_trim_much_little_and_nothing():
-    """The comparison above is of holds that differ."""
-    found = set()
-    for size in (0.0, 3.0, 300.0):
-        mean = np.zeros((60, 3))
-        mean[:8] = size
-        channels = channels_of(mean)
-        found.add(trim_edges(channels, Run(0, 60), EdgeNoise.of(channels, NOISE)).trimmed)
-    assert found == {(1, 1), (17, 1)}
-
-
 def test_means_over_ranges_pass_over_what_is_no_number():
     rng = np.random.default_rng(3)
     values = rng.normal(size=(50, 4))
@@ -90,24 +78,6 @@ def test_means_over_ranges_pass_over_what_is_no_number():
     for wrong in ([[0, 51]], [[-1, 3]], [[3, 1]]):
         with pytest.raises(ValueError, match="50 rows"):
             _core.column_means(values, np.array(wrong), np.array([0]), 1)
-
-
-@pytest.mark.parametrize("bumps", [(), ((12, 15),), ((6, 7), (20, 31))])
-def test_halves_of_a_hold_that_creeps_are_counted_over_quiet_blocks(bumps):
-    mean = np.random.default_rng(len(bumps)).normal(size=(60, 3)) * 0.1
-    mean[:, 0] += np.linspace(0.0, 30.0, 60)
-    channels, run = channels_of(mean), Run(3, 56, bumps)
-    rows = run.quiet_rows(mean)
-    half = len(rows) // 2
-    difference = rows[-half:].mean(axis=0) - rows[:half].mean(axis=0)
-    variance = 2.0 * NOISE.variance(half * 0.1) + channels.quantisation_variance / 10
-    still, short = Run(3, 56, bumps, is_unsteady=True), Run(56, 59)
-    found = _creep_sizes(channels, [run, still, short], NOISE, 1e-3)
-    # Sums of some ten rows.
-    assert found[0] == pytest.approx(np.sqrt(np.sum(difference**2 / variance)), rel=1e-12)
-    assert found[1] == found[2] == 0.0
-    assert not _creep_sizes(channels_of(mean * [0.0, 1.0, 0.0]), [run], NOISE, 1e-3).any()
-    assert found[0] ** 2 > probability.chdtri(3, 1e-3)
 
 
 def test_the_scale_of_turns_is_that_of_a_loop_over_moves():

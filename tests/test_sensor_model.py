@@ -6,6 +6,18 @@ import pytest
 from trihedron.gravity import EARTH_RATE_RAD_S, earth_rate_north_up, normal_gravity
 from trihedron.records import Calibration, SensorCalibration
 from trihedron.sensor_model import correct, distort, in_frame, other_form, other_form_jacobian, reframing, rotated
+from trihedron.units import (
+    AccelerationUnit,
+    RateUnit,
+    acceleration_lsb_to_si,
+    acceleration_to_si,
+    degrees_from_radians,
+    m_s2_from_micro_g,
+    mg_from_m_s2,
+    radians_from_degrees,
+    rate_lsb_to_si,
+    rate_to_si,
+)
 
 MANUAL_S = np.array([[-0.0393, 0, 0], [0.0001, 0.0390, 0], [0.0001, 0.0002, 0.0385]])
 MANUAL_B = np.array([19.5696, -22.4746, -20.3088])
@@ -181,3 +193,16 @@ def test_earth_rate_is_split_by_latitude():
     north, up = earth_rate_north_up(30.0)
     assert np.hypot(north, up) == pytest.approx(EARTH_RATE_RAD_S)
     assert up == pytest.approx(EARTH_RATE_RAD_S / 2)
+
+
+def test_units_have_the_sizes_of_the_international_system():
+    # The unit g is defined as 9.80665 m/s²; a degree is pi/180.
+    assert acceleration_to_si(AccelerationUnit.G) == 9.80665
+    assert acceleration_to_si(AccelerationUnit.MG) == pytest.approx(9.80665e-3, rel=1e-15)
+    assert rate_to_si(RateUnit.DEG_S) == pytest.approx(0.017453292519943295, rel=1e-15)
+    assert (rate_to_si(RateUnit.MDEG_S), rate_to_si(RateUnit.MRAD_S)) == pytest.approx((1.7453292519943e-5, 1e-3))
+    assert acceleration_lsb_to_si("0.061 mg") == pytest.approx(0.061e-3 * 9.80665)
+    assert rate_lsb_to_si("0.05 deg/s") == pytest.approx(8.726646259971648e-4)
+    assert mg_from_m_s2(9.80665) == pytest.approx(1000.0)
+    assert m_s2_from_micro_g(1e6) == pytest.approx(9.80665)
+    assert (degrees_from_radians(np.pi), radians_from_degrees(180.0)) == pytest.approx((180.0, np.pi))

@@ -7,11 +7,9 @@ from trihedron.cli import main
 from trihedron.files.log import write_recording
 from trihedron.files.output import OutputError
 from trihedron.files.truth import read_truth, write_truth
-from trihedron.gravity import normal_gravity
 from trihedron.pipeline import read
 from trihedron.simulate import (
     Hold,
-    Scenario,
     Turn,
     profile_by_name,
     read_scenario,
@@ -65,7 +63,7 @@ def written(tmp_path, text):
 
 
 def test_a_scenario_file_says_the_same_as_python(tmp_path):
-    scenario = Scenario.from_toml(written(tmp_path, EXAMPLE))
+    scenario = read_scenario(written(tmp_path, EXAMPLE))
     assert scenario.name == "bench"
     assert scenario.motion.steps == (Hold(2.0), Turn((0.0, 0.0, 1.0), 90.0, 1.5))
     assert scenario.motion.table_tilt_deg == (0.1, -0.2)
@@ -183,21 +181,6 @@ def test_the_command_writes_log_and_truth_and_refuses_in_one_sentence(tmp_path, 
 
 
 @pytest.mark.parametrize(
-    ("text", "gravity"),
-    [
-        ("[environment]\nlatitude_deg = 48.0", normal_gravity(48.0, 0.0)),
-        ("[environment]\nheight_m = 2000", normal_gravity(55.7, 2000.0)),
-        ("[environment]\nlatitude_deg = 48.0\ngravity_m_s2 = 9.81", 9.81),
-        ("[environment]\nearth_rate = true", 9.80665),
-        ("", 9.80665),
-    ],
-)
-def test_a_latitude_without_gravity_means_the_gravity_there(tmp_path, text, gravity):
-    (tmp_path / "s.toml").write_text(text + "\n")
-    assert read_scenario(tmp_path / "s.toml").environment.gravity == pytest.approx(gravity, rel=1e-12)
-
-
-@pytest.mark.parametrize(
     ("text", "said"),
     [
         ("latitude_deg = 48.0", r"belongs in \[environment\]"),
@@ -211,11 +194,3 @@ def test_what_a_scenario_lacks_or_has_in_the_wrong_place_is_named(tmp_path, text
     (tmp_path / "s.toml").write_text(text + "\n")
     with pytest.raises(ValueError, match=said):
         read_scenario(tmp_path / "s.toml")
-
-
-def test_a_matrix_of_an_effect_is_printed_row_by_row(tmp_path, capsys):
-    (tmp_path / "s.toml").write_text(
-        '[[effect]]\nid = "gyro-g-sensitivity"\nmatrix = [[1e-3, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]]\n'
-    )
-    assert main(["simulate", str(tmp_path / "s.toml"), "-o", str(tmp_path / "log.csv")]) == 0
-    assert "matrix 0.001, 0, 0; 0, 0.001, 0; 0, 0, 0.001" in capsys.readouterr().out

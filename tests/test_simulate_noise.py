@@ -67,21 +67,6 @@ def test_the_intervals_of_the_allan_estimator_hold_the_defining_variance(term):
     assert inside / total > 0.95 - 4.0 * np.sqrt(0.95 * 0.05 / 120.0) - 0.01
 
 
-def test_white_noise_has_density_over_root_step_and_no_memory():
-    x = realisations("N", 0.3)
-    n = x.size
-    assert abs(x.std() / (0.3 / np.sqrt(DT)) - 1.0) < 4.0 / np.sqrt(2.0 * n)
-    assert abs(np.mean(x[:, 1:] * x[:, :-1])) * DT / 0.09 < 4.0 / np.sqrt(n)
-
-
-def test_a_walk_starts_at_zero_and_spreads_as_the_root_of_time():
-    x = realisations("K", 2.0)
-    assert not x[:, 0].any()
-    z = x[:, -1] / (2.0 * np.sqrt((N_SAMPLES - 1) * DT))
-    # 60 normal deviates: their mean square is chi-square/60.
-    assert 0.4 < np.mean(z**2) < 1.9
-
-
 def test_terms_axes_sensors_and_seeds_have_independent_streams():
     def draw(seed, sensor):
         return make_noise(NoiseTerms(N=(1.0, 1.0, 1.0)), 20_000, 1.0, seed, sensor)
@@ -90,14 +75,6 @@ def test_terms_axes_sensors_and_seeds_have_independent_streams():
     correlation = np.corrcoef(columns) - np.eye(9)
     # 36 pairs of correlation coefficients of 1/√n each: 4.5 standard deviations leave 1e-4 for an accident.
     assert np.abs(correlation).max() < 4.5 / np.sqrt(20_000)
-
-
-def test_one_term_does_not_change_another():
-    one = make_noise(NoiseTerms(N=(1.0, 0.0, 0.0)), 500, DT, 3, "a")
-    two = make_noise(NoiseTerms(N=(1.0, 0.0, 0.0), B=(0.0, 2.0, 0.0), K=(1.0, 0.0, 0.0)), 500, DT, 3, "a")
-    walk = make_noise(NoiseTerms(K=(1.0, 0.0, 0.0)), 500, DT, 3, "a")
-    # The sum is formed in another order: a few ulp.
-    assert np.allclose(two[:, 0], one[:, 0] + walk[:, 0], rtol=0, atol=1e-13)
 
 
 def test_a_negative_coefficient_is_refused():

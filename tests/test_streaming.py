@@ -60,33 +60,6 @@ def test_a_log_on_disk_is_calibrated_as_the_whole_is(whole, path):
     np.testing.assert_allclose(found.gyroscope.S, wanted.gyroscope.S, rtol=0, atol=1e-9)
 
 
-def test_long_holds_keep_their_means_and_give_up_their_middles(monkeypatch):
-    log = recorded(Instrument(), 6, rate_hz=50.0, hold_s=8.0)
-    monkeypatch.setattr(streaming, "KEPT_S", 2.0)
-    on_disk = FakeLog(log)
-    segments = trihedron.segment(log)
-    recording, shown = streaming.condensed(on_disk, segments)
-    assert recording.n_samples < 0.75 * log.n_samples
-    np.testing.assert_array_equal(shown.accelerometer_mean, segments.accelerometer_mean)
-    found = trihedron.calibrate(recording, segments=shown, gravity_m_s2=G).calibration
-    wanted = trihedron.calibrate(log, gravity_m_s2=G).calibration
-    off = (found.gyroscope.S - wanted.gyroscope.S) / wanted.gyroscope.sigma_S
-    # Less of the zero beside each move is seen: the answer stays well inside its error bars.
-    assert np.abs(off).max() < 1.0
-    # The accelerometer is fitted to the means of whole holds; the moves pull it a little.
-    away = (found.accelerometer.S - wanted.accelerometer.S)[np.tril_indices(3)]
-    assert np.abs(away / wanted.accelerometer.sigma_S[np.tril_indices(3)]).max() < 1.0
-
-
-class FakeLog:
-    """A recording in memory with the attributes of a log on disk."""
-
-    def __init__(self, recording):
-        for name in ("time_s", "accelerometer", "gyroscope", "rate_hz", "accelerometer_unit", "gyroscope_unit"):
-            setattr(self, name, getattr(recording, name))
-        self.source, self.n_samples = recording.source, recording.n_samples
-
-
 def test_corrected_readings_are_those_of_the_whole_and_a_stopped_run_goes_on(whole, path, tmp_path, monkeypatch):
     monkeypatch.setattr(streaming, "PIECE_ROWS", 1000)
     calibration = trihedron.calibrate(whole, gravity_m_s2=G)

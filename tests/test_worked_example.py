@@ -21,6 +21,7 @@ def blocks(kind):
     return re.findall(rf"^```{kind}(?: (\S+))?\n(.*?)^```$", text, flags=re.M | re.S)
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")  # as the page shows it

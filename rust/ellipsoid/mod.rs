@@ -9,7 +9,7 @@ mod standard;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use crate::error::{Error, Result};
-use crate::norm_invariant::{Frame, Model};
+use crate::sensor_model::{Frame, Model};
 pub(crate) use moments::Moments;
 pub use standard::Standardisation;
 

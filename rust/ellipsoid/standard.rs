@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::norm_invariant::Model;
+use crate::sensor_model::Model;
 
 /// Readings moved to the origin and to unit size: `a' = centre + size · u`.
 #[derive(Debug, Clone, Copy)]

@@ -1,20 +1,15 @@
 //! The fit itself: a start, steps with σ frozen, σ renewed, and what is known of the answer.
 
-use std::cell::RefCell;
+use nalgebra::{DVector, Vector3};
 
-use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
-
-use super::descent::{Direct, Equations};
-use super::lanes::{LANES, ZERO};
 use super::near::Near;
-use super::parameters::{in_frame, map_to_entries, pack, unpack, unpack_standardised};
+use super::parameters::{in_frame, pack, unpack};
 use super::problem::{self, Frozen, PoseProblem};
-use super::start::{self, Starts};
-use super::sums::{At, SHARE, by_share};
-use super::{Fit, Model, N_PARAMETERS, Parameters, ROWS_KEPT, Readings, Settings};
+use super::settled::{SMALLEST_SPREAD, WORTHLESS, finish, settle, spread};
+use super::start::{self, Share, Starts};
+use super::{Fit, Model, N_PARAMETERS, ROWS_KEPT, Readings, Settings};
 use crate::ellipsoid::Standardisation;
 use crate::error::{Error, Result};
-use crate::gauss_newton::{self, Certainty, Loss, Options, Stop};
 
 /// Times that σ is renewed at most; it depends on the answer only through directions and settles in two.
 const RENEWALS: usize = 8;
@@ -54,11 +49,7 @@ fn is_shrunken(model: &Model, readings: Readings<'_>, settings: &Settings) -> bo
         .is_ok_and(|sphere| model.s.determinant().abs() < 1e-2 * sphere.s.determinant().abs())
 }
 
-pub(super) fn fit_from(
-    readings: Readings<'_>,
-    settings: &Settings,
-    start: Option<Model>,
-) -> Result<Fit> {
+fn fit_from(readings: Readings<'_>, settings: &Settings, start: Option<Model>) -> Result<Fit> {
     readings.check()?;
     if !settings.gravity.is_finite() || settings.gravity <= 0.0 {
         return Err(Error::bad_input(format!(
@@ -68,11 +59,11 @@ pub(super) fn fit_from(
     }
     let few = start::even_share(readings, ROWS_KEPT);
     // Of very many readings, a share shows nearly the same answer: all are then passed over a few times only.
-    let shown = few.fitted(settings);
+    let shown = of_share(&few, settings);
     let starts = Starts::of(few.values())?;
     let standard = match few {
-        start::Share::All(_) => starts.standard,
-        start::Share::Some { .. } => Standardisation::of(readings.values)?,
+        Share::All(_) => starts.standard,
+        Share::Some { .. } => Standardisation::of(readings.values)?,
     };
     let nominal = match start.or(shown) {
         Some(model) => in_frame(&model, settings.frame)?,
@@ -142,158 +133,24 @@ pub(super) fn fit_from(
     unreachable!("the loop returns at its last renewal")
 }
 
-pub(super) fn direct<'a>(problem: &'a PoseProblem<'_>, theta: &Parameters) -> Direct<'a> {
-    Direct {
-        charged: problem.charged(),
-        at: At {
-            model: unpack_standardised(theta.as_slice(), problem.settings.frame),
-            standard: problem.standard,
-            settings: *problem.settings,
-            widening: problem.frozen.widening,
-        },
-        volume: problem.volume,
-        tried: RefCell::new(None),
-    }
-}
-
-/// Where the solver ended for one set of σ.
-pub(super) struct Settled {
-    pub theta: Parameters,
-    pub stop: Stop,
-    pub iterations: usize,
-    pub found: Found,
-}
-
-/// What the solution is known by.
-pub(super) enum Found {
-    /// Normal equations.
-    Direct(Box<Equations>),
-    /// Rows, or normal equations too weak to be solved as they are.
-    Dense(Certainty),
-}
-
-fn settle(problem: &PoseProblem<'_>, theta: &Parameters) -> Result<Settled> {
-    let settings = problem.settings;
-    let options = Options {
-        loss: settings.loss,
-        ..Options::default()
+/// The model that fits a share; `None` where that is all readings, or where it does not determine one.
+fn of_share(share: &Share<'_>, settings: &Settings) -> Option<Model> {
+    let Share::Some {
+        values,
+        noise,
+        pose,
+    } = share
+    else {
+        return None;
     };
-    let direct = direct(problem, theta);
-    let has_anchor = problem.anchor.is_some();
-    if !has_anchor && let Ok(ended) = gauss_newton::descend(&direct, *theta, &options) {
-        return Ok(Settled {
-            theta: ended.point,
-            stop: ended.stop,
-            iterations: ended.iterations,
-            found: Found::Direct(Box::new(ended.local)),
-        });
-    }
-    let start = DVector::from_column_slice(theta.as_slice());
-    let solution = if problem.readings.values.len() > ROWS_KEPT && !has_anchor {
-        gauss_newton::minimise_problem(&direct, start, &options)?
-    } else {
-        gauss_newton::minimise(
-            |x| Ok(problem.linearise(x)),
-            |x| Ok(problem.residuals(x)),
-            start,
-            &options,
-        )?
+    let readings = Readings {
+        values,
+        noise,
+        pose,
     };
-    Ok(Settled {
-        theta: Parameters::from_column_slice(solution.parameters.as_slice()),
-        stop: solution.stop,
-        iterations: solution.iterations,
-        found: Found::Dense(solution.certainty),
-    })
-}
-
-/// Poses whose specific forces differ by less than this fraction of |g|, half a degree, are one pose, or `S` is nothing.
-const SMALLEST_SPREAD: f64 = 1e-2;
-
-const WORTHLESS: &str = "the fit runs into the worthless minimum S = 0, |b| = |g|: the poses hardly differ, or are not \
-                         still; hold the sensor still in clearly different orientations";
-
-/// Root mean square size of `S (a' - mean)`, m/s².
-fn spread(model: &Model, standard: &Standardisation) -> f64 {
-    (model.s * standard.size).norm() / 3.0_f64.sqrt()
-}
-
-pub(super) fn finish(
-    problem: &PoseProblem<'_>,
-    settled: &Settled,
-    iterations: usize,
-) -> Result<Fit> {
-    let settings = problem.settings;
-    let factor = settings.loss.covariance_factor(1);
-    let held = match &settled.found {
-        Found::Direct(equations) => equations.certainty(factor),
-        Found::Dense(certainty) => certainty.clone(),
-    };
-    // Noise in a reading enters residual and derivative alike and draws S towards zero, by (σ/g)² of itself.
-    let pull = problem.noise_in_gradient(settled.theta.as_slice());
-    let theta = settled.theta + fixed(&held.covariance) * pull;
-    let certainty = match problem.anchor {
-        None => held,
-        Some(_) => gauss_newton::certainty(
-            &problem.data_jacobian(&DVector::from_column_slice(settled.theta.as_slice())),
-            factor,
-            Options::default().rank_tolerance,
-        ),
-    };
-    let model = unpack(&theta, settings.frame, &problem.standard);
-    let shrink = (model.s * problem.standard.size).determinant().abs() / problem.volume;
-    if shrink < 2.0 * problem::SMALLEST_VOLUME
-        || spread(&model, &problem.standard) < SMALLEST_SPREAD * settings.gravity
-    {
-        return Err(Error::not_determined(WORTHLESS));
-    }
-    let map = map_to_entries(settings.frame, &problem.standard);
-    let covariance = map * fixed(&certainty.covariance) * map.transpose();
-    let residuals = problem.in_m_s2(&model);
-    let sigmas = &problem.frozen.sigma;
-    let squares = || residuals.iter().zip(sigmas).map(|(r, s)| (r / s).powi(2));
-    let chi2 = sum_of_squares(&residuals, sigmas);
-    let (weights, robust_chi2) = if settings.loss == Loss::Linear {
-        (Vec::new(), chi2)
-    } else {
-        let weights: Vec<f64> = squares().map(|z2| settings.loss.weight(z2)).collect();
-        let influence: f64 = squares().zip(&weights).map(|(z2, w)| w * w * z2).sum();
-        (weights, influence / settings.loss.expected_influence(1))
-    };
-    Ok(Fit {
-        model,
-        covariance,
-        chi2,
-        robust_chi2,
-        residuals,
-        sigmas: Vec::new(),
-        weights,
-        certainty,
-        is_anchored: problem.anchor.is_some(),
-        stop: settled.stop,
-        iterations,
-    })
-}
-
-/// `Σ (r/σ)²`, eight at a time: one sum would wait for itself at every reading.
-fn sum_of_squares(residuals: &[f64], sigmas: &[f64]) -> f64 {
-    let share = |k: usize| {
-        let range = k * SHARE..((k + 1) * SHARE).min(residuals.len());
-        let (r, r_rest) = residuals[range.clone()].as_chunks::<LANES>();
-        let (s, s_rest) = sigmas[range].as_chunks::<LANES>();
-        let mut sums = ZERO;
-        for (r, s) in r.iter().zip(s) {
-            for l in 0..LANES {
-                sums[l] += (r[l] / s[l]).powi(2);
-            }
-        }
-        let rest = r_rest.iter().zip(s_rest).map(|(r, s)| (r / s).powi(2));
-        sums.iter().sum::<f64>() + rest.sum::<f64>()
-    };
-    by_share(residuals.len(), share, |a, b| a + b).unwrap_or(0.0)
-}
-
-/// The same numbers without a heap.
-fn fixed(square: &DMatrix<f64>) -> SMatrix<f64, N_PARAMETERS, N_PARAMETERS> {
-    SMatrix::from_column_slice(square.as_slice())
+    let is_good = |found: &Fit| found.stop.is_converged() && !found.is_anchored;
+    fit_from(readings, settings, None)
+        .ok()
+        .filter(is_good)
+        .map(|found| found.model)
 }

@@ -12,6 +12,7 @@ mod near;
 mod noise;
 mod parameters;
 mod problem;
+mod settled;
 mod start;
 mod sums;
 
@@ -23,6 +24,8 @@ pub use held_out::{HeldOut, held_out};
 pub use parameters::in_frame;
 pub use problem::residual_gradient;
 
+pub use crate::sensor_model::{Frame, Model};
+
 use crate::error::{Error, Result};
 use crate::gauss_newton::{Certainty, Loss, Stop};
 
@@ -31,15 +34,6 @@ pub const N_PARAMETERS: usize = 9;
 
 /// The solver's.
 type Parameters = SVector<f64, N_PARAMETERS>;
-
-/// The instrument trihedron in which `S` is expressed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frame {
-    /// z1 along accelerometer axis 1, z2 in the plane of axes 1 and 2: `S` lower triangular.
-    Lower,
-    /// `S` symmetric.
-    Symmetric,
-}
 
 impl Frame {
     /// `(row, column)` of the six free entries of `S`; a symmetric `S` has the mirrored one as well.
@@ -53,23 +47,6 @@ pub enum Objective {
     Norm,
     /// `(|S a' + b|² - |g|²) / 2|g|`, the manual's objective in m/s².
     SquaredNorm,
-}
-
-/// Direct model `f = S a' + b`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Model {
-    /// m/s² per raw unit.
-    pub s: Matrix3<f64>,
-    /// m/s².
-    pub b: Vector3<f64>,
-}
-
-impl Model {
-    /// Raw reading → specific force.
-    #[must_use]
-    pub fn correct(&self, reading: &Vector3<f64>) -> Vector3<f64> {
-        self.s * reading + self.b
-    }
 }
 
 /// How to fit.

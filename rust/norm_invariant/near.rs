@@ -1,8 +1,8 @@
 //! The last steps of a fit to very many readings, from the answer of a share of them.
 
-use super::fitting::{Found, Settled, direct, finish};
 use super::parameters::unpack;
 use super::problem::{Frozen, PoseProblem};
+use super::settled::{Found, Settled, direct, finish};
 use super::{Fit, Parameters, Readings, Settings};
 use crate::ellipsoid::Standardisation;
 use crate::error::Result;

@@ -2,8 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::fitting::fit_from;
-use super::{Fit, Model, N_PARAMETERS, Readings, Settings};
+use super::{Model, N_PARAMETERS, Readings, Settings};
 use crate::ellipsoid::{self, Moments, Standardisation};
 use crate::error::{Error, Result};
 
@@ -53,28 +52,6 @@ impl Share<'_> {
             Self::All(values) => values,
             Self::Some { values, .. } => values,
         }
-    }
-
-    /// The model that fits a share; `None` where it does not determine one.
-    pub(super) fn fitted(&self, settings: &Settings) -> Option<Model> {
-        let Self::Some {
-            values,
-            noise,
-            pose,
-        } = self
-        else {
-            return None;
-        };
-        let readings = Readings {
-            values,
-            noise,
-            pose,
-        };
-        let is_good = |found: &Fit| found.stop.is_converged() && !found.is_anchored;
-        fit_from(readings, settings, None)
-            .ok()
-            .filter(is_good)
-            .map(|found| found.model)
     }
 }
 

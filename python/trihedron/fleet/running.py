@@ -100,7 +100,7 @@ def fleet(
     made = [{"path": job.path, "name": job.name, "serial": job.serial, "key": job.key} | rows[job.key] for job in jobs]
     tell(1.0, "writing the table and the page")
     result = summarise(made, folder, n_before)
-    write_tables(result)
+    write_tables(result.rows, result.summary, folder)
     return result
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.estimate.sessions import changes_among, repeated_parameters
+from trihedron.fleet.table import frame_of
 from trihedron.probability import betaincinv, fdtrc
 from trihedron.records.fleet import FleetLog, FleetSummary, Outlier, SharedEffect
 from trihedron.records.sessions import PARAMETERS, Session
@@ -36,8 +37,6 @@ class FleetResult:
 
     def to_dataframe(self) -> Any:
         """One row a log (polars)."""
-        from trihedron.fleet.table import frame_of
-
         return frame_of(self.rows)
 
     def __repr__(self) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from trihedron.files.output import write_whole
-from trihedron.fleet.summary import FleetResult
+from trihedron.records.fleet import FleetSummary
 from trihedron.records.sessions import PARAMETERS
 
 if TYPE_CHECKING:
@@ -29,17 +30,17 @@ PLAIN = (
 )
 
 
-def write_tables(result: FleetResult) -> None:
+def write_tables(rows: Sequence[dict[str, Any]], summary: FleetSummary, folder: Path) -> None:
     """``fleet.parquet``, ``fleet.csv`` and ``fleet.html`` in the folder of the results; those of an earlier run go."""
     from trihedron.report.fleet import fleet_report
     from trihedron.report.page import to_html
 
-    frame = frame_of(result.rows)
+    frame = frame_of(rows)
     buffer = io.BytesIO()
     frame.write_parquet(buffer)
-    write_whole(result.folder / "fleet.parquet", buffer.getvalue(), overwrite=True)
-    write_whole(result.folder / "fleet.csv", frame.write_csv(), overwrite=True)
-    write_whole(result.folder / "fleet.html", to_html(fleet_report(result.summary)), overwrite=True)
+    write_whole(folder / "fleet.parquet", buffer.getvalue(), overwrite=True)
+    write_whole(folder / "fleet.csv", frame.write_csv(), overwrite=True)
+    write_whole(folder / "fleet.html", to_html(fleet_report(summary)), overwrite=True)
 
 
 def frame_of(rows: Sequence[dict[str, Any]]) -> polars.DataFrame:

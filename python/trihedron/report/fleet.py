@@ -10,9 +10,8 @@ from trihedron.records.fleet import FleetLog, FleetSummary
 from trihedron.records.sessions import Change, Repeated
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
-from trihedron.report.many_charts import fleet_chart
+from trihedron.report.many_charts import fleet_chart, shown
 from trihedron.report.numbers import how_many, plain_number, with_sigma
-from trihedron.report.sessions import shown
 
 VERDICTS = {
     "consistent": "the linear model explains everything",

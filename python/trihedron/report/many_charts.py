@@ -9,8 +9,20 @@ from trihedron.records.reference import AgainstReference
 from trihedron.records.sessions import PARAMETERS, SessionsModel
 from trihedron.report.chart import AXIS_COLOURS, Band, Chart, Level, Line, Panel, Points, Scale
 from trihedron.report.drawn import envelope, said
-from trihedron.report.sessions import shown
-from trihedron.units import degrees_from_radians
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+
+SHOWN: dict[str, tuple[float, str]] = {
+    "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
+    "rad/s": (degrees_from_radians(1.0), "°/s"),
+    "rad": (degrees_from_radians(1.0), "°"),
+    "1": (1e2, "%"),
+}
+"""Factor and unit in which people compare numbers of each kind."""
+
+
+def shown(unit: str) -> tuple[float, str]:
+    """Factor and unit in print."""
+    return SHOWN[unit]
 
 
 def sessions_chart(model: SessionsModel) -> Chart:

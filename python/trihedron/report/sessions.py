@@ -7,21 +7,12 @@ from functools import partial
 from typing import Any
 
 from trihedron.records.sessions import Change, Repeated, Session, SessionsModel, Spread, ThermalModel
-from trihedron.report.chart import Chart
 from trihedron.report.document import Block, Document, Facts, Paragraph, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.findings import findings_block, verdict_of
 from trihedron.report.frames import Columns
+from trihedron.report.many_charts import sessions_chart, shown
 from trihedron.report.numbers import how_many, plain_number, with_sigma
-from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
-
-SHOWN: dict[str, tuple[float, str]] = {
-    "m/s^2": (mm_s2_from_m_s2(1.0), "mm/s²"),
-    "rad/s": (degrees_from_radians(1.0), "°/s"),
-    "rad": (degrees_from_radians(1.0), "°"),
-    "1": (1e2, "%"),
-}
-"""Factor and unit in which people compare numbers of each kind."""
 
 
 def sessions_report(model: SessionsModel) -> Document:
@@ -104,11 +95,6 @@ def _repeatability(model: SessionsModel) -> list[Block]:
             "unit, relative to the common value; misalignments are departures from 90°.",
         )
     ]
-
-
-def shown(unit: str) -> tuple[float, str]:
-    """Factor and unit in print."""
-    return SHOWN[unit]
 
 
 def _row(one: Repeated, grouped: bool) -> list[str]:
@@ -213,16 +199,9 @@ def _picture(model: SessionsModel) -> Picture:
     return Picture(
         "sessions",
         "Every number in every recording with its own error (bars), about the common value.",
-        later("chart_figures", "draw_chart", partial(_chart, model)),
-        partial(_chart, model),
+        later("chart_figures", "draw_chart", partial(sessions_chart, model)),
+        partial(sessions_chart, model),
     )
-
-
-def _chart(model: SessionsModel) -> Chart:
-    # The drawing's units are this module's, so that it loads after it.
-    from trihedron.report.many_charts import sessions_chart
-
-    return sessions_chart(model)
 
 
 def sessions_columns(model: SessionsModel) -> Columns:

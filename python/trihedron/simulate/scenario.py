@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
@@ -168,10 +167,3 @@ class Scenario:
     gyroscope: Gyroscope = field(default_factory=Gyroscope)
     clock: Clock = field(default_factory=Clock)
     environment: Environment = field(default_factory=Environment)
-
-    @staticmethod
-    def from_toml(path: str | Path) -> Scenario:
-        """Read a scenario file (docs/simulation.md); see :func:`trihedron.simulate.scenario_file.read_scenario`."""
-        from trihedron.simulate.scenario_file import read_scenario
-
-        return read_scenario(path)

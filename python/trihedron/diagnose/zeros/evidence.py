@@ -19,8 +19,6 @@ CONFOUNDED_VARIANCE = 10.0
 """A coefficient whose variance walk and drift raise by more than this factor is not told apart from them."""
 KIND_LIMIT = 8.75
 """1 % point of 3/8 χ²(1) + 3/8 χ²(2) + 1/8 χ²(3): one strength more where the others may be 0."""
-WALKS = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-"""Shares of the strongest walk that noise may make."""
 SLOW = 0.01
 """p-value from which zeros are said to change slowly: false in 1 % of sessions whose zeros only scatter."""
 AT_EDGE = 0.99
@@ -110,19 +108,6 @@ def examine(
         process, readings.n_poses, sigma, scatter, scatter_std, p_slow, p_scatter, max(p_scatter, p_spared), worst,
         kind, drift_over, walk_over, bool((sigma >= AT_EDGE * process.levels[-1]).any()), groups,
     )  # fmt: skip
-
-
-def beats_walk(found: ZeroEvidence, walk: float) -> bool:
-    """Whether zeros change by more than scatter and a walk of an rms of at most ``walk`` about its mean make them.
-
-    False in 1 % of sessions with a walk as strong as that: one strength more, or a larger one.
-    """
-    process = found.process
-    every = list(range(process.readings.design.shape[1]))
-    top, _ = process.maximum(ALL, every, restricted=True)
-    levels = np.meshgrid(process.levels, walk * WALKS, [0.0], indexing="ij")
-    noise = process.grams(np.stack(levels, axis=-1).reshape(-1, 3)).log_likelihood(every, restricted=True)
-    return 2.0 * (top - float(noise.sum(axis=0).max())) > KIND_LIMIT
 
 
 def _half(ratio: float) -> float:
