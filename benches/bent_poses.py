@@ -1,4 +1,4 @@
-"""Accelerometers that bend: does ``calibrate`` say so, and are S and b right where it does not? See docs/confidence.md.
+"""Accelerometers that bend: does ``calibrate`` say so, and are S and b right where it does not? See docs/evidence.md.
 
     python benches/bent_poses.py --sessions 20 --first 91000 accel-cubic accel-quadratic accel-scale-asymmetry
     python benches/bent_poses.py --sessions 70 --first 92000 none            # the small faults of real logs alone

@@ -1,4 +1,4 @@
-"""Figures of docs/gallery.md: ``python benches/gallery.py FOLDER`` (the recordings are not part of the repository).
+"""Figures of docs/evidence.md: ``python benches/gallery.py FOLDER`` (the recordings are not part of the repository).
 
 Results only: residuals of poses and moves, nothing of the readings themselves.
 """

@@ -1,7 +1,7 @@
 """Real recordings end to end: ``python benches/recordings.py FOLDER`` (the recordings are not part of the repository).
 
 One line per recording: time warm (reading included), poses, norm residual and held-out gravity prediction; then what
-was published about them (docs/real-recordings.md).
+was published about them (docs/evidence.md).
 """
 
 import json

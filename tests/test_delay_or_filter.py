@@ -19,7 +19,7 @@ def test_a_filter_of_first_order_is_fitted_beside_the_delay_that_is_ahead_of_it(
     name, shared, values = effects[0]
     assert name == FILTERED
     assert LATE in shared
-    # The value comes out 3 % short (docs/confidence.md).
+    # The value comes out 3 % short.
     assert abs(values["gyro_lag"][0] - 0.04) < 0.002
 
 

@@ -2,26 +2,23 @@
 
 import re
 import shlex
-from pathlib import Path
 
 import matplotlib as mpl
 import pytest
 
+from documented import DOCS, blocks
 from trihedron.cli import main
 
 mpl.use("Agg")
 
-FOLDER = Path(__file__).parents[1] / "docs" / "tutorials"
-TUTORIALS = sorted(FOLDER.glob("*.md"))
-
-# A block may say what its last command returns: ```sh exit=2. Blocks of a real board or a real log are ```sh not-run.
-BLOCK = re.compile(r"^```(sh|python)( [^\n]*)?\n(.*?)^```", re.M | re.S)
+TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
 
 
-def blocks(path):
-    for language, words, body in BLOCK.findall(path.read_text(encoding="utf-8")):
-        if "not-run" not in words:
-            yield language, int(next(iter(re.findall(r"exit=(\d)", words)), 0)), body
+def shown_to_run(path):
+    """(language, status of the last command, text); a block of a real board or a real log says ``not-run``."""
+    for block in blocks(path):
+        if block.language in ("sh", "python") and block.said != "not-run":
+            yield block.language, int(next(iter(re.findall(r"exit=(\d)", block.said)), 0)), block.text
 
 
 def commands(body):
@@ -37,7 +34,7 @@ def test_what_the_tutorial_shows_runs_as_shown(path, tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     names = {}
     n_run = 0
-    for language, status, body in blocks(path):
+    for language, status, body in shown_to_run(path):
         if language == "python":
             exec(compile(body, path.name, "exec"), names)
             n_run += 1

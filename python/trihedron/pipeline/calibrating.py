@@ -52,7 +52,7 @@ FALSE_ALARM = 1e-3
 
 MOST_CREEPING = 0.05
 """Share of holds that may be seen to creep. The creep that is seen is the top of what is not: with one of 18 seen, on a
-support that yields, the gyro's scale lay outside its 95 % bars in a fifth of its elements (docs/confidence.md)."""
+support that yields, the gyro's scale lay outside its 95 % bars in a fifth of its elements."""
 
 Found = tuple[Finding, ...]
 
