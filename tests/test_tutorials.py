@@ -37,6 +37,9 @@ def test_what_the_tutorial_shows_runs_as_shown(path, tmp_path, monkeypatch, caps
     for language, status, body in shown_to_run(path):
         if language == "python":
             exec(compile(body, path.name, "exec"), names)
+            # What a comment promises is what is printed.
+            promised = re.findall(r"# → (.*)$", body, re.MULTILINE)
+            assert not promised or capsys.readouterr().out.splitlines() == promised
             n_run += 1
             continue
         shown = list(commands(body))
