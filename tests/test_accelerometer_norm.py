@@ -292,6 +292,6 @@ def test_very_many_readings_are_fitted_as_carefully_as_few(n, loss):
 
 def test_the_documented_call_of_the_ellipsoid_gives_its_own_answer():
     found = doctest.testmod(importlib.import_module("trihedron.estimate.accelerometer.ellipsoid"))
-    assert (found.attempted, found.failed) == (5, 0)
+    assert (found.attempted, found.failed) == (6, 0)
     with pytest.raises(ValueError, match="nine"):
         ellipsoid(np.r_[np.eye(3), -np.eye(3)], 9.81)
