@@ -3,6 +3,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Matrix3, Vector3};
 use std::hint::black_box;
+use trihedron::allan::{Column, Kind, octave_clusters, variances};
 use trihedron::attitude::{Form, IDENTITY, Samples};
 use trihedron::gauss_newton::Loss;
 use trihedron::kalman::{AxisFilter, NoiseTerms, Pose, Prior, ShapingModel};
@@ -131,6 +132,30 @@ fn long_logs(c: &mut Criterion) {
     group.finish();
 }
 
+fn allan(c: &mut Criterion) {
+    let n = 1_u32 << 20;
+    let data: Vec<f64> = (0..n).map(|k| (f64::from(k) * 0.618_034).fract()).collect();
+    let column = Column {
+        data: &data,
+        channels: 1,
+        channel: 0,
+    };
+    let clusters = octave_clusters(data.len() / 8, 4);
+    let mut group = c.benchmark_group("allan");
+    group.throughput(Throughput::Elements((data.len() * clusters.len()) as u64));
+    for kind in [
+        Kind::Overlapping,
+        Kind::Modified,
+        Kind::Hadamard,
+        Kind::Total,
+    ] {
+        group.bench_function(format!("{kind:?}"), |b| {
+            b.iter(|| variances(black_box(&column), black_box(&clusters), kind));
+        });
+    }
+    group.finish();
+}
+
 /// One pose of the Kalman filter of one axis: time update, measurement update, on a regular log.
 fn kalman_poses(c: &mut Criterion) {
     let model = |averages, flicker_rates: &[f64]| ShapingModel {
@@ -199,6 +224,7 @@ criterion_group!(
     norm_fits,
     poisson,
     long_logs,
+    allan,
     kalman_poses
 );
 criterion_main!(benches);

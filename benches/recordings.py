@@ -1,46 +1,118 @@
-"""Real recordings end to end: ``python benches/recordings.py FOLDER`` (the recordings are not part of the repository).
+"""Every public set of recordings, causes withheld (the recordings are not part of the repository).
 
-One line per recording: time warm (reading included), poses, norm residual and held-out gravity prediction; then what
-was published about them (docs/evidence.md).
+python benches/recordings.py calibrate FOLDER [WORD ...]   poses, residuals, held-out gravity; what was published
+python benches/recordings.py diagnose FOLDER [WORD ...]    the table of docs/diagnosis-real.md
 """
 
 import json
+import os
 import sys
 import time
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
+import polars as pl
 
 import trihedron
 
 
-def sessions(folder: Path) -> dict[str, tuple[dict[str, object], float]]:
-    """Arguments of :func:`trihedron.read` and gravity of every session."""
-    xsens = {
-        "accelerometer_path": folder / "xsens_mti/xsens_acc.txt",
-        "gyroscope_path": folder / "xsens_mti/xsens_gyro.txt",
-    }
-    out: dict[str, tuple[dict[str, object], float]] = {"xsens_mti": (xsens, 9.81744)}
+def recordings(folder: Path):
+    """Name, arguments of the reader (or readings in memory), gravity."""
+    pair = {"accelerometer_path": folder / "xsens_mti/xsens_acc.txt",
+            "gyroscope_path": folder / "xsens_mti/xsens_gyro.txt"}  # fmt: skip
+    yield "xsens_mti", pair, 9.81744
     for k in range(3):
-        out[f"mpu9150 imu{k}"] = ({"path": folder / f"mpu9150/imu{k}.log", "rate_hz": 100.0}, 9.81)
+        yield f"mpu9150 unit {k}", {"path": folder / f"mpu9150/imu{k}.log", "rate_hz": 100.0}, 9.8
     for k in (1, 2, 3):
-        out[f"kim {k}"] = ({"path": folder / f"kim/kim_imu_good{k}.txt"}, 9.79871)
-    out["mpu6050_tomi"] = ({"path": folder / "mpu6050_tomi/tomi_example_data_calibration.csv"}, 9.81)
+        yield f"kim run {k}", {"path": folder / f"kim/kim_imu_good{k}.txt"}, 9.79871
+    for k in (2, 3, 4, 5, 7):
+        yield f"mimu4444 exp {k}", {"path": folder / f"mimu4444/exp_{k}.npz", "device": 1}, 9.8184
     for k in (2, 3):
-        pair = {
-            f"{name}_path": next((folder / "phone").glob(f"rec_{k}*__{word}.csv"))
-            for name, word in (("accelerometer", "Acceleration"), ("gyroscope", "AngularVelocity"))
-        }
-        out[f"phone rec_{k}"] = (pair, 9.7974)
-    for k in (2, 3, 4, 5):
-        out[f"mimu4444 exp_{k}, device 1"] = ({"path": folder / f"mimu4444/exp_{k}.npz", "device": 1}, 9.8184)
-    return out
+        names = [next((folder / "phone").glob(f"rec_{k}*__{w}.csv")) for w in ("Acceleration", "AngularVelocity")]
+        yield f"phone rec_{k}", {"accelerometer_path": names[0], "gyroscope_path": names[1]}, 9.7974
+    yield "mpu6050_tomi poses", {"path": folder / "mpu6050_tomi/tomi_example_data_calibration.csv"}, 9.8
+    yield "mpu6050_tomi rest", {"path": folder / "mpu6050_tomi/tomi_example_data_tinit_calc.csv"}, 9.8
+    yield "imucal_ferraris", {"path": folder / "imucal_ferraris/example_ferraris_session.csv", "rate_hz": 102.4}, 9.81
+    for name in ("bmi160", "adxl355"):
+        yield f"openaxes {name}", {"path": folder / f"openaxes/{name}.csv"}, 9.8127
+    for k in (2, 3, 4):
+        own = folder / f"getovermassif/session{k}"
+        yield f"getovermassif {k}", {"accelerometer_path": f"{own}_acc.txt", "gyroscope_path": f"{own}_gyro.txt"}, 9.803
+    yield "thermal_chamber", {"path": folder / "thermal_chamber/imu_raw_data.tsv"}, 9.81
+    tag = pl.read_csv(folder / "cats_tag/cats_temperature_2poses.csv.gz").to_dict(as_series=False)
+    tag = {name: np.array(v) for name, v in tag.items()}
+    yield "cats_tag", {"path": tag}, 9.806
+    yield "cats_tag, no temperature", {"path": {k: v for k, v in tag.items() if k != "temp_C"}}, 9.806
+    for k in range(1, 6):
+        yield f"analog6dof {k}", {"path": folder / f"analog6dof/imuRaw{k}.csv"}, 9.796
+    for unit in "ab":
+        for k in (1, 2):
+            yield f"dual_xsens {unit} {k}", {"path": folder / f"dual_xsens/imu_{unit}_45_{k}.csv"}, 9.81
+    for k in (1, 2):
+        yield f"adis16405 {k}", {"path": folder / f"adis16405/adis16405_imu{k}.npz"}, 9.81
+    yield "galaxy_s5", {"path": folder / "galaxy_s5/samsung_galaxy_s5.csv.gz"}, 9.81
+    for axis in "xyz":
+        yield f"ctu {axis} rotation", {"path": folder / f"ctu/{axis}_rotation.csv", "rate_hz": 100.0}, 9.81
+
+
+def calibrated(name, arguments, gravity):
+    """One line of a calibration: time with reading, norm residual, held-out gravity prediction, verdict."""
+    began = time.perf_counter()
+    try:
+        result = trihedron.calibrate(trihedron.read(**arguments), gravity_m_s2=gravity)
+    except ValueError as error:
+        return f"{name}: refused: {error}"
+    seconds = time.perf_counter() - began
+    quality, gyroscope = result.accelerometer.quality, result.gyroscope
+    angles = None if gyroscope is None else gyroscope.quality.held_out_angle_deg
+    angle = f"{np.sqrt(np.nanmean(angles**2)):7.3f} °" if angles is not None else "–"
+    held = "–" if quality.held_out_rms is None else f"{1e3 * quality.held_out_rms:.2f} mm/s²"
+    verdict = "good" if result.is_trustworthy else "not to be trusted"
+    norms = f"{1e3 * quality.rms_dof:5.2f} mm/s² {held:>10s} {1e3 * quality.floor:4.2f} mm/s²"
+    return f"{name:26s} {seconds:5.2f} s {result.segments.n_holds:5d} {norms} {angle:>9s}  {verdict}"
+
+
+def of(arguments, gravity):
+    """``(diagnosis or None, one sentence, seconds)``."""
+    start = time.process_time()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            d = trihedron.diagnose(trihedron.read(**arguments), gravity_m_s2=gravity)
+    except ValueError as error:
+        return None, str(error), time.process_time() - start
+    return d, "", time.process_time() - start
+
+
+def as_row(name, d, why, seconds):
+    """One line of the table."""
+    if d is None:
+        return f"| {name} | – | refused: {why.split(': ', 1)[-1]} | | | | {seconds:.0f} s |"
+    ids, sizes, held = [], [], []
+    for e in d.effects:
+        also = f" (or {', '.join(e.confounded_with)})" if e.confounded_with else ""
+        ids.append(e.id + also)
+        told = [p for p in e.parameters if p.std > 0.0] or list(e.parameters)
+        big = max(told, key=lambda p: abs(p.value) / max(p.std, 1e-300), default=None)
+        codes = "".join(f", {p.name} {p.value:.9g}" for p in e.parameters if p.name.startswith("raw_"))
+        sizes.append("–" if big is None else f"{big.name} {big.value:.3g} ± {big.std:.1g} {big.unit}{codes}")
+        h = e.held_out[0] if e.held_out else None
+        held.append("–" if h is None else f"{h.domain} {h.chi2_per_dof_before:.2g} → {h.chi2_per_dof_after:.2g}")
+    left = ", ".join(f"{t.domain} {t.chi2_per_dof:.2g}" for t in d.remaining if t.disagrees)
+    laws = "".join(f"; law: {', '.join(law.depends_on)}" for law in d.laws)
+    told = "; ".join(ids) + laws
+    return (f"| {name} | {d.segments.n_holds} | {d.verdict}{': ' if told else ''}{told} | {'; '.join(sizes)} "
+            f"| {'; '.join(held)} | {left or '–'} | {seconds:.0f} s |")  # fmt: skip
 
 
 def against_published(folder: Path) -> None:
     """Print what was published next to what is found."""
-    arguments, gravity = sessions(folder)["xsens_mti"]
+    sessions = {name: (arguments, gravity) for name, arguments, gravity in recordings(folder)}
+    arguments, gravity = sessions["xsens_mti"]
     result = trihedron.calibrate(trihedron.read(**arguments), gravity_m_s2=gravity, method="separate")
     published = json.loads((folder / "xsens_mti/published_imu_tk.json").read_text())
     accelerometer, gyroscope = result.accelerometer, result.gyroscope
@@ -53,13 +125,13 @@ def against_published(folder: Path) -> None:
     residual = 1e3 * accelerometer.quality.rms_dof
     print(f"xsens_mti accelerometer zero: {np.abs(zero).max():.1f} counts; residual {residual:.2f} mm/s²")
     for k in range(3):
-        arguments, gravity = sessions(folder)[f"mpu9150 imu{k}"]
+        arguments, gravity = sessions[f"mpu9150 unit {k}"]
         quality = trihedron.calibrate(
             trihedron.read(**arguments), gravity_m_s2=gravity, method="separate"
         ).accelerometer.quality
-        print(f"mpu9150 imu{k}: chi-square {quality.chi2 / quality.dof:.2f} per degree of freedom ({quality.dof})")
+        print(f"mpu9150 unit {k}: chi-square {quality.chi2 / quality.dof:.2f} per degree of freedom ({quality.dof})")
     for k, said in ((1, 0.57), (2, 1.17), (3, 1.39)):
-        arguments, gravity = sessions(folder)[f"kim {k}"]
+        arguments, gravity = sessions[f"kim run {k}"]
         recording = trihedron.read(**arguments)
         segments = trihedron.segment(recording)
         alike = replace(segments, accelerometer_sigma_mean=np.full((segments.n_holds, 3), 1e-3))
@@ -72,24 +144,19 @@ def against_published(folder: Path) -> None:
 
 
 def main() -> None:
-    """Print the table."""
-    folder = Path(sys.argv[1])
-    print("recording                     time poses   residual   held out     noise   gravity  verdict")
-    for name, (arguments, gravity) in sessions(folder).items():
-        walls = []
-        for _ in range(3):
-            began = time.perf_counter()
-            result = trihedron.calibrate(trihedron.read(**arguments), gravity_m_s2=gravity)
-            walls.append(time.perf_counter() - began)
-        quality = result.accelerometer.quality
-        gyroscope = result.gyroscope
-        angles = None if gyroscope is None else gyroscope.quality.held_out_angle_deg
-        angle = f"{np.sqrt(np.nanmean(angles**2)):7.3f} °" if angles is not None else "–"
-        held = "–" if quality.held_out_rms is None else f"{1e3 * quality.held_out_rms:.2f} mm/s²"
-        verdict = "good" if result.is_trustworthy else "not to be trusted"
-        norms = f"{1e3 * quality.rms_dof:5.2f} mm/s² {held:>10s} {1e3 * quality.floor:4.2f} mm/s²"
-        print(f"{name:26s} {min(walls):5.2f} s {result.segments.n_holds:5d} {norms} {angle:>9s}  {verdict}")
-    against_published(folder)
+    what, folder, words = sys.argv[1], Path(sys.argv[2]), sys.argv[3:]
+    if what == "diagnose":
+        print("| set | poses | verdict: effects in order | parameter | held out, χ² per row | remains | CPU |")
+        print("|---|---|---|---|---|---|---|")
+    else:
+        print("recording                     time poses   residual   held out     noise   gravity  verdict")
+    for name, arguments, gravity in recordings(folder):
+        if words and not any(word in name for word in words):
+            continue
+        done = as_row(name, *of(arguments, gravity)) if what == "diagnose" else calibrated(name, arguments, gravity)
+        print(done, flush=True)
+    if what == "calibrate" and not words:
+        against_published(folder)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ python benches/rivals.py [--rounds 3] [--rows 1e7] [--only norm] [--write]
 
 Each method runs in a process of its own, in turn, `--rounds` times; a round is the fastest of some calls after a first.
 Numbers are CPU time on one core (`two cores` and reading: wall time), so that a busy machine shifts them little; quote
-ratios. `--write` puts the tables into docs/evidence.md and draws docs/figures/speed.png.
+ratios. `--write` puts the tables into docs/evidence.md.
 A rival that is not installed is left out: `pip install numba python-ins bottleneck pandas pyarrow
 filterpy colorednoise`.
 """
@@ -34,7 +34,7 @@ FACTORIES = ("ours", "numba_chain", "sensitivities", "parser")
 
 @dataclass(frozen=True)
 class Subject:
-    """One table: what is timed, in which unit, and of how much."""
+    """One table: what is timed, by which methods of a module, of how much, in units of ``per`` seconds."""
 
     key: str
     title: str
@@ -43,86 +43,41 @@ class Subject:
     n: int
     unit: str
     per: float
-    slow: dict[str, int]
     on_both: bool = False
 
-    @property
-    def count(self) -> float:
-        """What a call's seconds are divided by, in units of ``per`` seconds."""
-        return self.per
+
+# Methods that would take minutes are timed on fewer.
+SLOW = {
+    "SciPy steps, loop of products": 20_000,
+    "numba, sixteen Gauss-Markov processes": 100_000,
+    "SciPy RotationSpline, a knot in five samples": 100_000,
+    "pyins generate_imu": 20_000,
+}
 
 
 def subjects(rows: int) -> list[Subject]:
-    ns, us, ms = 1e-9, 1e-6, 1e-3
     million = 10**6
+    step = ("ns/step", 1e-9)
+    sample = ("ns/sample", 1e-9)
+    with_sensitivities = "Rotation with 12 sensitivities and covariance, 10⁶ uneven steps in moves of 2000"
+    motion = "Motion of a hand session, 10⁶ samples: attitude, rate, its change, force"
+    noise = "Noise of a triad, 10⁶ samples: white, flicker, walk"
+    text = f"Reading {rows:_} × 7 numbers of CSV, two cores".replace("10_000_000", "10⁷")
     return [
-        Subject("last", "Rotation over 10⁶ steps, the last attitude", "attitude", "LAST", million, "ns/step", ns, {}),
+        Subject("last", "Rotation over 10⁶ steps, the last attitude", "attitude", "LAST", million, *step),
+        Subject("trajectory", "Attitude at each of 10⁶ steps", "attitude", "TRAJECTORY", million, *step),
+        Subject("sensitivities", with_sensitivities, "attitude", "SENSITIVITIES", million, *step),
+        Subject("norm18", "Accelerometer from 18 poses", "norm", "FIT", 18, "µs", 1e-6),
+        Subject("norm500", "Accelerometer from 500 poses", "norm", "FIT", 500, "µs", 1e-6),
+        Subject("norm1e6", "Accelerometer from 10⁶ raw samples", "norm", "FIT", million, "ms", 1e-3),
+        Subject("still", "Still detection, 10⁷ × 3", "still", "DETECT", 10 * million, *sample),
+        Subject("kalman", "Kalman filter of one axis, 20 000 poses", "kalman", "TRACK", 20_000, "ns/pose", 1e-9),
+        Subject("noise", noise, "simulation", "NOISE", million, *sample),
         Subject(
-            "trajectory",
-            "Attitude at each of 10⁶ steps",
-            "attitude",
-            "TRAJECTORY",
-            million,
-            "ns/step",
-            ns,
-            {"SciPy steps, loop of products": 20_000},
+            "response", "Second-order response of a triad, 10⁶ samples", "simulation", "RESPONSE", million, *sample
         ),
-        Subject(
-            "sensitivities",
-            "Rotation with 12 sensitivities and covariance, 10⁶ uneven steps in moves of 2000",
-            "attitude",
-            "SENSITIVITIES",
-            million,
-            "ns/step",
-            ns,
-            {},
-        ),
-        Subject("norm18", "Accelerometer from 18 poses", "norm", "FIT", 18, "µs", us, {}),
-        Subject("norm500", "Accelerometer from 500 poses", "norm", "FIT", 500, "µs", us, {}),
-        Subject("norm1e6", "Accelerometer from 10⁶ raw samples", "norm", "FIT", million, "ms", ms, {}),
-        Subject("still", "Still detection, 10⁷ × 3", "still", "DETECT", 10 * million, "ns/sample", ns, {}),
-        Subject("kalman", "Kalman filter of one axis, 20 000 poses", "kalman", "TRACK", 20_000, "ns/pose", ns, {}),
-        Subject(
-            "noise",
-            "Noise of a triad, 10⁶ samples: white, flicker, walk",
-            "simulation",
-            "NOISE",
-            million,
-            "ns/sample",
-            ns,
-            {"numba, sixteen Gauss-Markov processes": 100_000},
-        ),
-        Subject(
-            "response",
-            "Second-order response of a triad, 10⁶ samples",
-            "simulation",
-            "RESPONSE",
-            million,
-            "ns/sample",
-            ns,
-            {},
-        ),
-        Subject(
-            "motion",
-            "Motion of a hand session, 10⁶ samples: attitude, rate, its change, force",
-            "simulation",
-            "MOTION",
-            million,
-            "ns/sample",
-            ns,
-            {"SciPy RotationSpline, a knot in five samples": 100_000, "pyins generate_imu": 20_000},
-        ),
-        Subject(
-            "read",
-            f"Reading {rows:_} × 7 numbers of CSV, two cores".replace("10_000_000", "10⁷"),
-            "reading",
-            "READ",
-            rows,
-            "s",
-            1.0,
-            {},
-            True,
-        ),
+        Subject("motion", motion, "simulation", "MOTION", million, *sample),
+        Subject("read", text, "reading", "READ", rows, "s", 1.0, True),
     ]
 
 
@@ -134,7 +89,7 @@ def worker(subject: Subject, method: str) -> None:
     function = getattr(module, subject.methods)[method]
     if function.__name__ in FACTORIES:
         function = function()
-    n = subject.slow.get(method, subject.n)
+    n = min(SLOW.get(method, subject.n), subject.n)
     arguments = module.data(n)
     first = arguments if subject.on_both else module.data(min(n, 20_000))
     if not subject.on_both:
@@ -240,16 +195,9 @@ def main() -> None:
                 kept.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n")
     if options.write:
         measured = [(subject, results[subject.key]) for subject in subjects(rows) if subject.key in results]
-        picture = ROOT / "docs/figures/speed.png"
-        if not options.only:
-            from rival_paths.growth import draw
-
-            draw(picture)
         # A reader must know how far to trust a median.
         how = f"Rounds: {options.rounds}; other work on the machine: load average {os.getloadavg()[0]:.0f}."
         parts = [*(table(*pair) for pair in measured), how]
-        if picture.exists():
-            parts.append(f"![Time against length and number of poses, both cores](figures/{picture.name})")
         put(ROOT / "docs/evidence.md", "rivals", "\n\n".join(parts))
 
 

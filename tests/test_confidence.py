@@ -8,8 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
-from confidence.arm import carried
-from confidence.machine import box, robot
+from confidence.machine import robot
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import hand, manual, table
@@ -33,7 +32,7 @@ def gyro_z(result, truth):
     return error / result.gyroscope.sigma_S, np.abs(error).max() / np.abs(np.diag(truth.S_w)).mean()
 
 
-@pytest.mark.parametrize(("move_s", "part"), [(2.0, 5e-4), (30.0, 1e-3), (60.0, 2e-3)])
+@pytest.mark.parametrize(("move_s", "part"), [(2.0, 5e-4), (30.0, 1e-3)])
 def test_the_gyro_scale_is_the_same_however_slowly_the_sensor_is_turned(move_s, part):
     f, w, rate, truth, motion = hand(21, n_poses=12, move_s=move_s)
     result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
@@ -129,10 +128,10 @@ def test_a_coarse_gyro_has_the_error_bars_of_its_rounding(bits):
     assert np.sum(np.square(z)) < 56.0
 
 
-@pytest.mark.parametrize(("make", "move_s"), [(hand, 2.0), (carried, 2.0), (carried, 10.0)])
-def test_lost_samples_with_stamps_remade_are_seen_through_tremor_and_soft_moves(make, move_s):
+@pytest.mark.parametrize("make", [hand, robot])
+def test_lost_samples_with_stamps_remade_are_seen_through_tremor_and_ringing(make):
     for seed in (41, 42):
-        f, w, rate, _, _ = make(seed, n_poses=12, move_s=move_s)
+        f, w, rate, _, _ = make(seed, n_poses=12)
         result = calibrate(recording_of(*with_losses(f, w, seed), rate), gravity_m_s2=G)
         lost = [finding for finding in result.findings if finding.code is FindingCode.SAMPLES_LOST]
         assert lost
@@ -141,18 +140,10 @@ def test_lost_samples_with_stamps_remade_are_seen_through_tremor_and_soft_moves(
         assert 0.01 < lost[0].numbers["lost_share"] < 0.045
 
 
-@pytest.mark.parametrize("move_s", [0.5, 10.0])
-def test_a_healthy_log_carried_by_an_arm_has_lost_nothing(move_s):
-    for seed in (43, 44, 45):
-        f, w, rate, _, _ = carried(seed, n_poses=12, move_s=move_s)
-        result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
-        assert FindingCode.SAMPLES_LOST not in {finding.code for finding in result.findings}
-
-
-@pytest.mark.parametrize("seed", [43, 44, 45, 46])
-def test_quick_moves_through_hundreds_of_degrees_need_no_nominal_scale(seed):
-    # Pulled by several g on their arm, they tell the linear start nothing; moves of 105 to 450°.
-    f, w, rate, truth, _ = carried(seed, n_poses=12, move_s=0.5)
+@pytest.mark.parametrize("seed", [43, 44])
+def test_moves_through_hundreds_of_degrees_need_no_nominal_scale(seed):
+    # Turns of up to 360° one after another between two poses.
+    f, w, rate, truth, _ = robot(seed, n_poses=14, speed_deg_s=300.0)
     result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
     assert result.is_trustworthy
     z, relative = gyro_z(result, lower(truth))
@@ -186,14 +177,6 @@ def test_whole_turns_show_the_lean_of_a_table_that_headings_hide():
     assert np.mean(np.square(accelerometer)) > 0.1, "bars that say nothing would pass as well"
 
 
-def test_poses_that_go_on_settling_mark_the_calibration_and_firm_ones_do_not():
-    trusted = {}
-    for name, settle in (("soft", {"settle_deg": 1.0, "settle_s": 0.8}), ("firm", {})):
-        f, w, rate, _, _ = carried(5011, **settle)
-        trusted[name] = calibrate(recording_of(f, w, rate), gravity_m_s2=G).is_trustworthy
-    assert trusted == {"soft": False, "firm": True}
-
-
 def test_losses_that_no_step_shows_are_in_the_error_bars_and_said():
     # At 1000 Hz a lost sample is below the noise of a reading, and each move lost two of its 2000: 0.1 % of the scale,
     # ten standard errors of the bars without them.
@@ -216,16 +199,3 @@ def test_a_machine_that_always_turns_at_one_speed_is_not_at_its_gyros_limit():
             z, relative = gyro_z(result, lower(truth))
             assert np.abs(z).max() < 4.0
             assert relative < 5e-3
-
-
-def test_a_box_that_falls_and_rocks_is_charged_with_what_its_samples_miss():
-    scores = []
-    for seed in range(3010, 3018):
-        f, w, rate, truth, _ = box(seed, n_poses=18)
-        result = calibrate(recording_of(f, w, rate), gravity_m_s2=G)
-        if result.is_trustworthy:
-            scores.append(gyro_z(result, lower(truth))[0])
-    # Half of such sessions were marked for losses they have not; of the rest the mean square was 2.2 (108 scores).
-    assert len(scores) >= 6
-    # 54 scores and more: 1.8 is beyond chance once in a thousand.
-    assert np.mean(np.square(scores)) < 1.8

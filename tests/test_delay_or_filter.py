@@ -1,31 +1,42 @@
-"""A delay and a low-pass, on sessions of ``benches/review_walk``: both are fitted, and said."""
+"""A delay and a low-pass of the gyro, on sessions of ``benches/confidence``: each is fitted, and said."""
 
 import sys
 from pathlib import Path
 
-import pytest
+import numpy as np
+from scipy.signal import lfilter
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
-from review_walk.causes import said
+from confidence.motion import G
+from confidence.sessions import hand
+from trihedron import diagnose
+from trihedron.records import Recording
 
 LATE, FILTERED = "accel-gyro-time-offset", "sensor-lag"
 
 
-@pytest.mark.parametrize("seed", [91, 100])
-def test_a_filter_of_first_order_is_fitted_beside_the_delay_that_is_ahead_of_it(seed):
-    # The delay's score, a straight line at no effect, is more than four times the filter's here.
-    _, effects = said(seed, (1, 0.04), {}, {})
-    name, shared, values = effects[0]
+def first_effect(behind):
+    """Id, what it is confounded with and parameters of the first effect, where the gyro's counts pass ``behind``."""
+    f, w, rate, _, _ = hand(91, move_s=1.5)
+    recording = Recording(
+        np.arange(len(f)) / rate, f, np.round(behind(w)), rate, accelerometer_unit="counts", gyroscope_unit="counts"
+    )
+    effect = diagnose(recording, gravity_m_s2=G).effects[0]
+    return effect.id, effect.confounded_with, {p.name: (p.value, p.std) for p in effect.parameters}
+
+
+def test_a_filter_of_first_order_is_fitted_beside_the_delay_that_is_ahead_of_it():
+    keep = np.exp(-0.01 / 0.04)
+    name, shared, values = first_effect(lambda w: lfilter([1.0 - keep], [1.0, -keep], w - w[0], axis=0) + w[0])
+    # The delay's score, a straight line at no effect, is several times the filter's here.
     assert name == FILTERED
     assert LATE in shared
-    # The value comes out 3 % short.
-    assert abs(values["gyro_lag"][0] - 0.04) < 0.002
+    assert abs(values["gyro_lag"][0] - 0.04) < 0.003
 
 
 def test_a_delay_comes_before_the_filter():
-    _, effects = said(91, (0, 0.04), {}, {})
-    name, _, values = effects[0]
+    name, _, values = first_effect(lambda w: np.concatenate([np.repeat(w[:1], 4, axis=0), w[:-4]]))
     assert name == LATE
     value, sigma = values["accelerometer_delay"]
     # A gyro that is late is an accelerometer that is early; four standard errors.

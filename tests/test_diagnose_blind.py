@@ -46,7 +46,7 @@ def test_a_drawn_flaw_is_named_with_its_size(effect, grade, seed):
 
 
 def test_every_effect_of_the_catalogue_is_drawn():
-    # Zeros that differ from pose to pose are drawn as nuisances (benches/blind_nuisances.py, benches/zero_process.py):
+    # Zeros that differ from pose to pose are drawn as nuisances (benches/blind_nuisances.py):
     # stress and mounting have no mechanism in the simulator.
     elsewhere = {"accel-zero-scatter", "gyro-zero-scatter"}
     assert set(SIZES) <= {effect.id for effect in catalogue()}

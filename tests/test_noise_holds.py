@@ -1,18 +1,39 @@
 """Noise inside holds: simulated sessions of known figures, and one held against another."""
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
-
-from noise_holds import RATE, session
 from trihedron.estimate.noise import noise_of_holds, ratio_of
 from trihedron.records.hold_noise import Measured
+
+RATE = 100.0
+
+
+def session(rng, holds=20, seconds=4.0, N=1e-2, step=0.0, corner=0.0, scatter=0.0, knocks=0, line=0.0, rate=RATE):
+    """Readings (n,) of one axis and windows of its holds, a second of handling between them."""
+    parts, windows, at = [], [], 0
+    for k in range(holds):
+        n = int(rate * seconds * rng.uniform(0.7, 1.4))
+        x = N * np.sqrt(rate) * np.exp(0.5 * scatter * rng.standard_normal()) * rng.standard_normal(n + 200)
+        if corner:
+            # First order, density at zero kept; a recursion has the spectrum of an analog filter that is sampled.
+            decay = np.exp(-2 * np.pi * corner / rate)
+            x = lfilter([1 - decay], [1, -decay], x)
+        x = x[200:]
+        if line:
+            x = x + line * np.sin(2 * np.pi * 17.0 * np.arange(n) / rate + rng.uniform(0, 2 * np.pi))
+        if k < knocks:
+            x[n // 2 : n // 2 + 5] += 40 * N * np.sqrt(rate)
+        x = x + rng.uniform(-10, 10)
+        if step:
+            x = np.round(x / step) * step
+        parts += [x, 5.0 * rng.standard_normal(int(rate))]
+        windows.append((at, at + n))
+        at += n + int(rate)
+    return np.concatenate(parts), windows
 
 
 def of(rng, **options):

@@ -1,19 +1,13 @@
 """Zeros from pose to pose: the kernel against dense matrices, the tests on sessions drawn second by second."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from trihedron import _core
 from trihedron.diagnose.zeros.curve import smooth_curve
 from trihedron.diagnose.zeros.evidence import examine
 from trihedron.diagnose.zeros.process import ZeroProcess, ZeroReadings
-from zero_process import readings_of
-from zero_sessions import Session, draw
+from zero_sessions import Session, draw, readings_of
 
 ALL = [0, 1, 2, 3, 4]
 

@@ -15,9 +15,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from confidence.arm import carried
 from confidence.judge import judge
-from confidence.machine import box, robot, swing
+from confidence.machine import robot
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import hand, manual, table
@@ -52,26 +51,9 @@ SETTINGS = {
         f"faces, stated {a:g}": (table, {"turns": t, "method": "faces", "is_stated": True})
         for a, t in THERE_AND_BACK.items()
     },
-    **{f"arm, moves of {s:g} s": (carried, {"move_s": s}) for s in (0.5, 2.0, 10.0, 30.0)},
-    "arm, soft settling": (carried, {"settle_deg": 1.0, "settle_s": 0.8}),
-    "arm, held in the hand": (carried, {"rest": "in hand"}),
-    "arm, 50 Hz": (carried, {"rate_hz": 50.0}),
-    "arm, 12 bit": (carried, {"gyro_bits": 12, "accel_bits": 12}),
-    **{make.__name__: (make, {}) for make in (box, robot, swing)},
-    **{
-        f"robot, noise {kind}": (robot, {"noise": kind})
-        for kind in ("telegraph", "tails", "spikes", "laplace", "filtered", "mains", "unequal")
-    },
+    "robot": (robot, {}),
     "robot, 12 bit": (robot, {"gyro_bits": 12}),
     "robot, 12 bit, lost 0.3 %, remade": (robot, {"gyro_bits": 12, "lost": 0.003, "is_remade": True}),
-    "robot, 10 bit, poses of 1.5 s, lost 1 %": (
-        robot,
-        {"hold_s": 1.5, "gyro_bits": 10, "accel_bits": 12, "lost": 0.01},
-    ),
-    "swing, 10 bit, poses of 1.5 s, lost 0.5 %, remade": (
-        swing,
-        {"hold_s": 1.5, "gyro_bits": 10, "accel_bits": 12, "lost": 0.005, "is_remade": True},
-    ),
     "manual's session, moves": (manual, {}),
     "manual's session, stated turns": (manual, {"is_stated": True}),
 }

@@ -54,7 +54,7 @@ const GAUSS_MARKOV_PEAK: f64 = 0.381_138_658;
 /// Variance of the slowest and the fastest of several Gauss-Markov processes, over that of the others.
 ///
 /// With one process per decade from 0.3/T to 6/hold the Allan deviation then follows 0.664 B within 2 % between one hold
-/// and a third of the session T (`benches/kalman_shaping.py`).
+/// and a third of the session T.
 const END_SHARE: f64 = 1.25;
 
 /// The continuous system behind a [`ShapingModel`], with states of unit amplitude: `n(t) = h·s`.

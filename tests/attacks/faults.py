@@ -43,7 +43,7 @@ LINES: dict[str, list[str]] = {
     "guide": ["guide", "log.csv", "-o", "OUT.json"],
     "plan": ["plan", "--json", "OUT.json"],
 }
-"""One line per way of writing. `capture` is killed by benches/capture_kill.py, `fleet` in tests/test_fleet.py."""
+"""One line per way of writing. `capture` is killed by `benches/capture.py kill`, `fleet` in tests/test_fleet.py."""
 
 
 class Faults(Attack):

@@ -137,7 +137,7 @@ def _coverage(comparison: Comparison) -> str:
         f"Within 1σ: {int(np.sum(z < 1.0))} of {n} (honest error bars: about {round(0.683 * n)}); within 2σ: "
         f"{int(np.sum(z < 2.0))} of {n} (about {round(0.954 * n)}). With all correlations χ² is "
         f"{plain_number(comparison.chi2)} for {n} parameters. One session proves little: the same count over 200 "
-        "sessions is benches/coverage.py. (The zeros of a real sensor wander; truth is their mean in this session.)"
+        "sessions is benches/confidence. (The zeros of a real sensor wander; truth is their mean in this session.)"
     )
 
 

@@ -11,7 +11,7 @@ from trihedron.records.kalman import AxisNoise
 
 SLOWEST_PER_SESSION, FASTEST_PER_HOLD = 0.3, 6.0
 """Extreme inverse correlation times, over those of the session and of a hold. With one Gauss-Markov process per decade
-between them the Allan deviation follows flicker within 2 % (benches/kalman_shaping.py)."""
+between them the Allan deviation follows flicker within 2 %."""
 
 
 @dataclass(frozen=True)

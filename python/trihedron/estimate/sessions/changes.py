@@ -21,7 +21,7 @@ SPREAD_DOF, WANDER_DOF = 25.0, 5.0
 """Degrees of freedom a session that its covariance and its wander bring: some 25 poses, and half of what was measured
 for the wander of a pair of sessions (:mod:`trihedron.diagnose.against.numbers`). An inverse of an estimate is too large
 by ν/(ν - 2) on average; the weights of sessions are taken back by it, or ten sessions would be called changed by chance
-in 3.5 % of units instead of 1 (benches/many_recordings.py)."""
+in 3.5 % of units instead of 1."""
 RIDGE = 1e-9
 """Variance, relative to its group's largest, below which a covariance is not told from zero."""
 

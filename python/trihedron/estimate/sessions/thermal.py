@@ -22,7 +22,7 @@ SPARE = 2
 """Sessions beyond the coefficients of a polynomial: one left out must leave a degree of freedom."""
 GAIN = 6.0
 """Held-out score (twice a log likelihood, three numbers together) by which a higher order must win. With 6 a group that
-does not follow temperature is given an order in 1 % of cases (benches/many_recordings.py)."""
+does not follow temperature is given an order in 1 % of cases."""
 HYSTERESIS_P = 0.01 / 7.0
 """One in a hundred units without hysteresis is given one, over the seven groups."""
 MIN_SPAN_DEGC = 2.0

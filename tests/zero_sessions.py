@@ -3,14 +3,12 @@
 Every process is a path on a fine clock; a pose's two numbers are averages of path plus white noise over its halves.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from trihedron.diagnose.zeros.process import ZeroReadings
+
 STEP_S = 0.25
 
 
@@ -29,49 +27,30 @@ class Session:
     walk: float = 0.0
     smooth: float = 0.0
     """Integrated walk."""
-    warm_up: float = 0.0
     swing: float = 0.0
     """Two swings of a temperature nobody logged."""
-    flicker: float = 0.0
-    creep: float = 0.0
-    """Each pose settles from here, per axis with its own sign, with a time constant of a third of the pose."""
     bump: float = 0.0
     gravity: float = 0.0
     """rms of what follows gravity."""
     thermal: float = 0.0
     """rms of what follows a logged temperature that swings."""
-    axis_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    temperature: bool = True
-    laws: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Zeros:
     """Half-means (3, 2h), their stated errors, times, pose numbers, verticals (2h, 3), temperature (2h,)."""
 
-    values: FloatArray
-    sigma: FloatArray
-    time_s: FloatArray
-    length_s: FloatArray
-    pose: npt.NDArray[np.int64]
-    up: FloatArray
-    temperature: FloatArray
+    values: np.ndarray
+    sigma: np.ndarray
+    time_s: np.ndarray
+    length_s: np.ndarray
+    pose: np.ndarray
+    up: np.ndarray
+    temperature: np.ndarray
 
 
-def _unit(path: FloatArray) -> FloatArray:
+def _unit(path: np.ndarray) -> np.ndarray:
     return (path - path.mean()) / max(float(path.std()), 1e-12)
-
-
-def _flicker(n: int, rng: np.random.Generator) -> FloatArray:
-    total = np.zeros(n)
-    for tau in (8.0, 30.0, 120.0, 480.0, 2000.0):
-        keep = np.exp(-STEP_S / tau)
-        kicks = rng.normal(0, np.sqrt(1 - keep**2), n)
-        state = rng.normal()
-        for k in range(n):
-            state = keep * state + kicks[k]
-            total[k] += state
-    return total
 
 
 def draw(session: Session, seed: int) -> Zeros:
@@ -92,29 +71,23 @@ def draw(session: Session, seed: int) -> Zeros:
     along_u = session.gravity * (along_u - along_u.mean(axis=0)) / along_u.std(axis=0)
     values, sigma = [], []
     for axis in range(3):
-        size = session.axis_scale[axis]
         path = np.zeros(n)
         # Scaled by their expected rms: a walk scaled by its own would be tamer than a walk.
         path += session.walk * np.cumsum(rng.normal(size=n)) / np.sqrt(n / 6)
         wave = np.cumsum(np.cumsum(rng.normal(size=n)) + rng.normal() * n**0.5)
         path += session.smooth * wave / np.sqrt(n**3 * (1 / 30 + 1 / 12))
-        path += session.warm_up * _unit(np.exp(-x / rng.uniform(0.1, 0.5))) * rng.choice((-1, 1))
         path += session.swing * hidden * rng.choice((-1, 1))
         path += session.thermal * temperature * rng.choice((-1, 1))
-        if session.flicker:
-            path += session.flicker * _unit(_flicker(n, rng))
-        path *= size
         row, errors = [], []
         middles, lengths, pose = [], [], []
         for i in range(h):
-            jump = size * session.scatter * rng.normal() + along_u[i, axis]
+            jump = session.scatter * rng.normal() + along_u[i, axis]
             if session.bump and i == h // 3:
-                jump += session.bump * size
-            settle = size * session.creep * rng.normal()
+                jump += session.bump
             for half in (0, 1):
                 a = begin[i] + half * holds[i] / 2
                 t = np.arange(a, a + holds[i] / 2, STEP_S / 5)
-                inside = np.interp(t, clock, path) + jump + settle * np.exp(-3.0 * (t - begin[i]) / holds[i])
+                inside = np.interp(t, clock, path) + jump
                 true = session.noise * np.sqrt(2.0 * session.hold_s / holds[i])
                 row.append(inside.mean() + true * rng.normal())
                 errors.append(true * session.stated)
@@ -126,3 +99,10 @@ def draw(session: Session, seed: int) -> Zeros:
     t = np.array(middles)
     heat = np.interp(t, clock, temperature)
     return Zeros(np.array(values), np.array(sigma), t, np.array(lengths), np.array(pose), up[np.array(pose)], heat)
+
+
+def readings_of(session: Session, seed: int) -> ZeroReadings:
+    """What the tests on zeros are given of a session."""
+    z = draw(session, seed)
+    design = np.column_stack([np.ones(len(z.time_s)), z.up, z.temperature])
+    return ZeroReadings(z.values, z.sigma, z.time_s, z.length_s, z.pose, design, np.ones((len(z.time_s), 1)))

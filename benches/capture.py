@@ -1,0 +1,141 @@
+"""Capture over a pseudo-terminal with a simulated board at its other end.
+
+python benches/capture.py faults [FRAMES] [FAULTS] [BOARD ...]   frames sent = frames saved + frames counted lost
+python benches/capture.py kill [KILLS]                           kill -9 at 1 kHz: what is lost, does every file read
+python benches/capture.py cpu [RATE_HZ] [BOARD ...]              share of a core that a recording takes
+"""
+
+from __future__ import annotations
+
+import random
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import trihedron
+from trihedron.capture import Recorder, decoder_factory, open_source
+from trihedron.files.frame_declaration import read_frame_declaration
+from trihedron.pipeline.capturing import column_namer
+from trihedron.records import Recording
+from trihedron.simulate.device import Device, PseudoTerminal, Sent, parse_faults, serve
+
+DECLARED = """
+sync = "AA 55"
+[checksum]
+kind = "crc16-ccitt"
+[[field]]
+name = "counter"
+type = "u16"
+""" + "".join(f'[[field]]\nname = "{name}"\ntype = "i16"\n' for name in ("ax", "ay", "az", "gx", "gy", "gz"))
+# What the board speaks, what it is read as, and the rate it pretends to: 115 200 baud and more.
+BOARDS = {
+    "xsens-mtdata2": ("xsens-mtdata2", 400.0), "xio": ("xio", 1000.0), "xio-text": ("xio", 400.0),
+    "sparkfun-6dof": ("sparkfun-6dof", 100.0), "sparkfun-6dof-text": ("sparkfun-6dof-text", 100.0),
+    "lines": ("lines", 1000.0), "lines-space": ("lines", 200.0), "lines-label": ("lines", 100.0),
+    "lines-equals": ("lines", 100.0), "declared": ("declared", 2000.0),
+}  # fmt: skip
+SHORT_S, LONG_S = 4.0, 14.0
+
+
+def readings(n: int, rate_hz: float, seed: int = 0) -> Recording:
+    """Ten-bit readings without meaning."""
+    values = np.round(np.random.default_rng(seed).uniform(0.0, 1023.0, (n, 6)))
+    return Recording(np.arange(n) / rate_hz, values[:, :3], values[:, 3:], rate_hz, "counts", "counts")
+
+
+@contextmanager
+def served(device: Device, line: PseudoTerminal, sent: Sent):
+    """The board at work in a thread, until the block ends."""
+    ended = threading.Event()
+
+    def board() -> None:
+        with suppress(OSError):
+            serve(device, line, is_wanted=lambda: not ended.is_set(), sent=sent)
+
+    thread = threading.Thread(target=board, daemon=True)
+    thread.start()
+    yield
+    ended.set()
+    line.patience_s = 0.0
+    thread.join()
+
+
+def faults(frames: str = "1e5", kinds: str = "1%", *only: str) -> None:
+    """The account of every board, as fast as it can be read."""
+    n, total = int(float(frames)), np.zeros(2, dtype=int)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "declared.toml").write_text(DECLARED)
+        declaration = read_frame_declaration(folder / "declared.toml")
+        for board in only or BOARDS:
+            read_as, rate_hz = BOARDS[board]
+            line = PseudoTerminal(folder / "port")  # a name that stays the same when it comes back
+            # The port is open before the first byte is sent: nothing is lost for want of a reader.
+            source, sent = open_source(line.name), []
+            spoken = declaration if board == "declared" else board
+            device = Device(readings(n, rate_hz), spoken, replace(parse_faults(kinds), clean_ends=30), 0.0, seed=7)
+            thread = threading.Thread(target=lambda d=device, p=line, s=sent: s.append(serve(d, p)))
+            make = decoder_factory(declaration if read_as == "declared" else read_as, column_namer())
+            # A board that goes away comes back; one that has sent everything does not.
+            away_s = 5.0 if "disconnect" in kinds else 0.0
+            recorder = Recorder(source, make, folder / f"{board}.csv", wait_for_return_s=away_s, silence_s=120.0)
+            thread.start()
+            for _ in recorder:
+                pass
+            thread.join()
+            count, rows = recorder.count, sum(row[0].isdigit() for row in (folder / f"{board}.csv").open())
+            missing = sent[0].frames - rows - count.lost
+            total += (sent[0].frames, missing)
+            account = f"sent {sent[0].frames:8d} = saved {rows:8d} + lost {count.lost:6d} + {missing}"
+            print(f"{board:20s} {account} (corrupt pieces {count.corrupt}, {count.tally})", flush=True)
+    print(f"{total[0]} frames; not accounted for: {total[1]}")
+
+
+def kill(kills: str = "50") -> None:
+    """Seconds of readings that were sent and are not in the file."""
+    lost = []
+    with tempfile.TemporaryDirectory() as name:
+        for seed in range(int(kills)):
+            line, log, sent = PseudoTerminal(Path(name) / f"tty{seed}"), Path(name) / f"log{seed}.csv", Sent()
+            command = [sys.executable, "-m", "trihedron", "capture", line.name, "-o", str(log)]
+            command += ["--protocol", "xsens-mtdata2", "--baud", "115200"]
+            process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+            with served(Device(readings(60_000, 1000.0, seed), "xsens-mtdata2", seed=seed), line, sent):
+                while not (log.exists() and log.stat().st_size > 2000):
+                    time.sleep(0.01)
+                time.sleep(random.Random(seed).uniform(0.0, 2.0))
+                process.send_signal(signal.SIGKILL)
+                sent_then = sent.frames
+                process.wait()
+            lost.append(sent_then / 1000.0 - int(trihedron.read(log).auxiliary["device_ticks"][-1]) * 1e-4)
+    print(f"{kills} kills: lost median {1e3 * np.median(lost):.0f} ms, most {1e3 * max(lost):.0f} ms; every file reads")
+
+
+def cpu(rate_hz: str = "1000", *only: str) -> None:
+    """CPU of the process over 4 and over 14 seconds, the difference over ten."""
+    for board in only or ("xsens-mtdata2", "lines", "xio", "sparkfun-6dof"):
+        spent = []
+        for seconds in (SHORT_S, LONG_S):
+            line = PseudoTerminal()
+            device = Device(readings(int((seconds + 60.0) * float(rate_hz)), float(rate_hz)), board)
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            with tempfile.TemporaryDirectory() as folder, served(device, line, Sent()):
+                command = [sys.executable, "-m", "trihedron", "capture", line.name, "-o", f"{folder}/log.csv"]
+                command += ["--protocol", BOARDS[board][0], "--baud", "115200", "--seconds", str(seconds)]
+                subprocess.run(command, check=True, capture_output=True)
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        print(f"{board:16s} {rate_hz} Hz: {100 * (spent[1] - spent[0]) / (LONG_S - SHORT_S):.1f} % of a core")
+
+
+if __name__ == "__main__":
+    {"faults": faults, "kill": kill, "cpu": cpu}[sys.argv[1]](*sys.argv[2:])

@@ -1,1 +1,0 @@
-"""Stamps of imagined loggers, drawn without a look at what reads them."""
