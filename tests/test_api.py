@@ -13,6 +13,7 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import polars as pl
 import pytest
+from matplotlib.figure import Figure
 
 import trihedron
 from trihedron.cli import COMMANDS
@@ -288,3 +289,13 @@ def test_capture_of_a_file_of_bytes_gives_a_recording(tmp_path):
     taken = trihedron.capture(str(tmp_path / "stream.txt"), tmp_path / "log.csv", on_block=blocks.append)
     assert taken.n_samples > 380
     assert sum(len(block.time_s) for block in blocks) == taken.n_samples
+
+
+def test_a_figure_is_drawn_where_it_is_asked_for(result):
+    figure = Figure()
+    above, below = figure.subplots(2)
+    assert result.plot("residuals", ax=above) is figure
+    assert above.has_data()
+    assert not below.has_data()
+    with pytest.raises(ValueError, match="needs 1 axes, one a panel; ax has 2"):
+        result.plot("residuals", ax=[above, below])

@@ -17,8 +17,10 @@ from documented import DOCS, blocks
 
 ROOT = DOCS.parent
 PAGES = sorted(DOCS.rglob("*.md"))
-# Made from the code when the site is built (docs/hooks/reference.py).
-MADE = {f"reference/{name}.md" for name in ("commands", "python", "findings", "effects", "schemas")}
+# Made from the code when the site is built (docs/hooks/reference.py), or from a notebook beside it.
+MADE = {f"reference/{name}.md" for name in ("commands", "python", "findings", "effects", "schemas")} | {
+    "tutorials/notebook.md"
+}
 BROWSER = next(
     (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
 )
@@ -57,6 +59,13 @@ def test_links_of_the_sources_hold_where_they_are_read_as_files(page):
     ] == []
 
 
+def test_commands_name_programs_that_are_there():
+    """``python benches/...``: what a figure was made with can be run again."""
+    for page in [*PAGES, *ROOT.glob("*.md")]:
+        named = set(re.findall(r"python (benches/\w+(?:\.py)?)", page.read_text(encoding="utf-8")))
+        assert [name for name in named if not (ROOT / name).exists()] == [], page.name
+
+
 def test_the_readme_is_short_and_its_pictures_show_on_a_package_index():
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 140
@@ -90,7 +99,7 @@ def site(tmp_path_factory):
     # Without -q, which silences the warnings before --strict counts them.
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(made)]
     built = subprocess.run(
-        command, cwd=ROOT, env={**os.environ, **quiet}, capture_output=True, text=True, timeout=120, check=False
+        command, cwd=ROOT, env={**os.environ, **quiet}, capture_output=True, text=True, timeout=600, check=False
     )
     assert built.returncode == 0, built.stdout + built.stderr
     handler = partial(SilentHandler, directory=str(made))

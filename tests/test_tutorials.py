@@ -1,5 +1,6 @@
 """Every command and every line of Python that a tutorial shows is run, in order, in an empty folder."""
 
+import json
 import re
 import shlex
 
@@ -53,6 +54,17 @@ def test_what_the_tutorial_shows_runs_as_shown(path, tmp_path, monkeypatch, caps
     # Files that the text names as results exist.
     for name in re.findall(r"<!-- makes (\S+) -->", path.read_text(encoding="utf-8")):
         assert (tmp_path / name).stat().st_size > 0, name
+
+
+def test_the_notebook_runs_and_was_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    document = json.loads((DOCS / "tutorials" / "notebook.ipynb").read_text(encoding="utf-8"))
+    cells = [cell for cell in document["cells"] if cell["cell_type"] == "code"]
+    assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
+    names = {}
+    for cell in cells:
+        assert not any(given["output_type"] == "error" for given in cell["outputs"])
+        exec("".join(cell["source"]), names)
 
 
 def test_every_kind_of_reader_has_a_tutorial():

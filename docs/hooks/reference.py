@@ -1,9 +1,11 @@
-"""Reference pages made from the code when the site is built: commands, Python, findings, effects, schemas."""
+"""Pages made when the site is built: commands, Python, findings, effects and schemas from the code; notebooks."""
 
 from __future__ import annotations
 
 import json
+from base64 import b64decode
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import mkdocs_gen_files
@@ -82,3 +84,28 @@ PAGES = {"commands": commands, "python": python, "findings": findings, "effects"
 for name, made in PAGES.items():
     with mkdocs_gen_files.open(f"reference/{name}.md", "w") as page:
         page.write(made())
+
+
+def notebook(cells: list[dict[str, Any]], name: str) -> str:
+    """An executed notebook as a page: cells and what they gave, pictures beside it."""
+    out: list[str] = []
+    for number, cell in enumerate(cells):
+        source = "".join(cell["source"])
+        out += [source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```", ""]
+        for given in cell.get("outputs", ()):
+            data = given.get("data", {})
+            if "image/png" in data:
+                with mkdocs_gen_files.open(f"tutorials/{name}-{number}.png", "wb") as picture:
+                    picture.write(b64decode(data["image/png"]))
+                out += [f"![What the cell above draws]({name}-{number}.png)", ""]
+            elif "text/html" in data:
+                # On one line: a blank one would end the block of HTML.
+                out += [f'<div class="given">{" ".join("".join(data["text/html"]).split())}</div>', ""]
+            elif text := "".join(given.get("text", data.get("text/plain", ()))):
+                out += ["```text", text.rstrip(), "```", ""]
+    return "\n".join(out)
+
+
+for path in sorted(Path(__file__).parents[1].glob("tutorials/*.ipynb")):
+    with mkdocs_gen_files.open(f"tutorials/{path.stem}.md", "w") as page:
+        page.write(notebook(json.loads(path.read_text(encoding="utf-8"))["cells"], path.stem))

@@ -50,6 +50,12 @@ if TYPE_CHECKING:
     from trihedron.files.calibration import read_calibration
     from trihedron.fleet import fleet
     from trihedron.pipeline import (
+        CalibrationResult,
+        CheckResult,
+        DiagnosisResult,
+        KalmanResult,
+        SessionsResult,
+        VerificationResult,
         allan_deviation,
         apply,
         calibrate,
@@ -75,17 +81,38 @@ if TYPE_CHECKING:
         verify,
         write_calibration,
     )
-    from trihedron.records import Calibration, Finding, Recording, Segments
+    from trihedron.records import (
+        AllanCurve,
+        Calibration,
+        Finding,
+        Noise,
+        Recording,
+        Segments,
+        SensorCalibration,
+    )
     from trihedron.records.diagnosis import Diagnosis
+    from trihedron.records.truth import Truth
+    from trihedron.refused import RefusedError
 
     __version__: str
 
 __all__ = [
+    "AllanCurve",
     "Calibration",
+    "CalibrationResult",
+    "CheckResult",
     "Diagnosis",
+    "DiagnosisResult",
     "Finding",
+    "KalmanResult",
+    "Noise",
     "Recording",
+    "RefusedError",
     "Segments",
+    "SensorCalibration",
+    "SessionsResult",
+    "Truth",
+    "VerificationResult",
     "__version__",
     "allan_deviation",
     "apply",
@@ -117,12 +144,14 @@ __all__ = [
     "write_calibration",
 ]
 
-_HOME = {"Diagnosis": "trihedron.records.diagnosis"}
+_HOME = {"Diagnosis": "trihedron.records.diagnosis", "Truth": "trihedron.records.truth"}
+_HOME |= {"RefusedError": "trihedron.refused"}
 _HOME |= {"integrate_rate": "trihedron.estimate.attitude"}
 _HOME |= {"fleet": "trihedron.fleet"}
 _HOME |= {"identify_noise": "trihedron.estimate.noise", "read_calibration": "trihedron.files.calibration"}
-_HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")
-# The others are verbs.
+_RECORDS = ("AllanCurve", "Calibration", "Finding", "Noise", "Recording", "Segments", "SensorCalibration")
+_HOME |= dict.fromkeys(_RECORDS, "trihedron.records")
+# The others are verbs, and what they return.
 _HOME |= {name: "trihedron.pipeline" for name in __all__ if name not in _HOME and not name.startswith("_")}
 
 
