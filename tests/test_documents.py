@@ -13,6 +13,7 @@ from importlib.util import find_spec
 import pytest
 import yaml
 
+import trihedron
 from documented import DOCS, blocks
 
 ROOT = DOCS.parent
@@ -96,6 +97,7 @@ def site(tmp_path_factory):
         pytest.skip(f"the site cannot be built without {', '.join(missing)} (extra docs)")
     made = tmp_path_factory.mktemp("site")
     quiet = {"NO_MKDOCS_2_WARNING": "1", "DISABLE_MKDOCS_2_WARNING": "true"}
+    quiet |= {"PYTHONPATH": str(Path(trihedron.__file__).parents[1])}
     # Without -q, which silences the warnings before --strict counts them.
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(made)]
     built = subprocess.run(
@@ -147,6 +149,8 @@ def test_every_page_in_a_browser_is_whole(site):
     with sync_playwright() as tool:
         browser = tool.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
         tab = browser.new_page(viewport={"width": 390, "height": 800})
+        # The theme's search reads its whole index anew on every page: nothing that is looked at here.
+        tab.route("**/workers/*", lambda route: route.abort())
         tab.on("pageerror", lambda error: faults.append(f"{tab.url}: {error}"))
         for path in sorted(made.rglob("index.html")):
             address = home + path.parent.relative_to(made).as_posix().removeprefix(".").rstrip("/")
