@@ -15,6 +15,7 @@ pub mod fit;
 mod gaps;
 mod held;
 pub mod held_out;
+pub mod hypothesis;
 mod lanes;
 pub mod move_rows;
 pub mod moves;
@@ -157,6 +158,8 @@ pub struct Strengths {
     pub scatter: [f64; 2],
     /// How far a zero that scatters leaves, during a move, the line between its poses: in units of its scatter.
     pub between: [f64; 2],
+    /// Factors, at least 1, on the standard errors of gravity after moves and of the velocity over them.
+    pub excess: [f64; 2],
 }
 
 impl Strengths {
@@ -165,6 +168,7 @@ impl Strengths {
         corner_s: [f64::INFINITY; 2],
         scatter: [0.0; 2],
         between: [0.0; 2],
+        excess: [1.0; 2],
     };
 }
 

@@ -74,7 +74,11 @@ impl Passed {
     #[must_use]
     pub fn covariance(&self, strengths: &Strengths) -> MoveCovariance {
         let mut out = self.response.covariance;
-        widen(&mut out, self.inflation);
+        let [gravity, velocity] = strengths.excess;
+        widen(
+            &mut out,
+            [self.inflation[0] * gravity, self.inflation[1] * velocity],
+        );
         if let Some(loose) = &self.loose {
             for s in 0..2 {
                 out += loose[s] * (strengths.scatter[s] * strengths.between[s]).powi(2);

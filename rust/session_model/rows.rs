@@ -96,7 +96,7 @@ impl Session {
             .collect();
         out.extend(moves);
         self.process_rows(state, strengths, layout, &mut out);
-        self.prior_rows(state, layout, &mut out);
+        self.prior_rows(state, distortion, layout, &mut out);
         Ok(out)
     }
 
@@ -116,7 +116,7 @@ impl Session {
         let mut rest = Vec::with_capacity(6 * layout.n_poses);
         self.rest_rows(state, distortion, layout, &mut rest)?;
         self.process_rows(state, strengths, layout, &mut rest);
-        self.prior_rows(state, layout, &mut rest);
+        self.prior_rows(state, distortion, layout, &mut rest);
         let effects = Effects::at(distortion, state);
         let carried: Vec<Carried> = (0..self.moves.len())
             .into_par_iter()
@@ -134,7 +134,23 @@ impl Session {
         Ok((moves + still, carried))
     }
 
-    fn prior_rows(&self, state: &State, layout: Layout, out: &mut Vec<Group>) {
+    fn prior_rows(
+        &self,
+        state: &State,
+        distortion: &Distortion,
+        layout: Layout,
+        out: &mut Vec<Group>,
+    ) {
+        for (c, size) in distortion.sizes.iter().enumerate() {
+            if size.is_finite() {
+                out.push(size_row(
+                    layout.border,
+                    N_MODEL + c,
+                    state.effect[c],
+                    *size,
+                ));
+            }
+        }
         let Some(prior) = &self.prior else { return };
         let residual = prior.white * (state.model() - prior.mean);
         for (first, domain) in [(0, Domain::StaticForce), (9, Domain::Moves)] {
@@ -160,6 +176,25 @@ impl Session {
                 log_weight: 0.0,
             });
         }
+    }
+}
+
+/// One parameter of an effect held to its size beforehand.
+pub(super) fn size_row(n_border: usize, column: usize, value: f64, size: f64) -> Group {
+    let mut border = DMatrix::zeros(1, n_border);
+    border[(0, column)] = 1.0 / size;
+    Group {
+        rows: Rows {
+            residual: DVector::from_element(1, value / size),
+            border,
+            pose: None,
+            here: DMatrix::zeros(1, 0),
+            next: DMatrix::zeros(1, 0),
+        },
+        domain: Domain::Prior,
+        kind: Kind::Prior,
+        segment: 0,
+        log_weight: -size.ln(),
     }
 }
 

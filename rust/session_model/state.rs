@@ -14,6 +14,8 @@ pub struct Distortion {
     pub rate: Option<Vec<f64>>,
     /// Parameters.
     pub k: usize,
+    /// Standard deviation of each beforehand, none where that is not known.
+    pub sizes: Vec<f64>,
 }
 
 /// A point in the space of all unknowns.
@@ -60,37 +62,6 @@ impl Distortion {
                 })
                 .collect(),
         )
-    }
-
-    /// Two distortions side by side.
-    #[must_use]
-    pub fn beside(&self, other: &Self) -> Self {
-        let k = self.k + other.k;
-        let join = |a: Option<&Vec<f64>>, b: Option<&Vec<f64>>| {
-            if a.is_none() && b.is_none() {
-                return None;
-            }
-            let rows = a
-                .map(|a| a.len() / self.k)
-                .or_else(|| b.map(|b| b.len() / other.k))?;
-            let mut out = Vec::with_capacity(rows * k);
-            for r in 0..rows {
-                match a {
-                    Some(a) => out.extend_from_slice(&a[r * self.k..(r + 1) * self.k]),
-                    None => out.extend(std::iter::repeat_n(0.0, self.k)),
-                }
-                match b {
-                    Some(b) => out.extend_from_slice(&b[r * other.k..(r + 1) * other.k]),
-                    None => out.extend(std::iter::repeat_n(0.0, other.k)),
-                }
-            }
-            Some(out)
-        };
-        Self {
-            force: join(self.force.as_ref(), other.force.as_ref()),
-            rate: join(self.rate.as_ref(), other.rate.as_ref()),
-            k,
-        }
     }
 }
 

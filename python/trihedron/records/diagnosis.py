@@ -149,12 +149,21 @@ class Stage(Plain):
 
 @dataclass(frozen=True)
 class Candidate(Plain):
-    """One catalogue effect tried on the baseline: its score test, or why it does not apply."""
+    """One catalogue effect that was tried, accepted or not, or why it does not apply.
+
+    ``score`` is twice the log-evidence that it gains beside what was accepted, the search paid for; ``size`` what its
+    parameters come to there, ``limit95`` what the largest of them is at most (95 %), in its unit; ``stands_against`` the
+    accepted effect beside which it is needless, where it would stand without that one.
+    """
 
     id: str
     p_value: float | None
     applicable: bool
     reason: str = ""
+    score: float | None = None
+    size: tuple[EffectParameter, ...] = ()
+    limit95: float | None = None
+    stands_against: str | None = None
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,16 @@ def expected_scatter(readings: FloatArray, spans: IntArray, up: FloatArray) -> f
     return float(_between_poses(halves, parts, spans)[0])
 
 
+def expected_scatter_of_axes(readings: FloatArray, spans: IntArray) -> float:
+    """The same of a gyro, rms over its axes: its bias shows along all of them."""
+    spans = spans[spans[:, 1] - spans[:, 0] >= FEWEST_READINGS]
+    if len(spans) < FEWEST_POSES:
+        return 0.0
+    axes = np.broadcast_to(np.eye(3), (len(spans), 3, 3))
+    found = _between_poses(_steps(readings, spans, axes, 2), _steps(readings, spans, axes, PARTS), spans)
+    return float(np.sqrt(np.mean(found**2)))
+
+
 def _between_poses(halves: FloatArray, parts: FloatArray, spans: IntArray) -> FloatArray:
     """(k,) scatter along each direction from steps of halves (h, 1, k) and of parts (h, PARTS - 1, k) of poses."""
     k = halves.shape[2]

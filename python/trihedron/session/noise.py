@@ -14,15 +14,16 @@ from trihedron.records.segments import Segments
 from trihedron.refused import RefusedError
 from trihedron.session.aliasing import unresolved_variance
 from trihedron.session.coloured_noise import coloured_variance
-from trihedron.session.flicker import expected_scatter
+from trihedron.session.flicker import expected_scatter, expected_scatter_of_axes
 
 LEAST_SHARE = 1e-9
 """Where nothing scatters (a simulation without noise) a billionth of a unit stands for the rounding of the log."""
 Along = tuple[FloatArray, FloatArray]
 """Directions (h, 3) and the standard errors (h,) of pose means along them."""
-START_STRENGTHS = ((160.0, 160.0), (1e-3, 1e-3), (1.0, 1.0))
+Strengths = tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
+START_STRENGTHS: Strengths = ((160.0, 160.0), (1e-3, 1e-3), (1.0, 1.0), (1.0, 1.0))
 """Where the search of the zeros' strengths begins: corner times [s], scatter that counts as none, straying between
-poses in units of the scatter; accelerometer, gyro each."""
+poses in units of the scatter, excess of moves over their noise; accelerometer and gyro (gravity and velocity) each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +33,8 @@ class SessionNoise:
     Standard errors of pose means (h, 3), white noise ``density`` (3,) raw · √s, and ``unresolved`` (m, 2, 3): variance
     of every move's integrals, force and rate, (raw unit · s)², by motion faster than the samples and by noise slower
     than a move. ``force_up`` are the verticals (h, 3) and the standard errors (h,) of the means along them, NaN where
-    those of the axes hold; ``None`` where no vertical is known. ``force_scatter`` [raw]: by how much flicker lets the
-    accelerometer's zero differ from pose to pose, 0 where poses show none.
+    those of the axes hold; ``None`` where no vertical is known. ``force_scatter`` and ``rate_scatter`` [raw]: by how
+    much 1/f noise lets the bias differ from pose to pose, 0 where poses show none.
     """
 
     force_sigma: FloatArray
@@ -43,6 +44,7 @@ class SessionNoise:
     unresolved: FloatArray
     force_up: Along | None = None
     force_scatter: float = 0.0
+    rate_scatter: float = 0.0
 
 
 def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[int, int]]) -> SessionNoise:
@@ -91,7 +93,10 @@ def measure_noise(recording: Recording, segments: Segments, ranges: list[tuple[i
     scatter = 0.0
     if along is not None:
         scatter = expected_scatter(recording.accelerometer, np.array(spans, dtype=np.int64).reshape(-1, 2), along[0])
-    return SessionNoise(sigmas[0], densities[0], sigmas[1], densities[1], variances, along, scatter)
+    of_rate = 0.0
+    if has_rate and recording.gyroscope is not None:
+        of_rate = expected_scatter_of_axes(recording.gyroscope, np.array(spans, dtype=np.int64).reshape(-1, 2))
+    return SessionNoise(sigmas[0], densities[0], sigmas[1], densities[1], variances, along, scatter, of_rate)
 
 
 def along_gradient(sigma: FloatArray, along: Along | None, gradient: FloatArray) -> FloatArray:

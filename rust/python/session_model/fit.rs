@@ -12,12 +12,13 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::read_out::{Blocks, Rows, flagged, labels, moves, path};
-use super::{Corners, distortion};
+use super::{AllStrengths, Corners, all_strengths, distortion, sizes_fit, strengths_of};
 use crate::error::Result;
 use crate::python::arrays::{dmatrix, matrix, of3, vector3, vectors};
 use crate::python::{run, run_long};
 use crate::session_model::Session;
 use crate::session_model::fit::{Fit, widened};
+use crate::session_model::hypothesis::{Hypothesis, Within};
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
@@ -97,10 +98,8 @@ impl SessionFit {
 
     /// Corner times, s; scatter in its units; straying between poses in units of the scatter: accelerometer, gyro each.
     #[getter]
-    fn strengths(&self) -> (Corners, Corners, Corners) {
-        let s = &self.fit.strengths;
-        let pair = |[a, b]: [f64; 2]| (a, b);
-        (pair(s.corner_s), pair(s.scatter), pair(s.between))
+    fn strengths(&self) -> AllStrengths {
+        all_strengths(&self.fit.strengths)
     }
 
     #[getter]
@@ -230,6 +229,67 @@ impl SessionFit {
         let fit = Arc::clone(&self.fit);
         let out = run(py, || Ok(fit.project(&columns)))?;
         matrix(py, &out)
+    }
+
+    /// Log-evidence of every hypothesis (force, rate, sizes beforehand of further effects), all but the strengths of the
+    /// noise integrated out; strengths are sought from those given, `within` shortest
+    /// corner times, largest scatter and largest excess, or are those given where that is nothing. With each its strengths, its parameters
+    /// one linear step from here, and their covariance.
+    #[allow(clippy::type_complexity)]
+    fn evidence<'py>(
+        &self,
+        py: Python<'py>,
+        hypotheses: Vec<(Option<Array3<'py>>, Option<Array3<'py>>, Vec<f64>)>,
+        strengths: AllStrengths,
+        within: Option<(Corners, Corners, Corners)>,
+    ) -> PyResult<
+        Vec<(
+            f64,
+            AllStrengths,
+            Bound<'py, PyArray1<f64>>,
+            Bound<'py, PyArray2<f64>>,
+        )>,
+    > {
+        let n_points = self.session.n_points();
+        let mut asked = Vec::with_capacity(hypotheses.len());
+        for (force, rate, sizes) in &hypotheses {
+            let effects = distortion(force.as_ref(), rate.as_ref(), n_points)?;
+            sizes_fit(sizes, effects.k)?;
+            asked.push((effects, sizes.clone()));
+        }
+        let (fit, session) = (Arc::clone(&self.fit), Arc::clone(&self.session));
+        let strengths = strengths_of(strengths);
+        let within = within.map(|(corner, scatter, excess)| Within {
+            corner_s: [corner.0, corner.1],
+            scatter: [scatter.0, scatter.1],
+            excess: [excess.0, excess.1],
+        });
+        let found = run_long(py, || {
+            let each = asked.par_iter().map(|(effects, sizes)| {
+                let columns = session.columns(
+                    &fit.state,
+                    &fit.groups,
+                    &fit.weights,
+                    &fit.passed,
+                    effects,
+                )?;
+                let one = Hypothesis::of(&session, &fit, &columns, sizes)?;
+                within.as_ref().map_or_else(
+                    || one.found(&strengths),
+                    |within| one.tuned(&strengths, within),
+                )
+            });
+            each.collect::<Result<Vec<_>>>()
+        })?;
+        let lent = found.iter().map(|one| {
+            Ok((
+                one.log_evidence,
+                all_strengths(&one.strengths),
+                one.estimate.as_slice().to_pyarray(py),
+                matrix(py, &one.covariance)?,
+            ))
+        });
+        lent.collect()
     }
 
     /// `(rows,)` share of every row that the fit used up.

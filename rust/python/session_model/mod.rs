@@ -27,6 +27,8 @@ type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
 /// A figure of the accelerometer and of the gyro.
 type Corners = (f64, f64);
+/// Corner times s, scatter, straying between poses, excess of moves: accelerometer and gyro (gravity and velocity) each.
+type AllStrengths = (Corners, Corners, Corners, Corners);
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<SessionPoses>()?;
@@ -81,7 +83,38 @@ fn distortion(
         force: force.map(|(values, _)| values).filter(|_| k > 0),
         rate: rate.map(|(values, _)| values).filter(|_| k > 0),
         k,
+        sizes: Vec::new(),
     })
+}
+
+fn strengths_of(given: AllStrengths) -> Strengths {
+    let pair = |(a, b): Corners| [a, b];
+    Strengths {
+        corner_s: pair(given.0),
+        scatter: pair(given.1),
+        between: pair(given.2),
+        excess: pair(given.3),
+    }
+}
+
+fn all_strengths(given: &Strengths) -> AllStrengths {
+    let pair = |[a, b]: [f64; 2]| (a, b);
+    (
+        pair(given.corner_s),
+        pair(given.scatter),
+        pair(given.between),
+        pair(given.excess),
+    )
+}
+
+fn sizes_fit(sizes: &[f64], k: usize) -> PyResult<()> {
+    if sizes.len() == k && sizes.iter().all(|size| *size > 0.0) {
+        return Ok(());
+    }
+    Err(PyValueError::new_err(format!(
+        "{k} effect parameters need as many positive sizes, got {}",
+        sizes.len()
+    )))
 }
 
 #[pymethods]
@@ -142,18 +175,19 @@ impl SessionModel {
     }
 
     /// Fits from a state; of the `strengths`, corner times and scatter are chosen by marginal likelihood when `is_tuned`.
-    #[pyo3(signature = (*, state, strengths, force_effect, rate_effect, is_tuned))]
+    #[pyo3(signature = (*, state, strengths, force_effect, rate_effect, is_tuned, sizes=None))]
     fn fit(
         &self,
         py: Python<'_>,
         state: &SessionState,
-        strengths: (Corners, Corners, Corners),
+        strengths: AllStrengths,
         force_effect: Option<Array3<'_>>,
         rate_effect: Option<Array3<'_>>,
         is_tuned: bool,
+        sizes: Option<Vec<f64>>,
     ) -> PyResult<SessionFit> {
         let start = self.checked(state)?;
-        let effects = distortion(
+        let mut effects = distortion(
             force_effect.as_ref(),
             rate_effect.as_ref(),
             self.session.n_points(),
@@ -165,12 +199,11 @@ impl SessionModel {
                 effects.k
             )));
         }
-        let pair = |(a, b): Corners| [a, b];
-        let strengths = Strengths {
-            corner_s: pair(strengths.0),
-            scatter: pair(strengths.1),
-            between: pair(strengths.2),
-        };
+        if let Some(sizes) = sizes {
+            sizes_fit(&sizes, effects.k)?;
+            effects.sizes = sizes;
+        }
+        let strengths = strengths_of(strengths);
         let session = Arc::clone(&self.session);
         let found = super::run_long(py, || {
             if is_tuned {

@@ -11,8 +11,8 @@ from typing import Literal
 import numpy as np
 from scipy.stats import norm
 
+from trihedron.diagnose.accepted import HEADLINE
 from trihedron.diagnose.effects import catalogue
-from trihedron.diagnose.selection.accepted import HEADLINE
 from trihedron.probability import f_upper
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, ParameterDifference
 from trihedron.records.domains import Domain

@@ -10,6 +10,8 @@ class AccelCubic(Effect):
     """Adds K3 f³ along each axis: the first odd term of ξ/2 (1 + ξ²/4 + …)."""
 
     id = "accel-cubic"
+    size = 5e-5
+    """1/(m/s²)²: half a percent of g at 1 g."""
     applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:

@@ -13,6 +13,8 @@ class AccelGyroTimeOffset(Effect):
     """Accelerometer readings belong to an earlier instant: f(t) reads f(t − δ); where δ < 0 the gyro is late."""
 
     id = "accel-gyro-time-offset"
+    size = 0.015
+    """s: a sample or two of a slow log, the delay of a filter."""
 
     def unavailable(self, context: Context) -> str | None:
         return why_not("no-moves") if not context.moves else None

@@ -12,6 +12,8 @@ from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis
 
 PLAY_WIDTHS_M_S2 = (0.5, 2.0, 5.0)
+PLAY_M_S2, CREEP = 0.02, 0.005
+"""2 mg, and half a percent of a change that follows later."""
 CREEP_TIMES_S = (5.0, 20.0, 60.0)
 
 
@@ -19,6 +21,9 @@ class AccelHysteresis(Effect):
     """Offset per axis that depends on the direction of arrival (play operator) or creeps after a turn."""
 
     id = "accel-hysteresis"
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
+        return np.full(3, PLAY_M_S2 if variant.label == "play" else CREEP)
 
     def variants(self, context: Context) -> list[Variant]:
         return [self._play(context, width) for width in PLAY_WIDTHS_M_S2] + [

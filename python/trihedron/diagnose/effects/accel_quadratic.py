@@ -10,6 +10,8 @@ class AccelQuadratic(Effect):
     """Adds K2 f² along each accelerometer's own axis."""
 
     id = "accel-quadratic"
+    size = 5e-4
+    """1/(m/s²): half a percent of g at 1 g."""
     applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:

@@ -12,6 +12,8 @@ class AccelScaleAsymmetry(Effect):
     """Adds a |f|: half the difference between the scales of the two directions."""
 
     id = "accel-scale-asymmetry"
+    size = 5e-3
+    """Half a percent."""
     applies_elsewhere = True
 
     def variants(self, context: Context) -> list[Variant]:

@@ -13,6 +13,8 @@ class AccelSizeEffect(Effect):
     """Accelerometers 2 and 3 displaced from accelerometer 1: each reads its own α×r + ω×(ω×r)."""
 
     id = "accel-size-effect"
+    size = 5e-3
+    """m: dies of one package."""
 
     def unavailable(self, context: Context) -> str | None:
         return why_not("no-moves") if not context.moves else None

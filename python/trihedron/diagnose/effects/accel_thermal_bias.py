@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import LEAST_SWING_K, Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only
-from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants
+from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants, thermal_sizes
 from trihedron.records.words import why_not
+
+BIAS_PER_K = 0.005
+"""m/s²: half a mg per kelvin."""
 
 
 class AccelThermalBias(Effect):
@@ -24,6 +28,9 @@ class AccelThermalBias(Effect):
         if np.ptp(context.temperature) < LEAST_SWING_K:
             return why_not("steady-temperature", least_k=LEAST_SWING_K)
         return None
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:
+        return thermal_sizes(context, variant, BIAS_PER_K)
 
     def variants(self, context: Context) -> list[Variant]:
         return thermal_bias_variants(context, context.on_accelerometers, force_only, "m/s^2")

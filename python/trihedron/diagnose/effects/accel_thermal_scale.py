@@ -13,6 +13,8 @@ class AccelThermalScale(Effect):
     """Relative scale linear in temperature (about its mean over the holds)."""
 
     id = "accel-thermal-scale"
+    size = 3e-4
+    """1/K: 300 ppm."""
     leaves_open = ("accel-zero", "accel-scale")
     drifts_as = "accel-hidden-drift"
     applies_elsewhere = True

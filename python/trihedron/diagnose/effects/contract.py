@@ -19,6 +19,9 @@ from trihedron.records.domains import Domain
 from trihedron.records.words import Words, effect_words, experiment_for
 
 AXES = ("x", "y", "z")
+TYPICAL_M_S2, TYPICAL_RAD_S = 0.03, 2e-3
+"""3 mg and 0.1 °/s: what consumer parts stray by."""
+LEAST_RMS = 1e-12
 SHAPE_NAMES = ("time_constant", "half_width", "pose")
 """Nonlinear parameters, chosen from a grid and refined on the profile likelihood."""
 
@@ -79,6 +82,24 @@ class Effect(ABC):
     is_local: ClassVar[bool] = False
     """Whether it concerns one pose or move only: its gain may then come from one block of held-out data."""
 
+    size: ClassVar[float] = 0.0
+    """How large one parameter is in parts as data sheets have them, one sigma, in the unit that is reported; 0 where
+    :meth:`sizes` says so."""
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
+        """(k,) how large every parameter of a variant is expected to be, one sigma.
+
+        Of an effect that does not say so: what adds a few mg, or a tenth of a degree per second, to the readings.
+        """
+        if self.size > 0.0:
+            return np.full(variant.distortion.n_parameters, self.size / abs(variant.scale))
+        out = np.full(variant.distortion.n_parameters, np.inf)
+        for side, typical in ((variant.distortion.force, TYPICAL_M_S2), (variant.distortion.rate, TYPICAL_RAD_S)):
+            if side is not None:
+                rms = np.sqrt(np.mean(np.sum(side**2, axis=1), axis=0))
+                out = np.minimum(out, typical / np.maximum(rms, LEAST_RMS))
+        return out
+
     def unavailable(self, context: Context) -> str | None:  # noqa: ARG002
         """Why this recording cannot show the effect; ``None`` when it can."""
         return None
@@ -107,14 +128,6 @@ class Effect(ABC):
                 return replace(again, shape={name: (value, unit)}, shape_sigma=variant.shape_sigma)
             same = [v for v in same if v.shape == variant.shape]
         return same[0] if same else None
-
-    def withstands(self, context: Context) -> bool:  # noqa: ARG002
-        """Whether it stands out of everything that zeros do by themselves: scatter, walk and drift together."""
-        return True
-
-    def own_p_value(self, context: Context) -> float | None:  # noqa: ARG002
-        """p-value of a test of its own beside all that zeros do by themselves; ``None`` where it has none."""
-        return None
 
     def is_plausible(self, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
         """Whether the fitted parameters are ones that the mechanism can have."""

@@ -24,8 +24,8 @@ class Evidence:
     """What a direct test found.
 
     ``p_value`` before payment for the search over effects; ``held_out`` the effect's own before/after on data its
-    parameters were not fitted to; ``variant`` columns that join the model, or None; ``reweigh`` changes what the
-    observations claim (noise, excluded moves), or None; ``strength`` is the gain in 2 log-likelihood, for ranking.
+    parameters were not fitted to; ``reweigh`` changes what the observations claim (noise, excluded moves),
+    or None; ``strength`` is the gain in 2 log-likelihood, for ranking.
     ``touched`` are the moves whose readings ``reweigh`` changes, ``None`` for all: there the change must help.
     ``share`` is the part of its domain's misfit that it explains, where that is not a matter of poses and moves.
     ``statement`` is the catalogue's (:meth:`Effect.told`), or what a user's own effect says.
@@ -40,7 +40,6 @@ class Evidence:
     domain: Domain
     where: Where = NOWHERE
     held_out: tuple[HeldOut, ...] = ()
-    variant: Variant | None = None
     reweigh: Callable[[Observations], Observations] | None = None
     confounded_with: tuple[str, ...] = ()
     restate: Callable[[Context], tuple[EffectParameter, ...]] | None = None
@@ -52,8 +51,6 @@ class Evidence:
 class DirectEffect(Effect):
     """An effect with a test of its own."""
 
-    is_late: ClassVar[bool] = False
-    """Whether it is looked for after the competition, in what the effects of other mechanisms leave (scatter)."""
     is_sought_again: ClassVar[bool] = False
     """Whether it is looked for once more then: what another effect had hidden, or what was mistaken for it."""
     is_proof: ClassVar[bool] = False

@@ -81,13 +81,7 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
     obs, twin = context.obs, context.fitted.twin
     if len(twin.effect):
         return ()
-    # In the noise that the cut poses are judged by: one widened for what nothing explains makes another chi-square.
-    whole = replace(
-        observe(obs.recording, obs.whole),
-        jitter_s=obs.jitter_s,
-        moves_inflation=obs.moves_inflation,
-        dynamics_inflation=obs.dynamics_inflation,
-    )
+    whole = replace(observe(obs.recording, obs.whole), jitter_s=obs.jitter_s)
     force = whole.hold_force @ twin.accel_S.T + twin.accel_b
     n = whole.n_holds
     start = replace(
@@ -154,6 +148,8 @@ class DisturbedPose(DirectEffect):
     """A bump seen inside the hold, or one pose with an acceleration of its own."""
 
     id = "disturbed-pose"
+    size = 0.05
+    """m/s²: a push that a hand does not feel."""
     is_of_session = True
     repeatable = True
     is_local = True

@@ -135,13 +135,7 @@ class DroppedSamples(DirectEffect):
         def reweigh(old: Observations) -> Observations:
             recording, segments = insert_samples(old.recording, old.segments, counts)
             mended = observe(recording, segments)
-            return replace(
-                mended,
-                moves_inflation=old.moves_inflation,
-                dynamics_inflation=old.dynamics_inflation,
-                jitter_s=old.jitter_s,
-                zero_scatter=old.zero_scatter,
-            )
+            return replace(mended, jitter_s=old.jitter_s)
 
         where = Where(
             (),

@@ -106,6 +106,8 @@ class EarthRate(Effect):
     """Earth rate in the level frame of the first pose: two horizontal components and the vertical one."""
 
     id = "earth-rate"
+    size = EARTH_RATE_RAD_S
+    """It has one size."""
 
     def unavailable(self, context: Context) -> str | None:
         if context.obs.raw_rate is None or not context.moves:

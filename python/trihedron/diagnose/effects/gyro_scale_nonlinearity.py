@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, per_axis, rate_only
 from trihedron.records.words import why_not
+
+LEAST_RATE = 1e-3
+"""rad/s, where nothing turns."""
 
 
 class GyroScaleNonlinearity(Effect):
@@ -17,6 +21,12 @@ class GyroScaleNonlinearity(Effect):
 
     def unavailable(self, context: Context) -> str | None:
         return why_not("no-moves") if not context.moves else None
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:
+        # A hundredth of the fastest turn.
+        fastest = max(float(np.abs(context.axis_rate).max()), LEAST_RATE)
+        per = {"c": 0.01 / fastest**2, "q": 0.01 / fastest}
+        return np.array([per[name[0]] for name in variant.names])
 
     def variants(self, context: Context) -> list[Variant]:
         w = context.axis_rate

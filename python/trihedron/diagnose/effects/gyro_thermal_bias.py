@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import LEAST_SWING_K, Context
 from trihedron.diagnose.effects.contract import Effect, Variant, rate_only
-from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants
-from trihedron.diagnose.zeros.of_session import STANDS_OUT, gyro_evidence
+from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants, thermal_sizes
 from trihedron.records.words import why_not
+
+BIAS_PER_K = 4e-4
+"""rad/s: 0.02 °/s per kelvin."""
 
 
 class GyroThermalBias(Effect):
@@ -26,14 +29,8 @@ class GyroThermalBias(Effect):
             return why_not("steady-temperature", least_k=LEAST_SWING_K)
         return None
 
-    def withstands(self, context: Context) -> bool:
-        p = self.own_p_value(context)
-        return p is None or p < STANDS_OUT
-
-    def own_p_value(self, context: Context) -> float | None:
-        found = gyro_evidence(context)
-        thermal = None if found is None else found.evidence.groups.get("thermal")
-        return None if thermal is None else thermal.p_value
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:
+        return thermal_sizes(context, variant, BIAS_PER_K)
 
     def variants(self, context: Context) -> list[Variant]:
         return thermal_bias_variants(context, context.on_gyros, rate_only, "rad/s")

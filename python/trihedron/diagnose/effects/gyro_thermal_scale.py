@@ -13,6 +13,8 @@ class GyroThermalScale(Effect):
     """Relative scale linear in temperature (about its mean over the holds)."""
 
     id = "gyro-thermal-scale"
+    size = 3e-4
+    """1/K: 300 ppm."""
     leaves_open = ("gyro-zero", "gyro-scale")
     drifts_as = "gyro-hidden-drift"
     applies_elsewhere = True

@@ -1,4 +1,4 @@
-"""A zero that drifts in time though no logged channel explains it: what both sensors share."""
+"""A bias that drifts in time though no logged channel explains it: what both sensors share."""
 
 from __future__ import annotations
 
@@ -10,30 +10,20 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.bias_process import BiasProcess, per_axis_parameters
 from trihedron.diagnose.effects.contract import Variant
-from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.drift_shapes import drift_variants, is_possible_drift, warm_up_variant
 from trihedron.diagnose.session.twin import Distortion
-from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
-from trihedron.diagnose.zeros.of_session import SessionEvidence
 from trihedron.records.diagnosis import EffectParameter
-from trihedron.records.domains import Domain
-from trihedron.records.words import why_not
-
-AXES = ("x", "y", "z")
-FEWEST_HOLDS = 6
-"""Two shapes of drift on three axes are not told apart by fewer poses."""
+from trihedron.records.words import Words
 
 
-class HiddenDrift(DirectEffect):
-    """Warm-up exponential, straight line or slow curve per axis; where none of them fits, a free smooth curve."""
+class HiddenDrift(BiasProcess):
+    """Warm-up exponential, straight line or slow curve per axis, or a walk stronger than the part's noise explains."""
 
-    is_late = True
-    sensor: ClassVar[int]
-    domain: ClassVar[Domain]
-    unit: ClassVar[str]
-    fewest_poses: ClassVar[int]
-    """A free curve is told from scatter, or from the length of gravity, with this many poses."""
+    walks = True
+    typical: ClassVar[float]
+    """How far parts drift while they warm up, one sigma, SI."""
 
     @abstractmethod
     def on_axes(self, context: Context) -> Callable[[FloatArray], FloatArray]:
@@ -43,29 +33,11 @@ class HiddenDrift(DirectEffect):
     def only(self, columns: FloatArray) -> Distortion:
         """The distortion of this sensor alone."""
 
-    @abstractmethod
-    def evidence(self, context: Context) -> SessionEvidence | None:
-        """What the zeros of the session are: a drift, a walk or scatter."""
-
-    @abstractmethod
-    def is_beyond_noise(self, context: Context, found: SessionEvidence, curve: DriftCurve) -> bool:
-        """Whether the curve stands above what noise alone draws."""
-
-    @abstractmethod
-    def share(self, found: SessionEvidence, curve: DriftCurve) -> float:
-        """Part of the excess χ² that the curve explains."""
-
-    @abstractmethod
-    def curve_variant(self, context: Context, curve: DriftCurve) -> Variant:
-        """The curve itself, one column an axis: its factor is 1 where session and poses agree."""
-
-    def unavailable(self, context: Context) -> str | None:
-        if context.obs.flickers(self.sensor):
-            return why_not("flickers")
-        return why_not("six-poses") if context.obs.n_holds < FEWEST_HOLDS else None
-
     def variants(self, context: Context) -> list[Variant]:
         return drift_variants(context, self.on_axes(context), self.only, self.unit, self.n_waves(context.obs.n_holds))
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
+        return np.full(variant.distortion.n_parameters, self.typical)
 
     def n_waves(self, n_poses: int) -> int:  # noqa: ARG002
         """Cosines per axis that so many poses tell."""
@@ -79,34 +51,5 @@ class HiddenDrift(DirectEffect):
     def is_plausible_variant(self, variant: Variant, value: FloatArray, covariance: FloatArray) -> bool:  # noqa: ARG002
         return is_possible_drift(variant, value)
 
-    def made_again(self, context: Context, variant: Variant) -> Variant | None:
-        if variant.label != "smooth":
-            return super().made_again(context, variant)
-        found = self.evidence(context)
-        return None if found is None else self.curve_variant(context, _curve(context, found))
-
-    def find(self, context: Context) -> Evidence | None:
-        found = self.evidence(context)
-        if found is None or found.evidence.n_poses < self.fewest_poses or not found.evidence.kind:
-            return None
-        curve = _curve(context, found)
-        if not self.is_beyond_noise(context, found, curve):
-            return None
-        parameters = tuple(
-            EffectParameter(f"range_{axis}", float(r), float(np.hypot(s[v.argmax()], s[v.argmin()])), self.unit)
-            for axis, r, v, s in zip(AXES, curve.range, curve.values, curve.sigma, strict=True)
-        )
-        return Evidence(
-            found.evidence.p_slow, 0.0, parameters, self.told(found.evidence.kind, range=curve.range), self.domain,
-             variant=self.curve_variant(context, curve), share=self.share(found, curve),
-            series={
-                "time_s": curve.time_s.tolist(), "value": curve.values.tolist(), "sigma": curve.sigma.tolist(),
-                "unit": self.unit,
-            },
-        )  # fmt: skip
-
-
-def _curve(context: Context, found: SessionEvidence) -> DriftCurve:
-    readings = found.zeros.readings
-    every = list(range(readings.design.shape[1]))
-    return smooth_curve(found.evidence.process, every, found.evidence.sigma, context.obs.hold_time_s)
+    def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
+        return per_axis_parameters("range", size, std, self.unit), self.told("walk", range=size)

@@ -56,9 +56,7 @@ class _Saturation(DirectEffect):
         system = context.fitted.system
         move_rows = np.isin(system.domain, (MOVES, DYNAMICS)) & (system.walk == 0)
         at_limit = np.isin(system.segment, touched)
-        # In the noise of the parts, not in one that was widened for what nothing had explained.
-        widened = np.where(system.domain == MOVES, obs.moves_inflation, obs.dynamics_inflation)
-        squared = (system.residual * widened) ** 2
+        squared = system.residual**2
         misfit = float(np.mean(squared[move_rows & at_limit]))
         others = squared[move_rows & ~at_limit]
         usual = float(np.median(others) / MEDIAN_CHI2) if len(others) >= FEWEST_OTHERS else 0.0

@@ -18,6 +18,8 @@ class SensorLag(Effect):
     """Lag of one sensor, first order (per axis too) or second: its reading trails the motion by τ."""
 
     id = "sensor-lag"
+    size = 0.015
+    """s: the delay of a filter."""
 
     def unavailable(self, context: Context) -> str | None:
         return why_not("no-moves") if not context.moves else None

@@ -17,6 +17,20 @@ BRANCH_K_S = 0.002
 """Rate of change at which three quarters of a branch are reached: an oven has ten times as much, a room a tenth."""
 
 
+def thermal_sizes(context: Context, variant: Variant, per_kelvin: float) -> FloatArray:
+    """(k,) how large the numbers of a forward model are where a bias changes by so much per kelvin, one sigma.
+
+    What bends, follows the rate or stays behind moves the bias by a third of what the linear part does.
+    """
+    assert context.temperature is not None
+    swing = float(np.ptp(context.temperature))
+    beside = per_kelvin * swing / 3.0
+    by_name = {"bias_per_kelvin": per_kelvin, "bias_per_kelvin2": beside / swing**2, "half_gap": beside}
+    if context.temperature_rate is not None:
+        by_name["bias_per_kelvin_per_s"] = beside / max(float(np.abs(context.temperature_rate).max()), BRANCH_K_S)
+    return np.array([by_name[name.rsplit("_", 1)[0]] for name in variant.names])
+
+
 def thermal_bias_variants(
     context: Context,
     on_axes: Callable[[FloatArray], FloatArray],

@@ -79,8 +79,6 @@ class TimingJitter(DirectEffect):
                 move_holds=obs.move_holds,
                 jitter_s=obs.jitter_s,
                 bumped_s=obs.bumped_s,
-                moves_inflation=obs.moves_inflation,
-                dynamics_inflation=obs.dynamics_inflation,
             )
 
         return Evidence(

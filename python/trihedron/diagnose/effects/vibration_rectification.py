@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
 from trihedron.records.words import why_not
 
+ACCEL_PER_POWER, GYRO_PER_POWER = 0.02, 1e-3
+"""1/(m/s²), 20 mg/g², and (rad/s)/(m/s²)²: what vibrating consumer parts show."""
 STANDS_OUT = 1.5
 """Power of a pose over the median pose: the variance of 300 white readings is known to 8 %; the most in 48
 healthy sessions is 1.13 (benches/diagnosis_thresholds.py)."""
@@ -18,6 +21,9 @@ class VibrationRectification(Effect):
 
     id = "vibration-rectification"
     accounts_for = ("within-static",)  # the shaking that it follows
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:  # noqa: ARG002
+        return np.full(3, GYRO_PER_POWER if variant.distortion.force is None else ACCEL_PER_POWER)
 
     def unavailable(self, context: Context) -> str | None:
         power = context.hold_power.sum(axis=1)

@@ -15,9 +15,8 @@ from trihedron.diagnose.laws.moves import move_misfit
 from trihedron.diagnose.laws.poses import Zeros, accel_misfits, gyro_misfits
 from trihedron.diagnose.laws.room import RoomLaw, search_room
 from trihedron.diagnose.laws.search import Accepted, search
-from trihedron.diagnose.zeros.of_session import accel_evidence, gyro_evidence
 from trihedron.records.diagnosis import EffectParameter, Law
-from trihedron.records.domains import Domain, DomainTest, HeldOut
+from trihedron.records.domains import Domain, HeldOut
 from trihedron.records.words import law_experiment, law_resembles, words
 
 Sensor = Literal["accelerometer", "gyroscope"]
@@ -48,25 +47,6 @@ def find_laws(context: Context, domains: Collection[Domain]) -> tuple[Law, ...]:
     if "moves" in domains or "dynamics" in domains:
         out += _motion_laws(context, is_gyro_only="moves" in domains and "dynamics" not in domains)
     return tuple(sorted(out, key=lambda law: -law.share))
-
-
-MOST_FOLLOWS = 0.4
-"""Share of the held-out misfit at rest that a law may remove before the rest is still called scatter."""
-SCATTERS = 1e-4
-"""p-value of a zero that differs from pose to pose, from which its law is looked for even where the session's walk has
-swallowed it."""
-
-
-def laws_of_rest(context: Context, remaining: tuple[DomainTest, ...]) -> tuple[Law, ...]:
-    """Laws of what remains: of domains that disagree, and of zeros that differ from pose to pose."""
-    domains: set[Domain] = {d.domain for d in remaining if d.disagrees}
-    gyro = None if "static-gyro" in domains else gyro_evidence(context)
-    if gyro is not None and gyro.evidence.p_scatter_spared < SCATTERS:
-        domains.add("static-gyro")
-    accel = None if "static-accel" in domains else accel_evidence(context)
-    if accel is not None and accel.evidence.p_scatter_spared < SCATTERS:
-        domains.add("static-accel")
-    return find_laws(context, domains)
 
 
 @lru_cache(maxsize=4)

@@ -57,13 +57,13 @@ def _shown(fitted: Fit) -> dict[str, _Shown]:
         force = force - line.distortion.force[:h] @ twin.effect
     size = np.linalg.norm(force, axis=1)
     along = (force / size[:, None]) @ twin.accel_S
-    sigma = obs.norm_spread(along)
+    sigma = obs.norm_sigma(along)
     out["static-accel"] = _Shown(obs.hold_time_s, (size - twin.gravity)[:, None], sigma)
-    if obs.hold_rate is not None and obs.hold_rate_spread is not None:
+    if obs.hold_rate is not None and obs.hold_rate_sigma is not None:
         rate = obs.hold_rate @ twin.gyro_S.T
         if line.distortion.rate is not None:
             rate = rate - line.distortion.rate[:h] @ twin.effect
-        spread = np.sqrt((obs.hold_rate_spread**2 @ (twin.gyro_S**2).T).mean(axis=1))
+        spread = np.sqrt((obs.hold_rate_sigma**2 @ (twin.gyro_S**2).T).mean(axis=1))
         out["static-gyro"] = _Shown(obs.hold_time_s, rate - rate.mean(axis=0), spread)
     if obs.n_moves:
         residual, noise = line.move_errors

@@ -52,9 +52,7 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
         dof = float((1.0 - used[rows]).sum())
         if dof < LEAST_DOF:
             continue
-        # A widened domain is judged by the noise it was predicted to have.
-        widened = {MOVES: fitted.line.obs.moves_inflation, DYNAMICS: fitted.line.obs.dynamics_inflation}.get(label, 1.0)
-        chi2 = float(((fitted.system.residual[rows] * _unsettled(fitted, label, rows)) ** 2).sum()) * widened**2
+        chi2 = float(((fitted.system.residual[rows] * _unsettled(fitted, label, rows)) ** 2).sum())
         per_dof = chi2 / dof
         p = float(fdtrc(dof, NOISE_DOF, per_dof))
         disagrees = p < alpha / N_DOMAINS_TESTED
@@ -72,31 +70,15 @@ def judge_rows(fitted: Fit, alpha: float) -> tuple[DomainTest, ...]:
     return tuple(tests)
 
 
-DISAGREES = 0.01
-"""False alarms at which poses disagree with their predicted noise, shared by the domains (eq. 8.7)."""
-
-
-def asks_for_scatter(fitted: Fit, domain: Domain) -> bool:
-    """Whether poses disagree with their predicted noise, so that a scatter below twice their errors is a flaw too.
-
-    Asked of the fit before scatter was named: then poses agree because it is in their errors already.
-    """
-    named = fitted.line.obs.zero_scatter
-    if named is not None and named[0 if domain == "static-accel" else 1].any():
-        return True
-    return any(one.domain == domain and one.disagrees for one in judge_rows(fitted, DISAGREES))
-
-
 def _unsettled(fitted: Fit, label: int, rows: npt.NDArray[np.bool_]) -> FloatArray:
     """(rows,) what makes residuals of rates at rest those over their own noise again, where creep was added to it."""
     obs, system = fitted.line.obs, fitted.system
-    noise, spread = obs.hold_rate_noise, obs.hold_rate_spread
+    noise, spread = obs.hold_rate_noise, obs.hold_rate_sigma
     out = np.ones(int(np.count_nonzero(rows)))
     if label != STATIC_GYRO or obs.hold_creep is None or noise is None or spread is None:
         return out
     direct = system.walk[rows] == 0
-    own = noise if obs.zero_scatter is None else np.hypot(noise, obs.zero_scatter[1])
-    ratio = spread / own
+    ratio = spread / noise
     out[direct] = ratio[system.segment[rows][direct], system.channel[rows][direct]]
     return out
 
@@ -129,12 +111,6 @@ def _strayed(fitted: Fit, label: int) -> tuple[float, float, Where]:
     return 0.0, (stray.rms / stray.noise) ** 2, Where(_CHANNELS[label])
 
 
-def strayed(fitted: Fit) -> tuple[bool, bool]:
-    """Accelerometer, gyro: whether the walk of its zero stands in for something else (eq. 8.7b)."""
-    accel, gyro = hidden_zeros(fitted)
-    return accel.is_strayed, gyro is not None and gyro.is_strayed
-
-
 @dataclass(frozen=True)
 class HiddenZero:
     """What the model's walk of a sensor's zero absorbed, SI: ``rms`` about its mean, ``noise`` the median error of a
@@ -155,9 +131,9 @@ def hidden_zeros(fitted: Fit) -> tuple[HiddenZero, HiddenZero | None]:
     twin, obs = fitted.twin, fitted.line.obs
     edge = fitted.line.core.is_walk_at_edge
     out: list[HiddenZero | None] = []
-    rates = obs.hold_rate_spread
+    rates = obs.hold_rate_sigma
     sides = (
-        (twin.accel_bias, obs.norm_spread(twin.up @ twin.accel_S), edge[0]),
+        (twin.accel_bias, obs.norm_sigma(twin.up @ twin.accel_S), edge[0]),
         (
             twin.gyro_bias,
             None if rates is None else rates / np.linalg.norm(np.linalg.inv(twin.gyro_S), axis=1),
@@ -219,26 +195,3 @@ def physical_rms(fitted: Fit, rows_residual: FloatArray | None = None) -> tuple[
         out[MOVES] = float(np.degrees(np.sqrt(np.mean(angle))))
         out[DYNAMICS] = float(np.sqrt(np.mean(error[:, 2:] ** 2)))
     return out, {STATIC_ACCEL: "m/s^2", STATIC_GYRO: "rad/s", MOVES: "deg", DYNAMICS: "m/s"}
-
-
-def weighted_rms(fitted: Fit, rows_residual: FloatArray, base: Fit) -> dict[int, float]:
-    """Rms at rest in physical units, every reading weighted by the precision that ``base`` gives it.
-
-    One pose that was not still, or an axis whose zero scatters, has no more to say here than it knows. The weights are
-    the same for both models that are compared: only errors that fall make it fall.
-    """
-    line, system, obs = fitted.line, fitted.system, base.line.obs
-    twin, h = base.line.twin, base.line.obs.n_holds
-    direct = system.walk == 0
-    rows = np.flatnonzero((system.domain == STATIC_ACCEL) & direct)
-    error = np.linalg.solve(line.accel_white, rows_residual[rows].reshape(h, 3, 1))[:, :, 0]
-    along = np.einsum("ni,ni->n", error, line.twin.up)
-    weight = 1.0 / obs.norm_spread(twin.up @ twin.accel_S) ** 2
-    out = {STATIC_ACCEL: float(np.sqrt((weight * along**2).sum() / weight.sum()))}
-    spread = obs.hold_rate_spread
-    if line.gyro_white is not None and spread is not None:
-        rows = np.flatnonzero((system.domain == STATIC_GYRO) & direct)
-        error = np.linalg.solve(line.gyro_white, rows_residual[rows].reshape(h, 3, 1))[:, :, 0]
-        weight = 1.0 / (spread**2 @ (twin.gyro_S**2).T)
-        out[STATIC_GYRO] = float(np.sqrt((weight * error**2).sum() / weight.sum()))
-    return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -37,13 +37,10 @@ class Observations:
     their stamps, once a diagnosis has found it; ``bumped_s`` are stretches of poses that were seen disturbed.
     ``unresolved`` maps a move's two holds to the variance of its integrals, (2, 3) force and rate in (raw unit · s)²,
     by motion faster than the samples, by noise slower than a move and by shaking that stands in a pose's end.
-    ``zero_scatter`` (2, 3), once a diagnosis has found it: how far zeros scatter from hold to hold beside their walk,
-    accelerometer and gyro, raw units. ``hold_creep`` (h, 3), once it was seen: by how much (one sigma,
+    ``hold_creep`` (h, 3), once it was seen: by how much (one sigma,
     raw units) poses turn that settle; it is in ``hold_rate_sigma``.
     ``force_up`` are verticals (h, 3), raw unit vectors, and the errors (h,) of the means along them; ``force_scatter``
-    is how far flicker lets the accelerometer's zero scatter, raw; ``flicker`` (2, 3), raw, what of it, and of the
-    gyro's, is in the errors of the means (:func:`with_flicker`).
-    The two inflations widen the noise of moves that no known effect explains, so that they do not spoil the rest.
+    and ``rate_scatter`` are how far 1/f noise lets a bias scatter, raw.
     """
 
     recording: Recording
@@ -66,13 +63,10 @@ class Observations:
     jitter_s: float = 0.0
     bumped_s: tuple[tuple[float, float], ...] = ()
     unresolved: Mapping[tuple[int, int], FloatArray] = field(default_factory=dict)
-    moves_inflation: float = 1.0
-    dynamics_inflation: float = 1.0
-    zero_scatter: FloatArray | None = None
     hold_creep: FloatArray | None = None
     force_up: Along | None = None
     force_scatter: float = 0.0
-    flicker: FloatArray | None = None
+    rate_scatter: float = 0.0
 
     @property
     def n_holds(self) -> int:
@@ -92,28 +86,9 @@ class Observations:
         out: FloatArray = np.sqrt(self.hold_rate_sigma**2 - self.hold_creep**2)
         return out
 
-    def flickers(self, sensor: int) -> bool:
-        """Whether errors of poses' means hold what flicker does to the zero of the accelerometer (0), the gyro (1)."""
-        return self.flicker is not None and bool(self.flicker[sensor].any())
-
     def norm_sigma(self, gradient: FloatArray) -> FloatArray:
         """(h,) standard errors of the length of gravity, SI, that grows with the raw means by ``gradient`` (h, 3)."""
         return along_gradient(self.hold_force_sigma, self.force_up, gradient)
-
-    def norm_spread(self, gradient: FloatArray) -> FloatArray:
-        """(h,) what that length may differ by: its noise and scatter of the zeros."""
-        noise = self.norm_sigma(gradient)
-        if self.zero_scatter is None:
-            return noise
-        return np.asarray(np.sqrt(noise**2 + (gradient**2 * self.zero_scatter[0] ** 2).sum(axis=1)))
-
-    @property
-    def hold_rate_spread(self) -> FloatArray | None:
-        """(h, 3) the same of the gyro."""
-        if self.hold_rate_sigma is None or self.zero_scatter is None:
-            return self.hold_rate_sigma
-        out: FloatArray = np.hypot(self.hold_rate_sigma, self.zero_scatter[1])
-        return out
 
     @cached_property
     def _still(self) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], FloatArray]:
@@ -239,6 +214,7 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         bumped_s=bumped,
         force_up=noise.force_up,
         force_scatter=noise.force_scatter,
+        rate_scatter=noise.rate_scatter,
         unresolved=dict(zip(holds, unresolved, strict=True)),
     )
 
@@ -252,18 +228,3 @@ def _turned_at_ends(rate_sigma: FloatArray, lasts_s: FloatArray) -> FloatArray:
     usual = np.median(rate_sigma**2 * lasts_s[:, None], axis=0) / lasts_s[:, None]
     out: FloatArray = np.maximum(rate_sigma**2 - UNSTEADY**2 * usual, 0.0) * (0.5 * lasts_s[:, None]) ** 2
     return out
-
-
-def with_flicker(obs: Observations, force: FloatArray, rate: FloatArray) -> Observations:
-    """Means of poses good to what flicker moves zeros by from pose to pose, raw (3,) each; 0 for none."""
-    if not force.any() and not rate.any():
-        return obs
-    vertical = float(np.sqrt(np.mean(force**2)))
-    return replace(
-        obs,
-        hold_force_sigma=np.hypot(obs.hold_force_sigma, force),
-        force_up=None if obs.force_up is None else (obs.force_up[0], np.hypot(obs.force_up[1], vertical)),
-        force_scatter=0.0 if force.any() else obs.force_scatter,
-        hold_rate_sigma=None if obs.hold_rate_sigma is None else np.hypot(obs.hold_rate_sigma, rate),
-        flicker=np.stack([force, rate]),
-    )

@@ -26,7 +26,6 @@ from trihedron.diagnose.session.twin import (
     contiguous,
     core_model,
     core_state,
-    stacked,
     twin_of,
 )
 from trihedron.session.noise import START_STRENGTHS
@@ -46,6 +45,7 @@ class Fit:
 
     twin: Twin
     line: Linearisation
+    has_free_strengths: bool = False
 
     @cached_property
     def system(self) -> System:
@@ -92,12 +92,9 @@ class Fit:
         Error bars allow for zeros that scatter, as those of a calibration do (eq. 11.12b).
         """
         obs, core = self.line.obs, self.line.core
-        if obs.zero_scatter is None or not obs.zero_scatter[0].any():
-            # A gyro whose zeros scatter says nothing of the accelerometer's.
-            gyro = START_STRENGTHS[1][1] if obs.zero_scatter is None else core.strengths[1][1]
-            between = START_STRENGTHS[2] if obs.zero_scatter is None else core.strengths[2]
+        if not self.has_free_strengths:
             core = core_model(obs, self.twin.gravity, self.line.prior, is_scatter_free=True).fit(
-                state=core_state(self.twin), strengths=(core.strengths[0], (START_STRENGTHS[1][0], gyro), between),
+                state=core_state(self.twin), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
                 force_effect=contiguous(self.line.distortion.force), rate_effect=contiguous(self.line.distortion.rate),
                 is_tuned=False,
             )  # fmt: skip
@@ -110,7 +107,7 @@ def _fitted(obs: Observations, start: Twin, distortion: Distortion, prior: Prior
     corners = (float(start.accel_corner_s), float(start.gyro_corner_s))
     core = core_model(obs, start.gravity, prior).fit(
         state=core_state(start),
-        strengths=(corners, start.scatter_on(obs), start.between),
+        strengths=(corners, *START_STRENGTHS[1:]),
         force_effect=contiguous(distortion.force),
         rate_effect=contiguous(distortion.rate),
         is_tuned=is_tuned,
@@ -133,13 +130,6 @@ def tune_noise(
     """The same with the two corner times chosen by marginal likelihood on a grid (eq. 11.12)."""
     del n_iterations
     return _fitted(obs, start, distortion, prior, is_tuned=True)
-
-
-def extend(base: Fit, accepted: Distortion, added: Distortion, n_iterations: int = 2) -> Fit:
-    """The fit with further effect columns, from where it stands."""
-    del n_iterations
-    twin = replace(base.twin, effect=np.concatenate([base.twin.effect, np.zeros(added.n_parameters)]))
-    return _fitted(base.line.obs, twin, stacked([accepted, added]), base.line.prior, is_tuned=True)
 
 
 def move_misfit(obs: Observations, twin: Twin) -> FloatArray:

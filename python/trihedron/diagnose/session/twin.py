@@ -58,18 +58,7 @@ class Twin:
     effect: FloatArray
     between: tuple[float, float] = START_STRENGTHS[2]
     scatter: tuple[float, float] = START_STRENGTHS[1]
-
-    def scatter_on(self, obs: Observations) -> tuple[float, float]:
-        """Strength of either sensor's scatter in units of what was named, 1 where that is new; of none what counts as
-        none."""
-        none = START_STRENGTHS[1][0]
-        if obs.zero_scatter is None:
-            return START_STRENGTHS[1]
-        known = [self.scatter[k] if self.scatter[k] > none else 1.0 for k in range(2)]
-        return (
-            known[0] if obs.zero_scatter[0].any() else none,
-            known[1] if obs.zero_scatter[1].any() else none,
-        )
+    excess: tuple[float, float] = START_STRENGTHS[3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,19 +209,11 @@ def core_poses(obs: Observations) -> _core.SessionPoses:
 def core_model(
     obs: Observations, gravity_m_s2: float, prior: Prior | None, *, is_scatter_free: bool = False
 ) -> _core.SessionModel:
-    """The Rust model of some observations; with ``is_scatter_free`` zeros may scatter though no diagnosis says so
-    (a gyro's named scatter is its unit then)."""
+    """The Rust model of some observations; with ``is_scatter_free`` biases may differ from pose to pose."""
     scatter = None
-    if is_scatter_free or obs.zero_scatter is not None:
+    if is_scatter_free:
         unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma, obs.force_up)
         scatter = (unit, False, obs.force_scatter / float(unit[0, 0]))
-        if obs.zero_scatter is not None and is_scatter_free:
-            unit[1] = np.maximum(obs.zero_scatter[1], START_STRENGTHS[1][0] * unit[1])
-        elif obs.zero_scatter is not None:
-            # A sensor that does not scatter has any unit, and a strength that counts as none.
-            named = obs.zero_scatter.any(axis=1, keepdims=True)
-            floor = START_STRENGTHS[1][0] * unit
-            scatter = (np.where(named, np.maximum(obs.zero_scatter, floor), unit), True, 0.0)
     return _core.SessionModel(
         gravity_m_s2=gravity_m_s2,
         poses=core_poses(obs),
@@ -240,7 +221,7 @@ def core_model(
         noise=(
             float(obs.jitter_s),
             1.0 / obs.recording.rate_hz,
-            (float(obs.moves_inflation), float(obs.dynamics_inflation)),
+            (1.0, 1.0),
         ),
         prior=None
         if prior is None
@@ -270,5 +251,5 @@ def twin_of(core: _core.SessionFit, gravity_m_s2: float) -> Twin:
         gravity=gravity_m_s2, accel_S=accel_S, accel_b=np.asarray(core.force_bias), gyro_S=gyro_S,
         up=np.asarray(core.up), gyro_bias=core.rate_zero @ gyro_S.T, accel_bias=core.force_zero @ accel_S.T,
         gyro_corner_s=gyro_corner, accel_corner_s=accel_corner, effect=np.asarray(core.effect),
-        between=core.strengths[2], scatter=core.strengths[1],
+        between=core.strengths[2], scatter=core.strengths[1], excess=core.strengths[3],
     )  # fmt: skip

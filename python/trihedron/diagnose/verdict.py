@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from trihedron.diagnose.selection.accepted import are_footnotes
-from trihedron.diagnose.selection.model import StepwiseModel
+from trihedron.diagnose.accepted import Answer
+from trihedron.diagnose.effects import catalogue
 from trihedron.records.diagnosis import Verdict
 from trihedron.records.domains import DomainTest
 
@@ -17,17 +17,17 @@ LEAST_DOF = 1.0
 """Degrees of freedom below which a domain's rows are used up by the fit itself."""
 
 
-def accounted_for(model: StepwiseModel, remaining: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
+def accounted_for(answer: Answer, remaining: tuple[DomainTest, ...]) -> tuple[DomainTest, ...]:
     """Sample-level domains whose disagreement an accepted effect is, seen from another side, agree afterwards."""
-    explained = {one.evidence.domain for one in model.accepted if one.evidence is not None}
-    explained |= {domain for one in model.accepted for domain in one.effect.accounts_for}
+    explained = {one.evidence.domain for one in answer.seen}
+    explained |= {domain for one in catalogue() if one.id in answer.ids for domain in one.accounts_for}
     return tuple(
         replace(d, disagrees=False) if d.domain in explained and d.domain in SAMPLE_DOMAINS else d for d in remaining
     )
 
 
 def verdict_of(
-    model: StepwiseModel,
+    answer: Answer,
     domains: tuple[DomainTest, ...],
     remaining: tuple[DomainTest, ...] = (),
     *,
@@ -37,9 +37,9 @@ def verdict_of(
 
     Footnotes (one pushed pose, a faint line) are no answer while something else disagrees.
     """
-    if model.accepted:
+    if answer.ids:
         is_left = any(d.disagrees for d in remaining)
-        return "unexplained" if is_left and are_footnotes(model) else "missing-physics"
+        return "unexplained" if is_left and answer.are_footnotes else "missing-physics"
     if has_laws or any(d.disagrees for d in domains):
         return "unexplained"
     # A weak prior fills what the poses leave open; rows that it alone decides test nothing.

@@ -1,0 +1,243 @@
+"""What was accepted, as the record that reports and files show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from trihedron.diagnose.bias_strengths import BiasStrength
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.contract import Effect
+from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
+from trihedron.diagnose.sample_evidence import Seen
+from trihedron.diagnose.search import Found, Tried
+from trihedron.diagnose.session.hypothesis import Hypothesis
+from trihedron.diagnose.session.solve import Fit, leverage
+from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, Stage, StageDomain
+from trihedron.records.domains import HeldOut
+
+HEADLINE = 0.5
+"""What carries less than half of the samples' own variance (a faint line) or poses (one bump) follows behind whatever
+explains poses and moves."""
+LEAST_P = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Everything that was accepted: effects with columns, processes of the bias, what the samples show.
+
+    ``numbers`` is the hypothesis that parameters and their errors are taken from, its shapes being unknowns too.
+    """
+
+    found: Found
+    numbers: Hypothesis
+    biases: Sequence[BiasStrength]
+    seen: Sequence[Seen]
+    judged: Fit
+    """The session with all that, in the noise that was predicted: what remains is judged there."""
+
+    @property
+    def ids(self) -> set[str]:
+        """All that has a name."""
+        terms = {term.effect.id for term in self.found.model.terms}
+        return terms | {one.effect.id for one in self.biases} | {one.effect.id for one in self.seen}
+
+    @property
+    def gains(self) -> list[tuple[Effect, float, float | None]]:
+        """Every effect with its gain in twice a log-likelihood and, where it states that itself, its share."""
+        out: list[tuple[Effect, float, float | None]] = [
+            (term.effect, gain, None) for term, gain in zip(self.found.model.terms, self.found.gains, strict=True)
+        ]
+        out += [(one.effect, one.gain, None) for one in self.biases]
+        return out + [(one.effect, one.gain, one.evidence.share) for one in self.seen]
+
+    @property
+    def shares(self) -> list[float]:
+        """Part of the misfit that each explains: its gain over all gains and what is left unexplained."""
+        gains = self.gains
+        whole = max(sum(max(gain, 0.0) for _, gain, own in gains if own is None) + excess(self.judged), 1e-9)
+        return [max(gain, 0.0) / whole if own is None else own for _, gain, own in gains]
+
+    @property
+    def are_footnotes(self) -> bool:
+        """Whether nothing accepted is an answer: single poses, a faint line, biases that scatter, what is seen in the
+        samples and changes nothing in the fit."""
+        beside = {one.effect.id for one in self.seen if not one.reobserves}
+        return all(
+            share < HEADLINE and (own is not None or effect.is_spread or effect.is_local or effect.id in beside)
+            for (effect, _, own), share in zip(self.gains, self.shares, strict=True)
+        )
+
+
+def excess(fitted: Fit) -> float:
+    """Chi-square beyond its degrees of freedom, over the domains that have more than they should."""
+    used, out = leverage(fitted), 0.0
+    for domain in ROW_DOMAINS:
+        rows = fitted.system.domain == domain
+        out += max(float((fitted.system.residual[rows] ** 2).sum() - (1.0 - used[rows]).sum()), 0.0)
+    return out
+
+
+def accepted_effects(answer: Answer) -> tuple[AcceptedEffect, ...]:
+    """Every accepted effect with its parameters, the one that explains most of the misfit first."""
+    made = [*_of_terms(answer), *_of_biases(answer), *_of_samples(answer)]
+    rows = []
+    for record, (effect, _, own), share in zip(made, answer.gains, answer.shares, strict=True):
+        is_behind = effect.is_spread or (own is not None and share < HEADLINE)
+        is_beside = any(one.effect is effect and not one.reobserves for one in answer.seen)
+        rows.append(((is_behind, -share, is_beside), record, share))
+    return tuple(_shared(record, share) for _, record, share in sorted(rows, key=lambda row: row[0]))
+
+
+def _shared(record: dict[str, Any], share: float) -> AcceptedEffect:
+    return AcceptedEffect(**record, share=share)
+
+
+def _of_terms(answer: Answer) -> list[dict[str, Any]]:
+    found, out = answer.found, []
+    for k, term in enumerate(found.model.terms):
+        effect, variant = term.effect, term.variant
+        value, covariance = answer.numbers.value(k)
+        parameters = effect.parameters(variant, value, covariance)
+        wald = _p_of(value, covariance)
+        out.append(
+            _record(
+                effect, parameters, effect.statement(parameters), wald, found.scores[k], found.rivals[k],
+                held_out_records(found.without[k], found.model),
+                variant=variant.label, shape={name: v for name, (v, _) in variant.shape.items()},
+                values=[float(v) for v in value],
+            )
+        )  # fmt: skip
+    return out
+
+
+def _of_biases(answer: Answer) -> list[dict[str, Any]]:
+    model, out = answer.found.model, []
+    for one in answer.biases:
+        extra: dict[str, Any] = {}
+        if one.effect.walks:
+            twin, obs = model.fitted.twin, model.obs
+            path = twin.accel_bias if one.effect.sensor == 0 else twin.gyro_bias
+            extra["curve"] = {
+                "time_s": obs.hold_time_s.tolist(), "value": path.T.tolist(),
+                "sigma": [[float(s)] * obs.n_holds for s in one.std], "unit": one.effect.unit,
+            }  # fmt: skip
+        # Half of a chi-square with one degree of freedom: the strength lies at its boundary without it.
+        p = float(np.exp(-0.5 * max(one.gain, 0.0)))
+        held = held_out_records(one.without, model)
+        out.append(_record(one.effect, one.parameters, one.statement, p, one.score, (), held, **extra))
+    return out
+
+
+def _of_samples(answer: Answer) -> list[dict[str, Any]]:
+    context = Context(answer.numbers.obs, answer.numbers.fitted)
+    out = []
+    for one in answer.seen:
+        evidence = one.evidence
+        parameters = evidence.parameters if evidence.restate is None else evidence.restate(context)
+        extra = {"curve": evidence.series} if evidence.series else {}
+        out.append(
+            _record(
+                one.effect, parameters, evidence.statement, evidence.p_value, one.gain, evidence.confounded_with,
+                evidence.held_out, **extra,
+            )
+        )  # fmt: skip
+    return out
+
+
+def _p_of(value: np.ndarray, covariance: np.ndarray) -> float:
+    from scipy.special import chdtrc
+
+    return float(chdtrc(len(value), float(value @ np.linalg.solve(covariance, value))))
+
+
+def _record(
+    effect: Effect,
+    parameters: tuple[EffectParameter, ...],
+    statement: str,
+    p_value: float,
+    score: float,
+    rivals: tuple[str, ...],
+    held_out: tuple[HeldOut, ...],
+    **model: Any,
+) -> dict[str, Any]:
+    by_id = {one.id: one for one in catalogue()}
+    either = (effect, by_id[rivals[0]]) if rivals else ()
+    said: dict[str, Any] = {"variant": "", "shape": {}, "values": [], **model}
+    said["applies_to_other_recordings"] = effect.applies_elsewhere
+    return {
+        "id": effect.id,
+        "statement": statement,
+        "parameters": parameters,
+        "p_adjusted": min(1.0, max(p_value, LEAST_P) * len(catalogue())),
+        "delta_bic": float(score),
+        "held_out": held_out,
+        "confounded_with": rivals,
+        "separating_experiment": " / ".join(dict.fromkeys(e for one in either if (e := one.separating_experiment()))),
+        "model": MappingProxyType(said),
+    }
+
+
+def held_out_records(before: Hypothesis, after: Hypothesis) -> tuple[HeldOut, ...]:
+    """Held-out chi-square and physical rms per domain of two hypotheses, the largest gain first."""
+    was, now = before.prediction, after.prediction
+    rms_before, unit = physical_rms(before.fitted, was.innovation)
+    rms_after, _ = physical_rms(after.fitted, now.innovation)
+    out = []
+    for d, name in ROW_DOMAINS.items():
+        if was.n_rows[d] < LEAST_DOF or now.n_rows[d] < LEAST_DOF or d not in rms_before or d not in rms_after:
+            continue
+        gain = float(np.log(rms_before[d] / max(rms_after[d], LEAST_P)))
+        chi2 = float(was.chi2[d] / was.n_rows[d]), float(now.chi2[d] / now.n_rows[d])
+        out.append((gain, HeldOut(name, *chi2, rms_before[d], rms_after[d], unit[d])))
+    return tuple(held for _, held in sorted(out, key=lambda pair: -pair[0]))
+
+
+def held_out_stages(bare: Hypothesis, answer: Answer) -> tuple[Stage, ...]:
+    """The recording predicted by its own numbers, and, where effects were accepted, by numbers and effects."""
+    stages = (Stage("numbers", _stage(bare)),)
+    return (*stages, Stage("effects", _stage(answer.found.model))) if answer.ids else stages
+
+
+def _stage(model: Hypothesis) -> tuple[StageDomain, ...]:
+    prediction = model.prediction
+    rms, unit = physical_rms(model.fitted, prediction.innovation)
+    return tuple(
+        StageDomain(name, rms[d], float(prediction.chi2[d] / prediction.n_rows[d]), unit[d])
+        for d, name in ROW_DOMAINS.items()
+        if d in rms and prediction.n_rows[d] >= 1.0
+    )
+
+
+def candidates(answer: Answer, known: dict[str, Candidate], asked: dict[str, BiasStrength]) -> tuple[Candidate, ...]:
+    """Every effect that was tried, accepted or not: its score, its size, the limit on it, and what stood against it."""
+    found, out = answer.found, dict(known)
+    out |= {key: Candidate(key, None, False, reason) for key, reason in found.missing.items() if key not in known}
+    for key, one in found.tried.items():
+        out[key] = _candidate(one, found.against.get(key))
+    for key, bias in asked.items():
+        if key not in out or bias.score > (out[key].score or -np.inf):
+            limit = bias.size + 2.0 * bias.std
+            size = tuple(EffectParameter(p.name, p.value, p.std, p.unit) for p in bias.parameters)
+            p = min(1.0, float(np.exp(-0.5 * max(bias.gain, 0.0))))
+            out[key] = Candidate(key, p, True, "", bias.score, size, float(np.max(limit)))
+    for k, term in enumerate(found.model.terms):
+        value, covariance = answer.numbers.value(k)
+        size = term.effect.parameters(term.variant, value, covariance)
+        out[term.effect.id] = Candidate(
+            term.effect.id, max(_p_of(value, covariance), LEAST_P), True, "", found.scores[k], size
+        )
+    return tuple(out[key] for key in sorted(out))
+
+
+def _candidate(one: Tried, against: str | None) -> Candidate:
+    term, asked = one.term, one.asked
+    size = term.effect.parameters(term.variant, asked.value, asked.covariance)
+    sigma = np.sqrt(np.maximum(np.diag(asked.covariance), 0.0)) * abs(term.variant.scale)
+    limit = float(np.max(np.abs(asked.value) * abs(term.variant.scale) + 1.96 * sigma))
+    return Candidate(term.effect.id, one.p_value, True, "", one.score, size, limit, against)

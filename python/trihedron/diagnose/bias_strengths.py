@@ -1,0 +1,107 @@
+"""Bias drift and bias repeatability, from the strengths of the session's noise (eq. 11.20).
+
+Both are processes that every hypothesis allows, of any strength: what is asked is whether the session is less likely
+with that strength no larger than the part's own noise makes it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.bias_process import BiasProcess
+from trihedron.diagnose.search import threshold
+from trihedron.diagnose.session.hypothesis import ANYTHING, Bounds, Hypothesis, again
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.words import Words
+from trihedron.session.noise import scatter_unit
+
+NOISE_CORNER_S = 20.0
+"""Shortest corner time, where white noise and bias walk meet: Allan deviations of consumer parts turn up there or
+later. A walk of any strength is allowed in every hypothesis; a stronger one than this is called drift."""
+FLICKER_WITHIN = 1.5
+"""Factor within which the scatter that 1/f noise makes is told from inside the poses."""
+
+
+@dataclass(frozen=True, eq=False)
+class BiasStrength:
+    """One process that is stronger than noise makes it: ``gain`` in twice the log-evidence over the strongest that
+    noise makes, ``score`` what is left after the catalogue is paid for, ``size`` and ``std`` (3,) SI by axis."""
+
+    effect: BiasProcess
+    gain: float
+    score: float
+    size: FloatArray
+    std: FloatArray
+    parameters: tuple[EffectParameter, ...]
+    statement: Words
+    without: Hypothesis
+
+
+def bias_strengths(model: Hypothesis, alpha: float) -> tuple[list[BiasStrength], dict[str, BiasStrength]]:
+    """The processes that are called by a name, largest gain first; and all that could be asked, by id."""
+    held = {term.effect.id for term in model.terms}
+    asked = {}
+    for effect in catalogue():
+        if isinstance(effect, BiasProcess) and effect.id not in held and effect.unavailable(model.context) is None:
+            asked[effect.id] = _asked(model, effect)
+    named = [one for one in asked.values() if one.score > threshold(alpha)]
+    return sorted(named, key=lambda one: -one.gain), asked
+
+
+def noise_bounds(model: Hypothesis, but: tuple[BiasProcess, ...] = ()) -> Bounds:
+    """The strengths that the part's noise makes at most, but for some processes."""
+    free = {(one.sensor, one.walks) for one in but}
+    expected = _flicker(model)
+    corner = [ANYTHING[0][s] if (s, True) in free else NOISE_CORNER_S for s in range(2)]
+    scatter = [ANYTHING[1][s] if (s, False) in free else float(expected[s]) for s in range(2)]
+    return (corner[0], corner[1]), (scatter[0], scatter[1]), ANYTHING[2]
+
+
+def _asked(model: Hypothesis, effect: BiasProcess) -> BiasStrength:
+    s = effect.sensor
+    corner, scatter = list(model.within[0]), list(model.within[1])
+    if effect.walks:
+        corner[s] = NOISE_CORNER_S
+    else:
+        scatter[s] = float(_flicker(model)[s])
+    within: Bounds = ((corner[0], corner[1]), (scatter[0], scatter[1]), model.within[2])
+    without = again(model, model.terms, within)
+    gain = 2.0 * (model.log_evidence - without.log_evidence)
+    size, std = _size(model, effect)
+    parameters, statement = effect.of_strength(size, std)
+    paid = 2.0 * float(np.log(len(catalogue())))
+    return BiasStrength(effect, gain, gain - paid, size, std, parameters, statement, without)
+
+
+def _flicker(model: Hypothesis) -> FloatArray:
+    """(2,) the scatter from pose to pose that 1/f noise inside the poses lets expect, in the session's units."""
+    obs = model.obs
+    unit = _units(model)
+    expected = np.array([obs.force_scatter, obs.rate_scatter])
+    return np.asarray(FLICKER_WITHIN * expected / unit[:, 0])
+
+
+def _units(model: Hypothesis) -> FloatArray:
+    obs = model.obs
+    return scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma, obs.force_up)
+
+
+def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArray]:
+    """(3,) SI by axis, and its standard error: one sigma of a scatter, the range that a drift runs through."""
+    sensor = ("accelerometer", "gyroscope")[effect.sensor]
+    n = model.obs.n_holds
+    if not effect.walks:
+        raw = model.strengths[1][effect.sensor] * _units(model)[effect.sensor]
+        size = raw * model.context.si_per_raw(sensor)
+        return size, size / np.sqrt(2.0 * max(n - 1, 1))
+    twin = model.fitted.twin
+    path = twin.accel_bias if effect.sensor == 0 else twin.gyro_bias
+    obs = model.obs
+    sigma = obs.hold_force_sigma if effect.sensor == 0 else obs.hold_rate_sigma
+    assert sigma is not None
+    error = np.median(sigma, axis=0) * model.context.si_per_raw(sensor)
+    return np.ptp(path, axis=0), np.asarray(np.sqrt(2.0) * error)

@@ -1,0 +1,47 @@
+"""What a bias does by itself from pose to pose: a strength of the session's noise, not columns of the readings."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import AXES, Effect, Variant
+from trihedron.records.diagnosis import EffectParameter
+from trihedron.records.domains import Domain
+from trihedron.records.words import Words, why_not
+
+FEWEST_HOLDS = 6
+"""Two processes on three axes are not told apart by fewer poses."""
+
+
+class BiasProcess(Effect):
+    """A bias that walks, or is drawn anew, beyond what the part's noise explains (:mod:`diagnose.bias_strengths`)."""
+
+    sensor: ClassVar[int]
+    """0 accelerometer, 1 gyro."""
+    walks: ClassVar[bool]
+    """Whether it walks from pose to pose; else it is drawn anew in each."""
+    unit: ClassVar[str]
+    domain: ClassVar[Domain]
+
+    def unavailable(self, context: Context) -> str | None:
+        if self.sensor == 1 and context.obs.raw_rate is None:
+            return why_not("no-gyro")
+        return why_not("six-poses") if context.obs.n_holds < FEWEST_HOLDS else None
+
+    def variants(self, context: Context) -> list[Variant]:  # noqa: ARG002
+        return []
+
+    @abstractmethod
+    def of_strength(self, size: FloatArray, std: FloatArray) -> tuple[tuple[EffectParameter, ...], Words]:
+        """Parameters and sentence for its size along every axis, SI (3,), with standard errors."""
+
+
+def per_axis_parameters(symbol: str, size: FloatArray, std: FloatArray, unit: str) -> tuple[EffectParameter, ...]:
+    """One parameter an axis."""
+    named = zip(AXES, np.asarray(size), np.asarray(std), strict=True)
+    return tuple(EffectParameter(f"{symbol}_{axis}", float(v), float(s), unit) for axis, v, s in named)

@@ -1,0 +1,390 @@
+"""The one search: effects are added, dropped and swapped by one score (eq. 11.19).
+
+Score of an effect: twice the log-evidence that it gains, all strengths of noise found anew beside it, less what trying
+its shapes and the whole catalogue costs. It stands where that is more than the odds that the false-alarm rate asks for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.effects.contract import Variant
+from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
+from trihedron.diagnose.session.hypothesis import Asked, Hypothesis, Term, again, hypothesis
+from trihedron.diagnose.session.solve import Fit
+from trihedron.diagnose.session.twin import (
+    DYNAMICS,
+    MOVES,
+    STATIC_ACCEL,
+    STATIC_GYRO,
+    Distortion,
+    Linearisation,
+    contiguous,
+    core_model,
+    core_state,
+    stacked,
+    twin_of,
+)
+from trihedron.session.noise import Strengths
+
+PRIOR_SCALES = (1.0, 0.3, 0.1)
+"""Parts differ by ten from what data sheets of their kind say: the size expected is one of these times that."""
+QUIET: Strengths = ((640.0, 640.0), (1e-3, 1e-3), (1.0, 1.0), (1.0, 1.0))
+"""Noise of a good part: where the strengths have swallowed an effect, it is still seen in this."""
+N_LEADERS = 4
+"""Effects taken from either look at the whole catalogue to the full evidence."""
+SHAPES_KEPT = 2
+"""Shapes of one effect that go along."""
+NEAR = 6.0
+"""Difference of scores below which two explanations are named together: odds of twenty to one."""
+WORTH_FITTING = 20.0
+"""Difference of scores, one linear step from the fit, within which rivals are fitted in full."""
+N_RIVALS = 3
+MOST_EFFECTS = 4
+"""Mechanisms of one session at most; poses that were pushed are none."""
+MOST_STEPS = 8
+SHAPE_STEPS = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
+"""Logarithms of a shape number about the grid's best, over which a parabola is laid."""
+N_RESHAPED = 2
+STEP_LOG = 0.02
+"""Half-step of the derivative by the logarithm of a shape."""
+OWN_DOMAINS = {"force": (STATIC_ACCEL, DYNAMICS), "rate": (STATIC_GYRO, MOVES, DYNAMICS)}
+"""Where a flaw of one sensor must show: velocity needs both, a tilted force being half of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A candidate beside a hypothesis: its score, and what it comes to there."""
+
+    term: Term
+    score: float
+    asked: Asked
+
+    @property
+    def p_value(self) -> float:
+        """Wald's test of its parameters, in the noise found beside them."""
+        value, covariance = self.asked.value, self.asked.covariance
+        wald = float(value @ np.linalg.solve(covariance, value))
+        return float(max(chdtrc(len(value), max(wald, 0.0)), 1e-300))
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Where the search ended.
+
+    ``tried`` are, by id, candidates beside the final hypothesis, ``against`` what took the place of those that had
+    stood, ``missing`` why others do not apply; ``gains`` twice the log-evidence of every term, ``scores`` what is left
+    of that after its price, ``without`` the final hypothesis without it, ``rivals`` effects that explain as much.
+    """
+
+    model: Hypothesis
+    tried: dict[str, Tried] = field(default_factory=dict)
+    against: dict[str, str] = field(default_factory=dict)
+    missing: dict[str, str] = field(default_factory=dict)
+    gains: tuple[float, ...] = ()
+    without: tuple[Hypothesis, ...] = ()
+    rivals: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def scores(self) -> tuple[float, ...]:
+        """What is left of every term's gain."""
+        return tuple(gain - term.paid for gain, term in zip(self.gains, self.model.terms, strict=True))
+
+
+def threshold(alpha: float) -> float:
+    """Score from which an effect stands: twice the logarithm of odds of (1 - α)/α."""
+    return float(2.0 * np.log((1.0 - alpha) / alpha))
+
+
+def search(base: Hypothesis, alpha: float, exclude: Collection[str] = ()) -> Found:
+    """The effects that a session demands: the best is added, again; then each is dropped, or swapped, if that gains."""
+    limit, judged = threshold(alpha), _Judged(base, ())
+    rivals: dict[str, list[Tried]] = {}
+    against: dict[str, str] = {}
+    dropped: set[str] = set()
+    tried, missing = _tried(base, exclude)
+    for _ in range(MOST_STEPS):
+        standing = [one for one in tried if one.score > limit and one.term.effect.id not in dropped]
+        if not standing or sum(not t.effect.is_local for t in judged.model.terms) >= MOST_EFFECTS:
+            break
+        larger, chosen = _with_best(judged.model, standing)
+        if chosen is None:
+            break
+        before, (judged, gone) = judged, _pruned(larger, limit)
+        dropped |= gone
+        if chosen.effect.id in gone:
+            judged = before
+            continue
+        others = [one for one in standing if one.term.effect is not chosen.effect]
+        rivals[chosen.effect.id] = others[:N_RIVALS]
+        against |= {one.term.effect.id: chosen.effect.id for one in standing}
+        tried, missing = _tried(judged.model, exclude)
+    swapped, named = _swapped(judged, rivals)
+    if swapped is not judged.model:
+        judged, _ = _pruned(swapped, limit)
+        tried, missing = _tried(judged.model, exclude)
+    model = judged.model
+    held = {term.effect.id for term in model.terms}
+    return Found(
+        model, {one.term.effect.id: one for one in reversed(tried)},
+        {key: other for key, other in against.items() if other in held and key not in held}, missing,
+        tuple(2.0 * (model.log_evidence - one.log_evidence) for one in judged.without), judged.without,
+        tuple(tuple(named.get(term.effect.id, ())) for term in model.terms),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """A hypothesis, and what it is without each of its terms."""
+
+    model: Hypothesis
+    without: tuple[Hypothesis, ...]
+
+
+def _tried(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Tried], dict[str, str]]:
+    """Candidates beside a hypothesis, best first, one an effect; and why others do not apply."""
+    terms, missing = _terms(model, exclude)
+    if not terms:
+        return [], missing
+    leaders = list(dict.fromkeys([*_leaders(model.fitted, terms), *_leaders(_quiet(model), terms)]))
+    asked = model.asked([terms[k] for k in leaders])
+    # Strengths that a candidate found may be better for the hypothesis itself.
+    best: dict[str, Tried] = {}
+    plain = _without_columns(model, asked)
+    for k, one in zip(leaders, asked, strict=True):
+        term = terms[k]
+        score = 2.0 * (one.log_evidence - plain) - term.paid
+        known = best.get(term.effect.id)
+        if (known is None or score > known.score) and _is_possible(term, one):
+            best[term.effect.id] = Tried(term, score, one)
+    return sorted(best.values(), key=lambda one: -one.score), missing
+
+
+def _without_columns(model: Hypothesis, asked: Sequence[Asked]) -> float:
+    """Log-evidence of a hypothesis at the best of all strengths known, a candidate's too."""
+    best = max(asked, key=lambda one: one.log_evidence)
+    core = model.fitted.line.core
+    ((found, *_),) = core.evidence([(None, None, [])], best.strengths, model.within)
+    return max(model.log_evidence, float(found))
+
+
+def _terms(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dict[str, str]]:
+    """Every shape of every effect that applies and is not there yet."""
+    context = model.context
+    held = {t.effect.id for t in model.terms if not t.effect.repeatable} | set(exclude)
+    places = {(t.effect.id, t.variant.label) for t in model.terms}
+    terms, missing = [], {}
+    applying = []
+    for effect in catalogue():
+        reason = None if effect.id in held else effect.unavailable(context)
+        if reason is not None:
+            missing[effect.id] = reason
+        elif effect.id not in held:
+            applying.append(effect)
+    for effect in applying:
+        variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
+        paid = 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)) + np.log(len(catalogue())))
+        # A shape that stands for a family, a filter of any order, costs as much again as one that stands for itself.
+        terms += [Term(effect, v, effect.sizes(context, v), paid + NEAR * v.stands_for_many) for v in variants]
+    return terms, missing
+
+
+def _leaders(fitted: Fit, terms: list[Term]) -> list[int]:
+    """The candidates that gain most one linear step from a fit, in its noise, their sizes what fits best."""
+    core, merits = fitted.line.core, []
+    residual = fitted.system.residual
+    for k, term in enumerate(terms):
+        columns = core.columns(contiguous(term.distortion.force), contiguous(term.distortion.rate))
+        projected = core.project(np.ascontiguousarray(columns)) * term.sizes
+        merits.append((_merit(projected.T @ projected, projected.T @ residual), k))
+    kept: list[int] = []
+    count: dict[str, int] = {}
+    for _, k in sorted(merits, key=lambda pair: -pair[0]):
+        effect_id = terms[k].effect.id
+        if count.get(effect_id, 0) < SHAPES_KEPT and (effect_id in count or len(count) < N_LEADERS):
+            count[effect_id] = count.get(effect_id, 0) + 1
+            kept.append(k)
+    return kept
+
+
+def _merit(normal: FloatArray, gradient: FloatArray) -> float:
+    """Log-evidence gained by columns in units of their expected size, at the best of its scales."""
+    best = -np.inf
+    for scale in PRIOR_SCALES:
+        inner = np.eye(len(gradient)) + scale**2 * normal
+        explained = scale**2 * float(gradient @ np.linalg.solve(inner, gradient))
+        best = max(best, 0.5 * explained - 0.5 * float(np.linalg.slogdet(inner)[1]))
+    return best
+
+
+def _quiet(model: Hypothesis) -> Fit:
+    """The same effects fitted in the noise of a good part."""
+    distortion = stacked([term.distortion for term in model.terms])
+    sizes = [float(size) for term in model.terms for size in term.sizes]
+    twin = model.fitted.twin
+    core = core_model(model.obs, twin.gravity, model.prior, is_scatter_free=True).fit(
+        state=core_state(twin), strengths=QUIET, force_effect=contiguous(distortion.force),
+        rate_effect=contiguous(distortion.rate), is_tuned=False, sizes=sizes,
+    )  # fmt: skip
+    twin = twin_of(core, twin.gravity)
+    return Fit(twin, Linearisation(model.obs, twin, distortion, model.prior, core), has_free_strengths=True)
+
+
+def _is_possible(term: Term, asked: Asked) -> bool:
+    return term.effect.is_plausible_variant(term.variant, asked.value, asked.covariance)
+
+
+def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:
+    """The hypothesis with the best of the candidates that come near the first, each fitted in full."""
+    near = [one for one in standing if one.score > standing[0].score - WORTH_FITTING][:N_RIVALS]
+    best: tuple[float, Hypothesis, Term] | None = None
+    for one in near:
+        term = _fitting(model, one)
+        larger = _beside(model, term, one.asked.strengths)
+        value, covariance = larger.value(len(larger.terms) - 1)
+        if not term.effect.is_plausible_variant(term.variant, value, covariance):
+            continue
+        score = 2.0 * larger.log_evidence - term.paid
+        if best is None or score > best[0]:
+            best = score, larger, term
+    return (model, None) if best is None else best[1:]
+
+
+def _beside(model: Hypothesis, term: Term, strengths: Strengths) -> Hypothesis:
+    terms = (*model.terms, term)
+    twin = model.fitted.twin
+    start = replace(twin, effect=np.concatenate([twin.effect, np.zeros(term.distortion.n_parameters)]))
+    return hypothesis(model.obs, start, model.prior, terms, model.within, strengths)
+
+
+def _fitting(model: Hypothesis, tried: Tried) -> Term:
+    """A candidate with its expected size, its own size and its shape as they fit best."""
+    term, asked = tried.term, tried.asked
+    scaled = [replace(term, sizes=term.sizes * scale) for scale in PRIOR_SCALES]
+    found = model.asked(scaled)
+    k = int(np.argmax([one.log_evidence for one in found]))
+    term, asked = scaled[k], found[k]
+    for _ in range(N_RESHAPED):
+        made = term.effect.rescaled(model.context, term.variant, asked.value)
+        if made is None:
+            break
+        term = replace(term, variant=made)
+        asked = model.asked([term])[0]
+    return _reshaped(model, term)
+
+
+def _reshaped(model: Hypothesis, term: Term) -> Term:
+    """A term at the shape number of the largest evidence, with the standard error that its curvature gives."""
+    if len(term.variant.shape) != 1:
+        return term
+    ((name, (value, unit)),) = term.variant.shape.items()
+    if term.effect.reshaped(model.context, term.variant, value) is None:
+        return term
+    spread, sigma = 1.0, np.inf
+    for _ in range(N_RESHAPED):
+        steps = spread * SHAPE_STEPS
+        made = [term.effect.reshaped(model.context, term.variant, value * float(np.exp(step))) for step in steps]
+        asked = model.asked([replace(term, variant=v) for v in made if v is not None])
+        gain = np.array([one.log_evidence for one in asked])
+        a, b, _ = np.polyfit(steps, gain, 2)
+        if a < 0.0:
+            value *= float(np.exp(np.clip(-b / (2.0 * a), steps[0], steps[-1])))
+            sigma = float(np.sqrt(-0.5 / a))
+            spread = float(np.clip(2.0 * sigma, 0.1, 1.0))
+        else:
+            value *= float(np.exp(steps[gain.argmax()]))
+    final = term.effect.reshaped(model.context, term.variant, value)
+    if final is None:
+        return term
+    return replace(term, variant=replace(final, shape={name: (value, unit)}, shape_sigma=value * min(sigma, 10.0)))
+
+
+def _pruned(model: Hypothesis, limit: float) -> tuple[_Judged, set[str]]:
+    """The hypothesis without terms that the others have made needless, the one with least to show first."""
+    gone: set[str] = set()
+    while True:
+        n = len(model.terms)
+        without = tuple(again(model, [t for j, t in enumerate(model.terms) if j != k]) for k in range(n))
+        scores = [
+            2.0 * (model.log_evidence - one.log_evidence) - term.paid if _is_shown(model, one, k) else -np.inf
+            for k, (term, one) in enumerate(zip(model.terms, without, strict=True))
+        ]
+        if not scores or min(scores) > limit:
+            return _Judged(model, without), gone
+        k = int(np.argmin(scores))
+        gone.add(model.terms[k].effect.id)
+        model = without[k]
+
+
+def _is_shown(model: Hypothesis, without: Hypothesis, k: int) -> bool:
+    """Whether an effect has a size, and lowers the held-out rms, in physical units, of a domain of its own sensor."""
+    value, covariance = model.value(k)
+    if not (np.abs(value) > np.sqrt(np.maximum(np.diag(covariance), 0.0))).any():
+        return False
+    before, _ = physical_rms(without.fitted, without.prediction.innovation)
+    after, _ = physical_rms(model.fitted, model.prediction.innovation)
+    return any(after[d] < before[d] for d in own_domains(model.terms[k].distortion) if d in after and d in before)
+
+
+def own_domains(distortion: Distortion) -> tuple[int, ...]:
+    """Row domains of the sensors that an effect adds to."""
+    sides = [own for side, own in OWN_DOMAINS.items() if getattr(distortion, side) is not None]
+    return tuple(dict.fromkeys(d for own in sides for d in own))
+
+
+def _swapped(judged: _Judged, rivals: dict[str, list[Tried]]) -> tuple[Hypothesis, dict[str, list[str]]]:
+    """Every term the best of those that might stand in its place, beside all others; and which explain as much."""
+    model = judged.model
+    named: dict[str, list[str]] = {}
+    for k, without in enumerate(judged.without):
+        term = model.terms[k]
+        scored = [(2.0 * model.log_evidence - term.paid, model, term)]
+        for other in _others(rivals.get(term.effect.id, []), {t.effect.id for t in model.terms}):
+            fitted = _fitting(without, other)
+            swapped = again(model, [*model.terms[:k], fitted, *model.terms[k + 1 :]])
+            if fitted.effect.is_plausible_variant(fitted.variant, *swapped.value(k)):
+                scored.append((2.0 * swapped.log_evidence - fitted.paid, swapped, fitted))
+        most, model, chosen = max(scored, key=lambda one: one[0])
+        close = [t.effect.id for score, _, t in scored if score > most - NEAR and t.effect is not chosen.effect]
+        named[chosen.effect.id] = close
+    return model, named
+
+
+def _others(rivals: Iterable[Tried], held: set[str]) -> list[Tried]:
+    """Rivals that are not in the hypothesis, those that came near."""
+    free = [one for one in rivals if one.term.effect.id not in held]
+    return [one for one in free if one.score > free[0].score - WORTH_FITTING] if free else []
+
+
+def with_shapes(model: Hypothesis) -> Hypothesis:
+    """The hypothesis whose shape numbers are unknowns too: one more column each, p D'(ln shape).
+
+    With a shape held fixed S, b and p would claim to be known better than they are.
+    """
+    more = [term for k in range(len(model.terms)) if (term := _by_shape(model, k)) is not None]
+    return again(model, [*model.terms, *more]) if more else model
+
+
+def _by_shape(model: Hypothesis, k: int) -> Term | None:
+    term = model.terms[k]
+    if term.variant.shape_sigma <= 0.0 or len(term.variant.shape) != 1:
+        return None
+    ((_, (value, _)),) = term.variant.shape.items()
+    made = [term.effect.reshaped(model.context, term.variant, value * float(np.exp(s))) for s in (-STEP_LOG, STEP_LOG)]
+    if made[0] is None or made[1] is None:
+        return None
+    size, _ = model.value(k)
+    low, high = made[0].distortion, made[1].distortion
+
+    def slope(name: str) -> FloatArray | None:
+        a, b = getattr(low, name), getattr(high, name)
+        return None if a is None else ((b - a) @ size / (2.0 * STEP_LOG))[:, :, None]
+
+    columns = Distortion(slope("force"), slope("rate"))
+    return Term(term.effect, Variant(columns, ("shape",), ("1",), label="shape"), np.ones(1))

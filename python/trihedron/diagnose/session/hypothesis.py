@@ -1,0 +1,146 @@
+"""A hypothesis: the session with some effects, its noise of unknown strength, and how likely that is (eq. 11.18)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.context import Context
+from trihedron.diagnose.effects.contract import Effect, Variant
+from trihedron.diagnose.session.observations import Observations
+from trihedron.diagnose.session.solve import Fit, Prediction, folds_of, predict_held_out
+from trihedron.diagnose.session.twin import (
+    Distortion,
+    Linearisation,
+    Prior,
+    Twin,
+    contiguous,
+    core_model,
+    core_state,
+    stacked,
+    twin_of,
+)
+from trihedron.session.noise import START_STRENGTHS, Strengths
+
+Bounds = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
+"""Shortest corner times [s], largest scatter, largest excess of moves: accelerometer and gyro, gravity and velocity."""
+ANYTHING: Bounds = ((0.0, 0.0), (np.inf, np.inf), (np.inf, np.inf))
+MOST_ROUNDS = 4
+"""Rounds of fit and strengths: each finds the other almost where it left it."""
+SETTLED_LOG = 0.25
+"""Change of the logarithm of every strength below which another fit changes no number by a tenth of its error."""
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """One effect of a hypothesis: its columns, how large each parameter is expected to be (one sigma), and what its
+    choice among shapes and effects has ``paid``, in twice a log-likelihood."""
+
+    effect: Effect
+    variant: Variant
+    sizes: FloatArray
+    paid: float = 0.0
+
+    @property
+    def distortion(self) -> Distortion:
+        """What it adds to the readings per unit of each parameter."""
+        return self.variant.distortion
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What adding columns to a hypothesis comes to, one linear step from its fit.
+
+    ``log_evidence`` with everything but the strengths integrated out, at the ``strengths`` that make it largest;
+    ``value`` (k,) and ``covariance`` (k, k) of the new parameters.
+    """
+
+    log_evidence: float
+    strengths: Strengths
+    value: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """A session fitted with the effects of its ``terms``; the strengths of noise lie ``within`` their bounds."""
+
+    obs: Observations
+    prior: Prior | None
+    terms: tuple[Term, ...]
+    fitted: Fit
+    log_evidence: float
+    within: Bounds = ANYTHING
+
+    @property
+    def strengths(self) -> Strengths:
+        """Corner times [s], scatter and straying in their units, excess of moves."""
+        return self.fitted.line.core.strengths
+
+    @cached_property
+    def context(self) -> Context:
+        """What effects may look at."""
+        return Context(self.obs, self.fitted)
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """Blocks of poses and moves predicted from all others."""
+        return predict_held_out(self.fitted, folds_of(self.fitted))
+
+    def asked(self, terms: Sequence[Term], within: Bounds | None = None) -> list[Asked]:
+        """What every one of some terms would come to beside those that are there."""
+        columns = [(contiguous(t.distortion.force), contiguous(t.distortion.rate), t.sizes.tolist()) for t in terms]
+        found = self.fitted.line.core.evidence(columns, self.strengths, self.within if within is None else within)
+        return [Asked(*one) for one in found]
+
+    def span(self, k: int) -> slice:
+        """Where the parameters of term ``k`` lie among those of all effects."""
+        first = sum(term.distortion.n_parameters for term in self.terms[:k])
+        return slice(first, first + self.terms[k].distortion.n_parameters)
+
+    def value(self, k: int) -> tuple[FloatArray, FloatArray]:
+        """Parameters of term ``k`` and their covariance."""
+        covariance = self.fitted.covariance()
+        n, at = self.fitted.n_effect, self.span(k)
+        own = covariance[len(covariance) - n :, len(covariance) - n :]
+        return self.fitted.twin.effect[at], own[at, at]
+
+
+def hypothesis(
+    obs: Observations,
+    start: Twin,
+    prior: Prior | None,
+    terms: Sequence[Term] = (),
+    within: Bounds = ANYTHING,
+    strengths: Strengths = START_STRENGTHS,
+) -> Hypothesis:
+    """The session fitted with some effects, and the strengths of its noise that make it likeliest, in turns."""
+    distortion = stacked([term.distortion for term in terms])
+    sizes = np.concatenate([term.sizes for term in terms]) if terms else np.zeros(0)
+    if len(start.effect) != len(sizes):
+        start = replace(start, effect=np.zeros(len(sizes)))
+    model, state = core_model(obs, start.gravity, prior, is_scatter_free=True), core_state(start)
+    for _ in range(MOST_ROUNDS):
+        core = model.fit(
+            state=state, strengths=strengths, force_effect=contiguous(distortion.force),
+            rate_effect=contiguous(distortion.rate), is_tuned=False, sizes=sizes.tolist(),
+        )  # fmt: skip
+        ((log_evidence, found, _, _),) = core.evidence([(None, None, [])], strengths, within)
+        twin = twin_of(core, start.gravity)
+        moved = float(np.abs(np.log(found) - np.log(strengths)).max())
+        strengths, state = found, core_state(twin)
+        if moved < SETTLED_LOG:
+            break
+    fitted = Fit(twin, Linearisation(obs, twin, distortion, prior, core), has_free_strengths=True)
+    return Hypothesis(obs, prior, tuple(terms), fitted, log_evidence, within)
+
+
+def again(known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None) -> Hypothesis:
+    """The same observations with other effects or bounds, from where they were fitted."""
+    twin = replace(known.fitted.twin, effect=np.zeros(0))
+    within = known.within if within is None else within
+    return hypothesis(known.obs, twin, known.prior, terms, within, known.strengths)
