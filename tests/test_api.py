@@ -1,6 +1,7 @@
 """The package as people call it from Python: names, arguments, results in notebooks and in other processes."""
 
 import copy
+import doctest
 import inspect
 import json
 import multiprocessing
@@ -299,3 +300,17 @@ def test_a_figure_is_drawn_where_it_is_asked_for(result):
     assert not below.has_data()
     with pytest.raises(ValueError, match="needs 1 axes, one a panel; ax has 2"):
         result.plot("residuals", ax=[above, below])
+
+
+def test_verbs_say_what_they_return_and_their_examples_run(recording, result):
+    """Examples name a recording and its calibration as a reader has them."""
+    run = doctest.DocTestRunner()
+    for name in trihedron.__all__:
+        verb = getattr(trihedron, name)
+        if inspect.isfunction(verb) and name not in ("demo", "guide", "write_calibration"):
+            assert "Returns\n" in inspect.unwrap(verb).__doc__, name
+            names = {"trihedron": trihedron, "recording": recording, "result": result}
+            names |= inspect.unwrap(verb).__globals__ | names
+            run.run(doctest.DocTestParser().get_doctest(verb.__doc__, names, name, None, 0))
+    assert run.tries > 15
+    assert run.failures == 0

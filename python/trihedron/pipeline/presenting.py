@@ -159,12 +159,22 @@ def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] |
 def report(result: object, path: str | os.PathLike[str] | None = None, *, overwrite: bool = False) -> str:
     """The whole report of a result as text, and as a file where ``path`` is given: .html with figures, .txt or .json.
 
+    Returns
+    -------
+    str
+        The whole report as text.
+
     Raises
     ------
     TypeError
         When it is no result.
     ValueError
         When the ending of the path names no format, or the file exists and may not be replaced.
+
+    Examples
+    --------
+    >>> trihedron.report(result).splitlines()[0]
+    'Calibration'
     """
     laid_out = _kind(result).document(result)
     text = to_text(laid_out)
