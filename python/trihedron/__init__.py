@@ -6,12 +6,13 @@ recording
     What one IMU wrote: raw readings of accelerometer and gyro on one time base, in the unit of the log, with the audit
     of the log as findings. (:func:`read` makes one.)
 segments
-    *Holds*, where the sensor stood still, and the *moves* between them. (:func:`segment`)
+    *Poses* (``holds``), where the sensor stood still, and the *moves* between them. (:func:`segment`)
 pose
-    The orientation of one hold. A pose shows the accelerometer the vector of gravity.
-Mz
-    The *instrument trihedron*: the right-handed orthogonal frame fixed in the body in which specific force f [m/s²] and
-    angular rate ω [rad/s] are wanted. One Mz is shared by both sensors. *Lower*, *symmetric*, *case* say how it lies.
+    A static stretch in one orientation. It shows the accelerometer the vector of gravity.
+body frame
+    The right-handed orthogonal frame fixed in the instrument (*Mz* of the laboratory manual) in which specific force f
+    [m/s²] and angular rate ω [rad/s] are wanted, one for both sensors. *Lower* (triangular, X along accelerometer X),
+    *symmetric* and *case* say how it lies.
 S, b
     The direct model, raw → SI: ``f = S_f a' + b_f``, ``ω = S_ω w' + b_ω``. S is a full 3 × 3 matrix. *Correct* means
     raw → truth, *distort* truth → raw.
