@@ -1,4 +1,4 @@
-"""The attack: mutated input files and command lines, for as long as you like; docs/reliability.md quotes it.
+"""The attack: mutated input files and command lines, for as long as you like; docs/evidence.md quotes it.
 
 python benches/fuzz.py inputs 100000 [SEED]     every reader of a file that is ours or binary
 python benches/fuzz.py commands 5000 [SEED]     command lines, in forked children of one loaded process

@@ -4,7 +4,7 @@ python benches/rivals.py [--rounds 3] [--rows 1e7] [--only norm] [--write]
 
 Each method runs in a process of its own, in turn, `--rounds` times; a round is the fastest of some calls after a first.
 Numbers are CPU time on one core (`two cores` and reading: wall time), so that a busy machine shifts them little; quote
-ratios. `--write` puts the tables into docs/speed.md and the short one into README.md.
+ratios. `--write` puts the tables into docs/evidence.md.
 A rival that is not installed is left out: `pip install numba python-ins bottleneck pandas pyarrow
 filterpy colorednoise`.
 """
@@ -171,20 +171,6 @@ def put(path: Path, mark: str, text: str) -> None:
     path.write_text(f"{before}<!-- {mark} -->\n{text}\n<!-- /{mark} -->{after}")
 
 
-def short(results: list[tuple[Subject, dict[str, Any]]]) -> str:
-    """One line a path: ours, and how many times as long the others take."""
-    lines = ["| path | trihedron | times as long |", "|---|---:|---|"]
-    for subject, result in results:
-        found = result["found"]
-        clock = "wall" if subject.on_both else "cpu"
-        mine = next(iter(found.values()))[clock]
-        others = [
-            f"{name} {digits(one[clock] / mine, 2)}" for name, one in found.items() if not name.startswith("trihedron")
-        ]
-        lines.append(f"| {result['title']} | {digits(mine / subject.per, 3)} {subject.unit} | {'; '.join(others)} |")
-    return "\n".join(lines)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3)
@@ -212,8 +198,7 @@ def main() -> None:
         # A reader must know how far to trust a median.
         how = f"Rounds: {options.rounds}; other work on the machine: load average {os.getloadavg()[0]:.0f}."
         parts = [*(table(*pair) for pair in measured), how]
-        put(ROOT / "docs/speed.md", "rivals", "\n\n".join(parts))
-        put(ROOT / "README.md", "rivals", short(measured))
+        put(ROOT / "docs/evidence.md", "rivals", "\n\n".join(parts))
 
 
 if __name__ == "__main__":

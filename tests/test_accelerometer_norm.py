@@ -1,10 +1,13 @@
 """Method 2: truth comes back inside its error bars, and what the poses do not tell is not claimed."""
 
+import doctest
+import importlib
+
 import numpy as np
 import pytest
 
 from trihedron import _core
-from trihedron.estimate.accelerometer import calibrate_norm, calibrate_norm_samples
+from trihedron.estimate.accelerometer import calibrate_norm, calibrate_norm_samples, ellipsoid
 from trihedron.records import FindingCode, Severity
 from trihedron.sensor_model import distort
 
@@ -267,3 +270,10 @@ def test_very_many_readings_are_fitted_as_carefully_as_few(n, loss):
     # An entry that is nearly nothing moves by as little of the largest ones.
     np.testing.assert_allclose(near.covariance, careful.covariance, atol=1e-6 * np.abs(careful.covariance).max())
     assert abs(near.chi2 / careful.chi2 - 1.0) < 1e-6
+
+
+def test_the_documented_call_of_the_ellipsoid_gives_its_own_answer():
+    found = doctest.testmod(importlib.import_module("trihedron.estimate.accelerometer.ellipsoid"))
+    assert (found.attempted, found.failed) == (6, 0)
+    with pytest.raises(ValueError, match="nine"):
+        ellipsoid(np.r_[np.eye(3), -np.eye(3)], 9.81)

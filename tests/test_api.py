@@ -1,6 +1,8 @@
 """The package as people call it from Python: names, arguments, results in notebooks and in other processes."""
 
 import copy
+import doctest
+import inspect
 import json
 import multiprocessing
 import pickle
@@ -12,6 +14,7 @@ from concurrent.futures import ProcessPoolExecutor
 import numpy as np
 import polars as pl
 import pytest
+from matplotlib.figure import Figure
 
 import trihedron
 from trihedron.cli import COMMANDS
@@ -275,3 +278,27 @@ def test_capture_of_a_file_of_bytes_gives_a_recording(tmp_path):
     taken = trihedron.capture(str(tmp_path / "stream.txt"), tmp_path / "log.csv", on_block=blocks.append)
     assert taken.n_samples > 380
     assert sum(len(block.time_s) for block in blocks) == taken.n_samples
+
+
+def test_a_figure_is_drawn_where_it_is_asked_for(result):
+    figure = Figure()
+    above, below = figure.subplots(2)
+    assert result.plot("residuals", ax=above) is figure
+    assert above.has_data()
+    assert not below.has_data()
+    with pytest.raises(ValueError, match="needs 1 axes, one a panel; ax has 2"):
+        result.plot("residuals", ax=[above, below])
+
+
+def test_verbs_say_what_they_return_and_their_examples_run(recording, result):
+    """Examples name a recording and its calibration as a reader has them."""
+    run = doctest.DocTestRunner()
+    for name in trihedron.__all__:
+        verb = getattr(trihedron, name)
+        if inspect.isfunction(verb) and name not in ("demo", "guide", "write_calibration"):
+            assert "Returns\n" in inspect.unwrap(verb).__doc__, name
+            names = {"trihedron": trihedron, "recording": recording, "result": result}
+            names |= inspect.unwrap(verb).__globals__ | names
+            run.run(doctest.DocTestParser().get_doctest(verb.__doc__, names, name, None, 0))
+    assert run.tries > 15
+    assert run.failures == 0

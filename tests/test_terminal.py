@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from trihedron.cli import COMMANDS, main
+from trihedron.cli.help import COMMAND_GROUPS
 from trihedron.records import Finding, FindingCode, Severity
 from trihedron.report import Document, to_text
 from trihedron.report.document import Code, Facts, Paragraph, Section, Table
@@ -149,3 +150,14 @@ def test_help_fits_the_terminal_and_its_examples_name_real_options(command, colu
 )
 def test_shells_complete_a_command(shell, words):
     assert b"calibrate" in run(_TRIHEDRON_COMPLETE=f"complete_{shell}", **words)
+
+
+def test_every_command_stands_in_the_overview_and_on_the_manual_page(capsys):
+    assert {name for _, names in COMMAND_GROUPS for name in names} == {made.__name__ for made in COMMANDS}
+    assert main(["--man"]) == 0
+    page = capsys.readouterr().out
+    assert page.startswith(".TH TRIHEDRON 1")
+    assert all(f"\n.SS {made.__name__}" in page for made in COMMANDS)
+    # A line that begins with a point is a request, or it is lost.
+    requests = {".TH", ".SH", ".SS", ".B", ".I", ".TP", ".PP", ".RS", ".RE", ".EX", ".EE"}
+    assert {line.split()[0] for line in page.splitlines() if line.startswith((".", "'"))} <= requests

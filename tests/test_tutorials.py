@@ -1,27 +1,25 @@
 """Every command and every line of Python that a tutorial shows is run, in order, in an empty folder."""
 
+import json
 import re
 import shlex
-from pathlib import Path
 
 import matplotlib as mpl
 import pytest
 
+from documented import DOCS, blocks
 from trihedron.cli import main
 
 mpl.use("Agg")
 
-FOLDER = Path(__file__).parents[1] / "docs" / "tutorials"
-TUTORIALS = sorted(FOLDER.glob("*.md"))
-
-# A block may say what its last command returns: ```sh exit=2. Blocks of a real board or a real log are ```sh not-run.
-BLOCK = re.compile(r"^```(sh|python)( [^\n]*)?\n(.*?)^```", re.M | re.S)
+TUTORIALS = sorted((DOCS / "tutorials").glob("*.md"))
 
 
-def blocks(path):
-    for language, words, body in BLOCK.findall(path.read_text(encoding="utf-8")):
-        if "not-run" not in words:
-            yield language, int(next(iter(re.findall(r"exit=(\d)", words)), 0)), body
+def shown_to_run(path):
+    """(language, status of the last command, text); a block of a real board or a real log says ``not-run``."""
+    for block in blocks(path):
+        if block.language in ("sh", "python") and block.said != "not-run":
+            yield block.language, int(next(iter(re.findall(r"exit=(\d)", block.said)), 0)), block.text
 
 
 def commands(body):
@@ -37,9 +35,12 @@ def test_what_the_tutorial_shows_runs_as_shown(path, tmp_path, monkeypatch, caps
     monkeypatch.chdir(tmp_path)
     names = {}
     n_run = 0
-    for language, status, body in blocks(path):
+    for language, status, body in shown_to_run(path):
         if language == "python":
             exec(compile(body, path.name, "exec"), names)
+            # What a comment promises is what is printed.
+            promised = re.findall(r"# → (.*)$", body, re.MULTILINE)
+            assert not promised or capsys.readouterr().out.splitlines() == promised
             n_run += 1
             continue
         shown = list(commands(body))
@@ -53,6 +54,17 @@ def test_what_the_tutorial_shows_runs_as_shown(path, tmp_path, monkeypatch, caps
     # Files that the text names as results exist.
     for name in re.findall(r"<!-- makes (\S+) -->", path.read_text(encoding="utf-8")):
         assert (tmp_path / name).stat().st_size > 0, name
+
+
+def test_the_notebook_runs_and_was_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    document = json.loads((DOCS / "tutorials" / "notebook.ipynb").read_text(encoding="utf-8"))
+    cells = [cell for cell in document["cells"] if cell["cell_type"] == "code"]
+    assert [cell["execution_count"] for cell in cells] == list(range(1, len(cells) + 1))
+    names = {}
+    for cell in cells:
+        assert not any(given["output_type"] == "error" for given in cell["outputs"])
+        exec("".join(cell["source"]), names)
 
 
 def test_every_kind_of_reader_has_a_tutorial():

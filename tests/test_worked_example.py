@@ -9,35 +9,35 @@ from pathlib import Path
 
 import pytest
 
+from documented import DOCS, blocks
 from trihedron.cli import main
 from trihedron.report import diagnosis_report
 from trihedron.report.page import to_html
 
-DOCS = Path(__file__).parents[1] / "docs"
+PAGE = DOCS / "worked-example.md"
 
 
-def blocks(kind):
-    text = (DOCS / "worked-example.md").read_text(encoding="utf-8")
-    return re.findall(rf"^```{kind}(?: (\S+))?\n(.*?)^```$", text, flags=re.M | re.S)
+def shown(language):
+    return [block for block in blocks(PAGE) if block.language == language]
 
 
 @pytest.mark.slow
 def test_the_commands_of_the_worked_example_end_in_a_scenario_that_passes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")  # as the page shows it
-    for name, text in blocks("toml"):
-        Path(name).write_text(text, encoding="utf-8")
+    for block in shown("toml"):
+        Path(block.said).write_text(block.text, encoding="utf-8")
     said = []
-    for _, command in blocks("sh"):
-        words = shlex.split(command)
+    for block in shown("sh"):
+        words = shlex.split(block.text)
         assert words[0] == "trihedron"
         out = io.StringIO()
         with contextlib.redirect_stdout(out):
             status = main(words[1:])
-        assert not status, command
+        assert not status, block.text
         said.append(out.getvalue())
     assert len(said) == 6  # one that stands for the recording, and five
-    promised = blocks("text")[0][1]
+    promised = shown("text")[0].text
     assert "MISSING PHYSICS: gyro-g-sensitivity was left out" in said[2]
     assert "gyro x zero −7.86" in said[2]
     assert promised in said[3]

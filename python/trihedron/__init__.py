@@ -6,12 +6,13 @@ recording
     What one IMU wrote: raw readings of accelerometer and gyro on one time base, in the unit of the log, with the audit
     of the log as findings. (:func:`read` makes one.)
 segments
-    *Holds*, where the sensor stood still, and the *moves* between them. (:func:`segment`)
+    *Poses* (``holds``), where the sensor stood still, and the *moves* between them. (:func:`segment`)
 pose
-    The orientation of one hold. A pose shows the accelerometer the vector of gravity.
-Mz
-    The *instrument trihedron*: the right-handed orthogonal frame fixed in the body in which specific force f [m/s²] and
-    angular rate ω [rad/s] are wanted. One Mz is shared by both sensors. *Lower*, *symmetric*, *case* say how it lies.
+    A static stretch in one orientation. It shows the accelerometer the vector of gravity.
+body frame
+    The right-handed orthogonal frame fixed in the instrument (*Mz* of the laboratory manual) in which specific force f
+    [m/s²] and angular rate ω [rad/s] are wanted, one for both sensors. *Lower* (triangular, X along accelerometer X),
+    *symmetric* and *case* say how it lies.
 S, b
     The direct model, raw → SI: ``f = S_f a' + b_f``, ``ω = S_ω w' + b_ω``. S is a full 3 × 3 matrix. *Correct* means
     raw → truth, *distort* truth → raw.
@@ -50,6 +51,12 @@ if TYPE_CHECKING:
     from trihedron.files.calibration import read_calibration
     from trihedron.fleet import fleet
     from trihedron.pipeline import (
+        CalibrationResult,
+        CheckResult,
+        DiagnosisResult,
+        KalmanResult,
+        SessionsResult,
+        VerificationResult,
         allan_deviation,
         apply,
         calibrate,
@@ -75,17 +82,38 @@ if TYPE_CHECKING:
         verify,
         write_calibration,
     )
-    from trihedron.records import Calibration, Finding, Recording, Segments
+    from trihedron.records import (
+        AllanCurve,
+        Calibration,
+        Finding,
+        Noise,
+        Recording,
+        Segments,
+        SensorCalibration,
+    )
     from trihedron.records.diagnosis import Diagnosis
+    from trihedron.records.truth import Truth
+    from trihedron.refused import RefusedError
 
     __version__: str
 
 __all__ = [
+    "AllanCurve",
     "Calibration",
+    "CalibrationResult",
+    "CheckResult",
     "Diagnosis",
+    "DiagnosisResult",
     "Finding",
+    "KalmanResult",
+    "Noise",
     "Recording",
+    "RefusedError",
     "Segments",
+    "SensorCalibration",
+    "SessionsResult",
+    "Truth",
+    "VerificationResult",
     "__version__",
     "allan_deviation",
     "apply",
@@ -117,12 +145,14 @@ __all__ = [
     "write_calibration",
 ]
 
-_HOME = {"Diagnosis": "trihedron.records.diagnosis"}
+_HOME = {"Diagnosis": "trihedron.records.diagnosis", "Truth": "trihedron.records.truth"}
+_HOME |= {"RefusedError": "trihedron.refused"}
 _HOME |= {"integrate_rate": "trihedron.estimate.attitude"}
 _HOME |= {"fleet": "trihedron.fleet"}
 _HOME |= {"identify_noise": "trihedron.estimate.noise", "read_calibration": "trihedron.files.calibration"}
-_HOME |= dict.fromkeys(("Calibration", "Finding", "Recording", "Segments"), "trihedron.records")
-# The others are verbs.
+_RECORDS = ("AllanCurve", "Calibration", "Finding", "Noise", "Recording", "Segments", "SensorCalibration")
+_HOME |= dict.fromkeys(_RECORDS, "trihedron.records")
+# The others are verbs, and what they return.
 _HOME |= {name: "trihedron.pipeline" for name in __all__ if name not in _HOME and not name.startswith("_")}
 
 

@@ -13,6 +13,7 @@ COMMAND_GROUPS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Record", ("plan", "ports", "capture", "guide")),
     ("Calibrate", ("check", "segment", "calibrate", "kalman", "allan")),
     ("Judge", ("verify", "diagnose")),
+    ("Many devices", ("fleet",)),
     ("Use", ("apply", "export", "convert")),
     ("Simulate", ("simulate",)),
 )

@@ -66,6 +66,11 @@ def write_calibration(calibration: Calibration, path: str | os.PathLike[str], *,
 def read_calibration(path: str | os.PathLike[str]) -> Calibration:
     """Read and check a calibration file.
 
+    Returns
+    -------
+    Calibration
+        What ``write_calibration`` or the command wrote, to the last bit.
+
     Raises
     ------
     CalibrationFileError

@@ -61,6 +61,11 @@ def fleet(
     gravity_m_s2 or latitude_deg, height_m, columns, rate_hz, accelerometer_unit, gyroscope_unit
         As for :func:`trihedron.calibrate` and :func:`trihedron.read`; the same for all logs.
 
+    Returns
+    -------
+    FleetResult
+        One row a log (``rows``, ``to_dataframe``) and the ``summary`` over devices.
+
     Raises
     ------
     ValueError

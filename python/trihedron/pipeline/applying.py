@@ -74,11 +74,22 @@ def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     follows temperature, S and b are those of each sample's temperature; outside the range for which it was made the
     ends are held and a serious finding says so.
 
+    Returns
+    -------
+    Recording
+        Specific force [m/s²] and angular rate [rad/s] at the log's own instants.
+
     Raises
     ------
     ValueError
         When the recording is in other units than the calibration was made for, or has no sensor that was calibrated;
         when the calibration is no sensor's (S singular, a negative variance).
+
+    Examples
+    --------
+    >>> corrected = trihedron.apply(result, recording)
+    >>> corrected.accelerometer.shape == recording.accelerometer.shape
+    True
     """
     known = require_plausible(calibration_of(calibration))
     recording = recording_of(recording)

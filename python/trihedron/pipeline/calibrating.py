@@ -52,7 +52,7 @@ FALSE_ALARM = 1e-3
 
 MOST_CREEPING = 0.05
 """Share of holds that may be seen to creep. The creep that is seen is the top of what is not: with one of 18 seen, on a
-support that yields, the gyro's scale lay outside its 95 % bars in a fifth of its elements (docs/confidence.md)."""
+support that yields, the gyro's scale lay outside its 95 % bars in a fifth of its elements."""
 
 Found = tuple[Finding, ...]
 
@@ -75,40 +75,54 @@ def calibrate(
     reference_columns: str | None = None,
     progress: Progress | None = None,
 ) -> CalibrationResult:
-    """Calibrate both sensors from one recording of still poses and moves.
+    """Calibrate both sensors from one recording of static poses and moves.
 
     Parameters
     ----------
     recording : Recording, or what trihedron.read takes
         Without a gyro the accelerometer is calibrated alone.
     segments : Segments, optional
-        Still poses and moves; found when not given.
+        Static poses and the moves between them; found when not given.
     gravity_m_s2 or latitude_deg, height_m : float
         |g| at the place. When nothing is said a standard value is used, and a finding says what that may cost.
     method : "joint", "separate" or "faces"
         Method 2 with both sensors in one fit (default) or one after the other; or method 1.
     frame : "lower", "symmetric" or "case"
-        Instrument trihedron: ``lower`` for method 2 and ``case`` for method 1 unless said.
+        Body frame: ``lower`` (triangular, X along accelerometer X) for method 2 and ``case`` for method 1 unless said.
     faces : sequence of ±1, ±2, ±3 or 0
-        Method 1: the axis of the case that points up in every still pose; 0 leaves a pose out.
+        Method 1: the axis of the case that points up in every pose; 0 leaves a pose out.
     turns_deg : sequence of float
         The angle of every turn on a table, about the axis that points up; 0 leaves a turn out. Method 1: of the turns
         between poses on the same face, where multiples of 90° are recognised when nothing is said and the scale is
         known. Method 2: of the turns between poses of the same tilt, in any pose; the gyro is then calibrated by them.
     axis_signs : three of ±1
-        Method 2: the sign with which each raw axis follows its axis of Mz, by the board's documentation.
+        Method 2: the sign with which each raw axis follows its axis of the body, by the board's documentation.
     loss : "linear", "huber", "soft_l1" or "cauchy"
         Method 2: how far outlying poses count.
     gyroscope_nominal : float
         rad/s per raw unit, where readings are counts and too few moves tell it.
     reference : path, Recording or ReferenceMotion
         Known motion beside the log (rate table, optical tracking, another unit): both sensors are held against it, and
-        still poses are not needed. ``reference_columns`` says its columns where their names do not.
+        static poses are not needed. ``reference_columns`` says its columns where their names do not.
+
+    Returns
+    -------
+    CalibrationResult
+        ``accelerometer`` and ``gyroscope`` (None without one) with ``S`` (3, 3), ``b`` (3,), ``sigma_S``, ``sigma_b``
+        and ``covariance`` (12, 12); ``findings``, ``segments``, ``recording``. ``print`` shows the report.
 
     Raises
     ------
     ValueError
         When the question cannot be answered; one sentence says why and what to do.
+
+    Examples
+    --------
+    >>> result = trihedron.calibrate(recording, latitude_deg=59.94)
+    >>> result.accelerometer.S.shape, result.accelerometer.covariance.shape
+    ((3, 3), (12, 12))
+    >>> result.is_trustworthy
+    True
     """
     if method not in METHODS:
         raise RefusedError(f"there is no method {method!r}; choose one of {', '.join(METHODS)}.")

@@ -112,6 +112,11 @@ def capture(
     on_block : callable, optional
         Is given every block of samples as it is written.
 
+    Returns
+    -------
+    Recording
+        What was read, as ``read`` gives it from the log on disk.
+
     Raises
     ------
     CaptureError
@@ -158,7 +163,13 @@ def stopped_by_interrupt(recorder: Recorder) -> Iterator[None]:
 
 
 def ports() -> list[Port]:
-    """The serial ports that are plugged in."""
+    """The serial ports that are plugged in.
+
+    Returns
+    -------
+    list of Port
+        Each with its name, and what the system says of the device behind it.
+    """
     return list_ports()
 
 

@@ -17,6 +17,16 @@ def check(recording: AnyRecording, *, progress: Progress | None = None) -> Check
 
     The error bars come from the poses, the moves and the sensor's noise; gravity hardly matters for them and is not
     asked for.
+
+    Returns
+    -------
+    CheckResult
+        ``is_fit``, ``findings``, the poses found and the uncertainties to expect.
+
+    Examples
+    --------
+    >>> trihedron.check(recording).is_fit
+    True
     """
     recording = recording_of(recording)
     segments = segment(recording, progress=progress)

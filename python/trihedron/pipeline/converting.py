@@ -17,6 +17,11 @@ def convert(log: Any, output: str | os.PathLike[str], *, overwrite: bool = False
     ``log`` is a recording, or whatever :func:`trihedron.read` takes, with its ``options``. Names of columns state the
     units, so that the file is read again without a question; missing readings are NaN. Time starts at zero.
 
+    Returns
+    -------
+    Recording
+        What was written.
+
     Raises
     ------
     ValueError

@@ -76,6 +76,11 @@ def diagnose(
     alpha : float
         Chance that a healthy recording is called anything but consistent.
 
+    Returns
+    -------
+    DiagnosisResult
+        ``verdict``, ``effects`` with their parameters and uncertainties, ``domains``, ``candidates`` and ``findings``.
+
     Raises
     ------
     ValueError

@@ -47,10 +47,21 @@ def export(
     output : path, optional
         Where to write; of several files each takes its own ending.
 
+    Returns
+    -------
+    dict of str to str
+        The text of every file of the target, by its ending.
+
     Raises
     ------
     ValueError
         When the target is unknown or its convention cannot hold the calibration.
+
+    Examples
+    --------
+    >>> (header,) = trihedron.export(result, "c").values()
+    >>> "double S[3][3]" in header
+    True
     """
     if rate_hz is not None and not rate_hz > 0.0:
         raise RefusedError(f"rate_hz is the number of samples per second, not {rate_hz}")

@@ -25,6 +25,11 @@ def extend(result: CalibrationResult, *, alpha: float = 0.01, progress: Progress
 
     Frame ``lower``: effects are stated along the sensor's axes and in this trihedron.
 
+    Returns
+    -------
+    CalibrationResult
+        The calibration with the physical effects that its recording demands.
+
     Raises
     ------
     ValueError

@@ -97,6 +97,11 @@ def kalman(
     frame : "lower" or "symmetric"
         Instrument trihedron where there is no reference; with one it is the frame of the reference.
 
+    Returns
+    -------
+    KalmanResult
+        ``calibration`` of the accelerometer with the track of its constants, pose by pose.
+
     Raises
     ------
     ValueError

@@ -48,6 +48,11 @@ def noise(
 
     ``accelerometer_lsb`` and ``gyroscope_lsb`` say the size of a count of a log in counts, as in ``"0.05 deg/s"``.
 
+    Returns
+    -------
+    Noise
+        Q, N, B, K and R of every axis with 95 % intervals, and the best averaging time.
+
     Raises
     ------
     ValueError

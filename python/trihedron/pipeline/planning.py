@@ -44,6 +44,11 @@ def plan(
     sigma_turn_rad : float
         Standard error of a turn's angle (the wall).
 
+    Returns
+    -------
+    ExperimentPlan
+        Uncertainties that turns, poses and moves would lead to.
+
     Raises
     ------
     ValueError

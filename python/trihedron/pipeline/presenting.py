@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +31,8 @@ from trihedron.report.text import to_text
 from trihedron.report.verification import verification_report
 
 if TYPE_CHECKING:
-    from trihedron.report.figures import ShownFigure
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 REPORT_ENDINGS = (".html", ".txt", ".json")
 
@@ -115,28 +117,52 @@ def pictures(result: object) -> dict[str, document.Picture]:
     return found | {b.name: b for b in every if isinstance(b, document.Picture) and b.draw is not None}
 
 
-def plot(result: object, name: str | None = None) -> ShownFigure:
+def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
     """A figure of a result's report: the first, or the one of that name; a notebook shows it, ``savefig`` writes it.
+
+    Parameters
+    ----------
+    result : a result of trihedron
+        Of any verb but ``demo``.
+    name : str, optional
+        Which figure; a wrong name lists those that there are.
+    ax : matplotlib Axes, or one for each panel
+        Where to draw; a figure of its own when not given.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
 
     Raises
     ------
     TypeError
         When it is no result.
     ValueError
-        When there is no such figure, or matplotlib is not installed.
+        When there is no such figure, it has another number of panels, or matplotlib is not installed.
     """
     there = pictures(result)
     chosen = next(iter(there), None) if name is None else name
     if chosen is None or chosen not in there:
         listed = ", ".join(repr(key) for key in there) or "none"
         raise RefusedError(f"there is no figure {chosen!r} of this {type(result).__name__}; there are: {listed}.")
-    draw = there[chosen].draw
-    assert draw is not None
-    return draw()
+    picture = there[chosen]
+    if ax is not None:
+        if picture.chart is None:
+            raise RefusedError(f"the figure {chosen!r} has a layout of its own: leave ax out.")
+        from trihedron.report.chart_figures import draw_onto
+
+        return draw_onto(picture.chart, list(ax) if isinstance(ax, Iterable) else [ax])
+    assert picture.draw is not None
+    return picture.draw()
 
 
 def report(result: object, path: str | os.PathLike[str] | None = None, *, overwrite: bool = False) -> str:
     """The whole report of a result as text, and as a file where ``path`` is given: .html with figures, .txt or .json.
+
+    Returns
+    -------
+    str
+        The whole report as text.
 
     Raises
     ------
@@ -144,6 +170,11 @@ def report(result: object, path: str | os.PathLike[str] | None = None, *, overwr
         When it is no result.
     ValueError
         When the ending of the path names no format, or the file exists and may not be replaced.
+
+    Examples
+    --------
+    >>> trihedron.report(result).splitlines()[0]
+    'Calibration'
     """
     laid_out = _kind(result).document(result)
     text = to_text(laid_out)

@@ -40,6 +40,11 @@ def read(
     arrays (n,) or (n, 3); a list of dictionaries, one per sample; a data frame of pandas, polars or Arrow. Names of
     columns are understood as in a file; masked cells are missing readings. A recording comes back as it is.
 
+    Returns
+    -------
+    Recording
+        Raw readings on one time base, in the unit of the log, with findings about both.
+
     Raises
     ------
     ReadError
@@ -164,7 +169,19 @@ def segments_of(given: Segments | None, recording: Recording, progress: Progress
 
 
 def segment(recording: AnyRecording, *, progress: Progress | None = None) -> Segments:
-    """Still poses and the moves between them, told apart by the sensor's own noise: nothing to set."""
+    """Static poses and the moves between them, told apart by the sensor's own noise: nothing to set.
+
+    Returns
+    -------
+    Segments
+        ``holds`` and ``moves``, mean reading of every pose (n, 3) in raw units and its standard error.
+
+    Examples
+    --------
+    >>> poses = trihedron.segment(recording)
+    >>> poses.accelerometer_mean.shape == (poses.n_holds, 3)
+    True
+    """
     recording = recording_of(recording)
     # Loaded when it is needed: half of what a command that only reads would wait for.
     from trihedron.segment import segment_recording

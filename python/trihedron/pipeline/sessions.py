@@ -89,6 +89,11 @@ def calibrate_sessions(
     alpha : float
         Chance that any number of a unit that did not change is called changed.
 
+    Returns
+    -------
+    SessionsResult
+        ``calibration`` common to all sessions, and in ``model`` what repeats and what changed.
+
     Raises
     ------
     ValueError

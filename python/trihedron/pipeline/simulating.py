@@ -20,10 +20,21 @@ from trihedron.simulate import simulate as run
 def simulate(scenario: str | os.PathLike[str] | Scenario, seed: int = 0) -> tuple[Recording, Truth]:
     """Simulate a scenario: a record, the name of a ready-made one, or a TOML file (docs/simulation.md).
 
+    Returns
+    -------
+    (Recording, Truth)
+        The log as an instrument would write it, and what it was really exposed to and made of.
+
     Raises
     ------
     ValueError
         When there is no such scenario, or it asks for what cannot be.
+
+    Examples
+    --------
+    >>> recording, truth = trihedron.simulate("hand-session", 3)
+    >>> truth.accelerometer_S.shape
+    (3, 3)
     """
     return run(scenario_of(scenario), seed)
 
@@ -60,6 +71,11 @@ def with_effects(scenario: str | os.PathLike[str] | Scenario, effects: Sequence[
 
 def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) -> tuple[Recording, Truth]:
     """Repeat a recording as a simulation: its poses, moves, timing, noise and converter.
+
+    Returns
+    -------
+    (Recording, Truth)
+        As :func:`simulate` gives them, moved as the recording was.
 
     Raises
     ------

@@ -32,10 +32,20 @@ def verify(
     user can accept (rms): beyond them a serious finding says so. Where no limit is said, a miss of more than ten times
     what noise and the stated errors allow is serious; where one is said and kept, it is a warning.
 
+    Returns
+    -------
+    VerificationResult
+        ``is_passed``, errors beside those to be expected, and ``findings``.
+
     Raises
     ------
     ValueError
         When units differ, or the recording has no accelerometer or no still pose.
+
+    Examples
+    --------
+    >>> trihedron.verify(result, recording).is_passed
+    True
     """
     known = calibration_of(calibration)
     recording = recording_of(recording)

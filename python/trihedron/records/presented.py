@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import copyreg
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from trihedron.records.frozen import Frozen
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Library = Literal["polars", "pandas"]
 
@@ -33,17 +37,24 @@ class Presented(Frozen):
 
         return as_frame(self, library)
 
-    def plot(self, name: str | None = None) -> Any:
+    def plot(self, name: str | None = None, *, ax: Axes | Sequence[Axes] | None = None) -> Figure:
         """A matplotlib figure of the report: the first, or the one of that name. A notebook shows it.
+
+        Parameters
+        ----------
+        name : str, optional
+            Which figure; a wrong name lists those that there are.
+        ax : matplotlib Axes, or one for each panel
+            Where to draw; a figure of its own when not given.
 
         Raises
         ------
         ValueError
-            When there is no figure of that name (the sentence lists them), or matplotlib is not installed.
+            When there is no figure of that name, it has another number of panels, or matplotlib is not installed.
         """
         from trihedron.pipeline.presenting import plot
 
-        return plot(self, name)
+        return plot(self, name, ax=ax)
 
     def _repr_html_(self) -> str:
         from trihedron.pipeline.presenting import as_html

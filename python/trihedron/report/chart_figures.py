@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import cast
 
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from trihedron.refused import RefusedError
 from trihedron.report.chart import Band, Chart, Colour, Level, Line, Mark, Panel, Points, Scale
 from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels
 
@@ -21,6 +23,23 @@ MOST_NAMES = 24
 WIDTH_IN = 9.5
 FEW_DECADES = 100.0
 """Axes that span less are labelled thrice a decade."""
+
+
+def draw_onto(chart: Callable[[], Chart], axes: Sequence[Axes]) -> Figure:
+    """The panels of a chart on axes of the caller's own, one for each.
+
+    Raises
+    ------
+    ValueError
+        When there are not as many axes as panels.
+    """
+    laid_out = [panel for panel in chart().panels if isinstance(panel, Panel)]
+    if len(axes) != len(laid_out):
+        raise RefusedError(f"this figure needs {len(laid_out)} axes, one a panel; ax has {len(axes)}.")
+    for axis, panel in zip(axes, laid_out, strict=True):
+        _draw_panel(axis, panel)
+        _name_below(axis, panel.x)
+    return cast(Figure, axes[0].figure)
 
 
 def draw_chart(chart: Callable[[], Chart]) -> Figure:

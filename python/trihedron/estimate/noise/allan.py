@@ -56,6 +56,11 @@ def allan_deviation(
     kind
         ``overlapping`` uses every start; see :data:`~trihedron.records.noise.AllanKind`.
 
+    Returns
+    -------
+    AllanCurve
+        ``tau_s`` (k,), ``deviation`` (k, channels) in the unit of the readings, with a 95 % interval.
+
     Raises
     ------
     ValueError
@@ -66,7 +71,7 @@ def allan_deviation(
     >>> import numpy as np, trihedron
     >>> curve = trihedron.allan_deviation(np.random.default_rng(1).normal(size=10000), 100.0, clusters=[1, 100])
     >>> curve.deviation.shape, [round(float(d), 2) for d in curve.deviation]
-    ((2,), [1.0, 0.1])
+    ((2,), [1.0, 0.09])
     """
     if isinstance(names, str) or isinstance(units, str):
         raise RefusedError("names and units are lists, one text for each channel.")

@@ -54,6 +54,11 @@ def identify_noise(
     automatic
         Leave out knocks and shaken stretches by itself, and start a new level at each step; each is a finding.
 
+    Returns
+    -------
+    Noise
+        Terms of every axis with 95 % intervals.
+
     Raises
     ------
     ValueError
@@ -64,7 +69,7 @@ def identify_noise(
     >>> import numpy as np
     >>> noise = identify_noise(np.random.default_rng(1).normal(size=100_000), rate_hz=100.0)
     >>> round(noise.axes[0].value("N"), 3), noise.axes[0].terms["K"].is_present
-    (0.1, False)
+    (0.099, False)
     """
     readings = as_readings(x)
     check_question(rate_hz, "overlapping", 0.95)

@@ -1,4 +1,4 @@
-"""The catalogue as a page of the documents: ``python -m trihedron.report.effects.page > docs/effects.md``."""
+"""The catalogue as a page of the documents; the site is built with it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ _HEAD = """# Effects
 What a diagnosis can name is a closed list of mechanisms, each with an id that keeps its meaning. What it says of one is
 its mechanism with the strongest term, or the sentence that stands here, with values of the recording in *italics*; *to
 tell it apart* is printed where a recording cannot tell two effects from each other.
-[A new effect](adding-an-effect.md) is one file.
+[A new effect](../adding-an-effect.md) is one file.
 
-Stages make ids and values only; this page is made from the catalogue (`python/trihedron/report/effects/`) by
-`python -m trihedron.report.effects.page`.
+This page is made from the catalogue (`python/trihedron/report/effects/`).
 """
 
 
@@ -30,7 +29,3 @@ def _told(entry: EffectWords) -> str:
     if entry.experiment_at_rest:
         lines.append(f"*In a log of one or two orientations:* {entry.experiment_at_rest}.")
     return "<br>\n".join(lines) + "\n"
-
-
-if __name__ == "__main__":
-    print(page(), end="")

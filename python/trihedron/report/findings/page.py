@@ -1,4 +1,4 @@
-"""The catalogue as a page of the documents: ``python -m trihedron.report.findings.page > docs/findings.md``."""
+"""The catalogue as a page of the documents; the site is built with it."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ was seen, the likely cause and the next action; the same five stand in reports, 
 | warning | the answer stands, with less weight than it looks |
 | serious | the answer is not to be trusted (exit status 2) |
 
-Words in *italics* are values of the recording. The stages make codes and values only; this page is made from the
-catalogue (`python/trihedron/report/findings/`) by `python -m trihedron.report.findings.page`.
+Words in *italics* are values of the recording. Made from the catalogue (`python/trihedron/report/findings/`).
 """
 
 
@@ -62,7 +61,3 @@ def shown(template: str) -> str:
             unit = number.partition(" ")[2] if number[:1] in {".", "+"} else ""
             words.append(f"*{name.replace('_', ' ')}*" + (f" {unit}" if unit and unit[0] != "!" else ""))
     return "".join(words)
-
-
-if __name__ == "__main__":
-    print(page(), end="")

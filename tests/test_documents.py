@@ -1,0 +1,183 @@
+"""The documents: every page is in the navigation, every link holds, and the site shows what the sources say."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+import yaml
+
+import trihedron
+from documented import DOCS, blocks
+
+ROOT = DOCS.parent
+PAGES = sorted(DOCS.rglob("*.md"))
+# Made from the code when the site is built (docs/hooks/reference.py), or from a notebook beside it.
+MADE = {f"reference/{name}.md" for name in ("commands", "python", "findings", "effects", "schemas")} | {
+    "tutorials/notebook.md"
+}
+BROWSER = next(
+    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None
+)
+# What a fence may say behind its backticks: a language, and nothing else.
+FENCE = re.compile(r"^ *```(.*)$", re.MULTILINE)
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+
+
+def navigated(part):
+    """Paths of a navigation, however deep."""
+    if isinstance(part, str):
+        return [part]
+    return [path for inner in (part.values() if isinstance(part, dict) else part) for path in navigated(inner)]
+
+
+def test_every_page_is_in_the_navigation_once():
+    listed = navigated(yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))["nav"])
+    assert len(listed) == len(set(listed))
+    assert set(listed) == {page.relative_to(DOCS).as_posix() for page in PAGES} | MADE
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_a_fence_says_its_language_only(page):
+    said = FENCE.findall(page.read_text(encoding="utf-8"))
+    assert not [words for words in said if not re.fullmatch(r"\w*", words)]
+    assert len(said) % 2 == 0
+
+
+@pytest.mark.parametrize("page", [*PAGES, *ROOT.glob("*.md")], ids=lambda page: page.stem)
+def test_links_of_the_sources_hold_where_they_are_read_as_files(page):
+    prose = re.sub(r"^```.*?^```|`[^`\n]+`", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    paths = {link.partition("#")[0] for link in LINK.findall(prose) if not re.match(r"\w+:", link)} - {""}
+    made = {DOCS / name for name in MADE}
+    assert [
+        path for path in paths if not (found := (page.parent / path).resolve()).exists() and found not in made
+    ] == []
+
+
+def test_commands_name_programs_that_are_there():
+    """``python benches/...``: what a figure was made with can be run again."""
+    for page in [*PAGES, *ROOT.glob("*.md")]:
+        named = set(re.findall(r"python (benches/\w+(?:\.py)?)", page.read_text(encoding="utf-8")))
+        assert [name for name in named if not (ROOT / name).exists()] == [], page.name
+
+
+def test_the_readme_is_short_and_its_pictures_show_on_a_package_index():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 140
+    home = re.search(r'^Repository = "(.*)"$', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.MULTILINE)[1]
+    raw = home.replace("https://github.com/", "https://raw.githubusercontent.com/") + "/main/"
+    pictures = re.findall(r"!\[[^]]*\]\((\S+)\)", text)
+    assert pictures
+    assert all(picture.startswith(raw) and (ROOT / picture.removeprefix(raw)).is_file() for picture in pictures)
+    evidence = text.partition("## Evidence")[2].partition("\n## ")[0]
+    assert 3 < len(re.findall(r"^\|", evidence, re.MULTILINE)) <= 2 + 12
+
+
+def test_what_a_release_says_of_itself_agrees():
+    version = re.search(r'^version = "(.*)"$', (ROOT / "Cargo.toml").read_text(encoding="utf-8"), re.MULTILINE)[1]
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert citation["version"] == version
+    assert f"## {version} ({citation['date-released']})" in changes
+    assert len(changes.splitlines()) <= 40
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site as it is published, and its address."""
+    needed = ("mkdocs", "material", "mkdocstrings", "mkdocs_gen_files", "latex2mathml")
+    missing = [name for name in needed if not find_spec(name)]
+    if missing:
+        pytest.skip(f"the site cannot be built without {', '.join(missing)} (extra docs)")
+    made = tmp_path_factory.mktemp("site")
+    quiet = {"NO_MKDOCS_2_WARNING": "1", "DISABLE_MKDOCS_2_WARNING": "true"}
+    quiet |= {"PYTHONPATH": str(Path(trihedron.__file__).parents[1])}
+    # Without -q, which silences the warnings before --strict counts them.
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(made)]
+    built = subprocess.run(
+        command, cwd=ROOT, env={**os.environ, **quiet}, capture_output=True, text=True, timeout=600, check=False
+    )
+    assert built.returncode == 0, built.stdout + built.stderr
+    handler = partial(SilentHandler, directory=str(made))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield made, f"http://127.0.0.1:{server.server_port}/"
+        server.shutdown()
+
+
+class SilentHandler(SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+def test_nothing_of_the_site_is_loaded_from_elsewhere(site):
+    elsewhere = re.compile(r"""(?:src|href)="(?:https?:)?//[^"]+\.(?:js|css|woff2?)\"""")
+    assert not [page for page in site[0].rglob("*.html") if elsewhere.search(page.read_text(encoding="utf-8"))]
+
+
+# What is looked at in a page: its text outside code, its blocks of code, where its links go, what they may point at.
+LOOK = """() => {
+  const article = document.querySelector("article");
+  const prose = article.cloneNode(true);
+  prose.querySelectorAll("code, math").forEach((part) => part.remove());
+  return {
+    prose: prose.textContent,
+    code: [...article.querySelectorAll("pre > code")].map((part) => part.textContent),
+    links: [...document.querySelectorAll("a[href]")].map((part) => part.href),
+    names: [...document.querySelectorAll("[id]")].map((part) => part.id),
+    pictures: [...article.querySelectorAll("img")].filter((part) => !part.naturalWidth).map((part) => part.src),
+    spills: document.documentElement.scrollWidth > window.innerWidth,
+  };
+}"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no chromium on this machine")
+@pytest.mark.skipif(find_spec("playwright") is None, reason="playwright is not installed (extra test)")
+@pytest.mark.filterwarnings("default")
+def test_every_page_in_a_browser_is_whole(site):
+    """No raw fence, no cut code, no picture missing, nothing beyond a phone's edge, every link holds."""
+    from playwright.sync_api import sync_playwright
+
+    made, home = site
+    seen, faults = {}, []
+    with sync_playwright() as tool:
+        browser = tool.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        tab = browser.new_page(viewport={"width": 390, "height": 800})
+        # The theme's search reads its whole index anew on every page: nothing that is looked at here.
+        tab.route("**/workers/*", lambda route: route.abort())
+        tab.on("pageerror", lambda error: faults.append(f"{tab.url}: {error}"))
+        for path in sorted(made.rglob("index.html")):
+            address = home + path.parent.relative_to(made).as_posix().removeprefix(".").rstrip("/")
+            address = address if address.endswith("/") else address + "/"
+            tab.goto(address, wait_until="load")
+            seen[address] = tab.evaluate(LOOK)
+        browser.close()
+    for page in PAGES:
+        relative = page.relative_to(DOCS).with_suffix("").as_posix()
+        shown = seen[home if relative == "index" else f"{home}{relative}/"]["code"]
+        faults += [
+            f"{page.name}: cut or missing: {b.text}"
+            for b in blocks(page)
+            if b.text.rstrip() not in map(str.rstrip, shown)
+        ]
+    names = {address: set(of["names"]) | {"", "__comments"} for address, of in seen.items()}
+    for address, of in seen.items():
+        faults += [f"{address}: raw Markdown" for raw in ("```", "](", "$$") if raw in of["prose"]]
+        faults += [f"{address}: picture {picture}" for picture in of["pictures"]]
+        faults += [f"{address}: wider than a phone"] * of["spills"]
+        for link in of["links"]:
+            page, _, name = link.partition("#")
+            if not link.startswith(home):
+                continue
+            if page not in names:
+                faults += [] if (made / page.removeprefix(home)).is_file() else [f"{address}: {link}"]
+            elif name not in names[page]:
+                faults.append(f"{address}: {link}")
+    assert faults == []
