@@ -23,7 +23,7 @@ import numpy as np
 import yaml
 
 import trihedron
-from trihedron.files.export import TARGETS, upper_frame
+from trihedron.files.formats import TARGETS, upper_frame
 from trihedron.records import Calibration, Recording
 
 G = 9.80665

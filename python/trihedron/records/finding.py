@@ -45,6 +45,7 @@ class FindingCode(str, Enum):
     REPEATED_ROWS = "repeated-rows"
     NON_FINITE = "non-finite"
     COARSE_RESOLUTION = "coarse-resolution"
+    CORRECTED_ON_BOARD = "corrected-on-board"
     COLUMNS_RECOGNISED = "columns-recognised"
     COLUMNS_ASSUMED = "columns-assumed"
     COLUMN_LEFT_OUT = "column-left-out"
