@@ -85,7 +85,6 @@ def placed(made: dict[str, str], path: Path, *, write: bool = False, overwrite: 
     targets = {path.with_name(path.stem + ending) if ending else path: text for ending, text in made.items()}
     if write:
         check_free(list(targets), overwrite=overwrite)
-        path.parent.mkdir(parents=True, exist_ok=True)
         for name, text in targets.items():
             write_whole(name, text, overwrite=overwrite)
     return list(targets)
