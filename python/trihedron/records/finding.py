@@ -115,6 +115,8 @@ class FindingCode(str, Enum):
     # apply
     CALIBRATION_DOUBTED = "calibration-doubted"
     # verify, check
+    CALIBRATION_SHIFT = "calibration-shift"
+    WORSE_THAN_UNCALIBRATED = "worse-than-uncalibrated"
     LIMIT_EXCEEDED = "limit-exceeded"
     SAME_RECORDING = "same-recording"
     NOT_FIT = "not-fit"
