@@ -51,8 +51,9 @@ def said_of(one: Ranked) -> str:
     said = [_mistake(found) for found in one.suspicions]
     if not said:
         said = [f.seen for f in one.verification.findings if f.severity.value == "serious"][:2]
-    if not said:
-        said = ["nothing"]
+    if not said and one.behind > 2.0 * one.behind_sigma:
+        said = ["it fits, and another fits better"]
+    said = said or ["nothing"]
     if one.without_bias:
         said.append(f"its file holds no bias of the {' and the '.join(one.without_bias)}: that of this log was taken")
     return "; ".join(said)
