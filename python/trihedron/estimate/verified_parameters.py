@@ -68,13 +68,17 @@ def shift_findings(parameters: tuple[JudgedParameter, ...]) -> list[Finding]:
     return [
         Finding.of(
             FindingCode.CALIBRATION_SHIFT,
-            parameters=[f"{one.id}-{one.name}" for one in shifted],
+            parameters=[_label(one) for one in shifted],
             n_parameters=len(shifted),
             n_judged=len(judged),
-            worst=f"{worst.id}-{worst.name}",
+            worst=_label(worst),
             times_sigma=abs(worst.times_sigma),
         )
     ]
+
+
+def _label(one: JudgedParameter) -> str:
+    return f"{one.id}-{one.name}"
 
 
 def uncalibrated(known: Calibration, own: Calibration | None, recording: Recording) -> Calibration:

@@ -98,17 +98,16 @@ def is_calibration(path: str | os.PathLike[str]) -> bool:
     return f'"{OWN}"' in text or _recognised(text, path) is not None
 
 
-LARGEST_BYTES = 4_000_000
-"""A calibration with everything beside it is a tenth of this; what is larger is a log."""
+LARGEST = 4_000_000
+"""Characters: a calibration with everything beside it has a tenth of this; what is longer is a log."""
 
 
 def _text(path: Path) -> str:
     try:
-        if path.is_file() and path.stat().st_size > LARGEST_BYTES:
-            raise CalibrationFileError(f"{path}: too large for a calibration file.")
-        return read_text(path, "calibration file")
+        text = read_text(path, "calibration file")
     except DocumentError as error:
         raise CalibrationFileError(of_path(path, error)) from None
+    return text
 
 
 def _whole(text: str, path: Path, one: Format) -> str:
@@ -120,6 +119,8 @@ def _whole(text: str, path: Path, one: Format) -> str:
 
 
 def _recognised(text: str, path: Path) -> Calibration | None:
+    if len(text) > LARGEST:
+        return None
     for one in formats().values():
         found = None if one.read is None else one.read(_whole(text, path, one))
         if found is not None:
