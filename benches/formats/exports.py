@@ -23,7 +23,7 @@ import numpy as np
 import yaml
 
 import trihedron
-from trihedron.files.formats import TARGETS, upper_frame
+from trihedron.files.formats import upper_frame
 from trihedron.records import Calibration, Recording
 
 G = 9.80665
@@ -228,14 +228,31 @@ def _pyins(files: Files, a: np.ndarray, w: np.ndarray) -> Pair:
     return out[0], out[1]
 
 
-SI_TARGETS = {"kalibr", "openvins", "vins-fusion", "ros", "basalt", "px4", "ardupilot"}
+@target("realsense", "json")
+def _realsense(files: Files, a: np.ndarray, w: np.ndarray) -> Pair:
+    imu = json.loads(files[""])["imus"][0]
+    out = []
+    for name, readings in (("accelerometer", a), ("gyroscope", w)):
+        X = np.reshape(imu[name]["scale_and_alignment"], (3, 3))
+        out.append(readings @ X - imu[name]["bias"])
+    return out[0], out[1]
+
+
+@target("imucal", "json")
+def _imucal(files: Files, a: np.ndarray, w: np.ndarray) -> Pair:
+    p = {key: np.array(value) for key, value in json.loads(files[""]).items() if isinstance(value, list)}
+    force = undo(p["K_a"] @ p["R_a"], p["b_a"], a)
+    return force, np.radians(undo(p["K_g"] @ p["R_g"], p["b_g"], w - force @ p["K_ga"].T))
+
+
+SI_TARGETS = {"kalibr", "openvins", "vins-fusion", "ros", "basalt", "px4", "ardupilot", "realsense"}
 TURNED = {"imu_tk"}
 
 
 def lost_in(files: Files) -> str:
     """The sentences of the files that say what is lost, once each."""
     lines = [line.strip("# /*").strip() for text in files.values() for line in text.splitlines()]
-    said = [line for line in lines if "is lost" in line or "Left out they are worth" in line]
+    said = [line for line in lines if "is lost" in line or "this is lost" in line]
     return " ".join(dict.fromkeys(said))
 
 
@@ -260,11 +277,13 @@ def main() -> int:
     noise = trihedron.noise({"t": np.arange(20000) / 100, "acc": rest[:, :3], "gyr": rest[:, 3:]})
     sizes = {"accelerometer_lsb": f"{ACCEL_LSB!r} m/s^2", "gyroscope_lsb": f"{GYRO_LSB!r} rad/s"}
     rows = []
-    for name in ("c", "c (float)", *(t for t in TARGETS if t != "c")):
+    for name in ("c", "c (float)", *(t for t in EVALUATED if not t.startswith("c"))):
         by, evaluate = EVALUATED[name]
         key = name.split()[0]
         in_si = key in SI_TARGETS
-        files = trihedron.export(known, key, noise=noise, rate_hz=100.0, **(sizes if in_si else {}))
+        files = trihedron.export(
+            known, key, noise=noise, rate_hz=100.0, current_parameters="none", **(sizes if in_si else {})
+        )
         a, w = counts[0] * (ACCEL_LSB if in_si else 1.0), counts[1] * (GYRO_LSB if in_si else 1.0)
         try:
             f, r = evaluate(files, np.asarray(a), np.asarray(w))
