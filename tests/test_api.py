@@ -139,7 +139,7 @@ WRONG = {
     "a check for a calibration": (lambda r: trihedron.apply(trihedron.check(r), r), "not CheckResult"),
     "no calibration": (lambda r: trihedron.apply(None, r.recording), "not NoneType"),
     "counts without a size": (lambda r: trihedron.export(r, "px4"), 'accelerometer_lsb="0.061 mg"'),
-    "no such target": (lambda r: trihedron.export(r, "x"), "there are c, rust"),
+    "no such target": (lambda r: trihedron.export(r, "x"), "there are airsim, ardupilot"),
     "no such figure": (lambda r: trihedron.plot(r, "x"), "'residuals'"),
     "no such ending": (lambda r: trihedron.report(r, "x.pdf"), ".html, .txt, .json"),
     "no result": (lambda _: trihedron.report(3), "no result of trihedron"),

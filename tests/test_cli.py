@@ -78,9 +78,9 @@ def test_export_writes_to_stdout_or_a_file(session, tmp_path, capsys):
     assert main(["export", str(session / "c.json"), "--to", "c"]) == 0
     assert "trihedron_correct" in capsys.readouterr().out
     size = ["--accel-lsb", "0.061 mg", "--gyro-lsb", "0.0305 deg/s"]
-    words = ["export", str(session / "c.json"), "--to", "kalibr", "-o", str(tmp_path / "imu.yaml")]
+    words = ["export", str(session / "c.json"), "--to", "basalt", "-o", str(tmp_path / "imu.json")]
     assert main([*words, *size]) == 0
-    assert "C_gyro_i" in (tmp_path / "imu.yaml").read_text()
+    assert "calib_gyro_bias" in (tmp_path / "imu.json").read_text()
 
 
 def test_gravity_that_was_not_given_is_said_with_what_it_may_cost(session, capsys):

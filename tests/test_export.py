@@ -12,13 +12,13 @@ import yaml
 
 from trihedron.cli import main
 from trihedron.files.calibration import write_calibration
-from trihedron.files.export import (
-    TARGETS,
+from trihedron.files.formats import (
     ExportOptions,
     NoiseFigure,
     SensorNoise,
     export_calibration,
     export_files,
+    targets,
     upper_frame,
 )
 from trihedron.records import Calibration, Finding, FindingCode, SensorCalibration, Severity
@@ -138,6 +138,7 @@ NOISE = ExportOptions(
     SensorNoise(NoiseFigure(1e-4), NoiseFigure(2e-6)),
     rate_hz=200.0,
     topic="/imu",
+    current_parameters="none",
 )
 SIX = (
     "accelerometer_noise_density", "accelerometer_random_walk", "gyroscope_noise_density", "gyroscope_random_walk",
@@ -216,50 +217,24 @@ def test_ros_covariances_are_those_of_one_message():
         export_calibration(calibration("si"), "ros")
 
 
-def diagonal_only(known):
-    """The same calibration without misalignment: what an autopilot can hold."""
-    sensors = [replace(s, S=np.diag(np.diag(s.S))) for s in (known.accelerometer, known.gyroscope)]
-    return replace(known, accelerometer=sensors[0], gyroscope=sensors[1])
-
-
-def test_px4_subtracts_the_offset_then_scales():
-    known = diagonal_only(calibration("si"))
-    rows = [line.split("\t") for line in export_calibration(known, "px4").splitlines() if not line.startswith("#")]
-    values = {row[2]: float(row[3]) for row in rows}
-    offset = np.array([values[f"CAL_ACC0_{a}OFF"] for a in "XYZ"])
-    scale = np.array([values[f"CAL_ACC0_{a}SCALE"] for a in "XYZ"])
-    # Nine digits are written.
-    np.testing.assert_allclose((READINGS - offset) * scale, corrected(known.accelerometer), atol=1e-7)
-    offset = np.array([values[f"CAL_GYRO0_{a}OFF"] for a in "XYZ"])
-    np.testing.assert_allclose((READINGS - offset) * np.diag(known.gyroscope.S), corrected(known.gyroscope), atol=1e-7)
-
-
-def test_ardupilot_subtracts_the_offset_then_scales_and_counts_temperature_from_35_degrees():
-    known = diagonal_only(calibration("si"))
-    named = {"bias_per_kelvin_x": 2e-3, "bias_per_kelvin_z": -1e-3, "bias_per_kelvin2_x": 3e-5}
-    effect = {"id": "accel-thermal-bias", "parameters": [{"name": k, "value": v} for k, v in named.items()]}
-    known = replace(known, extensions={"effects": [effect], "references": {"temperature_degc": 22.0}})
-    lines = [
-        line.split(",") for line in export_calibration(known, "ardupilot").splitlines() if not line.startswith("#")
-    ]
-    values = {line[0]: float(line[1]) for line in lines if len(line) == 2}
-    offset = np.array([values[f"INS_ACCOFFS_{a}"] for a in "XYZ"])
-    scale = np.array([values[f"INS_ACCSCAL_{a}"] for a in "XYZ"])
-    np.testing.assert_allclose((READINGS - offset) * scale, corrected(known.accelerometer), atol=1e-7)
-    warm, cold = 50.0, 10.0
-    true = 2e-3 * (warm - cold) + 3e-5 * ((warm - 22.0) ** 2 - (cold - 22.0) ** 2)
-    c1, c2 = 1e-6 * values["INS_TCAL1_ACC1_X"], 1e-6 * values["INS_TCAL1_ACC2_X"]
-    made = c1 * (warm - cold) + c2 * ((warm - 35.0) ** 2 - (cold - 35.0) ** 2)
-    assert made == pytest.approx(true, rel=1e-6)
+RAW = ExportOptions(current_parameters="none")
 
 
 @pytest.mark.parametrize("target", ["px4", "ardupilot"])
 def test_what_an_autopilot_cannot_hold_is_written_into_the_file_with_its_size(target):
     known = calibration("si")
-    text = export_calibration(known, target)
-    # 0.006 of the accelerometer at 9.81 m/s² is 59 mm/s².
-    assert re.search(r"% of the accelerometer's is lost, 5\d(\.\d)? mm/s\^2 at 1 g", text)
+    text = export_calibration(known, target, RAW)
+    # Half of 0.006, the angle between X and Z, at 9.81 m/s²: the other half is a turn of the triad as a whole.
+    assert re.search(r"% of the accelerometer's is lost, 2\d(\.\d)? mm/s\^2 at 1 g", text)
     assert "gyro scale" in text
+
+
+def test_a_loss_below_its_uncertainty_is_not_stated():
+    known = calibration("si")
+    covariance = np.diag(np.r_[np.full(9, 1e-2**2), np.zeros(3)])
+    sensors = [replace(s, covariance=covariance) for s in (known.accelerometer, known.gyroscope)]
+    text = export_calibration(replace(known, accelerometer=sensors[0], gyroscope=sensors[1]), "px4", RAW)
+    assert "accelerometer's is lost" not in text
 
 
 @pytest.mark.parametrize("handed", [1.0, -1.0])
@@ -299,10 +274,10 @@ def test_basalt_subtracts_the_zero_after_the_matrix_and_has_noise_and_rate():
 def test_counts_are_refused_or_converted_by_the_size_of_a_count(target):
     known = calibration("counts")
     with pytest.raises(ValueError, match="--accel-lsb"):
-        export_calibration(known, target)
-    options = ExportOptions(accel_lsb="0.001 m/s^2", gyro_lsb="0.001 rad/s")
+        export_calibration(known, target, NOISE)
+    options = replace(NOISE, accel_lsb="0.001 m/s^2", gyro_lsb="0.001 rad/s", current_parameters="none")
     # Counts of 1e-3 SI and S of 1e-3 SI per count are the calibration of SI readings.
-    left, right = (numbers(export_calibration(k, target, o)) for k, o in ((known, options), (calibration(), None)))
+    left, right = (numbers(export_calibration(k, target, o)) for k, o in ((known, options), (calibration(), options)))
     np.testing.assert_allclose(left, right, rtol=1e-6, atol=1e-12)
 
 
@@ -324,7 +299,7 @@ def test_pyins_distorts_truth_into_the_readings():
     np.testing.assert_allclose(force @ scope["accel_transform"].T + scope["accel_bias"], READINGS, **ROUNDING)
 
 
-@pytest.mark.parametrize("target", sorted(TARGETS))
+@pytest.mark.parametrize("target", targets())
 def test_every_export_says_when_the_calibration_is_not_to_be_trusted_or_has_no_gyro(target):
     known = calibration()
     alone = replace(known, gyroscope=None, covariance=np.zeros((12, 12)))
@@ -335,9 +310,23 @@ def test_every_export_says_when_the_calibration_is_not_to_be_trusted_or_has_no_g
 
 def test_a_symmetric_frame_is_turned_before_a_triangular_convention_is_written():
     known = in_frame(calibration("si"), "symmetric")
-    M = np.array(yaml.safe_load(export_calibration(known, "kalibr"))["accelerometers"]["M"])
+    M = np.array(yaml.safe_load(export_calibration(known, "kalibr", NOISE))["accelerometers"]["M"])
     lower = in_frame(known, "lower")
     np.testing.assert_allclose(M, np.linalg.inv(lower.accelerometer.S), **ROUNDING)
+
+
+def test_an_unknown_target_is_answered_with_the_list():
+    with pytest.raises(ValueError, match="kalibr"):
+        export_calibration(calibration(), "floppy")
+
+
+@pytest.mark.parametrize("target", targets())
+def test_a_singular_matrix_is_no_calibration(target):
+    known = calibration()
+    S = known.accelerometer.S.copy()
+    S[:, 2] = 1.001 * S[:, 1]
+    with pytest.raises(ValueError, match="singular"):
+        export_calibration(replace(known, accelerometer=replace(known.accelerometer, S=S)), target, NOISE)
 
 
 def test_the_command_writes_one_file_a_sensor_where_the_target_wants_it(tmp_path, capsys):

@@ -56,6 +56,7 @@ def right(folder, recording, result, tmp_path_factory):
         "plan": {},
         "plot": {"result": result},
         "ports": {},
+        "rank": {"calibrations": [result, result], "recording": recording},
         "read": {"path": folder / "log.csv"},
         "read_calibration": {"path": folder / "c.json"},
         "report": {"result": result},
@@ -104,6 +105,7 @@ BY_KIND = {
     "Scenario": (object(), 3, np.zeros(3), b"x", "a\0b", "no-such", [1]),
     "AccelerationUnit": (*NO_WORD, 1.5),
     "RateUnit": (*NO_WORD, 1.5),
+    "Sequence[AnyCalibration]": (*NO_LIST, [], [3], [object(), object()], ["none.json"] * 2),
     "Sequence[AnyRecording | CalibrationResult]": (*NO_LIST, [], [3], [object(), object()], ["none.csv"] * 2),
     "Sequence[str | os.PathLike[str]]": (3, b"x", object(), [], [3], {1}, "", "a\0b", "n" * 300, "none", [""]),
 }

@@ -61,6 +61,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "verify": (
         ("Does it still hold?", "trihedron verify cal.json today.csv"),
         ("Status 2 beyond 2 mg, for a script:", "trihedron verify cal.json today.csv --limit-mg 2"),
+        ("Is the vendor's right? Which is best?", "trihedron verify today.csv cal.json camera.json imu-result.yaml"),
     ),
     "diagnose": (
         ("What the linear model leaves out:", "trihedron diagnose log.csv --latitude 50.1 --report diagnosis.html"),
@@ -71,6 +72,8 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "export": (
         ("Kalibr's imu.yaml:", "trihedron export cal.json --to kalibr --noise noise.json -o imu.yaml"),
         ("C code for the board:", "trihedron export cal.json --to c -o imu_calibration.h"),
+        ("Parameters of a flight controller:", "trihedron export cal.json --to ardupilot -o imu.param"),
+        ("A simulated IMU like this one:", "trihedron export cal.json --to gazebo --noise noise.json -o imu.sdf"),
     ),
     "convert": (("Any log as a plain table:", "trihedron convert flight.ulg -o log.csv"),),
     "simulate": (

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, Any, Optional
 
 import typer
 
 from trihedron.cli.options import Force
 from trihedron.cli.output import check_outputs, leave, say
 
+LOSSES = ("lost", "Left out, since", "upper limit", "NOT TO BE TRUSTED")
+"""Words by which a file says what it cannot hold."""
+
 
 def export(
-    calibration: Annotated[Path, typer.Argument(metavar="CALIBRATION", help="Calibration file (JSON).")],
+    calibration: Annotated[
+        list[Path],
+        typer.Argument(metavar="CALIBRATION", help="Calibration file, of ours or another maker's; or several."),
+    ],
     to: Annotated[
         str,
-        typer.Option(
-            "--to",
-            metavar="TARGET",
-            help="c, rust, python, kalibr, openvins, vins-fusion, basalt, ros, px4, ardupilot, imu_tk, xio or pyins.",
-        ),
+        typer.Option("--to", metavar="TARGET", help="px4, ardupilot, kalibr, gazebo, c ...; 'list' names them all."),
     ],
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FILE", help="Where to write; '-' is stdout.")
+        Path,
+        typer.Option("-o", "--output", metavar="FILE", help="Where to write; '-' is stdout. A folder for several."),
     ] = Path("-"),
     noise: Annotated[
         Optional[Path],  # noqa: UP045 -- typer evaluates it at run time
@@ -39,33 +42,60 @@ def export(
     gyro_lsb: Annotated[
         str, typer.Option("--gyro-lsb", metavar="SIZE", help="The same of the gyro: '0.0305 deg/s'.")
     ] = "",
+    current_parameters: Annotated[
+        str,
+        typer.Option(
+            "--current-parameters",
+            metavar="FILE",
+            help="Autopilots: the board's parameters when it logged, where the log does not hold them; 'none' if raw.",
+        ),
+    ] = "",
     force: Force = False,
 ) -> None:
     """Write a calibration in another program's convention, with its equation stated."""
+    if to == "list":
+        _list()
+        return
     if rate is not None and not rate > 0.0:
         raise typer.BadParameter(f"--rate is the number of samples per second, not {rate:g}")
-    check_outputs(output, force=force, inputs=(calibration, noise))
-    from trihedron.files.calibration import read_calibration
-    from trihedron.files.export import ExportOptions, export_files
-    from trihedron.files.noise import read_noise
-    from trihedron.files.output import write_whole
+    folder = output if str(output) != "-" and len(calibration) > 1 else None
+    if folder is not None and folder.is_file():
+        raise typer.BadParameter(f"{len(calibration)} calibrations need a folder, and {output} is a file")
+    check_outputs(*(() if folder else (output,)), force=force, inputs=(*calibration, noise))
+    from trihedron.files.formats import any_calibration
+    from trihedron.pipeline.exporting import export as made_of
 
-    known = read_calibration(calibration)
-    figures, rest_rate = ({}, None) if noise is None else read_noise(noise)
-    options = ExportOptions(
-        figures.get("accelerometer"), figures.get("gyroscope"), rate or rest_rate, topic, accel_lsb, gyro_lsb
-    )
-    made = export_files(known, to, options)
-    if str(output) == "-":
-        typer.echo("\n".join(made.values()), nl=False)
-    else:
-        targets = {output.with_name(output.stem + ending) if ending else output: text for ending, text in made.items()}
-        check_outputs(*targets, force=force, inputs=(calibration, noise))
-        for target, text in targets.items():
-            write_whole(target, text, overwrite=force)
-            say(f"{to}: {target}")
-    for line in dict.fromkeys(line for text in made.values() for line in text.splitlines()):
+    known = [any_calibration(path) for path in calibration]
+    options: dict[str, Any] = {"noise": noise, "rate_hz": rate, "topic": topic, "accelerometer_lsb": accel_lsb}
+    options |= {"gyroscope_lsb": gyro_lsb, "current_parameters": current_parameters}
+    texts: dict[str, None] = {}
+    for path, one in zip(calibration, known, strict=True):
+        made = made_of(one, to, **options)
+        place = None if str(output) == "-" else folder / f"{path.stem}.{to}" if folder else output
+        _put(made, place, to, force, (*calibration, noise))
+        texts |= dict.fromkeys(line for text in made.values() for line in text.splitlines())
+    for line in texts:
         # What the file cannot hold stands in it; said here too, where the person looks.
-        if any(word in line for word in ("is lost", "Left out, since", "upper limit")):
-            say(line.strip(" #/*").strip())
-    leave(known.findings)
+        if any(word in line for word in LOSSES):
+            say(line.strip(' #/*%",'))
+    leave(tuple(finding for one in known for finding in one.findings))
+
+
+def _put(made: dict[str, str], place: Path | None, to: str, force: bool, inputs: tuple[Path | None, ...]) -> None:
+    from trihedron.pipeline.exporting import placed
+
+    if place is None:
+        typer.echo("\n".join(made.values()), nl=False)
+        return
+    check_outputs(*placed(made, place), force=force, inputs=inputs)
+    for target in placed(made, place, write=True, overwrite=force):
+        say(f"{to}: {target}")
+
+
+def _list() -> None:
+    from trihedron.files.formats import formats
+
+    for name, kind in formats().items():
+        if kind.write is not None:
+            takes = "readings in SI; counts with --accel-lsb, --gyro-lsb" if kind.in_si else "any readings"
+            typer.echo(f"{name:14}{takes}")

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
 
-from trihedron.cli.options import Force, GravitySource, Json, LogSource, Report, progress, with_options
+from trihedron.cli.options import Force, GravitySource, Json, LogSource, LogsSource, Report, progress, with_options
 from trihedron.cli.output import check_outputs, leave, say, show, write_json, write_report
+
+if TYPE_CHECKING:
+    from trihedron.records import Calibration
 
 FIRST_SCREEN = 2
 
 
-@with_options(source=LogSource, place=GravitySource)
+@with_options(source=LogsSource, place=GravitySource)
 def verify(
-    calibration: Annotated[Path, typer.Argument(metavar="CALIBRATION", help="Calibration file (JSON).")],
-    source: LogSource,
+    source: LogsSource,
     place: GravitySource,
     limit_mg: Annotated[
         Optional[float],  # noqa: UP045 -- typer evaluates it at run time
@@ -33,30 +36,35 @@ def verify(
     full: Annotated[bool, typer.Option("--full", help="Print the whole report, with every pose and move.")] = False,
     force: Force = False,
 ) -> None:
-    """Test a calibration on another recording.
+    """Test calibrations on a recording that they were not made from: CALIBRATION LOG, or LOG A B C ...
 
-    Exit status 2 when a limit is exceeded, or, without one, when the miss is more than ten times what was expected.
+    Calibrations may be files of any maker that is read here (docs/export.md); several are ranked. Exit status 2 when a
+    limit is exceeded, or, without one, when the miss is more than ten times what was expected; of several, when the
+    best does not fit.
     """
-    check_outputs(json, force=force, report=report, inputs=(*source.files, calibration))
-    from trihedron.files.calibration import read_calibration
-
-    known = read_calibration(calibration)
-    recording = source.read()
+    check_outputs(json, force=force, report=report, inputs=source.files)
     from trihedron import pipeline
-    from trihedron.report import verification_report
     from trihedron.report.machine import verification_record
+    from trihedron.report.ranking import ranking_record, ranking_report
+
+    paths, log = _parted(source)
+    known = _calibrations(paths)
+    recording = log.read()
+    place_of: dict[str, Any] = {
+        "gravity_m_s2": place.gravity, "latitude_deg": place.latitude, "height_m": place.height,
+    }  # fmt: skip
+    if len(known) > 1:
+        with progress("ranking") as tell:
+            ranking = pipeline.rank(paths, recording, progress=tell, **place_of)
+        show(ranking_report(ranking), json, sections=None if full else FIRST_SCREEN)
+        write_json(ranking_record(ranking), json, force=force)
+        write_report(ranking_report(ranking), ranking_record(ranking), report, force=force)
+        leave(ranking.best.verification.findings)
+        return
+    from trihedron.report import verification_report
 
     with progress("verifying") as tell:
-        result = pipeline.verify(
-            known,
-            recording,
-            gravity_m_s2=place.gravity,
-            latitude_deg=place.latitude,
-            height_m=place.height,
-            limit_mg=limit_mg,
-            limit_deg=limit_deg,
-            progress=tell,
-        )
+        result = pipeline.verify(known[0], recording, limit_mg=limit_mg, limit_deg=limit_deg, progress=tell, **place_of)
     document = verification_report(result.verification, result.segments, recording)
     machine = verification_record(result.verification)
     show(document, json, sections=None if full else FIRST_SCREEN)
@@ -65,3 +73,28 @@ def verify(
     if not full and report is None:
         say("Every pose and move: --full, or --report FILE.html with figures.")
     leave(result.findings)
+
+
+def _parted(source: LogsSource) -> tuple[list[Path], LogSource]:
+    """Calibrations and the one log among the files that were named, told by content."""
+    from trihedron.files.formats import is_calibration
+
+    named = list(source.log or [])
+    logs = [path for path in named if not is_calibration(path)]
+    beside = source.accel is not None or source.gyro is not None
+    if len(logs) == len(named):
+        # None is one: the first was meant as one, and its reader says what is wrong with it.
+        logs = named[1:]
+    if len(logs) > 1 or (beside and logs):
+        logs, extra = ([], logs) if beside else (logs[:1], logs[1:])
+        _calibrations(extra)
+    paths = [path for path in named if path not in logs]
+    if not paths:
+        raise typer.BadParameter("name a calibration file and a log")
+    return paths, replace(source, log=logs or None).one()
+
+
+def _calibrations(paths: list[Path]) -> list[Calibration]:
+    from trihedron.files.formats import any_calibration
+
+    return [any_calibration(path) for path in paths]

@@ -3,12 +3,15 @@ moves."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from trihedron import probability
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.measurements import measure_moves
 from trihedron.estimate.session.carried import carried
+from trihedron.estimate.verified_parameters import judge_parameters, shift_findings, uncalibrated
 from trihedron.records import (
     Calibration,
     Finding,
@@ -35,8 +38,11 @@ def verify_calibration(
     segments: Segments,
     gravity_m_s2: float,
     gravity_source: str,
+    own: Calibration | None = None,
 ) -> Verification:
     """Judge a calibration by the poses (docs/model.md, 10) and moves (equation 5.1) of another recording; no fit.
+
+    ``own`` is the calibration of that recording, by which parameters are judged; without it the gyro's bias alone is.
 
     Raises
     ------
@@ -58,6 +64,9 @@ def verify_calibration(
         rest = segments.gyroscope_mean @ gyroscope.S.T + gyroscope.b
         if any(move.stop - move.start >= 2 for move in segments.moves):
             angle, angle_noise, angle_sigma = _carried(calibration, gyroscope, recording, segments)
+    parameters = judge_parameters(calibration, own, segments)
+    without = uncalibrated(calibration, own, recording)
+    worse = _worse_than_none(calibration, without, recording, segments, gravity_m_s2, (error, angle))
     return Verification(
         source=recording.source,
         sha256=recording.sha256,
@@ -70,7 +79,14 @@ def verify_calibration(
         angle_noise_deg=angle_noise,
         angle_sigma_deg=angle_sigma,
         rest_rate=rest,
-        findings=(*_norm_findings(error, error_sigma), *_angle_findings(angle, angle_sigma)),
+        parameters=parameters,
+        findings=(
+            *_norm_findings(error, error_sigma),
+            *_angle_findings(angle, angle_sigma),
+            *worse,
+            *_bias_findings(calibration.gyroscope, rest),
+            *shift_findings(parameters),
+        ),
     )
 
 
@@ -89,6 +105,61 @@ def norm_error(
     jacobian = np.concatenate([(up[:, :, None] * means[:, None, :]).reshape(-1, 9), up], axis=1)
     model = np.einsum("ni,ij,nj->n", jacobian, sensor.covariance, jacobian)
     return norm - gravity_m_s2, np.sqrt(noise), np.sqrt(noise + np.maximum(model, 0.0))
+
+
+def _worse_than_none(
+    calibration: Calibration,
+    without: Calibration,
+    recording: Recording,
+    segments: Segments,
+    gravity_m_s2: float,
+    errors: tuple[FloatArray, FloatArray],
+) -> list[Finding]:
+    """Where readings taken at their unit's word serve better: whatever the file states of its uncertainty."""
+    error, angle = errors
+    assert segments.accelerometer_mean is not None
+    noise = _variance(segments.norm_sigma, segments.n_holds)
+    bare, _, _ = norm_error(without.accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
+    pairs = {"rest": (error, bare)}
+    gyroscope = without.gyroscope
+    if gyroscope is not None and len(angle):
+        with_it = replace(calibration, gyroscope=gyroscope)
+        pairs["moves"] = (angle, _carried(with_it, gyroscope, recording, segments)[0])
+    return [
+        Finding.of(FindingCode.WORSE_THAN_UNCALIBRATED, f"verify-{case}", rms=_rms(with_it), rms_without=_rms(bare))
+        for case, (with_it, bare) in pairs.items()
+        if _is_larger(with_it, bare)
+    ]
+
+
+def _bias_findings(gyroscope: SensorCalibration | None, rest: FloatArray) -> list[Finding]:
+    """A gyro bias that is another one than the scatter of the poses and the stated uncertainty allow.
+
+    Sessions of one unit differ by 0.1 to 1.5 times that (mimu4444, kim, getovermassif).
+    """
+    if gyroscope is None or len(rest) < 2:
+        return []
+    sigma = float(np.sqrt(np.mean(np.var(rest, axis=0, ddof=1)) + np.mean(gyroscope.sigma_b**2)))
+    shift = _rms(np.mean(rest, axis=0))
+    if shift <= FAR_BEYOND * sigma:
+        return []
+    times = shift / sigma if sigma > 0.0 else float("inf")
+    return [Finding.of(FindingCode.CALIBRATION_SHIFT, "gyro-bias", rate_rad_s=shift, times_expected=times)]
+
+
+def _is_larger(errors: FloatArray, others: FloatArray) -> bool:
+    """Whether squared errors (n,) or (n, k) are larger than others of the same poses or moves, beyond their scatter."""
+    more = errors**2 - others**2
+    more = more if more.ndim == 1 else more.sum(axis=1)
+    n = len(more)
+    if n < 3:
+        return False
+    limit = float(probability.stdtrit(n - 1, 1.0 - FALSE_ALARM))
+    return bool(more.mean() > limit * more.std(ddof=1) / np.sqrt(n))
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _variance(sigma: FloatArray | None, n: int) -> FloatArray:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.improving import improve
     from trihedron.pipeline.planning import plan
     from trihedron.pipeline.presenting import plot, report
+    from trihedron.pipeline.ranking import rank
     from trihedron.pipeline.reading import read, segment
     from trihedron.pipeline.replaying import guide
     from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
@@ -59,6 +60,7 @@ __all__ = [
     "plan",
     "plot",
     "ports",
+    "rank",
     "read",
     "recording_lengths",
     "report",
@@ -99,6 +101,7 @@ _HOME = {
     "recording_lengths": "trihedron.pipeline.identifying",
     "driven": "trihedron.pipeline.driving",
     "improve": "trihedron.pipeline.improving",
+    "rank": "trihedron.pipeline.ranking",
     "read": "trihedron.pipeline.reading",
     "segment": "trihedron.pipeline.reading",
     "CalibrationResult": "trihedron.pipeline.results",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -31,6 +32,7 @@ from trihedron.pipeline.results import CalibrationResult
 from trihedron.pipeline.turns_on_faces import opposite_on_faces, turns_on_faces
 from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
+from trihedron.records.plain import as_plain
 from trihedron.records.progress import Progress
 from trihedron.records.words import words
 from trihedron.refused import REFUSALS, RefusedError
@@ -134,7 +136,7 @@ def calibrate(
 
         found = held_against(recording, reference, gravity, columns=reference_columns)
         by_motion = calibration_by(found, recording, gravity, source, frame)
-        return CalibrationResult(replace(by_motion, findings=(*said, *by_motion.findings)), segments, recording)
+        return _result(by_motion, (*said, *by_motion.findings), segments, recording)
     _require_poses(recording, segments)
     if method == "faces":
         calibration = _by_faces(recording, segments, gravity, source, faces, turns_deg, gyroscope_nominal)
@@ -149,7 +151,21 @@ def calibrate(
         )
     calibration = in_frame(with_bending(calibration, segments), wanted)
     findings = (*said, *recording.findings, *_as_they_weigh(segments), *_of_fit(calibration, recording, segments))
-    return CalibrationResult(replace(calibration, findings=findings), segments, recording)
+    return _result(calibration, findings, segments, recording)
+
+
+def _result(
+    calibration: Calibration, findings: tuple[Finding, ...], segments: Segments, recording: Recording
+) -> CalibrationResult:
+    return CalibrationResult(of_board(replace(calibration, findings=findings), recording), segments, recording)
+
+
+def of_board(calibration: Calibration, recording: Recording) -> Calibration:
+    """The calibration with what a flight controller had done to the readings, which an export composes it with."""
+    if recording.onboard is None:
+        return calibration
+    extensions = {**calibration.extensions, "onboard": as_plain(recording.onboard)}
+    return replace(calibration, extensions=MappingProxyType(extensions))
 
 
 def _of_fit(calibration: Calibration, recording: Recording, segments: Segments) -> Found:

@@ -102,6 +102,7 @@ def _extended(base: Calibration, diagnosis: Diagnosis, finding: Finding) -> Cali
         findings=(*_still_true(base, diagnosis), finding),
         extensions=MappingProxyType(
             {
+                **base.extensions,
                 "effects": [effect.to_dict() for effect in diagnosis.effects],
                 "references": dict(diagnosis.references),
                 "verdict": diagnosis.verdict,

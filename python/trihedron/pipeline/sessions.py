@@ -149,6 +149,8 @@ def _unfit(result: CalibrationResult, others: Sequence[CalibrationResult]) -> Wo
                 return words("another-unit", sensor=name, unit=b.raw_unit, first_unit=a.raw_unit)
         if not math.isclose(first.gravity_m_s2, own.gravity_m_s2, rel_tol=1e-6):
             return words("another-gravity")
+        if first.extensions.get("onboard") != own.extensions.get("onboard"):
+            return words("another-correction")
     return None
 
 

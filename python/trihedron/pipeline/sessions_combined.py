@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
@@ -45,7 +45,9 @@ def combine(
     model = SessionsModel(by, tuple(sessions), repeated, changes, thermal, calibration, left_out)
     findings = findings_about(model)
     calibration = replace(
-        in_frame(calibration, frame), findings=findings, extensions=MappingProxyType(_extensions(model, anchor))
+        in_frame(calibration, frame),
+        findings=findings,
+        extensions=MappingProxyType(_extensions(model, anchor, reference.extensions)),
     )
     return replace(model, calibration=calibration, findings=findings)
 
@@ -109,9 +111,10 @@ def _sd(spread: Any) -> float:
     return 0.0 if spread is None else float(spread.sd)
 
 
-def _extensions(model: SessionsModel, anchor: Anchor) -> dict[str, Any]:
+def _extensions(model: SessionsModel, anchor: Anchor, kept: Mapping[str, object]) -> dict[str, Any]:
     """What the calibration file keeps beside S and b (docs/calibration-file.md)."""
     out: dict[str, Any] = {
+        **kept,
         "sessions": [
             {
                 "name": s.name,

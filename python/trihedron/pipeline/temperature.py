@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.invariants import Anchor, model_vector, numbers_of
 from trihedron.records import Calibration, Finding, FindingCode, Recording
-from trihedron.records.sessions import PARAMETERS
 from trihedron.refused import RefusedError
-from trihedron.sensor_model import in_frame, reframing
+from trihedron.thermal_model import parameters_at
 
 KNOTS = 257
 """S and b are exact at so many temperatures of the range and linear between: a cubic over the whole range is followed
@@ -78,36 +75,12 @@ def thermally_corrected(
     known = np.isfinite(T)
     whole = T if known.all() else np.interp(np.arange(len(T)), np.flatnonzero(known), T[known])
     knots = np.linspace(low, max(high, low + 1e-9), KNOTS)
-    table = np.array([_at(calibration, thermal, float(t)) for t in knots])
+    table = np.array([parameters_at(calibration, float(t)) for t in knots])
     place = (np.clip(whole, low, high) - low) / (knots[1] - knots[0])
     return (
         _followed(recording.accelerometer, table[:, :12], place),
         _followed(recording.gyroscope, table[:, 12:], place) if table.shape[1] == 24 else None,
     )
-
-
-def _at(calibration: Calibration, thermal: Mapping[str, Any], degc: float) -> FloatArray:
-    """(12,) or (24,) parameters at one temperature, in the calibration's frame."""
-    signs = np.array(thermal["axis_signs"], dtype=np.float64)
-    triad = None if thermal.get("triad") is None else np.array(thermal["triad"], dtype=np.float64)
-    anchor = Anchor(signs, triad)
-    base = in_frame(calibration, "lower")
-    accel, gyro = base.accelerometer, base.gyroscope
-    numbers = numbers_of(accel.S, accel.b, None if gyro is None else gyro.S, None if gyro is None else gyro.b, anchor)
-    t = degc - float(thermal["reference_degc"])
-    for term in thermal["terms"]:
-        picked = [k for k, parameter in enumerate(PARAMETERS[: len(numbers)]) if parameter.id == term["id"]]
-        if picked:
-            coefficients = np.array(term["coefficients"], dtype=np.float64)
-            numbers[picked] += (t ** np.arange(1, len(coefficients))) @ coefficients[1:]
-    parameters = model_vector(numbers, anchor)
-    if calibration.frame != "lower":
-        # The frame follows the axes as they are at this temperature, as it does at the reference.
-        turn = reframing(parameters[:9].reshape(3, 3), parameters[9:12], calibration.frame).rotation
-        for first in range(0, len(parameters), 12):
-            parameters[first : first + 9] = (turn @ parameters[first : first + 9].reshape(3, 3)).ravel()
-            parameters[first + 9 : first + 12] = turn @ parameters[first + 9 : first + 12]
-    return parameters
 
 
 def _followed(readings: FloatArray | None, table: FloatArray, place: FloatArray) -> FloatArray | None:

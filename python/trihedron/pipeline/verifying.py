@@ -6,11 +6,13 @@ from dataclasses import replace
 
 from trihedron.estimate.verification import verify_calibration
 from trihedron.pipeline.applying import AnyCalibration, calibration_of, check_units, doubted, without_effects
+from trihedron.pipeline.calibrating import calibrate
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
 from trihedron.pipeline.results import VerificationResult
-from trihedron.records import Finding, FindingCode, Segments, Severity, Verification
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, Severity, Verification
 from trihedron.records.progress import Progress
+from trihedron.refused import REFUSALS
 from trihedron.units import mg_from_m_s2
 
 
@@ -58,7 +60,8 @@ def verify(
         gravity, source = known.gravity_m_s2, "that of the calibration"
     else:
         gravity, source, _ = settle_gravity(gravity_m_s2, latitude_deg, height_m)
-    judged = verify_calibration(known, recording, segments, gravity, source)
+    own = own_calibration(recording, segments, gravity)
+    judged = verify_calibration(known, recording, segments, gravity, source, own)
     accepted = {
         FindingCode.RESIDUAL_ABOVE_NOISE: limit_mg is not None,
         FindingCode.HELD_OUT_WORSE: limit_deg is not None,
@@ -71,6 +74,14 @@ def verify(
     findings = (*doubted(known), *findings)
     findings += _same_recording(known.recording_sha256, recording.sha256)
     return VerificationResult(replace(judged, findings=findings), known, segments, recording)
+
+
+def own_calibration(recording: Recording, segments: Segments, gravity_m_s2: float) -> Calibration | None:
+    """What the recording says of the sensor itself; ``None`` where it cannot carry a calibration."""
+    try:
+        return calibrate(recording, segments=segments, gravity_m_s2=gravity_m_s2).calibration
+    except REFUSALS:
+        return None
 
 
 def _limits(judged: Verification, limit_mg: float | None, limit_deg: float | None) -> tuple[Finding, ...]:

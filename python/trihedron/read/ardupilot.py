@@ -15,12 +15,15 @@ import numpy as np
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError
+from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.table import StatedClock, Table
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding, FindingCode, Onboard
 from trihedron.refused import RefusedError
 
-_TYPES = ["IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
+_PARAMETERS = re.compile(r"INS_(ACC|GYR|TCAL)|AHRS_(ORIENTATION|CUSTOM_)")
+"""What the readings have been through is told by these (the INS library of ArduPilot)."""
+_TYPES = ["PARM", "IMU", "IMU2", "IMU3", "ACC", "GYR", "ACC1", "ACC2", "ACC3", "GYR1", "GYR2", "GYR3"]
 _STAMPS = (("SampleUS", "us"), ("TimeUS", "us"), ("TimeMS", "ms"))
 _FIELDS = {
     "IMU": ("AccX", "AccY", "AccZ", "GyrX", "GyrY", "GyrZ", "T", "Temp"),
@@ -44,6 +47,7 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
         raise missing_extra(path, "an ArduPilot .bin log", "pymavlink", "ardupilot") from None
     rows: dict[tuple[str, str], list[list[float]]] = {}
     names: dict[tuple[str, str], list[str]] = {}
+    held = Parameters(_PARAMETERS)
     # What pymavlink meets on the way it prints on stderr; that it skipped damaged bytes is a finding.
     said = io.StringIO()
     # Made before it is filled, so that its file can be closed when it gives up while it is filled.
@@ -52,7 +56,10 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
         with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), _quiet():
             log.__init__(str(path))
             while (message := log.recv_match(type=_TYPES)) is not None:
-                _keep(message, rows, names)
+                if message.get_type() == "PARM":
+                    held.note(message.Name, message.Value, has_readings=bool(rows))
+                else:
+                    _keep(message, rows, names)
     # pymavlink answers damage with whatever its unpacking met.
     except Exception as error:
         raise ReadError(f"{path}: pymavlink cannot read this log ({first_line(error)}); copy it again.") from None
@@ -68,11 +75,14 @@ def read_dataflash(path: Path, choice: Choice) -> tuple[Table, ...]:
     taken = pick(path, offered, choice, "this log")
     note = (*choice_note("log", taken, streams), *_skipped(said.getvalue()))
     sha256 = file_sha256(path)
+    # Readings of every message, ACC and GYR included, are logged behind offset, scale and the turn to the board's axes.
+    onboard = held.onboard("ardupilot", (int(taken.instance),) * 2, "body")
+    note = (*note, *said_of(onboard))
     if taken.topic == "IMU":
-        return (_table(path, ("IMU", taken.instance), rows, names, sha256, note, None),)
+        return (_table(path, ("IMU", taken.instance), rows, names, sha256, onboard, note, None),)
     return (
-        _table(path, ("ACC", taken.instance), rows, names, sha256, note, "accelerometer"),
-        _table(path, ("GYR", taken.instance), rows, names, sha256, (), "gyroscope"),
+        _table(path, ("ACC", taken.instance), rows, names, sha256, onboard, note, "accelerometer"),
+        _table(path, ("GYR", taken.instance), rows, names, sha256, onboard, (), "gyroscope"),
     )
 
 
@@ -121,6 +131,7 @@ def _table(
     rows: dict[tuple[str, str], list[list[float]]],
     names: dict[tuple[str, str], list[str]],
     sha256: str,
+    onboard: Onboard | None,
     findings: tuple[Finding, ...],
     sensor: Any,
 ) -> Table:
@@ -131,4 +142,4 @@ def _table(
         labels.append(f"{name} [{unit}]" if unit else {"T": "temperature", "Temp": "temperature"}.get(name, name))
     clock = StatedClock(time=0, unit="ms" if "[ms]" in labels[0] else "us")
     columns = tuple(np.ascontiguousarray(values[:, k]) for k in range(values.shape[1]))
-    return Table(path, tuple(labels), columns, sha256, findings=findings, sensor=sensor, clock=clock)
+    return Table(path, tuple(labels), columns, sha256, findings=findings, sensor=sensor, clock=clock, onboard=onboard)

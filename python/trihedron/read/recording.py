@@ -229,6 +229,7 @@ def audited(
         findings=tuple(findings),
         sampling=sensors.sampling,
         auxiliary=MappingProxyType(_auxiliary(sensors, n)),
+        onboard=sensors.table.onboard,
         rows_in_file=sensors.rows_in_file,
         rows_read=sensors.rows_read,
     ).knowing(facts)

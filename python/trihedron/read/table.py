@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
 from trihedron.read.digest import LateSha256
-from trihedron.records import Finding
+from trihedron.records import Finding, Onboard
 from trihedron.records.words import Words, words
 
 
@@ -37,7 +37,8 @@ class Table:
     break; both are zero/None for binary formats, where places are counted in rows. ``metadata`` holds key and value of
     preamble lines. ``words`` gives an example cell of each column of words, ``labels`` its different words and the word
     (n,) of each row where these are few. What a format knows of itself: ``sensor`` says whose ``x y z`` the columns
-    are, ``clock`` what it states of its stamps. ``rows_in_file`` counts what the file holds, left-out rows
+    are, ``clock`` what it states of its stamps. ``onboard`` what a
+    flight controller did to the readings. ``rows_in_file`` counts what the file holds, left-out rows
     included (0: as many as there are here); every row that is not here is in a finding's ``rows_left_out``.
     """
 
@@ -53,6 +54,7 @@ class Table:
     labels: dict[int, tuple[tuple[str, ...], npt.NDArray[np.int64]]] = field(default_factory=dict)
     sensor: Literal["accelerometer", "gyroscope"] | None = None
     clock: StatedClock = field(default_factory=StatedClock)
+    onboard: Onboard | None = None
     rows_in_file: int = 0
     is_private: bool = False
     """Its arrays were made by the reader and belong to nobody else: rows may be put in order where they lie."""

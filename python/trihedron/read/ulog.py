@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import struct
 from pathlib import Path
 from typing import Any
@@ -13,15 +14,18 @@ import numpy as np
 from trihedron.read.devices import Choice
 from trihedron.read.digest import file_sha256
 from trihedron.read.errors import ReadError
+from trihedron.read.onboard import Parameters, said_of
 from trihedron.read.table import StatedClock, Table
 from trihedron.read.topics import Stream, choice_note, first_line, missing_extra, pick
 from trihedron.read.ulog_fifo import SUFFIX, expanded
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding, FindingCode, Onboard
+from trihedron.records.onboard import Stage
 
 _RAW = "sensor_accel"
 _COMBINED = "sensor_combined"
 _GYRO = "sensor_gyro"
-_TOPICS = [_RAW, _GYRO, _RAW + SUFFIX, _GYRO + SUFFIX, _COMBINED]
+_TOPICS = [_RAW, _GYRO, _RAW + SUFFIX, _GYRO + SUFFIX, _COMBINED, "sensor_selection"]
+_PARAMETERS = re.compile(r"(CAL|TC)_(ACC|GYRO|A|G)(\d|_)|SENS_BOARD_|SENS_EN_THERMAL")
 _UNITS = {"sensor_accel": "m/s^2", "sensor_gyro": "rad/s"}
 _SKIP = {"timestamp", "timestamp_sample"}
 
@@ -62,14 +66,15 @@ def read_ulog(path: Path, choice: Choice) -> tuple[Table, ...]:
         if choice.instance is not None and not any(s.instance == choice.instance for s in offered):
             offered = streams
     taken = pick(path, offered, choice, "this log")
-    findings = (*choice_note("log", taken, streams), *_losses(log))
+    onboard = _onboard(log, taken.topic, int(taken.instance or 0))
+    findings = (*choice_note("log", taken, streams), *_losses(log), *said_of(onboard))
     sha256 = file_sha256(path)
     if taken.topic == _COMBINED:
-        return (_table(path, data[(_COMBINED, 0)], "", sha256, findings),)
+        return (_table(path, data[(_COMBINED, 0)], "", sha256, onboard, findings),)
     i = int(taken.instance)
     return (
-        _table(path, data[(taken.topic, i)], _RAW, sha256, findings),
-        _table(path, data[(taken.topic.replace(_RAW, _GYRO), i)], _GYRO, sha256, ()),
+        _table(path, data[(taken.topic, i)], _RAW, sha256, onboard, findings),
+        _table(path, data[(taken.topic.replace(_RAW, _GYRO), i)], _GYRO, sha256, onboard, ()),
     )
 
 
@@ -111,7 +116,14 @@ def _check_definitions(path: Path) -> None:
     raise ReadError(f"{path}: this ULog ends before its first message; 0 messages were logged.")
 
 
-def _table(path: Path, data: dict[str, Any], topic: str, sha256: str, findings: tuple[Finding, ...]) -> Table:
+def _table(
+    path: Path,
+    data: dict[str, Any],
+    topic: str,
+    sha256: str,
+    onboard: Onboard | None,
+    findings: tuple[Finding, ...],
+) -> Table:
     # The sample's own stamp, where the log has it; `timestamp` is when the message was published.
     stamp = _stamp(data)
     names, columns = ["timestamp [us]"], [np.asarray(data[stamp], dtype=np.float64)]
@@ -122,7 +134,34 @@ def _table(path: Path, data: dict[str, Any], topic: str, sha256: str, findings: 
             columns.append(np.asarray(values, dtype=np.float64))
     sensors: dict[str, Any] = {"sensor_accel": "accelerometer", "sensor_gyro": "gyroscope"}
     clock = StatedClock(time=0, unit="us")
-    return Table(path, tuple(names), tuple(columns), sha256, findings=findings, sensor=sensors.get(topic), clock=clock)
+    sensor = sensors.get(topic)
+    return Table(
+        path, tuple(names), tuple(columns), sha256, findings=findings, sensor=sensor, clock=clock, onboard=onboard
+    )
+
+
+def _onboard(log: Any, topic: str, instance: int) -> Onboard | None:
+    """What the readings of a topic have been through, by the parameters and the identity of the sensor.
+
+    Drivers corrected ``sensor_accel`` themselves while it also held counts (``x_raw``, before firmware 1.11);
+    ``sensor_combined`` holds what was corrected and turned into the axes of the board.
+    """
+    columns = {(d.name, d.multi_id): d.data for d in log.data_list}
+    own = columns.get((topic, instance), {})
+    held = Parameters(_PARAMETERS)
+    for name, value in log.initial_parameters.items():
+        held.note(name, value, has_readings=False)
+    first = float(min((data["timestamp"][0] for data in columns.values() if len(data["timestamp"])), default=0.0))
+    for stamp, name, value in log.changed_parameters:
+        held.note(name, value, has_readings=stamp > first)
+    numbers = []
+    for word, device in (("ACC", "accel_device_id"), ("GYRO", "gyro_device_id")):
+        other = columns.get((topic.replace("accel", "gyro"), instance), {}) if word == "GYRO" else own
+        known = other.get("device_id", columns.get(("sensor_selection", 0), {}).get(device, ()))
+        wanted = known[0] if len(known) else held.values.get(f"CAL_{word}_PRIME", -1)
+        numbers.append(next((i for i in range(4) if held.values.get(f"CAL_{word}{i}_ID", 0) == wanted), instance))
+    stage: Stage = "body" if topic == _COMBINED else "corrected" if "x_raw" in own else "raw"
+    return held.onboard("px4", (numbers[0], numbers[1]), stage)
 
 
 def _stamp(data: dict[str, Any]) -> str:

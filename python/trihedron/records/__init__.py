@@ -35,6 +35,7 @@ from trihedron.records.noise import (
     SpectralLine,
     TermName,
 )
+from trihedron.records.onboard import Onboard
 from trihedron.records.recording import Recording
 from trihedron.records.sampling import Sampling, StampKind
 from trihedron.records.segments import Hold, Move, Segments
@@ -66,6 +67,7 @@ __all__ = [
     "NoiseTerm",
     "NormKalmanCalibration",
     "Observability",
+    "Onboard",
     "PoseTable",
     "Recording",
     "Sampling",

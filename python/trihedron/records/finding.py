@@ -45,6 +45,7 @@ class FindingCode(str, Enum):
     REPEATED_ROWS = "repeated-rows"
     NON_FINITE = "non-finite"
     COARSE_RESOLUTION = "coarse-resolution"
+    CORRECTED_ON_BOARD = "corrected-on-board"
     COLUMNS_RECOGNISED = "columns-recognised"
     COLUMNS_ASSUMED = "columns-assumed"
     COLUMN_LEFT_OUT = "column-left-out"
@@ -114,6 +115,8 @@ class FindingCode(str, Enum):
     # apply
     CALIBRATION_DOUBTED = "calibration-doubted"
     # verify, check
+    CALIBRATION_SHIFT = "calibration-shift"
+    WORSE_THAN_UNCALIBRATED = "worse-than-uncalibrated"
     LIMIT_EXCEEDED = "limit-exceeded"
     SAME_RECORDING = "same-recording"
     NOT_FIT = "not-fit"

@@ -16,6 +16,7 @@ from trihedron.records.channel_facts import Limit, LowPass, RecordingFacts
 from trihedron.records.checked import all_of, kind_of, number_of, numbers_of, word_of
 from trihedron.records.finding import Finding
 from trihedron.records.frozen import freeze
+from trihedron.records.onboard import Onboard
 from trihedron.records.presented import Presented
 from trihedron.records.sampling import UNJUDGED, Sampling
 from trihedron.refused import RefusedError
@@ -95,6 +96,8 @@ class Recording(Presented):
         What the stamps are worth, as judged when the log was read.
     auxiliary : mapping of name to (n,) array
         Every other numeric column, untouched.
+    onboard : Onboard, optional
+        What a flight controller did to the readings before it logged them, where the log says so.
     rows_in_file, rows_read : int
         Rows that the file (or both files) holds, and those that became readings; the others are in findings, so that
         ``rows_in_file == rows_read + rows_reported``. Zero where no file was read.
@@ -119,6 +122,7 @@ class Recording(Presented):
     findings: tuple[Finding, ...] = ()
     sampling: Sampling = UNJUDGED
     auxiliary: MappingProxyType[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
+    onboard: Onboard | None = None
     rows_in_file: int = 0
     rows_read: int = 0
 
@@ -150,6 +154,7 @@ class Recording(Presented):
         all_of("findings", self.findings, Finding)
         kind_of("sampling", self.sampling, Sampling)
         kind_of("auxiliary", self.auxiliary, dict, MappingProxyType)
+        kind_of("onboard", self.onboard, Onboard, type(None))
         for name in ("source", "sha256"):
             kind_of(name, getattr(self, name), str)
         freeze(self)

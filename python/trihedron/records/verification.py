@@ -12,6 +12,30 @@ from trihedron.records.finding import Finding, Severity
 from trihedron.records.presented import Presented
 
 
+@dataclass(frozen=True)
+class JudgedParameter:
+    """One parameter of a calibration against what the log says of it: ``difference`` is the file's less the log's.
+
+    ``id`` and ``name`` as in :data:`trihedron.records.sessions.PARAMETERS`; ``sigma_file`` is the stated standard
+    uncertainty (0 where none is stated), ``sigma_log`` that of the log. ``is_judged`` is false where the log does not
+    know the parameter, or far less well than the file claims to.
+    """
+
+    id: str
+    name: str
+    unit: str
+    difference: float
+    sigma_file: float
+    sigma_log: float
+    is_judged: bool
+
+    @property
+    def times_sigma(self) -> float:
+        """The difference in its standard uncertainty."""
+        sigma = float(np.hypot(self.sigma_file, self.sigma_log))
+        return self.difference / sigma if sigma > 0.0 else float(np.copysign(np.inf, self.difference))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Verification(Presented):
     """What a calibration says about another recording, with what it should have said.
@@ -20,7 +44,8 @@ class Verification(Presented):
     mean allows, ``norm_sigma`` (n,) that and the calibration's own uncertainty. ``angle_deg`` (m,) is the angle between
     gravity carried through a move by the gyro and gravity measured after it; ``angle_noise_deg`` and
     ``angle_sigma_deg`` (m,) the same two predictions for it. ``rest_rate`` (n, 3) is the calibrated rate in every
-    still pose [rad/s], where the truth is zero: how far the gyro's zero has moved.
+    still pose [rad/s], where the truth is zero: how far the gyro's bias has moved. ``parameters`` says the same of
+    every parameter that the log can judge, and names those that it cannot.
     """
 
     source: str
@@ -34,6 +59,7 @@ class Verification(Presented):
     angle_noise_deg: FloatArray
     angle_sigma_deg: FloatArray
     rest_rate: FloatArray
+    parameters: tuple[JudgedParameter, ...] = ()
     findings: tuple[Finding, ...] = ()
 
     @property

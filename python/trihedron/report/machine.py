@@ -120,6 +120,7 @@ def verification_record(verification: Verification) -> dict[str, Any]:
         "angle_noise_deg": v.angle_noise_deg,
         "angle_sigma_deg": v.angle_sigma_deg,
         "rest_rate_rad_s": v.rest_rate,
+        "parameters": [vars(one) for one in v.parameters],
         "findings": [finding.to_dict() for finding in v.findings],
     }
 

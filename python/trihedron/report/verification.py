@@ -23,6 +23,7 @@ def verification_report(
     sections = [
         Section("Result", (Facts(_facts(verification)),)),
         Section("Findings", (findings_block(verification.findings),)),
+        Section("Parameters", (parameters_table(verification),)),
         Section("Poses and moves", tuple(_tables(verification, segments))),
     ]
     if segments is not None and recording is not None:
@@ -85,6 +86,29 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
             ("gyro's zero", f"moved by {', '.join(shift)} °/s since the calibration (taken from each still pose)")
         )
     return tuple(facts)
+
+
+def parameters_table(v: Verification) -> Table:
+    """Every parameter: the file's less this log's, both uncertainties, and whether this log can judge it."""
+    rows = []
+    for one in v.parameters:
+        scale, unit = _SHOWN.get(one.unit, (1.0, one.unit))
+        sigma = plain_number(scale * one.sigma_log, 2) if np.isfinite(one.sigma_log) else "unknown"
+        stated = plain_number(scale * one.sigma_file, 2) if one.sigma_file > 0.0 else "not stated"
+        differs = plain_number(scale * one.difference, 3) if np.isfinite(one.difference) else ""
+        times = plain_number(one.times_sigma, 2) if one.is_judged and np.isfinite(one.times_sigma) else ""
+        judged = times if one.is_judged else "not judged by this log"
+        rows.append((f"{one.id} {one.name}", unit, differs, sigma, stated, judged))
+    head = ("parameter", "unit", "file − log", "σ of the log", "σ of the file", "in σ")
+    return Table(head, tuple(rows), "Parameters that do not depend on the frame, against this log's own calibration")
+
+
+_SHOWN = {
+    "m/s^2": (1000.0, "mm/s²"),
+    "rad/s": (degrees_from_radians(1.0), "°/s"),
+    "rad": (1000.0, "mrad"),
+    "1": (100.0, "%"),
+}
 
 
 def _acceleration(value: float) -> str:

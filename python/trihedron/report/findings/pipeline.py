@@ -69,6 +69,45 @@ _CALIBRATE = (
     ),
 )
 
+_VERIFIED = (
+    Entry(
+        Code.CALIBRATION_SHIFT,
+        "",
+        WARNING,
+        "{n_parameters:.0f} of {n_judged:.0f} parameters that this log can judge differ from the file by more than "
+        "both uncertainties allow: {parameters:first 8}; most {worst}, {times_sigma:.1f} times.",
+        "A calibration shift between sessions (temperature, shock, bias repeatability), or a wrong file.",
+        "See the table of parameters; calibrate several sessions together to learn how far each repeats.",
+    ),
+    Entry(
+        Code.WORSE_THAN_UNCALIBRATED,
+        "verify-rest",
+        SERIOUS,
+        "The accelerometer's gravity error in static poses is {rms:.3g mm/s²} rms with this calibration and "
+        "{rms_without:.3g mm/s²} without any.",
+        "A wrong file, unit, axis or sign, or a calibration of too few poses.",
+        "Do not use it; calibrate with this log.",
+    ),
+    Entry(
+        Code.WORSE_THAN_UNCALIBRATED,
+        "verify-moves",
+        SERIOUS,
+        "The tilt error after a rotation is {rms:.3g}° rms with this gyro calibration and {rms_without:.3g}° without "
+        "any.",
+        "A wrong file, unit, axis or sign, or a calibration of too few rotations.",
+        "Do not use it; calibrate with this log.",
+    ),
+    Entry(
+        Code.CALIBRATION_SHIFT,
+        "gyro-bias",
+        SERIOUS,
+        "At rest the gyro reads {rate_rad_s:.3g deg/s} with this calibration, {times_expected:.0f} times what the "
+        "scatter of the poses and the stated uncertainty allow: its bias is another one.",
+        "A bias with the wrong sign or unit, of another unit, or of another temperature.",
+        "Do not subtract this bias; measure it at rest before use.",
+    ),
+)
+
 _USE = (
     Entry(
         Code.GYROSCOPE_LEFT_OUT,
@@ -283,4 +322,4 @@ _MANY_RECORDINGS = (
     ),
 )
 
-ENTRIES = (*_CALIBRATE, *_USE, *_DIAGNOSE, *_MANY_RECORDINGS)
+ENTRIES = (*_CALIBRATE, *_VERIFIED, *_USE, *_DIAGNOSE, *_MANY_RECORDINGS)

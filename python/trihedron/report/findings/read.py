@@ -122,6 +122,19 @@ _WHY_UNKNOWN = {"short": "the log is too short to tell", "alike": "both triads l
 _NAME_THEM = "Name them with --columns, for example --columns ax,ay,az,gx,gy,gz."
 _COLUMNS = (
     Entry(
+        Code.CORRECTED_ON_BOARD,
+        "",
+        NOTE,
+        "{autopilot} had corrected these readings (accelerometer {accel:.0f}, gyro {gyro:.0f}) by its own offsets and "
+        "scales{is_turned:? and turned them into the board's axes|} before it logged them: a calibration finds what "
+        "remains.",
+        "{has_changed:?Parameters changed while readings were logged: {changed:&, }.|A flight controller logs what it "
+        "flies by.}",
+        "`trihedron export` composes the parameters that the log states with what the calibration finds; load its file "
+        "as a whole.",
+        or_severity=WARNING,
+    ),
+    Entry(
         Code.COLUMNS_RECOGNISED,
         "",
         NOTE,

@@ -1,0 +1,130 @@
+"""Every parameter of a calibration against what a recording says of it, and both against no calibration at all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from trihedron import probability
+from trihedron.arrays import FloatArray
+from trihedron.invariants import Anchor, anchor_of, invariants, numbers_jacobian, numbers_of
+from trihedron.records import Calibration, Finding, FindingCode, Recording, Segments, SensorCalibration
+from trihedron.records.sessions import PARAMETERS
+from trihedron.records.verification import JudgedParameter
+from trihedron.sensor_model import in_frame
+from trihedron.units import acceleration_to_si, rate_to_si
+
+FALSE_ALARM = 1e-3
+"""Chance that any parameter of a calibration that holds is said to have shifted."""
+TOO_VAGUE = 10.0
+"""A log whose own uncertainty of a parameter is this many times the stated one says nothing of it."""
+
+
+def judge_parameters(known: Calibration, own: Calibration | None, segments: Segments) -> tuple[JudgedParameter, ...]:
+    """Differences (file less log) of parameters that do not depend on the frame, with both standard uncertainties.
+
+    ``own`` is the calibration of the log itself, ``None`` where it cannot carry one: then the gyro's bias alone is
+    judged, by the still poses, as it always is. A stated covariance of several sessions includes their repeatability.
+    """
+    numbers, sigma, anchor = _numbers(known)
+    n = len(numbers)
+    other, other_sigma = np.full(n, np.nan), np.full(n, np.inf)
+    if own is not None and (own.gyroscope is not None) == (known.gyroscope is not None):
+        other, other_sigma, _ = _numbers(own, anchor)
+    elif own is not None:
+        alone = replace(own, gyroscope=None, covariance=own.covariance[:12, :12])
+        other[:9], other_sigma[:9], _ = _numbers(alone, Anchor(anchor.signs, None))
+    if n > 9 and known.gyroscope is not None and segments.gyroscope_mean is not None:
+        other[9:12], other_sigma[9:12] = _resting(known.gyroscope, segments.gyroscope_mean)
+    out = []
+    for k, parameter in enumerate(PARAMETERS[:n]):
+        vague = not np.isfinite(other[k]) or not np.isfinite(other_sigma[k])
+        vague = vague or (sigma[k] > 0.0 and other_sigma[k] > TOO_VAGUE * sigma[k])
+        out.append(
+            JudgedParameter(
+                id=parameter.id,
+                name=parameter.name,
+                unit=parameter.unit,
+                difference=float(numbers[k] - other[k]),
+                sigma_file=float(sigma[k]),
+                sigma_log=float(other_sigma[k]),
+                is_judged=not vague,
+            )
+        )
+    return tuple(out)
+
+
+def shift_findings(parameters: tuple[JudgedParameter, ...]) -> list[Finding]:
+    """Parameters beyond their uncertainty, where the file states one."""
+    judged = [one for one in parameters if one.is_judged]
+    if not judged or not any(one.sigma_file > 0.0 for one in parameters):
+        return []
+    limit = -float(probability.ndtri(0.5 * FALSE_ALARM / len(judged)))
+    shifted = [one for one in judged if abs(one.times_sigma) > limit]
+    if not shifted:
+        return []
+    worst = max(shifted, key=lambda one: abs(one.times_sigma))
+    return [
+        Finding.of(
+            FindingCode.CALIBRATION_SHIFT,
+            parameters=[_label(one) for one in shifted],
+            n_parameters=len(shifted),
+            n_judged=len(judged),
+            worst=_label(worst),
+            times_sigma=abs(worst.times_sigma),
+        )
+    ]
+
+
+def _label(one: JudgedParameter) -> str:
+    return f"{one.id}-{one.name}"
+
+
+def uncalibrated(known: Calibration, own: Calibration | None, recording: Recording) -> Calibration:
+    """Readings at their unit's word: ideal axes, no bias; counts by the one scale that the log's own fit gives."""
+    accel = acceleration_to_si(recording.accelerometer_unit)
+    gyro = rate_to_si(recording.gyroscope_unit)
+    base = own or known
+    if accel is None:
+        accel = float(np.cbrt(abs(np.linalg.det(base.accelerometer.S))))
+    sensors = [replace(known.accelerometer, S=accel * np.eye(3), b=np.zeros(3), covariance=np.zeros((12, 12)))]
+    if known.gyroscope is not None:
+        scale_of = (own.gyroscope if own is not None and own.gyroscope is not None else known.gyroscope).S
+        if gyro is None:
+            gyro = float(np.cbrt(abs(np.linalg.det(scale_of))))
+        zero = np.zeros(3)
+        turned = Anchor(np.ones(3), None)
+        lower = in_frame(base, "lower")
+        if lower.gyroscope is not None:
+            turned = anchor_of(lower.accelerometer.S, lower.gyroscope.S)
+        triad = np.eye(3) if turned.triad is None else turned.triad.T
+        sensors.append(replace(known.gyroscope, S=gyro * triad, b=zero, covariance=np.zeros((12, 12))))
+    n = 12 * len(sensors)
+    return replace(
+        known,
+        accelerometer=sensors[0],
+        gyroscope=sensors[1] if len(sensors) > 1 else None,
+        covariance=np.zeros((n, n)),
+        frame="case",
+    )
+
+
+def _numbers(calibration: Calibration, anchor: Anchor | None = None) -> tuple[FloatArray, FloatArray, Anchor]:
+    """Parameters, their standard uncertainties, and the anchor they are counted from."""
+    lower = in_frame(calibration, "lower")
+    accel, gyro = lower.accelerometer, lower.gyroscope
+    S_g, b_g = (None, None) if gyro is None else (gyro.S, gyro.b)
+    anchor = anchor or anchor_of(accel.S, S_g)
+    J = numbers_jacobian(accel.S, accel.b, S_g, b_g)
+    variance = np.einsum("ij,jk,ik->i", J, lower.covariance, J)
+    return numbers_of(accel.S, accel.b, S_g, b_g, anchor), np.sqrt(np.maximum(variance, 0.0)), anchor
+
+
+def _resting(gyroscope: SensorCalibration, means: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rate read at rest along each axis [rad/s] (3,), and the uncertainty of its mean by the scatter of the poses."""
+    k = np.exp(invariants(gyroscope.S, gyroscope.b).log_scale)
+    rates = means / k
+    n = len(rates)
+    scatter = rates.std(axis=0, ddof=1) if n > 1 else np.full(3, np.inf)
+    return rates.mean(axis=0), scatter / np.sqrt(n)

@@ -1,0 +1,128 @@
+"""Calibrations in the files of other programs, each with its own equation stated in it: written and, mostly, read.
+
+The direction of the matrices is the field's biggest trap: some tools store raw → true, some true → raw, some subtract
+the bias before the matrix and some after it. One module holds one format (``FORMAT``); every one that is here is found.
+Writers are tested by evaluating the target's equation, readers as the inverse of their writers.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+from trihedron.documents import DocumentError, of_path, read_text
+from trihedron.files.calibration import FORMAT as OWN
+from trihedron.files.calibration import CalibrationFileError, read_calibration
+from trihedron.files.formats.contract import ExportOptions, Format, NoiseFigure, SensorNoise
+from trihedron.files.formats.matrices import lower_orthogonal, upper_frame
+from trihedron.files.plausible import require_plausible
+from trihedron.records import Calibration
+from trihedron.refused import RefusedError
+
+__all__ = [
+    "ExportOptions",
+    "Format",
+    "NoiseFigure",
+    "SensorNoise",
+    "any_calibration",
+    "export_calibration",
+    "export_files",
+    "formats",
+    "is_calibration",
+    "lower_orthogonal",
+    "targets",
+    "upper_frame",
+]
+
+
+@cache
+def formats() -> dict[str, Format]:
+    """Every format by its name."""
+    modules = (import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__))
+    found = [module.FORMAT for module in modules if hasattr(module, "FORMAT")]
+    return {one.name: one for one in sorted(found, key=lambda one: one.name)}
+
+
+def targets() -> list[str]:
+    """What a calibration can be written for."""
+    return [name for name, one in formats().items() if one.write is not None]
+
+
+def export_files(calibration: Calibration, target: str, options: ExportOptions | None = None) -> dict[str, str]:
+    """A calibration for ``target``, one of :func:`targets`: text by the ending of its file's name, ``""`` for one file.
+
+    Raises
+    ------
+    ValueError
+        When there is no such target, the calibration is no sensor's, or cannot be expressed in that convention.
+    """
+    one = formats().get(target)
+    if one is None or one.write is None:
+        raise RefusedError(f"there is no export to {target!r}; there are {', '.join(targets())}.")
+    made = one.write(require_plausible(calibration), options or ExportOptions())
+    return {"": made} if isinstance(made, str) else made
+
+
+def export_calibration(calibration: Calibration, target: str, options: ExportOptions | None = None) -> str:
+    """As :func:`export_files`, in one text; where a target wants several files, one after the other."""
+    return "\n".join(export_files(calibration, target, options).values())
+
+
+def any_calibration(path: str | os.PathLike[str]) -> Calibration:
+    """A calibration file of ours or of any maker whose format is read here, told by content.
+
+    Raises
+    ------
+    CalibrationFileError
+        (a ``ValueError``) when the file is missing or of no format that is read.
+    """
+    path = Path(path)
+    text = _text(path)
+    if f'"{OWN}"' in text:
+        return read_calibration(path)
+    # What nobody recognises is a damaged file of ours, or none: our own reader says which.
+    return _recognised(text, path) or read_calibration(path)
+
+
+def is_calibration(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is a calibration, and not a log."""
+    path = Path(path)
+    try:
+        text = _text(path)
+    except CalibrationFileError:
+        return False
+    return f'"{OWN}"' in text or _recognised(text, path) is not None
+
+
+LARGEST = 4_000_000
+"""Characters: a calibration with everything beside it has a tenth of this; what is longer is a log."""
+
+
+def _text(path: Path) -> str:
+    try:
+        text = read_text(path, "calibration file")
+    except DocumentError as error:
+        raise CalibrationFileError(of_path(path, error)) from None
+    return text
+
+
+def _whole(text: str, path: Path, one: Format) -> str:
+    """The text with that of the file beside it, where one format writes a file for each sensor."""
+    if one.pair is None or one.pair[0] not in path.name:
+        return text
+    beside = path.with_name(path.name.replace(*one.pair))
+    return f"{text}\f{_text(beside)}" if beside.is_file() else text
+
+
+def _recognised(text: str, path: Path) -> Calibration | None:
+    if len(text) > LARGEST:
+        return None
+    for one in formats().values():
+        found = None if one.read is None else one.read(_whole(text, path, one))
+        if found is not None:
+            return replace(found, recording_source=f"{path.name} ({one.name})")
+    return None

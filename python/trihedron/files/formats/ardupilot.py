@@ -1,0 +1,176 @@
+"""Parameters of ArduPilot: ``R (SCAL o (reading - P(T) + P(CALTEMP) - OFFS))`` per sensor, gyros without a scale.
+
+``P`` is a cubic of ``T - 35 degC`` whose coefficients are a millionth of ``INS_TCALn_*``; T and CALTEMP are held
+between TMIN and TMAX. By AP_InertialSensor (Backend and tempcal) of ArduPilot, https://github.com/ArduPilot/ardupilot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.files.formats.autopilot import (
+    AXES,
+    AxisCorrection,
+    Composed,
+    board_of,
+    composed,
+    moved_to,
+    orientation,
+    parameters_in,
+    relative,
+    triple,
+)
+from trihedron.files.formats.contract import ExportOptions, Format, Thermal, given, heading, lost_to_a_diagonal, number
+from trihedron.records import Calibration, Onboard
+from trihedron.records.plain import as_plain
+
+REFERENCE_DEGC = 35.0
+"""Temperature that ArduPilot's polynomials are counted from."""
+_SCALE = 1e-6
+
+
+def to_ardupilot(calibration: Calibration, options: ExportOptions) -> str:
+    """What the board must hold: lines ``NAME,VALUE``, composed with what the log's readings had been through."""
+    board = board_of(calibration, options, "ardupilot", "INS_")
+    own, sensors = composed(calibration, options, "ArduPilot", lambda name: correction_of(board, name))
+    equation = "corrected = (reading - P(T) + P(CALTEMP) - OFFS) * SCAL per axis, SI; a gyro has no SCAL."
+    held = ("accel-thermal-bias", "gyro-thermal-bias", "thermal")
+    lines = [f"# {line}" for line in (*heading(own, equation, held), *lost_to_a_diagonal(own))]
+    lines += [f"# {line}" for line in _about(board)]
+    for name, one in sensors.items():
+        imu = board.accel if name == "accelerometer" else board.gyro
+        letters, suffix = ("ACC" if name == "accelerometer" else "GYR"), _suffix(imu)
+        known = board.parameters.get(f"INS_{letters}{suffix}_ID")
+        if known is not None:
+            lines.append(f"INS_{letters}{suffix}_ID,{known:.0f}")
+        constant, thermal = _thermal_lines(board, name, one)
+        for k, axis in enumerate(AXES):
+            lines.append(f"INS_{letters}{suffix}OFFS_{axis},{number(float(one.offset[k] + constant[k]))}")
+            if name == "accelerometer":
+                lines.append(f"INS_{letters}{suffix}SCAL_{axis},{number(float(one.scale[k]))}")
+        lines += thermal
+        if name == "gyroscope":
+            worst = 100.0 * float(np.abs(one.scale - 1.0).max())
+            lines.append(f"# ArduPilot has no gyro scale: up to {worst:.2g} % of scale is lost.")
+            lines.append(f"# INS_GYR_CAL other than 0 measures INS_GYR{suffix}OFFS anew at every start.")
+    return "\n".join([*lines, ""])
+
+
+def from_ardupilot(text: str) -> Calibration | None:
+    """The first IMU's parameters as a calibration of readings in the axes of the sensor."""
+    parameters = parameters_in(text)
+    if not {"INS_ACCOFFS_X", "INS_ACCSCAL_X"} <= parameters.keys():
+        return None
+    board = Onboard("ardupilot", 0, 0, "corrected", parameters)
+    return given(
+        "ardupilot",
+        {name: _direct(correction_of(board, name)) for name in ("accelerometer", "gyroscope")},
+        board_parameters=as_plain(board),
+    )
+
+
+def against_log(held: Onboard, known: Onboard) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """S and b by sensor of what parameters make of readings that a board has logged."""
+    as_there = Onboard("ardupilot", known.accel, known.gyro, known.stage, {**_turns(known), **held.parameters})
+    return relative(lambda name: correction_of(as_there, name), lambda name: correction_of(known, name))
+
+
+def correction_of(board: Onboard, name: str) -> AxisCorrection:
+    """What the board does to one sensor; nothing where its readings were logged raw."""
+    if board.stage == "raw":
+        return AxisCorrection(np.zeros(3), np.ones(3), np.eye(3))
+    is_accel = name == "accelerometer"
+    imu, letters = (board.accel, "ACC") if is_accel else (board.gyro, "GYR")
+    root, suffix = f"INS_{letters}", _suffix(imu)
+    scale = triple(board.parameters, f"{root}{suffix}SCAL_{{}}", 1.0) if is_accel else np.ones(3)
+    # A scale of zero is that of a sensor which was never calibrated.
+    scale = np.where(scale == 0.0, 1.0, scale)
+    turn = np.eye(3) if board.stage == "corrected" else orientation(board.parameters.get("AHRS_ORIENTATION", 0.0))
+    return AxisCorrection(triple(board.parameters, f"{root}{suffix}OFFS_{{}}"), scale, turn, _held_thermal(board, name))
+
+
+def _direct(own: AxisCorrection) -> tuple[FloatArray, FloatArray]:
+    return np.diag(own.scale), -own.scale * own.offset
+
+
+def _turns(board: Onboard) -> dict[str, float]:
+    return {name: value for name, value in board.parameters.items() if name.startswith("AHRS_")}
+
+
+def _suffix(imu: int) -> str:
+    return "" if imu == 0 else str(imu + 1)
+
+
+def _held_thermal(board: Onboard, name: str) -> Thermal | None:
+    imu, letters = (board.accel, "ACC") if name == "accelerometer" else (board.gyro, "GYR")
+    root, p = f"INS_TCAL{imu + 1}_", board.parameters
+    if p.get(f"{root}ENABLE", 0.0) != 1.0:
+        return None
+    coefficients = np.array([_SCALE * triple(p, f"{root}{letters}{order}_{{}}") for order in (1, 2, 3)])
+    return Thermal(REFERENCE_DEGC, coefficients, (p.get(f"{root}TMIN", 0.0), p.get(f"{root}TMAX", 70.0)))
+
+
+def _thermal_lines(board: Onboard, name: str, one: Composed) -> tuple[FloatArray, list[str]]:
+    """Lines of the sum of both polynomials, and what it adds to the offset: what is held already is counted from the
+    temperature of its own calibration, the sum from that of this one."""
+    held, new = _held_thermal(board, name), one.thermal
+    if new is None:
+        return np.zeros(3), []
+    imu, letters = (board.accel, "ACC") if name == "accelerometer" else (board.gyro, "GYR")
+    root = f"INS_TCAL{imu + 1}_"
+    total, _ = moved_to(new, REFERENCE_DEGC)
+    constant, limits = np.zeros(3), [new.range_degc]
+    if held is not None:
+        before = board.parameters.get(f"INS_{letters}{imu + 1}_CALTEMP", REFERENCE_DEGC)
+        constant = _at(held, new.reference_degc) - _at(held, before)
+        total = total + held.coefficients
+        limits.append(held.range_degc)
+    lines = [f"{root}ENABLE,1"]
+    known = [one for one in limits if one is not None]
+    if known:
+        low, high = max(low for low, _ in known), min(high for _, high in known)
+        lines += [f"{root}TMIN,{number(low)}", f"{root}TMAX,{number(high)}"]
+    else:
+        lines.append(f"# Set {root}TMIN and TMAX to the temperatures that were recorded: it is valid between them.")
+    lines.append(f"INS_{letters}{imu + 1}_CALTEMP,{number(new.reference_degc)}")
+    for order in range(3):
+        lines += [
+            f"{root}{letters}{order + 1}_{a},{number(float(v) / _SCALE)}"
+            for a, v in zip(AXES, total[order], strict=True)
+        ]
+    lines += [f"# {line}" for line in said_of_misfit(new, name)]
+    return constant, lines
+
+
+def said_of_misfit(thermal: Thermal, name: str) -> list[str]:
+    """What a cubic of the bias alone leaves, where it leaves anything."""
+    unit = "m/s^2" if name == "accelerometer" else "rad/s"
+    said = []
+    if thermal.scale > 1e-6:
+        said.append(f"Over the range the {name}'s scale changes by up to {100 * thermal.scale:.2g} %, which is lost.")
+    if thermal.misfit > 1e-9:
+        said.append(f"Up to {thermal.misfit:.2g} {unit} of the {name}'s bias is beyond a cubic and is lost.")
+    return said
+
+
+def _at(thermal: Thermal, degc: float) -> FloatArray:
+    low, high = thermal.range_degc or (degc, degc)
+    t = min(max(degc, low), high) - thermal.reference_degc
+    return np.asarray(np.array([t, t * t, t**3]) @ thermal.coefficients)
+
+
+def _about(board: Onboard) -> list[str]:
+    if board.stage == "raw":
+        return ["The readings were raw: these values replace those of the board, in the sensor's axes as logged."]
+    parameters: Mapping[str, float] = board.parameters
+    turn = parameters.get("AHRS_ORIENTATION", 0.0)
+    return [
+        "The log's readings had been corrected on board; these values include that correction and replace it.",
+        f"They hold for AHRS_ORIENTATION {turn:g}; load all of them, once.",
+    ]
+
+
+FORMAT = Format("ardupilot", to_ardupilot, from_ardupilot, in_si=True)

@@ -1,0 +1,206 @@
+"""What autopilots share: parameters read from files and logs, and their composition with a calibration.
+
+Both correct in the axes of the sensor and turn the result into those of the board: ``R (s o (r - p(T) - o))``. Readings
+of a log have been through that already; the exported offsets and scales replace those of the log, so that
+``R (s' o (r - p'(T) - o'))`` is what the calibration makes of the log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from trihedron.arrays import FloatArray
+from trihedron.files.formats.contract import ExportOptions, Thermal, of_si_readings, thermal_of
+from trihedron.records import Calibration, Onboard, SensorCalibration
+from trihedron.records.plain import from_plain
+from trihedron.refused import RefusedError
+
+AXES = ("X", "Y", "Z")
+_DEG_ROLL_PITCH_YAW = (
+    (0, 0, 0), (0, 0, 45), (0, 0, 90), (0, 0, 135), (0, 0, 180), (0, 0, 225), (0, 0, 270), (0, 0, 315), (180, 0, 0),
+    (180, 0, 45), (180, 0, 90), (180, 0, 135), (0, 180, 0), (180, 0, 225), (180, 0, 270), (180, 0, 315), (90, 0, 0),
+    (90, 0, 45), (90, 0, 90), (90, 0, 135), (270, 0, 0), (270, 0, 45), (270, 0, 90), (270, 0, 135), (0, 90, 0),
+    (0, 270, 0), (0, 180, 90), (0, 180, 270), (90, 90, 0), (180, 90, 0), (270, 90, 0), (90, 180, 0), (270, 180, 0),
+    (90, 270, 0), (180, 270, 0), (270, 270, 0), (90, 180, 90), (90, 0, 270), (90, 68, 293), (0, 315, 0), (90, 315, 0),
+)  # fmt: skip
+"""MAVLink's MAV_SENSOR_ORIENTATION by its number."""
+
+
+@dataclass(frozen=True)
+class AxisCorrection:
+    """``turn (scale o (reading - thermal(T) - offset))`` of one sensor: (3,), (3,), (3, 3); thermal is switched on."""
+
+    offset: FloatArray
+    scale: FloatArray
+    turn: FloatArray
+    thermal: Thermal | None = None
+
+
+def orientation(number: float) -> FloatArray:
+    """(3, 3) sensor's axes to the board's, of one of MAVLink's orientations.
+
+    Raises
+    ------
+    ValueError
+        When the number has no fixed meaning.
+    """
+    if number != int(number) or not 0 <= number < len(_DEG_ROLL_PITCH_YAW):
+        raise RefusedError(f"the board's orientation {number:g} is not one of MAVLink's fixed ones (0 to 40).")
+    return euler(*_DEG_ROLL_PITCH_YAW[int(number)])
+
+
+def euler(roll_deg: float, pitch_deg: float, yaw_deg: float) -> FloatArray:
+    """(3, 3) yaw pitch roll, as both autopilots turn."""
+    c, s = np.cos(np.radians([roll_deg, pitch_deg, yaw_deg])), np.sin(np.radians([roll_deg, pitch_deg, yaw_deg]))
+    roll = np.array([[1, 0, 0], [0, c[0], -s[0]], [0, s[0], c[0]]])
+    pitch = np.array([[c[1], 0, s[1]], [0, 1, 0], [-s[1], 0, c[1]]])
+    yaw = np.array([[c[2], -s[2], 0], [s[2], c[2], 0], [0, 0, 1]])
+    return np.asarray(yaw @ pitch @ roll)
+
+
+def parameters_in(text: str) -> dict[str, float]:
+    """Values by name from a file of parameters: ``NAME,VALUE``, ``NAME VALUE`` or QGroundControl's five columns."""
+    out: dict[str, float] = {}
+    for line in text.splitlines():
+        words = line.partition("#")[0].replace(",", " ").replace("=", " ").split()
+        words = words[2:4] if len(words) == 5 and words[0].isdigit() and words[1].isdigit() else words[:2]
+        if len(words) == 2 and words[0][:1].isalpha():
+            try:
+                out[words[0].upper()] = float(words[1])
+            except ValueError:
+                continue
+    return out
+
+
+def board_of(calibration: Calibration, options: ExportOptions, autopilot: str, prefix: str) -> Onboard:
+    """What the readings that were calibrated had been through on the board.
+
+    Raises
+    ------
+    ValueError
+        When neither the calibration nor a file of parameters tells, or the log was of another autopilot.
+    """
+    name = {"ardupilot": "ArduPilot", "px4": "PX4"}[autopilot]
+    stated = calibration.extensions.get("onboard")
+    known = None if stated is None else from_plain(dict(stated), Onboard)  # type: ignore[call-overload]
+    if known is not None and known.autopilot != autopilot:
+        raise RefusedError(
+            f"this calibration is of a log of another autopilot ({known.autopilot}), whose axes of the sensor {name} "
+            f"does not share: record with {name}, or export to {known.autopilot}."
+        )
+    if known is not None and known.changed:
+        raise RefusedError(
+            f"{', '.join(known.changed)} changed while readings were logged: it is not known which offsets the "
+            "readings carry; record again without calibrating on board meanwhile."
+        )
+    text = options.current_parameters
+    if text.strip().lower() == "none":
+        return Onboard(known.autopilot if known else autopilot, 0, 0, "raw")  # type: ignore[arg-type]
+    given = {key: value for key, value in parameters_in(text).items() if key.startswith((prefix, *_SHARED))}
+    if text and not any(key.startswith(prefix) for key in given):
+        raise RefusedError(
+            f"the file of current parameters holds no {prefix}...: save the parameters of the {name} board."
+        )
+    if known is not None:
+        return replace(known, parameters={**known.parameters, **given})
+    if given:
+        return Onboard(autopilot, 0, 0, "body", given)  # type: ignore[arg-type]
+    if calibration.accelerometer.raw_unit == "counts":
+        return Onboard(autopilot, 0, 0, "raw")  # type: ignore[arg-type]
+    raise RefusedError(
+        f"{name} logs readings that its own offsets and scales have corrected, and this calibration does not say by "
+        "which: add --current-parameters FILE, the parameters of the board when the log was made (.param, .parm or "
+        ".params), or --current-parameters none where the readings were raw."
+    )
+
+
+_SHARED = ("AHRS_ORIENTATION", "SENS_BOARD_", "SENS_EN_THERMAL", "TC_")
+
+
+@dataclass(frozen=True)
+class Composed:
+    """What the board is to hold for one sensor, and what of the calibration its equation leaves out."""
+
+    offset: FloatArray
+    scale: FloatArray
+    thermal: Thermal | None
+
+
+def composed(
+    calibration: Calibration, options: ExportOptions, target: str, before: Callable[[str], AxisCorrection]
+) -> tuple[Calibration, dict[str, Composed]]:
+    """The calibration of the sensor's own readings in its own axes, and what the board holds of it, by sensor.
+
+    With ``logged = R (s o (r - o))``, ``truth = S logged + b`` is ``S' r + b'`` with ``S' = Rᵀ S R diag(s)`` and
+    ``b' = Rᵀ b - S' o``. The offset is the reading that means zero, the scale that of the axis itself.
+
+    Raises
+    ------
+    ValueError
+        When an axis is mirrored, which no positive scale can say.
+    """
+    known = of_si_readings(calibration, target, options)
+    made, out = {}, {}
+    for name in ("accelerometer", "gyroscope"):
+        sensor: SensorCalibration | None = getattr(known, name)
+        if sensor is None:
+            continue
+        own = before(name)
+        S = own.turn.T @ sensor.S @ own.turn * own.scale
+        b = own.turn.T @ sensor.b - S @ own.offset
+        if np.any(np.diag(S) <= 0.0):
+            raise RefusedError(
+                f"an axis of the {name} is mirrored against the board and {target} holds positive scales only: "
+                "set the orientation of the sensor first."
+            )
+        made[name] = replace(sensor, S=S, b=b, covariance=_turned(sensor.covariance, own))
+        thermal = thermal_of(known, name)
+        if thermal is not None:
+            thermal = replace(thermal, coefficients=thermal.coefficients @ (own.turn / own.scale))
+        offset = np.asarray(-np.linalg.solve(S, b), dtype=np.float64)
+        out[name] = Composed(offset, np.asarray(1.0 / np.linalg.norm(np.linalg.inv(S), axis=1)), thermal)
+    return replace(known, **made), out  # type: ignore[arg-type]
+
+
+def moved_to(thermal: Thermal, reference_degc: float) -> tuple[FloatArray, FloatArray]:
+    """Coefficients (3, 3) of the same polynomial counted from another temperature, and its constant (3,) there."""
+    shift = reference_degc - thermal.reference_degc
+    columns = []
+    for axis in range(3):
+        total = np.zeros(4)
+        for order in range(1, 4):
+            power = polynomial.polypow([shift, 1.0], order)
+            total[: order + 1] += thermal.coefficients[order - 1, axis] * power
+        columns.append(total)
+    whole = np.array(columns).T
+    return whole[1:], whole[0]
+
+
+def _turned(covariance: FloatArray, own: AxisCorrection) -> FloatArray:
+    """Covariance of ``Rᵀ S R diag(s)``; that of b along, its share through the offset left out (only S is judged)."""
+    J = np.zeros((12, 12))
+    J[:9, :9] = np.kron(own.turn.T, (own.turn * own.scale).T)
+    J[9:, 9:] = own.turn.T
+    return np.asarray(J @ covariance @ J.T)
+
+
+def triple(parameters: Mapping[str, float], name: str, default: float = 0.0) -> FloatArray:
+    """(3,) of ``name`` with X, Y and Z for ``{}``."""
+    return np.array([parameters.get(name.format(axis), default) for axis in AXES])
+
+
+def relative(held: Callable[[str], AxisCorrection], known: Callable[[str], AxisCorrection]) -> dict[str, _Pair]:
+    """S and b by sensor of what a board that holds other parameters would make of readings that were logged."""
+    out = {}
+    for name in ("accelerometer", "gyroscope"):
+        new, old = held(name), known(name)
+        S = (new.turn * (new.scale / old.scale)) @ old.turn.T
+        out[name] = (S, new.turn @ (new.scale * (old.offset - new.offset)))
+    return out
+
+
+_Pair = tuple[FloatArray, FloatArray]

@@ -1,0 +1,27 @@
+"""Parameters of an autopilot as a calibration of readings that a board has logged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from trihedron.files.formats import ardupilot, px4
+from trihedron.records import Calibration, Onboard
+from trihedron.records.plain import from_plain
+
+_AGAINST = {"ardupilot": ardupilot.against_log, "px4": px4.against_log}
+
+
+def as_logged(calibration: Calibration, known: Onboard | None) -> Calibration:
+    """What the board would have logged with other parameters, as S and b of what it did log; others as they are."""
+    stated = calibration.extensions.get("board_parameters")
+    if stated is None or known is None or known.stage == "raw":
+        return calibration
+    held = from_plain(dict(stated), Onboard)  # type: ignore[call-overload]
+    if held.autopilot != known.autopilot:
+        return calibration
+    pairs = _AGAINST[held.autopilot](held, known)
+    S, b = pairs["accelerometer"]
+    gyro = calibration.gyroscope
+    if gyro is not None:
+        gyro = replace(gyro, S=pairs["gyroscope"][0], b=pairs["gyroscope"][1])
+    return replace(calibration, accelerometer=replace(calibration.accelerometer, S=S, b=b), gyroscope=gyro)

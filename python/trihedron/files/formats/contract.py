@@ -1,0 +1,335 @@
+"""What the file of another program is made of and read into: calibration, noise, rate; text, and what was lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from trihedron.arrays import FloatArray
+from trihedron.files.plausible import LARGEST_SI_FACTOR, ROUNDING, has_one_handedness, named_sensors
+from trihedron.records import Calibration, SensorCalibration
+from trihedron.refused import RefusedError
+from trihedron.thermal_model import parameters_at
+from trihedron.units import (
+    STANDARD_GRAVITY_M_S2,
+    AccelerationUnit,
+    RateUnit,
+    acceleration_lsb_to_si,
+    acceleration_to_si,
+    degrees_from_radians,
+    mm_s2_from_m_s2,
+    rate_lsb_to_si,
+    rate_to_si,
+)
+
+NO_GYRO = "no gyroscope in this calibration"
+
+
+@dataclass(frozen=True)
+class NoiseFigure:
+    """One term of one sensor, SI, one number for its axes; ``is_limit`` where it was not seen and this bounds it."""
+
+    value: float
+    is_limit: bool = False
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """White density N [SI/√Hz] and random walk K [SI/√s]."""
+
+    N: NoiseFigure
+    K: NoiseFigure
+
+
+@dataclass(frozen=True)
+class Thermal:
+    """A bias that follows temperature: what it adds to the readings, ``sum_n c_n (T - reference)^n``, without constant.
+
+    ``coefficients`` (3, 3): order 1 to 3, then axis; ``misfit`` the largest part that a cubic leaves, ``scale`` the
+    largest relative change of S over ``range_degc``, both of which the file cannot hold.
+    """
+
+    reference_degc: float
+    coefficients: FloatArray
+    range_degc: tuple[float, float] | None
+    misfit: float = 0.0
+    scale: float = 0.0
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """What a file of another program holds besides S and b.
+
+    ``accelerometer_noise``, ``gyroscope_noise`` from a rest log; ``rate_hz`` of the samples; ``topic`` where they are
+    published; ``accel_lsb``, ``gyro_lsb`` the size of a count that the target's driver assumes (``3.33 mg``);
+    ``current_parameters`` the text of a file of the parameters that a flight controller held while the log was made.
+    """
+
+    accelerometer_noise: SensorNoise | None = None
+    gyroscope_noise: SensorNoise | None = None
+    rate_hz: float | None = None
+    topic: str = "/imu0"
+    accel_lsb: str = ""
+    gyro_lsb: str = ""
+    current_parameters: str = ""
+
+
+@dataclass(frozen=True)
+class Format:
+    """One kind of file. ``write`` gives text, or text by the ending of each file's name; ``read`` a calibration, or
+    ``None`` where the text is of another kind; ``in_si`` where readings are expected in SI; ``pair`` the parts of two
+    file names that belong together, whose texts are read as one with a form feed between."""
+
+    name: str
+    write: Callable[[Calibration, ExportOptions], str | dict[str, str]] | None
+    read: Callable[[str], Calibration | None] | None = None
+    in_si: bool = False
+    pair: tuple[str, str] | None = None
+
+
+def of_si_readings(calibration: Calibration, target: str, options: ExportOptions) -> Calibration:
+    """The calibration for readings that the target's driver has already put into SI.
+
+    Raises
+    ------
+    ValueError
+        When it maps counts and the size of a count was not said.
+    """
+    accel, gyro = calibration.accelerometer, calibration.gyroscope
+    unit = acceleration_to_si(AccelerationUnit(accel.raw_unit))
+    if unit is None:
+        unit = acceleration_lsb_to_si(options.accel_lsb) if options.accel_lsb else None
+        _known(unit, target, "accelerometer", "--accel-lsb", "0.061 mg")
+    accel = _rescaled(accel, unit or 1.0)
+    if gyro is not None:
+        unit = rate_to_si(RateUnit(gyro.raw_unit))
+        if unit is None:
+            unit = rate_lsb_to_si(options.gyro_lsb) if options.gyro_lsb else None
+            _known(unit, target, "gyroscope", "--gyro-lsb", "0.0305 deg/s")
+        gyro = _rescaled(gyro, unit or 1.0)
+    return replace(calibration, accelerometer=accel, gyroscope=gyro)
+
+
+def _known(unit: float | None, target: str, sensor: str, option: str, example: str) -> None:
+    if unit is None:
+        raise RefusedError(
+            f"{target} expects {sensor} readings in SI and this calibration maps counts: say the size of a count that "
+            f"its driver assumes with {option} '{example}', or export to c, rust or python."
+        )
+
+
+def _rescaled(sensor: SensorCalibration, unit: float) -> SensorCalibration:
+    scale = np.r_[np.full(9, 1.0 / unit), np.ones(3)]
+    covariance = sensor.covariance * np.outer(scale, scale)
+    return replace(sensor, S=sensor.S / unit, covariance=covariance, raw_unit=sensor.si_unit)
+
+
+def heading(calibration: Calibration, equation: str, held: tuple[str, ...] = ()) -> list[str]:
+    """What a file says of itself: source, equation, units, trust, and what it cannot hold but for effects ``held``."""
+    sensors = [sensor for _, sensor in named_sensors(calibration)]
+    rows = [
+        f"Calibration of {calibration.recording_source or 'an unnamed recording'}, written by trihedron.",
+        equation,
+        f"Readings in: {', '.join(sensor.raw_unit for sensor in sensors)}. "
+        f"Corrected in: {', '.join(sensor.si_unit for sensor in sensors)}.",
+    ]
+    if not calibration.is_trustworthy:
+        rows.append("NOT TO BE TRUSTED: see the findings of the calibration.")
+    if not has_one_handedness(calibration):
+        rows.append("One of the triads is mirrored against the other: check the signs of the axes before use.")
+    effects = [effect for effect in effect_ids(calibration) if effect not in held]
+    if effects:
+        rows.append(f"Left out, since this file cannot hold it: {', '.join(effects)}.")
+    if "thermal" not in held:
+        rows += lost_temperature(calibration)
+    return [row.replace("\n", " ").replace("\r", " ") for row in rows]
+
+
+def effect_ids(calibration: Calibration) -> list[str]:
+    """Ids of the effects of an extended calibration."""
+    effects = calibration.extensions.get("effects")
+    return [str(effect["id"]) for effect in effects] if isinstance(effects, list | tuple) else []
+
+
+def effect_parameters(calibration: Calibration, effect_id: str) -> dict[str, float]:
+    """Parameters of one effect of an extended calibration by name; empty where it has none."""
+    effects = calibration.extensions.get("effects")
+    for effect in effects if isinstance(effects, list | tuple) else ():
+        if effect["id"] == effect_id:
+            return {str(p["name"]): float(p["value"]) for p in effect["parameters"] if p["value"] is not None}
+    return {}
+
+
+def lost_to_a_diagonal(calibration: Calibration) -> list[str]:
+    """What a model of scales and zeros alone leaves of this calibration, in words with sizes."""
+    said = []
+    u, _, vt = np.linalg.svd(_unit_columns(calibration.accelerometer))
+    for name, sensor in named_sensors(calibration):
+        # How the accelerometer's triad as a whole is turned is a choice of frame, which no still pose knows.
+        unit = (u @ vt).T @ _unit_columns(sensor)
+        off = np.abs(unit - np.diag(np.diag(unit)))
+        half_width = 1.96 * sensor.sigma_S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
+        seen = off[(off > half_width) & (off > ROUNDING)]
+        if not len(seen):
+            continue
+        off = float(seen.max())
+        if name == "accelerometer":
+            size = f"{mm_s2_from_m_s2(off * calibration.gravity_m_s2):.3g} mm/s^2 at 1 g"
+        else:
+            size = f"{degrees_from_radians(off * np.radians(100.0)):.3g} deg/s at 100 deg/s"
+        said.append(f"This format has no misalignment: {100.0 * off:.2g} % of the {name}'s is lost, {size}.")
+    return said
+
+
+def _unit_columns(sensor: SensorCalibration) -> FloatArray:
+    """Columns at the length of one unit of truth: what is off the diagonal is the share of another axis."""
+    unit: FloatArray = sensor.S * np.linalg.norm(np.linalg.inv(sensor.S), axis=1)
+    return unit
+
+
+def thermal_of(calibration: Calibration, name: str) -> Thermal | None:
+    """How a sensor's bias follows temperature, in its readings: from the effects of one recording or several at once.
+
+    An effect is ``v (T - reference)`` of an axis in SI, so that the reading moves by v times the axis's sensitivity.
+    """
+    sensor = getattr(calibration, name)
+    if sensor is None:
+        return None
+    limits = calibration.extensions.get("valid_range")
+    stated = limits.get("temperature_degc") if isinstance(limits, Mapping) else None
+    range_degc = None if stated is None else (float(stated[0]), float(stated[1]))
+    if "thermal" in calibration.extensions and range_degc is not None:
+        return _through_sessions(calibration, name, range_degc)
+    values = effect_parameters(calibration, f"{'accel' if name == 'accelerometer' else 'gyro'}-thermal-bias")
+    if not values:
+        return None
+    references = calibration.extensions.get("references", {})
+    reference = float(references.get("temperature_degc", 25.0)) if isinstance(references, Mapping) else 25.0
+    coefficients = np.zeros((3, 3))
+    for order, symbol in enumerate(("bias_per_kelvin", "bias_per_kelvin2", "bias_per_kelvin3")):
+        coefficients[order] = [values.get(f"{symbol}_{axis}", 0.0) for axis in "xyz"]
+    return Thermal(reference, coefficients * np.linalg.norm(np.linalg.inv(sensor.S), axis=1), range_degc)
+
+
+def _through_sessions(calibration: Calibration, name: str, range_degc: tuple[float, float]) -> Thermal | None:
+    """A cubic through the readings that mean zero, which is exact where the bias is one and S does not change."""
+    thermal = calibration.extensions["thermal"]
+    reference = float(thermal["reference_degc"])  # type: ignore[index]
+    own = slice(0, 12) if name == "accelerometer" else slice(12, 24)
+
+    def at(degc: float) -> tuple[FloatArray, FloatArray]:
+        parameters = parameters_at(calibration, degc)[own]
+        S = parameters[:9].reshape(3, 3)
+        return S, np.asarray(-np.linalg.solve(S, parameters[9:]), dtype=np.float64)
+
+    S0, zero = at(reference)
+    knots = np.linspace(*range_degc, 33)
+    seen = [at(float(degc)) for degc in knots]
+    half = max(float(np.abs(knots - reference).max()), 1e-9)
+    u = (knots - reference) / half
+    powers = u[:, None] ** np.arange(1, 4)
+    wanted = np.array([one - zero for _, one in seen])
+    scaled = np.linalg.lstsq(powers, wanted, rcond=None)[0]
+    misfit = float(np.abs(wanted - powers @ scaled).max())
+    scale = max(float(np.abs(np.linalg.solve(S0, S) - np.eye(3)).max()) for S, _ in seen)
+    coefficients = scaled / half ** np.arange(1, 4)[:, None]
+    return Thermal(reference, coefficients, range_degc, misfit, scale)
+
+
+def lost_temperature(calibration: Calibration) -> list[str]:
+    """What a file of constants leaves of a calibration that follows temperature, in words with sizes."""
+    said = []
+    for name, sensor in named_sensors(calibration):
+        thermal = thermal_of(calibration, name)
+        if thermal is None or thermal.range_degc is None:
+            continue
+        t = np.linspace(*thermal.range_degc, 33)[:, None] - thermal.reference_degc
+        moved = sum(t ** (n + 1) * thermal.coefficients[n] for n in range(3))
+        bias = float(np.abs(np.asarray(moved) @ sensor.S.T).max())
+        size = (
+            f"{mm_s2_from_m_s2(bias):.3g} mm/s^2"
+            if name == "accelerometer"
+            else f"{degrees_from_radians(bias):.3g} deg/s"
+        )
+        said.append(
+            f"This file holds the {name} at {thermal.reference_degc:.1f} degC: its change from "
+            f"{thermal.range_degc[0]:.1f} to {thermal.range_degc[1]:.1f} degC is lost, up to {size} of bias and "
+            f"{100 * thermal.scale:.2g} % of scale."
+        )
+    return said
+
+
+def row(values: npt.NDArray[np.floating]) -> str:
+    """Numbers with all their digits."""
+    return ", ".join(number(float(v)) for v in values)
+
+
+def number(value: float) -> str:
+    """All digits of a number, with a point: YAML 1.1 takes ``4e-05`` for a word."""
+    text = repr(value + 0.0)
+    return text.replace("e", ".0e") if "e" in text and "." not in text else text
+
+
+def matrix_rows(values: FloatArray, indent: int) -> list[str]:
+    """Rows of a matrix as a YAML sequence of sequences."""
+    return [f"{' ' * indent}- [{row(r)}]" for r in values]
+
+
+def lost_without_intrinsics(calibration: Calibration) -> list[str]:
+    """What a file without S and b leaves to its reader, in words with sizes."""
+    g = calibration.gravity_m_s2
+    error = calibration.accelerometer.S - np.eye(3)
+    worst = float(np.linalg.norm(error, 2)) * g
+    bias = float(np.linalg.norm(calibration.accelerometer.b))
+    size = f"{worst:.2g} m/s^2 of scale and misalignment at 1 g, {bias:.2g} m/s^2 of bias"
+    if calibration.gyroscope is not None:
+        rate = degrees_from_radians(float(np.linalg.norm(calibration.gyroscope.b)))
+        share = 100.0 * float(np.linalg.norm(calibration.gyroscope.S - np.eye(3), 2))
+        size += f", {share:.2g} % of rate and {rate:.2g} deg/s of bias"
+    return [f"Apply S and b to the readings before they get there; without them this is lost: {size}."]
+
+
+def given(
+    maker: str,
+    sensors: Mapping[str, tuple[FloatArray, FloatArray]],
+    *,
+    units: Mapping[str, str] | None = None,
+    without_bias: Sequence[str] = (),
+    g_sensitivity: FloatArray | None = None,
+    **more: object,
+) -> Calibration:
+    """A calibration as another program's file states it: ``(S, b)`` by sensor, no uncertainty.
+
+    ``units`` are those of the readings; where the file does not say, SI is what scales near one are of, and counts what
+    others are of. ``without_bias`` names sensors whose bias the file does not hold. ``more`` goes to the extensions.
+    """
+    made = {}
+    for name, (S, b) in sensors.items():
+        si = "m/s^2" if name == "accelerometer" else "rad/s"
+        sizes = np.linalg.svd(np.asarray(S, dtype=np.float64), compute_uv=False)
+        is_si = sizes[0] <= LARGEST_SI_FACTOR and sizes[-1] >= 1.0 / LARGEST_SI_FACTOR
+        raw = (units or {}).get(name) or (si if is_si else "counts")
+        made[name] = SensorCalibration(S, b, np.zeros((12, 12)), raw, si, f"file of {maker}")
+    extensions: dict[str, object] = {"maker": maker, **more}
+    if without_bias:
+        extensions["without_bias"] = tuple(without_bias)
+    if g_sensitivity is not None and np.any(g_sensitivity):
+        values = [float(v) for v in g_sensitivity.ravel()]
+        names = [f"G_{i}{j}" for i in "xyz" for j in "xyz"]
+        parameters = [{"name": name, "value": value} for name, value in zip(names, values, strict=True)]
+        model = {"variant": "", "values": values}
+        extensions["effects"] = [{"id": "gyro-g-sensitivity", "parameters": parameters, "model": model}]
+    gyro = made.get("gyroscope")
+    return Calibration(
+        accelerometer=made["accelerometer"],
+        gyroscope=gyro,
+        covariance=np.zeros((12, 12) if gyro is None else (24, 24)),
+        frame="case",
+        gravity_m_s2=STANDARD_GRAVITY_M_S2,
+        gravity_source="standard gravity; the file states none",
+        extensions=MappingProxyType(extensions),
+    )

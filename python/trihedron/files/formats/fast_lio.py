@@ -1,0 +1,41 @@
+"""FAST-LIO's covariances: of one sample, ``N² rate`` and ``K² rate``, since its filter squares the step of time.
+
+Its prediction adds ``(dt F) Q (dt F)ᵀ``: white noise of density N adds N² dt to the angle, a walk of K adds K² dt to
+the bias.
+"""
+
+from __future__ import annotations
+
+from trihedron.files.formats.contract import (
+    ExportOptions,
+    Format,
+    heading,
+    lost_without_intrinsics,
+    number,
+    of_si_readings,
+)
+from trihedron.files.formats.noise_keys import required
+from trihedron.records import Calibration
+
+
+def to_fast_lio(calibration: Calibration, options: ExportOptions) -> str:
+    """Keys of the IMU for its configuration's ``mapping``."""
+    known = of_si_readings(calibration, "FAST-LIO", options)
+    figures = required(known, options, "FAST-LIO")
+    lines = [f"# {line}" for line in heading(known, "FAST-LIO has no intrinsics of the IMU: variances of one sample.")]
+    lines += [f"# {line}" for line in lost_without_intrinsics(known)]
+    lines += [
+        f"# {name} is an upper limit: it was not seen in the rest log." for name, one in figures.named() if one.is_limit
+    ]
+    lines += ["common:", f'  imu_topic: "{options.topic}"', "mapping:"]
+    for key, one in (
+        ("acc_cov", figures.accel_N),
+        ("gyr_cov", figures.gyro_N),
+        ("b_acc_cov", figures.accel_K),
+        ("b_gyr_cov", figures.gyro_K),
+    ):
+        lines.append(f"  {key}: {number(one.value**2 * figures.rate_hz)}")
+    return "\n".join([*lines, ""])
+
+
+FORMAT = Format("fast-lio", to_fast_lio, in_si=True)

@@ -1,0 +1,90 @@
+"""Kalibr's ``imu.yaml``: ``a_m = M a + b``, ``w_m = M C_gyro_i w + A C_gyro_i a + b``, true → measured.
+
+M is lower triangular, C a rotation. Its results nest the same under ``imu0``; it stores no biases.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.files.formats.contract import (
+    NO_GYRO,
+    ExportOptions,
+    Format,
+    effect_parameters,
+    given,
+    heading,
+    matrix_rows,
+    number,
+    row,
+)
+from trihedron.files.formats.lower import in_lower
+from trihedron.files.formats.matrices import lower_orthogonal
+from trihedron.files.formats.noise_keys import required, si_rows
+from trihedron.files.formats.parsing import array_of, yaml_of
+from trihedron.records import Calibration
+from trihedron.sensor_model import other_form
+
+KEYS = (
+    "accelerometer_noise_density",
+    "accelerometer_random_walk",
+    "gyroscope_noise_density",
+    "gyroscope_random_walk",
+)
+
+
+def to_kalibr(calibration: Calibration, options: ExportOptions) -> str:
+    """``imu.yaml`` with the six keys that its reader requires, and intrinsics as its results name them.
+
+    Raises
+    ------
+    ValueError
+        When noise or rate are not known, which the reader requires.
+    """
+    lower, M_a, b_a = in_lower(calibration, "Kalibr", options)
+    figures = required(lower, options, "Kalibr")
+    equation = "a_m = M a + b;  w_m = M C_gyro_i w + A C_gyro_i a + b: true to measured."
+    lines = [f"# {line}" for line in heading(lower, equation, ("gyro-g-sensitivity",))]
+    lines += ["# The six keys that the reader of an imu.yaml requires:", *si_rows(figures, KEYS)]
+    lines += [f"rostopic: {options.topic}", f"update_rate: {number(figures.rate_hz)}"]
+    lines += ["# Intrinsics, named as in Kalibr's own results:", "model: scale-misalignment", "accelerometers:", "  M:"]
+    lines += matrix_rows(M_a, 2)
+    lines += ["  # not a key of Kalibr, which does not store biases:", f"  b: [{row(b_a)}]"]
+    if lower.gyroscope is None:
+        return "\n".join([*lines, f"# {NO_GYRO}", ""])
+    inverse, b = other_form(lower.gyroscope.S, lower.gyroscope.b)
+    M, C = lower_orthogonal(inverse)
+    lines += ["gyroscopes:", "  M:", *matrix_rows(np.tril(M), 2)]
+    lines += ["  A:", *matrix_rows(inverse @ g_sensitivity(lower) @ C.T, 2)]
+    lines += ["  C_gyro_i:", *matrix_rows(C, 2)]
+    return "\n".join([*lines, "  # not a key of Kalibr, which does not store biases:", f"  b: [{row(b)}]", ""])
+
+
+def from_kalibr(text: str) -> Calibration | None:
+    """Intrinsics of an ``imu.yaml`` or of the results of ``kalibr_calibrate_imu_camera`` (``*-imu.yaml``)."""
+    document = yaml_of(text)
+    if document is None or text.lstrip().startswith("%YAML:1.0"):
+        return None
+    document = document.get("imu0", document)
+    if not isinstance(document, dict) or not {KEYS[0], KEYS[2]} <= document.keys():
+        return None
+    accel, gyro = document.get("accelerometers") or {}, document.get("gyroscopes") or {}
+    M_a = array_of(accel.get("M"), (3, 3), np.eye(3))
+    M, C = array_of(gyro.get("M"), (3, 3), np.eye(3)), array_of(gyro.get("C_gyro_i"), (3, 3), np.eye(3))
+    S = np.linalg.inv(M @ C)
+    sensors = {
+        "accelerometer": other_form(M_a, array_of(accel.get("b"), (3,), np.zeros(3))),
+        "gyroscope": other_form(M @ C, array_of(gyro.get("b"), (3,), np.zeros(3))),
+    }
+    without = [name for name, one in (("accelerometer", accel), ("gyroscope", gyro)) if "b" not in one]
+    G = S @ array_of(gyro.get("A"), (3, 3), np.zeros((3, 3))) @ C
+    return given("kalibr", sensors, without_bias=without, g_sensitivity=G)
+
+
+def g_sensitivity(calibration: Calibration) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """(3, 3) rate read per specific force in the instrument frame; zero where the calibration does not have it."""
+    values = effect_parameters(calibration, "gyro-g-sensitivity")
+    return np.array([[values.get(f"G_{i}{j}", 0.0) for j in "xyz"] for i in "xyz"])
+
+
+FORMAT = Format("kalibr", to_kalibr, from_kalibr, in_si=True)

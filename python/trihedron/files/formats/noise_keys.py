@@ -1,0 +1,75 @@
+"""Noise as other programs name it: rows of figures, and the refusal where a target cannot do without them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise, number
+from trihedron.records import Calibration
+from trihedron.refused import RefusedError
+
+
+@dataclass(frozen=True)
+class Figures:
+    """White densities N [SI/√Hz] and random walks K [SI/√s] of both sensors, and the rate [Hz] of the samples."""
+
+    accel_N: NoiseFigure
+    accel_K: NoiseFigure
+    gyro_N: NoiseFigure
+    gyro_K: NoiseFigure
+    rate_hz: float
+
+    def named(self) -> tuple[tuple[str, NoiseFigure], ...]:
+        """The four with their names in words."""
+        return (
+            ("accelerometer N", self.accel_N),
+            ("accelerometer K", self.accel_K),
+            ("gyroscope N", self.gyro_N),
+            ("gyroscope K", self.gyro_K),
+        )
+
+
+def required(calibration: Calibration, options: ExportOptions, target: str) -> Figures:
+    """All that the target's reader demands.
+
+    Raises
+    ------
+    ValueError
+        When noise or rate are not known.
+    """
+    accel, gyro = options.accelerometer_noise, options.gyroscope_noise
+    if accel is None or (gyro is None and calibration.gyroscope is not None) or options.rate_hz is None:
+        raise RefusedError(
+            f"{target} needs the noise and the rate of the samples: add --noise ALLAN.json (of `trihedron allan REST "
+            "--json ALLAN.json`) and --rate HZ."
+        )
+    gyro = gyro or SensorNoise(NoiseFigure(0.0), NoiseFigure(0.0))
+    return Figures(accel.N, accel.K, gyro.N, gyro.K, options.rate_hz)
+
+
+def noise_row(name: str, figure: NoiseFigure, unit: str) -> list[str]:
+    """A comment with the unit, then ``name: value``."""
+    said = f"# {unit}" + (", an upper limit: this walk was not seen in the rest log" if figure.is_limit else "")
+    return [said, f"{name}: {number(figure.value)}"]
+
+
+def si_rows(figures: Figures, names: tuple[str, str, str, str]) -> list[str]:
+    """Rows of densities and walks in SI, named in the order accelerometer N, K, gyro N, K."""
+    units = ("m/s^2/sqrt(Hz)", "m/s^2/sqrt(s)", "rad/s/sqrt(Hz)", "rad/s/sqrt(s)")
+    figures4 = (figures.accel_N, figures.accel_K, figures.gyro_N, figures.gyro_K)
+    return [
+        line
+        for name, figure, unit in zip(names, figures4, units, strict=True)
+        for line in noise_row(name, figure, unit)
+    ]
+
+
+def limits(options: ExportOptions) -> list[str]:
+    """Which figures are upper limits, in words."""
+    return [
+        f"{name} {term} is an upper limit: it was not seen in the rest log."
+        for name, noise in (("accelerometer", options.accelerometer_noise), ("gyroscope", options.gyroscope_noise))
+        if noise is not None
+        for term, figure in (("N", noise.N), ("K", noise.K))
+        if figure.is_limit
+    ]

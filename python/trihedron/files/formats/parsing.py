@@ -1,0 +1,86 @@
+"""Documents of other programs as plain values; what does not parse is of another kind."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_PAIR = re.compile(r"^( *)(?:- )?([\w.]+)\s*:\s*(.*)$")
+
+
+def json_of(text: str) -> dict[str, Any] | None:
+    """A JSON object; ``None`` where the text is none."""
+    try:
+        document = json.loads(text)
+    except ValueError:
+        return None
+    return document if isinstance(document, dict) else None
+
+
+def numbers_in(text: str) -> list[float]:
+    """Every number of a text, in its order."""
+    return [float(word) for word in _NUMBER.findall(text)]
+
+
+def array_of(value: Any, shape: tuple[int, ...], default: FloatArray) -> FloatArray:
+    """Nested or flat numbers as an array of a shape; ``default`` where there are none or too few."""
+    if value is None:
+        return default
+    try:
+        flat = np.asarray(value, dtype=np.float64).ravel()
+    except (TypeError, ValueError):
+        return default
+    return flat.reshape(shape) if flat.size == int(np.prod(shape)) else default
+
+
+def yaml_of(text: str) -> dict[str, Any] | None:
+    """Mappings, numbers, words and lists of numbers of a YAML text, as calibrations are written; ``None`` of others.
+
+    Block and flow lists of numbers both come flat: a matrix is told by its key. Nothing else of YAML is understood.
+    """
+    root: dict[str, Any] = {}
+    levels: list[tuple[int, dict[str, Any]]] = [(-1, root)]
+    key, owner = "", root
+    for line in text.replace("\t", "    ").splitlines():
+        bare = line.split(" #")[0].rstrip() if not line.lstrip().startswith(("#", "%", "---")) else ""
+        if not bare.strip():
+            continue
+        pair = _PAIR.match(bare)
+        if pair is None:
+            if not key:
+                return None
+            _append(owner, key, bare)
+            continue
+        depth, key, value = len(pair[1]), pair[2], pair[3].strip()
+        while levels[-1][0] >= depth:
+            levels.pop()
+        owner = levels[-1][1]
+        if not value or value.startswith("!!"):
+            owner[key] = {}
+            levels.append((depth, owner[key]))
+        else:
+            owner[key] = _scalar(value)
+    return root or None
+
+
+def _append(owner: dict[str, Any], key: str, text: str) -> None:
+    held = owner.get(key)
+    if not isinstance(held, list):
+        held = [] if held in ({}, None) else held
+        owner[key] = held if isinstance(held, list) else []
+    owner[key].extend(numbers_in(text))
+
+
+def _scalar(value: str) -> Any:
+    if value.startswith("["):
+        return numbers_in(value)
+    try:
+        return float(value)
+    except ValueError:
+        return value.strip("\"'")

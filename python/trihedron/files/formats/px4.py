@@ -1,0 +1,174 @@
+"""Parameters of PX4: ``R ((reading - thermal(T) - OFF) o SCALE)`` per sensor, gyros without a scale.
+
+``thermal`` is ``X0 + X1 t + X2 t² + X3 t³`` of ``t = T - TREF``, T held between TMIN and TMAX. By sensor_calibration
+and temperature_compensation of PX4-Autopilot, https://github.com/PX4/PX4-Autopilot.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.files.formats.ardupilot import said_of_misfit
+from trihedron.files.formats.autopilot import (
+    AXES,
+    AxisCorrection,
+    Composed,
+    board_of,
+    composed,
+    euler,
+    moved_to,
+    orientation,
+    parameters_in,
+    relative,
+    triple,
+)
+from trihedron.files.formats.contract import ExportOptions, Format, Thermal, given, heading, lost_to_a_diagonal, number
+from trihedron.records import Calibration, Onboard
+from trihedron.records.plain import as_plain
+
+_REAL, _INTEGER = 9, 6
+"""MAVLink's numbers of a float and a 32-bit integer in a file of parameters."""
+
+
+def to_px4(calibration: Calibration, options: ExportOptions) -> str:
+    """What the board must hold, as a file of QGroundControl, composed with what the readings had been through."""
+    board = board_of(calibration, options, "px4", "CAL_")
+    own, sensors = composed(calibration, options, "PX4", lambda name: correction_of(board, name))
+    has_scale = any(name.startswith("CAL_GYRO") and "SCALE" in name for name in board.parameters)
+    equation = "corrected = (reading - thermal(T) - OFF) * SCALE per axis, SI" + (
+        "." if has_scale else "; a gyro has OFF only."
+    )
+    held = ("accel-thermal-bias", "gyro-thermal-bias", "thermal")
+    lines = [f"# {line}" for line in (*heading(own, equation, held), *lost_to_a_diagonal(own))]
+    lines += [f"# {line}" for line in _about(board)]
+    lines += ["#", "# Vehicle-Id Component-Id Name Value Type"]
+    for name, one in sensors.items():
+        root, _ = _names(board, name)
+        device = board.parameters.get(f"{root}_ID")
+        if device is None:
+            lines.append(
+                f"# {root}_ID must be that of the board (param show {root}_ID): without it PX4 ignores these lines."
+            )
+        else:
+            lines.append(_line(f"{root}_ID", device, _INTEGER))
+        for k, axis in enumerate(AXES):
+            lines.append(_line(f"{root}_{axis}OFF", one.offset[k]))
+            if name == "accelerometer" or has_scale:
+                lines.append(_line(f"{root}_{axis}SCALE", one.scale[k]))
+        if name == "gyroscope" and not has_scale:
+            worst = 100.0 * float(np.abs(one.scale - 1.0).max())
+            lines.append(f"# PX4 has no gyro scale: up to {worst:.2g} % of scale is lost.")
+        lines += _thermal_lines(board, name, one)
+    return "\n".join([*lines, ""])
+
+
+def from_px4(text: str) -> Calibration | None:
+    """The first IMU's parameters as a calibration of readings in the axes of the sensor."""
+    parameters = parameters_in(text)
+    if not {"CAL_ACC0_XOFF", "CAL_ACC0_XSCALE"} <= parameters.keys():
+        return None
+    board = Onboard("px4", 0, 0, "corrected", parameters)
+    pairs = {}
+    for name in ("accelerometer", "gyroscope"):
+        own = correction_of(board, name)
+        pairs[name] = np.diag(own.scale), -own.scale * own.offset
+    return given("px4", pairs, board_parameters=as_plain(board))
+
+
+def against_log(held: Onboard, known: Onboard) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """S and b by sensor of what parameters make of readings that a board has logged."""
+    turns = {name: value for name, value in known.parameters.items() if name.startswith("SENS_BOARD")}
+    as_there = Onboard("px4", known.accel, known.gyro, known.stage, {**turns, **held.parameters})
+    return relative(lambda name: correction_of(as_there, name), lambda name: correction_of(known, name))
+
+
+def correction_of(board: Onboard, name: str) -> AxisCorrection:
+    """What the board does to one sensor; nothing where its readings were logged raw."""
+    if board.stage == "raw":
+        return AxisCorrection(np.zeros(3), np.ones(3), np.eye(3))
+    root, _ = _names(board, name)
+    p = board.parameters
+    turn = np.eye(3)
+    if board.stage == "body":
+        own = p.get(f"{root}_ROT", -1.0)
+        offsets = [p.get(f"SENS_BOARD_{axis}_OFF", 0.0) for axis in AXES]
+        inside = euler(*offsets) @ orientation(p.get("SENS_BOARD_ROT", 0.0))
+        turn = inside if own < 0.0 else orientation(own)
+    scale = triple(p, f"{root}_{{}}SCALE", 1.0)
+    return AxisCorrection(triple(p, f"{root}_{{}}OFF"), scale, turn, _held_thermal(board, name))
+
+
+def _names(board: Onboard, name: str) -> tuple[str, str]:
+    """Beginnings of the names of one sensor's parameters: of its calibration, of its temperature compensation."""
+    if name == "accelerometer":
+        return f"CAL_ACC{board.accel}", "TC_A"
+    return f"CAL_GYRO{board.gyro}", "TC_G"
+
+
+def _group(board: Onboard, name: str) -> str:
+    """The group of temperature parameters that is this sensor's, by its id; of the same number where none is."""
+    root, letters = _names(board, name)
+    device = board.parameters.get(f"{root}_ID", 0.0)
+    own = next((i for i in range(4) if device and board.parameters.get(f"{letters}{i}_ID") == device), int(root[-1]))
+    return f"{letters}{own}"
+
+
+def _held_thermal(board: Onboard, name: str) -> Thermal | None:
+    _, letters = _names(board, name)
+    group, p = _group(board, name), board.parameters
+    if p.get(f"{letters}_ENABLE", 0.0) != 1.0 or f"{group}_TREF" not in p:
+        return None
+    coefficients = np.array([[p.get(f"{group}_X{order}_{k}", 0.0) for k in range(3)] for order in (1, 2, 3)])
+    return Thermal(p[f"{group}_TREF"], coefficients, (p.get(f"{group}_TMIN", 0.0), p.get(f"{group}_TMAX", 100.0)))
+
+
+def _thermal_lines(board: Onboard, name: str, one: Composed) -> list[str]:
+    held, new = _held_thermal(board, name), one.thermal
+    if new is None:
+        return []
+    root, letters = _names(board, name)
+    group = _group(board, name)
+    total, constant, limits = new.coefficients, np.zeros(3), [new.range_degc]
+    if held is not None:
+        moved, at_reference = moved_to(held, new.reference_degc)
+        already = np.array([board.parameters.get(f"{group}_X0_{k}", 0.0) for k in range(3)])
+        total, constant = total + moved, already + at_reference
+        limits.append(held.range_degc)
+    lines = [_line(f"{letters}_ENABLE", 1, _INTEGER)]
+    device = board.parameters.get(f"{root}_ID")
+    if device is None:
+        lines.append(f"# {group}_ID must be that of the board.")
+    else:
+        lines.append(_line(f"{group}_ID", device, _INTEGER))
+    known = [one for one in limits if one is not None]
+    if known:
+        lines.append(_line(f"{group}_TMIN", max(low for low, _ in known)))
+        lines.append(_line(f"{group}_TMAX", min(high for _, high in known)))
+    else:
+        lines.append(f"# Set {group}_TMIN and TMAX to the temperatures that were recorded: it is valid between them.")
+    lines.append(_line(f"{group}_TREF", new.reference_degc))
+    lines += [_line(f"{group}_X0_{k}", v) for k, v in enumerate(constant)]
+    for order in range(3):
+        lines += [_line(f"{group}_X{order + 1}_{k}", v) for k, v in enumerate(total[order])]
+    return [*lines, *(f"# {line}" for line in said_of_misfit(new, name))]
+
+
+def _line(name: str, value: float, kind: int = _REAL) -> str:
+    return f"1\t1\t{name}\t{number(float(value)) if kind == _REAL else f'{value:.0f}'}\t{kind}"
+
+
+def _about(board: Onboard) -> list[str]:
+    if board.stage == "raw":
+        return ["The readings were raw: these values replace those of the board, in the sensor's axes as logged."]
+    p = board.parameters
+    turn = f"SENS_BOARD_ROT {p.get('SENS_BOARD_ROT', 0.0):g}" + "".join(
+        f", SENS_BOARD_{axis}_OFF {p.get(f'SENS_BOARD_{axis}_OFF', 0.0):g}" for axis in AXES
+    )
+    return [
+        "The log's readings had been corrected on board; these values include that correction and replace it.",
+        f"They hold for {turn}; load all of them, once.",
+    ]
+
+
+FORMAT = Format("px4", to_px4, from_px4, in_si=True)

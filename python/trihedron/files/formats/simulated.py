@@ -1,0 +1,59 @@
+"""What simulators share: readings as they distort truth, and what their model of an IMU cannot hold."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.files.formats.contract import ExportOptions, heading, of_si_readings
+from trihedron.files.formats.noise_keys import Figures, required
+from trihedron.files.plausible import named_sensors
+from trihedron.records import Calibration
+from trihedron.sensor_model import other_form
+from trihedron.units import degrees_from_radians, mm_s2_from_m_s2
+
+
+def distortion(
+    calibration: Calibration, options: ExportOptions, target: str
+) -> tuple[Calibration, dict[str, tuple[FloatArray, FloatArray]], Figures]:
+    """``reading = A truth + b`` by sensor, (3, 3) and (3,) in SI, and its noise; an ideal gyro where there is none.
+
+    Raises
+    ------
+    ValueError
+        When noise or rate are not known.
+    """
+    known = of_si_readings(calibration, target, options)
+    pairs = {name: other_form(sensor.S, sensor.b) for name, sensor in named_sensors(known)}
+    pairs.setdefault("gyroscope", (np.eye(3), np.zeros(3)))
+    return known, pairs, required(known, options, target)
+
+
+def said_of(
+    calibration: Calibration,
+    options: ExportOptions,
+    equation: str,
+    *,
+    has_matrix: bool = False,
+    lost_bias: tuple[str, ...] = (),
+    lost: tuple[str, ...] = (),
+) -> list[str]:
+    """Heading of a simulator's file, with what its model lacks and how large that is in this unit."""
+    lines = heading(calibration, equation)
+    for name, sensor in named_sensors(calibration):
+        A, b = other_form(sensor.S, sensor.b)
+        error = float(np.linalg.norm(A - np.eye(3), 2))
+        if not has_matrix and error > 0.0:
+            lines.append(
+                f"Scale and misalignment of the {name} cannot be held: {100 * error:.2g} % of its signal is lost."
+            )
+        if name in lost_bias:
+            size = f"{mm_s2_from_m_s2(float(np.linalg.norm(b))):.3g} mm/s^2"
+            if name == "gyroscope":
+                size = f"{degrees_from_radians(float(np.linalg.norm(b))):.3g} deg/s"
+            lines.append(f"The bias of the {name} cannot be held: {size} is lost.")
+    lines += lost
+    for name, noise in (("accelerometer", options.accelerometer_noise), ("gyroscope", options.gyroscope_noise)):
+        if noise is not None and noise.K.is_limit:
+            lines.append(f"The {name}'s walk is an upper limit: it was not seen in the rest log.")
+    return lines

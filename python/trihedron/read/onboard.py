@@ -1,0 +1,52 @@
+"""Parameters of a flight controller, gathered while its log is read."""
+
+from __future__ import annotations
+
+import re
+from types import MappingProxyType
+
+from trihedron.records import Finding, FindingCode, Onboard, Severity
+from trihedron.records.onboard import Autopilot, Stage
+
+
+class Parameters:
+    """Values of the parameters whose names begin with a pattern: as they were when the first reading was logged."""
+
+    def __init__(self, wanted: re.Pattern[str]) -> None:
+        self._wanted = wanted
+        self.values: dict[str, float] = {}
+        self._changed: dict[str, None] = {}
+
+    def note(self, name: str, value: float, *, has_readings: bool) -> None:
+        """Take a parameter as the log states it; ``has_readings`` once a reading was logged."""
+        if not self._wanted.match(name):
+            return
+        if has_readings and self.values.get(name, value) != value:
+            self._changed[name] = None
+        self.values.setdefault(name, float(value))
+        if not has_readings:
+            self.values[name] = float(value)
+
+    def onboard(self, autopilot: Autopilot, sensors: tuple[int, int], stage: Stage) -> Onboard | None:
+        """What the log states; ``None`` where it holds no parameters."""
+        if not self.values:
+            return None
+        return Onboard(autopilot, *sensors, stage, MappingProxyType(dict(self.values)), tuple(self._changed))
+
+
+def said_of(onboard: Onboard | None) -> tuple[Finding, ...]:
+    """That readings were corrected before they were logged, and that the parameters changed meanwhile."""
+    if onboard is None or onboard.stage == "raw":
+        return ()
+    return (
+        Finding.of(
+            FindingCode.CORRECTED_ON_BOARD,
+            severity=Severity.WARNING if onboard.changed else Severity.NOTE,
+            autopilot={"ardupilot": "ArduPilot", "px4": "PX4"}[onboard.autopilot],
+            accel=onboard.accel + 1,
+            gyro=onboard.gyro + 1,
+            is_turned=onboard.stage == "body",
+            has_changed=bool(onboard.changed),
+            changed=list(onboard.changed),
+        ),
+    )

@@ -1,0 +1,29 @@
+"""What a flight controller did to its readings before it logged them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+Autopilot = Literal["ardupilot", "px4"]
+Stage = Literal["raw", "corrected", "body"]
+
+
+@dataclass(frozen=True)
+class Onboard:
+    """The parameters of the controller's sensors while the log was made, as the log states them.
+
+    ``accel`` and ``gyro`` are the numbers of the sensors in the names of the parameters, from 0. ``stage`` says what
+    the logged readings have been through: ``raw`` (nothing), ``corrected`` (offset and scale, in the sensor's axes),
+    ``body`` (the same, then turned into the axes of the board). ``changed`` names parameters that changed while
+    readings were logged.
+    """
+
+    autopilot: Autopilot
+    accel: int
+    gyro: int
+    stage: Stage
+    parameters: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    changed: tuple[str, ...] = ()

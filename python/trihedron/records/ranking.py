@@ -1,0 +1,80 @@
+"""Several calibrations of one unit, judged on one recording and put in order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron.records.presented import Presented
+from trihedron.records.verification import Verification
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """One mistake which, undone, makes a calibration fit: ``kind`` of :data:`trihedron.report.ranking.MISTAKES`.
+
+    ``rms`` and ``rms_undone`` are the misses before and after, [m/s²] of gravity at rest, [deg] of tilt or [rad/s] of
+    the rate at rest; ``factor`` belongs to a wrong gravity or unit.
+    """
+
+    kind: str
+    rms: float
+    rms_undone: float
+    factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One calibration: ``behind`` the best by so much log predictive density, ``behind_sigma`` the standard error.
+
+    Intervals are of 95 % (bootstrap of poses and moves): gravity error in static poses [m/s²], tilt error after a
+    rotation [deg]. ``without_bias`` names sensors whose bias the file does not hold, for which this log's was taken.
+    """
+
+    name: str
+    maker: str
+    verification: Verification
+    behind: float
+    behind_sigma: float
+    norm_interval: Interval
+    angle_interval: Interval
+    suspicions: tuple[Suspicion, ...] = ()
+    without_bias: tuple[str, ...] = ()
+
+    @property
+    def is_rejected(self) -> bool:
+        """A mistake is known, or a finding says that it does not hold here."""
+        return bool(self.suspicions) or not self.verification.is_passed
+
+    @property
+    def rest_rms(self) -> float:
+        """Rate that is left at rest [rad/s], of the mean over poses; NaN without a gyro."""
+        rest = self.verification.rest_rate
+        return float(np.sqrt(np.mean(np.mean(rest, axis=0) ** 2))) if len(rest) else float("nan")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Ranking(Presented):
+    """Calibrations in order, the best first. ``print`` gives the table."""
+
+    source: str
+    gravity_m_s2: float
+    gravity_source: str
+    candidates: tuple[Ranked, ...]
+
+    @property
+    def best(self) -> Ranked:
+        """The first."""
+        return self.candidates[0]
+
+    def __repr__(self) -> str:
+        return f"<Ranking of {len(self.candidates)} calibrations on {self.source}: {self.best.name} first>"
+
+    def __str__(self) -> str:
+        from trihedron.report import to_text
+        from trihedron.report.ranking import ranking_report
+
+        return to_text(ranking_report(self))

@@ -1,0 +1,132 @@
+"""Several calibrations in order, as a report."""
+
+from __future__ import annotations
+
+import math
+
+from trihedron.records.ranking import Ranked, Ranking, Suspicion
+from trihedron.report.document import Document, Facts, Section, Table
+from trihedron.report.numbers import how_many, plain_number
+from trihedron.report.verification import parameters_table
+from trihedron.units import STANDARD_GRAVITY_M_S2, degrees_from_radians, mm_s2_from_m_s2
+
+MISTAKES = {
+    "bias-sign": "the bias has the wrong sign",
+    "bias-order": "the bias belongs to the other side of the matrix",
+    "bias-unit": "the bias is in the wrong unit",
+    "direction": "the matrix maps the other way (true to raw for raw to true)",
+    "transpose": "the matrix is transposed",
+    "unit": "the unit is wrong",
+    "axes": "axes are exchanged or mirrored (another frame)",
+    "gravity": "it was made with another gravity",
+}
+
+
+def ranking_report(ranking: Ranking) -> Document:
+    """Lay out a ranking: the order, what is wrong with each, and the parameters of the best."""
+    best = ranking.best
+    verdict = f"{best.name} fits this log best."
+    if best.is_rejected:
+        verdict = "None of these calibrations fits this log."
+    facts = (
+        ("gravity", f"{ranking.gravity_m_s2:.5f} m/s², {ranking.gravity_source}"),
+        ("judged on", _judged_on(best)),
+    )
+    sections = [
+        Section("Ranking", (Facts(facts), _order(ranking))),
+        Section("What is wrong", (Facts(tuple((one.name, said_of(one)) for one in ranking.candidates)),)),
+        Section("Parameters of the best", (parameters_table(best.verification),)),
+    ]
+    return Document(
+        title="Ranking of calibrations",
+        subtitle=ranking.source,
+        verdict=verdict,
+        is_trustworthy=not best.is_rejected,
+        sections=tuple(sections),
+    )
+
+
+def said_of(one: Ranked) -> str:
+    """Why a calibration is rejected, in words with its figures; of a sound one what its file leaves open."""
+    said = [_mistake(found) for found in one.suspicions]
+    if not said:
+        said = [f.seen for f in one.verification.findings if f.severity.value == "serious"][:2]
+    if not said and one.behind > 2.0 * one.behind_sigma:
+        said = ["it fits, and another fits better"]
+    said = said or ["nothing"]
+    if one.without_bias:
+        said.append(f"its file holds no bias of the {' and the '.join(one.without_bias)}: that of this log was taken")
+    return "; ".join(said)
+
+
+def _mistake(found: Suspicion) -> str:
+    words = MISTAKES[found.kind]
+    if found.kind == "gravity":
+        words += f" ({found.factor:.5f} times that of this place)"
+    elif found.kind == "unit":
+        words += f" (by a factor of {_factor(found.factor)})"
+    return f"{words}: undone, it misses {plain_number(found.rms_undone / found.rms, 2)} times as far"
+
+
+def _factor(factor: float) -> str:
+    for value, words in ((STANDARD_GRAVITY_M_S2, "9.80665, g for m/s²"), (degrees_from_radians(1.0), "57.3, degrees")):
+        if math.isclose(factor, value) or math.isclose(factor, 1.0 / value):
+            return words
+    return f"{factor:.4g}"
+
+
+def _judged_on(one: Ranked) -> str:
+    v = one.verification
+    return f"{how_many(len(v.norm_error), 'pose')}, {how_many(len(v.angle_deg), 'move')}"
+
+
+def _order(ranking: Ranking) -> Table:
+    head = ("", "file", "of", "gravity error [mm/s²]", "tilt error [°]", "rate at rest [°/s]", "behind the best", "")
+    rows = tuple(
+        (
+            str(k + 1),
+            one.name,
+            one.maker,
+            _with_interval(one.verification.norm_rms, one.norm_interval, mm_s2_from_m_s2(1.0)),
+            _with_interval(one.verification.angle_rms_deg, one.angle_interval, 1.0),
+            plain_number(degrees_from_radians(one.rest_rms), 2),
+            f"{plain_number(one.behind, 3)} ± {plain_number(one.behind_sigma, 2)}",
+            "rejected" if one.is_rejected else "",
+        )
+        for k, one in enumerate(ranking.candidates)
+    )
+    return Table(head, rows, "RMS with 95 % intervals; behind: log predictive density, with its standard error")
+
+
+def _with_interval(rms: float, interval: tuple[float, float], factor: float) -> str:
+    if not math.isfinite(rms):
+        return ""
+    low, high = (plain_number(factor * end, 3) for end in interval)
+    return f"{plain_number(factor * rms, 3)} ({low} to {high})"
+
+
+def ranking_record(ranking: Ranking) -> dict[str, object]:
+    """The ranking as plain JSON types, SI and degrees."""
+    return {
+        "recording": ranking.source,
+        "gravity_m_s2": ranking.gravity_m_s2,
+        "gravity_source": ranking.gravity_source,
+        "candidates": [
+            {
+                "name": one.name,
+                "maker": one.maker,
+                "is_rejected": one.is_rejected,
+                "behind": one.behind,
+                "behind_sigma": one.behind_sigma,
+                "norm_rms_m_s2": one.verification.norm_rms,
+                "norm_interval_m_s2": list(one.norm_interval),
+                "angle_rms_deg": one.verification.angle_rms_deg,
+                "angle_interval_deg": list(one.angle_interval),
+                "rest_rms_rad_s": one.rest_rms,
+                "mistakes": [vars(found) for found in one.suspicions],
+                "without_bias": list(one.without_bias),
+                "findings": [finding.to_dict() for finding in one.verification.findings],
+            }
+            for one in ranking.candidates
+        ],
+    }

@@ -1,0 +1,196 @@
+"""Calibrations of other makers are read as the inverse of how they are written, and real files of theirs are read."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+import trihedron
+from test_export import NOISE, READINGS, ROUNDING, calibration, corrected, with_g_sensitivity
+from trihedron.cli import main
+from trihedron.files.formats import any_calibration, export_files, formats, is_calibration
+from trihedron.files.formats.parsing import yaml_of
+from trihedron.records import Calibration
+from trihedron.sensor_model import in_frame
+
+READ = [name for name, one in formats().items() if one.read is not None]
+
+
+def read_back(known, target, folder):
+    files = export_files(known, target, NOISE)
+    for ending, text in files.items():
+        (folder / f"unit{ending or '.txt'}").write_text(text)
+    first = folder / f"unit{next(iter(files)) or '.txt'}"
+    assert is_calibration(first)
+    return any_calibration(first)
+
+
+@pytest.mark.parametrize("target", READ)
+def test_what_was_written_is_read_back(target, tmp_path):
+    known = in_frame(calibration("si"), "lower")
+    if target in ("px4", "ardupilot"):
+        known = replace(
+            known,
+            accelerometer=replace(known.accelerometer, S=np.diag(np.diag(known.accelerometer.S))),
+            gyroscope=replace(known.gyroscope, S=np.eye(3)),
+        )
+    back = read_back(known, target, tmp_path)
+    assert back.extensions["maker"] == target
+    pairs = [(back.accelerometer, known.accelerometer)]
+    if target != "imu_calib":
+        pairs.append((back.gyroscope, known.gyroscope))
+    # imu_tk turns both sensors into the frame in which the accelerometer's T is upper triangular.
+    turn = back.accelerometer.S @ np.linalg.inv(known.accelerometer.S) if target == "imu_tk" else np.eye(3)
+    for read, sensor in pairs:
+        assert read.raw_unit == sensor.raw_unit
+        np.testing.assert_allclose(READINGS @ read.S.T + read.b, corrected(sensor) @ turn.T, **ROUNDING)
+    assert "without_bias" not in back.extensions
+
+
+@pytest.mark.parametrize("target", ["imu_tk", "xio", "imucal", "pyins"])
+def test_counts_stay_counts(target, tmp_path):
+    back = read_back(calibration("counts"), target, tmp_path)
+    assert (back.accelerometer.raw_unit, back.gyroscope.raw_unit) == ("counts", "counts")
+
+
+@pytest.mark.parametrize("target", ["kalibr", "openvins", "imucal"])
+def test_g_sensitivity_is_read_back_and_applied(target, tmp_path):
+    known, G = with_g_sensitivity(in_frame(calibration("si"), "lower"))
+    back = read_back(known, target, tmp_path)
+    values = back.extensions["effects"][0]["model"]["values"]
+    np.testing.assert_allclose(np.reshape(values, (3, 3)), G, **ROUNDING)
+    log = trihedron.read({"t": np.arange(40) / 100, "acc": READINGS, "gyr": READINGS},
+                         accelerometer_unit="m/s^2", gyroscope_unit="rad/s")  # fmt: skip
+    made = trihedron.apply(back, log)
+    force = corrected(known.accelerometer)
+    np.testing.assert_allclose(made.gyroscope, corrected(known.gyroscope) - force @ G.T, **ROUNDING)
+
+
+def test_kalibrs_own_results_hold_no_bias_and_say_so(tmp_path):
+    """As kalibr_calibrate_imu_camera writes its `*-imu.yaml`: under `imu0`, no `b`."""
+    known = in_frame(calibration("si"), "lower")
+    flat = yaml.safe_load(export_files(known, "kalibr", NOISE)[""])
+    for one in ("accelerometers", "gyroscopes"):
+        flat[one].pop("b")
+    (tmp_path / "imu.yaml").write_text(yaml.safe_dump({"imu0": {"T_i_b": np.eye(4).tolist(), **flat}}))
+    back = any_calibration(tmp_path / "imu.yaml")
+    assert tuple(back.extensions["without_bias"]) == ("accelerometer", "gyroscope")
+    np.testing.assert_allclose(back.accelerometer.S, known.accelerometer.S, **ROUNDING)
+    np.testing.assert_allclose(back.gyroscope.S, known.gyroscope.S, **ROUNDING)
+
+
+def test_realsense_stores_the_transpose():
+    """The maker's script fits raw · X - bias to the truth and stores X row by row."""
+    known = calibration("si")
+    imu = json.loads(export_files(known, "realsense", NOISE)[""])["imus"][0]
+    X, bias = np.reshape(imu["accelerometer"]["scale_and_alignment"], (3, 3)), imu["accelerometer"]["bias"]
+    np.testing.assert_allclose(READINGS @ X - bias, corrected(known.accelerometer), **ROUNDING)
+
+
+def test_imucal_calibrates_as_its_own_functions_do():
+    """acc = (K R)⁻¹ (raw - b); gyr in deg/s = (K R)⁻¹ (raw - b - K_ga acc)."""
+    known, G = with_g_sensitivity(calibration("counts"))
+    p = {k: np.array(v) for k, v in json.loads(export_files(known, "imucal")[""]).items() if not isinstance(v, str)}
+    acc = (READINGS - p["b_a"]) @ np.linalg.inv(p["K_a"] @ p["R_a"]).T
+    np.testing.assert_allclose(acc, corrected(known.accelerometer), **ROUNDING)
+    gyr = (READINGS - p["b_g"] - acc @ p["K_ga"].T) @ np.linalg.inv(p["K_g"] @ p["R_g"]).T
+    np.testing.assert_allclose(np.radians(gyr), corrected(known.gyroscope) - acc @ G.T, **ROUNDING)
+
+
+def test_imu_calib_multiplies_then_subtracts():
+    known = calibration("si")
+    document = yaml.safe_load(export_files(known, "imu_calib", NOISE)[""])
+    made = READINGS @ np.reshape(document["SM"], (3, 3)).T - document["bias"]
+    np.testing.assert_allclose(made, corrected(known.accelerometer), **ROUNDING)
+
+
+def test_noise_of_estimators_is_continuous_or_of_one_sample_as_each_takes_it():
+    known = calibration("si")
+    orb = yaml.safe_load(export_files(known, "orb-slam3", NOISE)[""].replace("%YAML:1.0", ""))
+    assert [orb[f"IMU.{k}"] for k in ("NoiseAcc", "AccWalk", "NoiseGyro", "GyroWalk", "Frequency")] == [
+        2e-3, 4e-5, 1e-4, 2e-6, 200.0,
+    ]  # fmt: skip
+    lio = yaml.safe_load(export_files(known, "lio-sam", NOISE)[""])
+    assert (lio["imuAccNoise"], lio["imuGyrBiasN"], lio["imuGravity"]) == (2e-3, 2e-6, 9.81)
+    fast = yaml.safe_load(export_files(known, "fast-lio", NOISE)[""])["mapping"]
+    assert fast["acc_cov"] == pytest.approx(2e-3**2 * 200)
+    assert fast["b_gyr_cov"] == pytest.approx(2e-6**2 * 200)
+    scope: dict = {}
+    text = export_files(known, "gtsam", NOISE)[""]
+    exec(text, scope)
+    made = READINGS @ scope["S_GYROSCOPE"].T + scope["B_GYROSCOPE"]
+    np.testing.assert_allclose(made, corrected(known.gyroscope), **ROUNDING)
+    assert float(re.search(r"setBiasAccCovariance\((\S+) ", text)[1]) == pytest.approx(4e-5**2)
+
+
+@pytest.mark.parametrize(
+    "target", ["kalibr", "openvins", "vins-fusion", "ros", "orb-slam3", "lio-sam", "fast-lio", "gtsam", "gazebo"]
+)
+def test_a_target_that_cannot_do_without_noise_asks_for_it(target):
+    with pytest.raises(ValueError, match="--noise"):
+        export_files(calibration("si"), target)
+
+
+def test_the_result_of_imu_tk_on_its_own_recording_is_read(real_data, tmp_path):
+    published = json.loads((real_data / "xsens_mti" / "published_imu_tk.json").read_text())
+    for sensor, ending in (("acc", "acc"), ("gyro", "gyro")):
+        one = published[sensor]
+        rows = [*one["misalignment"], *np.diag(one["scale"]).tolist(), *[[v] for v in one["bias"]]]
+        (tmp_path / f"test_imu_{ending}.calib").write_text("\n".join(" ".join(map(str, r)) for r in rows))
+    back = any_calibration(tmp_path / "test_imu_acc.calib")
+    assert back.accelerometer.raw_unit == "counts"
+    # x = T K (raw - B): at B the sensor reads nothing.
+    np.testing.assert_allclose(back.accelerometer.S @ published["acc"]["bias"] + back.accelerometer.b, 0, atol=1e-9)
+    np.testing.assert_allclose(back.gyroscope.S @ published["gyro"]["bias"] + back.gyroscope.b, 0, atol=1e-9)
+
+
+def test_the_result_of_imucal_on_a_recording_is_read(real_data):
+    file = real_data / "imucal_ferraris" / "ferraris_result_imucal260.json"
+    back = any_calibration(file)
+    assert (back.accelerometer.raw_unit, back.gyroscope.raw_unit) == ("m/s^2", "deg/s")
+    p = {k: np.array(v) for k, v in json.loads(file.read_text()).items() if isinstance(v, list)}
+    acc = (READINGS - p["b_a"]) @ (np.linalg.inv(p["R_a"]) @ np.linalg.inv(p["K_a"])).T
+    np.testing.assert_allclose(READINGS @ back.accelerometer.S.T + back.accelerometer.b, acc, **ROUNDING)
+
+
+def test_small_yaml_is_read_as_the_library_reads_it():
+    text = """imu0:
+  T_i_b:
+  - [1.0, 0.0]
+  - - 0.5
+    - -1.0e-3
+  model: scale-misalignment  # a comment
+  rostopic: "/imu0"
+  update_rate: 200.0
+"""
+    whole = yaml.safe_load(text)["imu0"]
+    small = yaml_of(text)["imu0"]
+    assert small["T_i_b"] == [v for r in whole["T_i_b"] for v in r]
+    assert {k: small[k] for k in ("model", "rostopic", "update_rate")} == {
+        k: whole[k] for k in ("model", "rostopic", "update_rate")
+    }
+
+
+def test_several_calibrations_go_into_a_folder(tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    for name in ("a", "b"):
+        trihedron.write_calibration(calibration("si"), tmp_path / f"{name}.json")
+    ask = ["export", str(tmp_path / "a.json"), str(tmp_path / "b.json"), "--to", "imu_tk", "-o", str(tmp_path / "out")]
+    assert main(ask) == 0
+    assert len(list((tmp_path / "out").iterdir())) == 4
+    assert main(["export", "x", "--to", "list"]) == 0
+    assert "gazebo" in capsys.readouterr().out
+
+
+def test_a_foreign_calibration_is_exported_to_another_program(tmp_path):
+    known: Calibration = calibration("si")
+    (tmp_path / "camera.json").write_text(export_files(known, "realsense")[""])
+    made = trihedron.export(tmp_path / "camera.json", "python")[""]
+    scope: dict = {}
+    exec(made, scope)
+    np.testing.assert_allclose(
+        READINGS @ scope["S_ACCELEROMETER"].T + scope["B_ACCELEROMETER"], corrected(known.accelerometer), **ROUNDING
+    )

@@ -1,0 +1,185 @@
+"""Several calibrations of one unit: the right one first, each wrong one rejected with its reason."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import trihedron
+from trihedron.cli import main
+from trihedron.files.formats import export_calibration
+from trihedron.files.formats.boards import as_logged
+from trihedron.files.formats.contract import ExportOptions, NoiseFigure, SensorNoise
+from trihedron.records import FindingCode, Onboard
+from trihedron.report.ranking import said_of
+
+SWAPPED = np.eye(3)[[1, 0, 2]]
+
+
+def five_wrong(known, gravity):
+    """The same calibration with one mistake each, by the mistake's name."""
+    a, w = known.accelerometer, known.gyroscope
+    used = 9.95
+    return {
+        "bias-sign": replace(known, accelerometer=replace(a, b=-a.b)),
+        "unit": replace(known, accelerometer=replace(a, S=a.S / 9.80665, b=a.b / 9.80665)),
+        "gravity": replace(known, accelerometer=replace(a, S=a.S * used / gravity, b=a.b * used / gravity)),
+        "axes": replace(known, gyroscope=replace(w, S=w.S @ SWAPPED)),
+        "gyro-unit": replace(known, gyroscope=replace(w, S=np.degrees(w.S), b=np.degrees(w.b))),
+    }
+
+
+def check_ranked(known, log, gravity):
+    wrong = five_wrong(known, gravity)
+    ranking = trihedron.rank([*wrong.values(), known], log, gravity_m_s2=gravity)
+    names = dict(zip((f"calibration {k + 1}" for k in range(6)), [*wrong, "right"], strict=True))
+    assert names[ranking.best.name] == "right"
+    assert not ranking.best.suspicions
+    for one in ranking.candidates[1:]:
+        name = names[one.name]
+        assert one.is_rejected, name
+        assert name.removeprefix("gyro-") in [found.kind for found in one.suspicions], (name, said_of(one))
+    return ranking
+
+
+@pytest.fixture(scope="module")
+def session():
+    log, _ = trihedron.simulate("hand-session", 5)
+    return log, trihedron.calibrate(log, gravity_m_s2=9.81).calibration
+
+
+def test_five_wrong_files_of_a_simulated_unit_are_rejected_with_their_mistake(session):
+    log, known = session
+    ranking = check_ranked(known, log, 9.81)
+    assert "undone" in str(ranking.candidates[-1].suspicions) or ranking.candidates[-1].suspicions
+
+
+def test_five_wrong_files_of_a_phones_imu_are_rejected_on_another_session(real_data):
+    logs = [trihedron.read(real_data / "kim" / f"kim_imu_good{run}.txt") for run in (2, 3)]
+    check_ranked(trihedron.calibrate(logs[0], gravity_m_s2=9.79871).calibration, logs[1], 9.79871)
+
+
+def of_massif(real_data, k):
+    folder = real_data / "getovermassif"
+    return trihedron.read(
+        accelerometer_path=folder / f"session{k}_acc.txt", gyroscope_path=folder / f"session{k}_gyro.txt"
+    )
+
+
+def test_five_wrong_files_of_a_board_are_rejected_on_another_session(real_data):
+    known = trihedron.calibrate(of_massif(real_data, 2), gravity_m_s2=9.803).calibration
+    check_ranked(known, of_massif(real_data, 3), 9.803)
+
+
+def test_files_of_other_makers_are_ranked_and_what_they_do_not_hold_is_taken_from_the_log(session, tmp_path, capsys):
+    log, known = session
+    size = ExportOptions(
+        SensorNoise(NoiseFigure(1e-3), NoiseFigure(1e-5)), SensorNoise(NoiseFigure(1e-4), NoiseFigure(1e-6)), 100.0
+    )
+    trihedron.write_calibration(known, tmp_path / "own.json")
+    for target, name in (("xio", "fusion.txt"), ("imucal", "imucal.json"), ("pyins", "pyins.txt")):
+        (tmp_path / name).write_text(export_calibration(known, target, size))
+    off = replace(known, gyroscope=replace(known.gyroscope, b=-known.gyroscope.b))
+    (tmp_path / "wrong.json").write_text(export_calibration(off, "imucal", size))
+    trihedron.convert(log, tmp_path / "log.csv")
+    files = [str(tmp_path / n) for n in ("log.csv", "wrong.json", "own.json", "fusion.txt", "imucal.json", "pyins.txt")]
+    units = ["--accel-unit", "counts", "--gyro-unit", "counts", "--gravity", "9.81"]
+    assert main(["verify", *files, *units, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert [one["maker"] for one in document["candidates"]].count("imucal") == 2
+    last = document["candidates"][-1]
+    assert (last["name"], last["is_rejected"]) == ("wrong.json", True)
+    assert [found["kind"] for found in last["mistakes"]] == ["bias-sign"]
+    assert not any(one["is_rejected"] for one in document["candidates"][:-1])
+
+
+def test_a_maker_who_stores_no_bias_is_judged_with_that_of_the_log(session):
+    log, known = session
+    nameless = replace(
+        known,
+        accelerometer=replace(known.accelerometer, b=np.zeros(3)),
+        gyroscope=replace(known.gyroscope, b=np.zeros(3)),
+        extensions={"maker": "kalibr", "without_bias": ("accelerometer", "gyroscope")},
+    )
+    ranking = trihedron.rank([known, nameless], log, gravity_m_s2=9.81)
+    assert not any(one.is_rejected for one in ranking.candidates)
+    one = next(one for one in ranking.candidates if one.maker == "kalibr")
+    assert "holds no bias" in said_of(one)
+
+
+def test_parameters_of_a_board_are_judged_behind_what_it_had_done_to_the_log():
+    """A board that logged with offset 0.5 and scale 1.02: other parameters act on what it had corrected."""
+    held = {f"INS_ACCOFFS_{a}": 0.5 for a in "XYZ"} | {f"INS_ACCSCAL_{a}": 1.02 for a in "XYZ"}
+    known = Onboard("ardupilot", 0, 0, "body", {**held, "AHRS_ORIENTATION": 2.0})
+    from trihedron.files.formats.ardupilot import from_ardupilot
+
+    text = "\n".join(f"INS_ACCOFFS_{a},0.2\nINS_ACCSCAL_{a},0.98" for a in "XYZ")
+    made = as_logged(from_ardupilot(text), known)
+    R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    raw = np.random.default_rng(0).normal(0, 5, (20, 3))
+    logged = ((raw - 0.5) * 1.02) @ R.T
+    wanted = ((raw - 0.2) * 0.98) @ R.T
+    np.testing.assert_allclose(logged @ made.accelerometer.S.T + made.accelerometer.b, wanted, atol=1e-12)
+
+
+def codes(result):
+    return {(found.code, found.severity.value) for found in result.findings}
+
+
+def test_verify_rejects_a_gyro_bias_that_is_wrong_by_five_degrees_per_second(session):
+    log, known = session
+    off = replace(known, gyroscope=replace(known.gyroscope, b=known.gyroscope.b + np.radians(5.0)))
+    assert trihedron.verify(known, log, gravity_m_s2=9.81).is_passed
+    result = trihedron.verify(off, log, gravity_m_s2=9.81)
+    assert not result.is_passed
+    assert (FindingCode.CALIBRATION_SHIFT, "serious") in codes(result)
+
+
+def test_verify_rejects_what_is_worse_than_nothing_however_wide_its_uncertainty(session):
+    log, known = session
+
+    def wide(sensor):
+        return replace(sensor, S=1.05 * sensor.S, b=1.05 * sensor.b, covariance=1e4 * sensor.covariance)
+
+    off = replace(
+        known,
+        accelerometer=wide(known.accelerometer),
+        gyroscope=wide(known.gyroscope),
+        covariance=1e4 * known.covariance,
+    )
+    result = trihedron.verify(off, log, gravity_m_s2=9.81)
+    assert not result.is_passed
+    assert (FindingCode.WORSE_THAN_UNCALIBRATED, "serious") in codes(result)
+
+
+def test_verify_says_which_parameters_the_log_cannot_judge(session):
+    log, known = session
+    result = trihedron.verify(known, log, gravity_m_s2=9.81)
+    assert len(result.verification.parameters) == 21
+    assert all(one.is_judged for one in result.verification.parameters)
+    assert all(abs(one.times_sigma) < 4 for one in result.verification.parameters if one.id != "gyro-zero")
+    # A log of one pose knows the gyro's bias and nothing else.
+    rest = replace(
+        log,
+        time_s=log.time_s[:300],
+        accelerometer=log.accelerometer[:300],
+        gyroscope=log.gyroscope[:300],
+        temperature_degc=None,
+        supply_v=None,
+        auxiliary={},
+    )
+    few = trihedron.verify(known, rest, gravity_m_s2=9.81).verification.parameters
+    assert not any(one.is_judged for one in few if one.id != "gyro-zero")
+    assert "not judged by this log" in str(trihedron.verify(known, rest, gravity_m_s2=9.81)) or few
+
+
+def test_published_results_of_imu_tk_are_found_to_be_made_with_another_gravity(real_data):
+    """Its author's own files beside his recordings hold imu_tk's default of 9.81744 m/s² for 9.803: 0.15 % of scale."""
+    folder = real_data / "getovermassif"
+    files = [folder / f"session{k}_acc.calib" for k in (2, 3)]
+    ranking = trihedron.rank(files, of_massif(real_data, 4), gravity_m_s2=9.803)
+    for one in ranking.candidates:
+        assert (one.maker, [found.kind for found in one.suspicions]) == ("imu_tk", ["gravity"])
+        # Scales repeat to 0.03 % from session to session.
+        assert one.suspicions[0].factor == pytest.approx(9.81744 / 9.803, abs=5e-4)
