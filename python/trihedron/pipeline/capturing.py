@@ -30,7 +30,7 @@ from trihedron.capture import (
 from trihedron.files.frame_declaration import read_frame_declaration
 from trihedron.files.output import check_free
 from trihedron.pipeline.reading import read
-from trihedron.read.clock import SECONDS, parse_time_unit
+from trihedron.read.clock import parse_time_unit, seconds_of
 from trihedron.read.columns import Columns, find_columns
 from trihedron.read.table import Table
 from trihedron.records import Recording
@@ -177,7 +177,7 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
             columns = _by_content(cells) if names is None else Columns()
         unit = given or columns.time_unit or _unit_of_step(cells, columns.time)
         labels = _labels(columns, names, cells.shape[1], is_mapped=mapping is not None)
-        return LineColumns(labels, columns.time, SECONDS.get(unit, 1e-3), columns.counter)
+        return LineColumns(labels, columns.time, 1e-3 if not unit else seconds_of(unit), columns.counter)
 
     return name
 
@@ -237,7 +237,7 @@ def _unit_of_step(cells: Cells, column: int | None) -> str:
     if len(steps) == 0:
         return ""
     step = float(np.median(steps))
-    rates = {unit: 1.0 / (step * SECONDS[unit]) for unit in ("s", "ms", "us", "ns")}
+    rates = {unit: 1.0 / (step * seconds_of(unit)) for unit in ("s", "ms", "us", "ns")}
     fitting = {u: hz for u, hz in rates.items() if PLAUSIBLE_HZ[0] <= hz <= PLAUSIBLE_HZ[1]}
     return min(fitting or rates, key=lambda unit: abs(math.log(rates[unit] / USUAL_HZ)))
 
