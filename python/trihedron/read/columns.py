@@ -250,7 +250,8 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         units[guess] = parsed[bare[0][0]].unit_for(guess)
         if told is None:
             notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "x-y-z"))
-    times = [i for i, p in enumerate(parsed) if p.role == "time"]
+    # A program may keep a column for a clock that it does not have.
+    times = [i for i, p in enumerate(parsed) if p.role == "time" and np.isfinite(table.columns[i]).any()]
     time = max(times, key=lambda i: (parsed[i].rank, -i)) if times else None
     if own_time is not None:
         time = own_time  # the device's clock, beside the one of whoever listened

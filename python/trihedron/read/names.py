@@ -15,7 +15,7 @@ _NOT_A_SENSOR = frozenset(
     | {"status", "heading", "delta", "id", "count", "error", "drift"}
 )
 _SENSOR_WORDS = {
-    "accelerometer": re.compile(r"acc\d*|accl|accel\w*|acceler\w*|specific|specificforce|sf"),
+    "accelerometer": re.compile(r"acc\d*|acce|accl|accel\w*|acceler\w*|specific|specificforce|sf"),
     "gyroscope": re.compile(
         r"gyr\d*|gyro\w*|angular|omega|rot|rotation|rotationrate|angvel|angrate|rotrate|av|angularvelocity|rate"
     ),
@@ -146,9 +146,9 @@ def parse_name(name: str) -> ColumnName:
             bracket = inside.lower()
         text = text_before
     # Another index before a unit in brackets, as in "gyro[0] [rad/s]".
-    inner = re.search(r"\[([012])\]\s*$", text)
+    inner = re.search(r"[\[(]\s*([012xyzXYZ])\s*[\])]\s*$", text)
     if inner:
-        index, text = inner.group(1), text[: inner.start()]
+        index, text = inner.group(1).lower(), text[: inner.start()]
     text = text.replace("m/s^2", "m_s2").replace("m/s²", "m_s2")
     words = english(_WORD.findall(re.sub(r"([a-z])([A-Z])", r"\1 \2", text).lower()))
     unit_words = english(_WORD.findall(bracket.replace("²", "2").replace("-1", "").replace("-2", "2")))
@@ -269,7 +269,7 @@ def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
     if is_time and not any(w in {"x", "y", "z", "zone", "offset", "valid"} for w in words):
         units = [_TIME_UNIT_OF[w] for w in [*words, *unit_words] if w in _TIME_UNIT_OF]
         rank = 2 if words[0] in {"t", "time", "timestamp"} else 1
-        if not units and set(words) & _TICK_WORDS:
+        if not units and {*words, joined} & _TICK_WORDS:
             units = ["tick"]
         return ColumnName("time", time_unit=units[-1] if units else "", rank=rank + bool(units and units[-1] != "tick"))
     return None

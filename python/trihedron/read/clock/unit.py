@@ -42,6 +42,7 @@ _IMPOSSIBLE, _HASTY = -20.0, -4.0
 QUICKEST_TURN_S, HASTY_TURN_S = 0.03, 0.12
 """20 degrees from rest to rest in the first take 1500 rad/s², more than a wrist flicks and a table bears; in the
 second 100 rad/s², a knock."""
+LEISURELY_TURN_S, _LEISURELY = 10.0, -1.5
 SLOWEST_TURN_S, _SLOW = 60.0, -3.0
 """The quickest change of pose in a session takes less, unless it is a drift in a chamber."""
 FASTEST_KELVIN_S = 5.0
@@ -139,8 +140,8 @@ def _scores(raw: FloatArray, usual: float, possible: list[str], witness: Witness
             score += _SHORT
         if rest_to_rest is not None and rest_to_rest * row_s < HASTY_TURN_S:
             score += _IMPOSSIBLE if rest_to_rest * row_s < QUICKEST_TURN_S else _HASTY
-        if any_turn is not None and any_turn * row_s > SLOWEST_TURN_S:
-            score += _SLOW
+        if any_turn is not None and any_turn * row_s > LEISURELY_TURN_S:
+            score += _SLOW if any_turn * row_s > SLOWEST_TURN_S else _LEISURELY
         if kelvin is not None and kelvin / row_s > FASTEST_KELVIN_S:
             score += _IMPOSSIBLE
         scores[unit] = score
