@@ -19,7 +19,7 @@ import sys
 import tempfile
 import warnings
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from time import perf_counter
@@ -160,8 +160,6 @@ class Layout:
     accel_factor: float = 1.0
     gyro_factor: float = 1.0
     is_open: bool = False
-    head: list[str] = field(default_factory=list)
-    options: dict[str, object] = field(default_factory=dict)
 
 
 def stamps(clock: str, time_s: np.ndarray, rng: np.random.Generator) -> list[str]:
@@ -208,6 +206,8 @@ def drawn(rng: np.random.Generator) -> Layout:
     container = pick(("csv", "semicolon", "tab", "jsonl", "labelled", "lines"), [0.45, 0.15, 0.15, 0.1, 0.1, 0.05])
     if container in ("jsonl", "labelled", "lines"):
         names, said = pick(("short", "accel", "AccX", "mavlink")), "nowhere"
+    if container == "jsonl" and clock == "counter, rate said":
+        clock = "counter"  # JSON has no place for a remark
     extras = tuple(x for x in EXTRAS if names != "none" and container == "csv" and rng.random() < 0.2)
     devices = pick(("one", *DEVICES), [0.84, 0.04, 0.04, 0.04, 0.04])
     if container in ("labelled", "lines") or names in ("none", "imu0"):
@@ -224,10 +224,8 @@ def drawn(rng: np.random.Generator) -> Layout:
         clock, accel, gyro, said, names, order, extras, devices, container, rate_hz, accel_factor, gyro_factor
     )
     no_rate = clock in ("counter", "none") or (clock in TICKS and (said == "nowhere" or gyro == "counts"))
-    odd = said == "nowhere" and (accel == "cm/s^2" or gyro in ("rpm", "deg/h"))
-    made.is_open = bool(no_rate or devices != "one" or (odd and clock in TICKS))
-    if devices != "one":
-        made.options["instance or topic"] = "asked"
+    odd = said == "nowhere" and gyro in ("rpm", "deg/h")
+    made.is_open = bool(no_rate or odd or devices != "one")
     return made
 
 

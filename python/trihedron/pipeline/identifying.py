@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.estimate.noise.from_curve import identify_curve
-from trihedron.estimate.noise.grid import readings_of
+from trihedron.estimate.noise.grid import readings_of, refuse_size_of_a_unit
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s
 from trihedron.estimate.noise.streamed import stream_noise
@@ -105,6 +105,7 @@ def noise_of_file(
             rate_unit = RateUnit(gyroscope_unit or "counts")
             scale = rate_to_si(rate_unit) if gyroscope_lsb is None else rate_lsb_to_si(gyroscope_lsb)
             printed, si = rate_unit.value, "rad/s"
+            refuse_size_of_a_unit("gyro", printed, None if gyroscope_lsb is None else scale)
         else:
             force_unit = AccelerationUnit(accelerometer_unit or "counts")
             scale = (
@@ -113,6 +114,7 @@ def noise_of_file(
                 else acceleration_lsb_to_si(accelerometer_lsb)
             )
             printed, si = force_unit.value, "m/s^2"
+            refuse_size_of_a_unit("accel", printed, None if accelerometer_lsb is None else scale)
         names.append(f"{'gyro' if role[0] == 'g' else 'accel'} {role[1]}")
         units.append(printed if scale is None else si)
         factor.append(1.0 if scale is None else scale)

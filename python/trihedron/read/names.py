@@ -263,6 +263,7 @@ def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
     ):
         return ColumnName("counter")
     is_time = words[0] in _TIME_WORDS or (len(words) == 1 and words[0] in _TIME_UNIT_OF)
+    is_time = is_time or (words[-1] == "t" and all(_DEVICE_WORD.match(word) for word in words[:-1]))
     is_time = is_time or any(
         w in {"time", "timestamp", "timestamps", "stamp", "datetime", "tow", "itow"} for w in words
     )
