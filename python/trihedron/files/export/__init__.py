@@ -16,6 +16,7 @@ from trihedron.files.export.matrices import lower_orthogonal, upper_frame
 from trihedron.files.export.others import to_imu_tk, to_pyins, to_xio
 from trihedron.files.export.vio import to_basalt, to_kalibr, to_openvins, to_ros, to_vins_fusion
 from trihedron.files.plausible import require_plausible
+from trihedron.printable import printable
 from trihedron.records import Calibration
 from trihedron.refused import RefusedError
 
@@ -59,7 +60,9 @@ def export_files(calibration: Calibration, target: str, options: ExportOptions |
     if target not in TARGETS:
         raise RefusedError(f"there is no export to {target!r}; there are {', '.join(TARGETS)}.")
     made = TARGETS[target](require_plausible(calibration), options or ExportOptions())
-    return {"": made} if isinstance(made, str) else made
+    texts = {"": made} if isinstance(made, str) else made
+    # Names of files stand in them, and control characters may stand in names.
+    return {ending: printable(text) for ending, text in texts.items()}
 
 
 def export_calibration(calibration: Calibration, target: str, options: ExportOptions | None = None) -> str:

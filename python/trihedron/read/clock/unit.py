@@ -42,7 +42,7 @@ _IMPOSSIBLE, _HASTY = -20.0, -4.0
 QUICKEST_TURN_S, HASTY_TURN_S = 0.03, 0.12
 """20 degrees from rest to rest in the first take 1500 rad/s², more than a wrist flicks and a table bears; in the
 second 100 rad/s², a knock."""
-LEISURELY_TURN_S, _LEISURELY = 10.0, -1.5
+LEISURELY_TURN_S, _LEISURELY = 3.0, -1.5
 SLOWEST_TURN_S, _SLOW = 60.0, -3.0
 """The quickest change of pose in a session takes less, unless it is a drift in a chamber."""
 FASTEST_KELVIN_S = 5.0
