@@ -230,3 +230,79 @@ def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
     (tmp_path / "bad").write_text(texts["lines"].replace('{"t": 0.05,', "oops", 1))
     with pytest.raises(ReadError, match="line 6 is no JSON"):
         read_recording(tmp_path / "bad")
+
+
+@pytest.mark.parametrize("start", [0, 250, 65530])
+@pytest.mark.parametrize("names", [None, ("t", "ax", "ay", "az", "gx", "gy", "gz")])
+def test_a_counter_in_front_of_a_streams_lines_is_no_clock(start, names):
+    from trihedron.pipeline.capturing import column_namer
+
+    wrap = 256 if start == 250 else 65536
+    rows = [[str((start + k) % wrap), *(f"{0.1 * j + k:.1f}" for j in range(6))] for k in range(12)]
+    found = column_namer()(names, rows)
+    assert (found.time, found.counter) == (None, 0)
+    clock = column_namer()(names, [[str(10 * k), *row[1:]] for k, row in enumerate(rows)])
+    assert (clock.time, clock.counter, clock.time_unit_s) == (0, None, 1e-3)
+    stated = column_namer(time_unit="ms")(names, [[str(k), *row[1:]] for k, row in enumerate(rows)])
+    assert (stated.time, stated.counter) == (0, None)
+
+
+def test_the_size_of_a_count_is_refused_where_readings_are_in_a_unit(tmp_path):
+    import trihedron
+
+    t, force, rate = motion(n_poses=3)
+    header = "t_s,ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
+    log = written(tmp_path / "log.csv", *table(t, force, rate), header=header)
+    with pytest.raises(ValueError, match=r"gyro are in rad/s, not in counts"):
+        trihedron.noise(log, gyroscope_lsb="0.05 deg/s")
+
+
+def test_verbs_are_pickled_under_the_name_that_people_call():
+    import pickle
+
+    import trihedron
+
+    for name in trihedron.__all__:
+        assert pickle.loads(pickle.dumps(getattr(trihedron, name))) == getattr(trihedron, name)
+
+
+def test_mavlinks_and_other_names_are_known(tmp_path):
+    t, force, rate = motion(n_poses=3)
+    for names in (
+        "ustime,xacc,yacc,zacc,xgyro,ygyro,zgyro",
+        "us,imu0_ax,imu0_ay,imu0_az,imu0_gx,imu0_gy,imu0_gz",
+        "us,accX,accY,accZ,rotX,rotY,rotZ",
+        "us,ax,ay,az,p,q,r",
+        "us,acc1,acc2,acc3,gyro1,gyro2,gyro3",
+        "us,加速度X,加速度Y,加速度Z,ジャイロX,ジャイロY,ジャイロZ",
+    ):
+        path = written(tmp_path / "log.csv", *table([round(1e6 * x) for x in t], force, rate), header=names)
+        recording = read_recording(path)
+        assert recording.gyroscope is not None, names
+        assert recording.rate_hz == pytest.approx(100.0), names
+
+
+def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
+    t, force, rate = motion(n_poses=3)
+    lines, messages = [], []
+    oxts = tmp_path / "drive" / "oxts"
+    (oxts / "data").mkdir(parents=True)
+    for k, (x, a, w) in enumerate(zip(t, force, rate, strict=True)):
+        acc, gyr = (", ".join(f"{v:.4f}" for v in s) for s in (a, w))
+        lines.append(f"{x:.3f}, 3, {acc}, 4, {gyr}" + (", 5, 1.0, 2.0, 3.0" if k % 2 else ""))
+        c = np.rint(np.r_[a / 1e-3, w / 1e-4]).astype(int)
+        counts = f"{c[2]},{-c[1]},{c[0]},{c[5]},{-c[4]},{c[3]}"
+        messages.append(f"%RAWIMUSA,2105,{x:.3f};2105,{366000 + x:.9f},00000077,{counts}*b5c3d6f8")
+        (oxts / "data" / f"{k:010d}.txt").write_text(" ".join(map(str, [*range(11), *a, *a, *w, *w, *range(7)])))
+    stamps = [f"2011-09-26 13:02:{int(x):02d}.{round(1e9 * (x % 1)):09d}" for x in t]
+    (oxts / "timestamps.txt").write_text("\n".join(stamps) + "\n")
+    (tmp_path / "stream.csv").write_text("\n".join(lines) + "\n")
+    (tmp_path / "rawimu.txt").write_text("\n".join([*messages[:50], "#BESTPOSA,COM1;x,y", *messages[50:]]) + "\n")
+    stream = read_recording(tmp_path / "stream.csv")
+    np.testing.assert_allclose(stream.gyroscope, rate, atol=1e-4)
+    raw = read_recording(tmp_path / "rawimu.txt")
+    np.testing.assert_allclose(raw.accelerometer * 1e-3, force, atol=1e-3)
+    assert raw.rows_in_file == len(t) + 1
+    drive = read_recording(tmp_path / "drive")
+    np.testing.assert_allclose(drive.accelerometer, force)
+    assert drive.rate_hz == pytest.approx(100.0)
