@@ -95,8 +95,7 @@ def noise_of_file(
     Raises
     ------
     ValueError
-        When the file cannot be read in pieces, the columns do not fit, stretches are to be left out of a stream, or
-        ``checkpoint`` is a file of something else.
+        When file, columns, stretches to leave out, sizes of counts or ``checkpoint`` do not fit one another.
     """
     log = open_chunks(Path(path), columns)
     factor, names, units = [], [], []
