@@ -138,8 +138,8 @@ def test_two_files_account_for_the_rows_of_both(tmp_path):
 REFUSED = {
     "workbook": (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), "Excel workbook.*save the sheet as CSV"),
     "blackbox": (b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n" * 5, "blackbox_decode"),
-    "json": (b'{"accel": [[1, 2, 3]]}', "this is JSON.*from Python"),
-    "json-list": (b'[{"t": 0}]', "this is JSON"),
+    "json": (b'{"accel": [[1, 2, 3]]}', "this JSON.*from Python"),
+    "json-list": (b'[{"t": 0}]', "this JSON"),
     "video": (b"\x00\x00\x00\x18ftypmp42" + bytes(500), "a video.*GPMF"),
     "7z": (b"7z\xbc\xaf\x27\x1c" + bytes(500), "7-Zip archive.*unpack"),
     "xml": (b"<?xml version='1.0'?><a/>", "XML"),

@@ -45,6 +45,8 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from trihedron.threads import cap_threads
+
 if TYPE_CHECKING:
     from trihedron.estimate.attitude import integrate_rate
     from trihedron.estimate.noise import identify_noise
@@ -196,5 +198,7 @@ def _installed_version() -> str:
         return "0+unknown"
 
 
+# Before anything starts threads.
+cap_threads()
 # Names are fetched when first asked for: `trihedron --help` must not wait for what it does not use.
 sys.modules[__name__].__class__ = _Front

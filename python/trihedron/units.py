@@ -21,6 +21,7 @@ class AccelerationUnit(str, Enum):
     M_S2 = "m/s^2"
     G = "g"
     MG = "mg"
+    CM_S2 = "cm/s^2"
     COUNTS = "counts"
 
 
@@ -31,6 +32,8 @@ class RateUnit(str, Enum):
     MRAD_S = "mrad/s"
     DEG_S = "deg/s"
     MDEG_S = "mdeg/s"
+    DEG_H = "deg/h"
+    RPM = "rpm"
     COUNTS = "counts"
 
 
@@ -38,9 +41,16 @@ _ACCELERATION_TO_SI = {
     AccelerationUnit.M_S2: 1.0,
     AccelerationUnit.G: STANDARD_GRAVITY_M_S2,
     AccelerationUnit.MG: STANDARD_GRAVITY_M_S2 / 1000.0,
+    AccelerationUnit.CM_S2: 0.01,
 }
-_RATE_TO_SI = {RateUnit.RAD_S: 1.0, RateUnit.MRAD_S: 1e-3, RateUnit.DEG_S: math.pi / 180.0}
-_RATE_TO_SI[RateUnit.MDEG_S] = _RATE_TO_SI[RateUnit.DEG_S] / 1000.0
+_RATE_TO_SI = {
+    RateUnit.RAD_S: 1.0,
+    RateUnit.MRAD_S: 1e-3,
+    RateUnit.DEG_S: math.pi / 180.0,
+    RateUnit.MDEG_S: math.pi / 180.0e3,
+    RateUnit.DEG_H: math.pi / 180.0 / 3600.0,
+    RateUnit.RPM: 2.0 * math.pi / 60.0,
+}
 
 
 def acceleration_to_si(unit: AccelerationUnit) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shutil
 import sys
@@ -148,7 +149,9 @@ def put(text: str) -> None:
     """
     try:
         typer.echo(text, nl=False, color=has_colour())
-    except BrokenPipeError:
+    except OSError as error:
+        if error.errno not in (errno.EPIPE, errno.EBADF):
+            raise
         silence_stdout()
 
 
@@ -160,7 +163,13 @@ def silence_stdout() -> None:
 
 def say(sentence: str) -> None:
     """To stderr: what was done, not what was found."""
-    typer.echo(printable(sentence), err=True)
+    try:
+        typer.echo(printable(sentence), err=True)
+    except OSError as error:
+        if error.errno not in (errno.EPIPE, errno.EBADF):
+            raise
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
 
 
 def step(sentence: str) -> None:

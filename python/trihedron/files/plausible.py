@@ -13,6 +13,9 @@ LARGEST_CONDITION = 100.0
 LARGEST_SI_FACTOR = 5.0
 """Of a scale where readings and result are in one unit: degrees for radians are a factor of 57, g for m/s^2 of 10."""
 
+LARGEST_NUMBER = 1e12
+"""Of S and b in SI: no sensor's, and code in single precision overflows beyond 1e38."""
+
 ROUNDING = 1e-9
 """Of the largest eigenvalue of a covariance scaled to unit diagonal: below zero by less is rounding of 24 columns."""
 
@@ -23,10 +26,14 @@ def require_plausible(calibration: Calibration) -> Calibration:
     Raises
     ------
     ValueError
-        When S is singular or nearly so, a scale is off its unit by a factor, a zero is no number, or a covariance is
+        When S is singular or nearly so, a scale is off its unit by a factor, a number is beyond any sensor's,
+        or a covariance is
         none (a negative variance, correlations beyond one).
     """
     for name, sensor in named_sensors(calibration):
+        largest = max(float(np.abs(sensor.S).max()), float(np.abs(sensor.b).max()))
+        if not largest < LARGEST_NUMBER:
+            raise RefusedError(f"the {name} holds {largest:.3g} among S and b: the file is damaged; calibrate again.")
         lengths = np.linalg.norm(sensor.S, axis=0)
         if not np.all(lengths > 0.0) or np.linalg.cond(sensor.S / lengths) > LARGEST_CONDITION:
             raise RefusedError(

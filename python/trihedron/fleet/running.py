@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -187,6 +188,8 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     }
     with dask.config.set(settings):
         if scheduler is not None:
+            if re.search(r"(^\w+://.|:\d+$)", scheduler) is None:
+                raise RefusedError(f"{scheduler}: this is no address of a Dask scheduler; say tcp://HOST:8786.")
             try:
                 client = distributed.Client(scheduler, timeout="15s", set_as_default=False)
             except (OSError, TimeoutError, ValueError) as error:

@@ -51,6 +51,8 @@ def asked_in_python(verb: Verb) -> Verb:
                 named = ValueError(said)
             raise named from None
 
+    # Pickle finds it under the name that people call.
+    ask.__module__, ask.__qualname__ = "trihedron", verb.__name__
     return ask  # type: ignore[return-value]
 
 

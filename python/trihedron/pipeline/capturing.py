@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ from trihedron.capture import (
 from trihedron.files.frame_declaration import read_frame_declaration
 from trihedron.files.output import check_free
 from trihedron.pipeline.reading import read
-from trihedron.read.clock import SECONDS, parse_time_unit
+from trihedron.read.clock import TICKS, parse_time_unit, seconds_of
 from trihedron.read.columns import Columns, find_columns
 from trihedron.read.table import Table
 from trihedron.records import Recording
@@ -186,9 +187,13 @@ def column_namer(mapping: str | None = None, time_unit: str | None = None) -> Na
             if mapping is not None:
                 raise
             columns = _by_content(cells) if names is None else Columns()
-        unit = given or columns.time_unit or _unit_of_step(cells, columns.time)
+        stated = given or columns.time_unit.replace(TICKS, "")
+        if columns.time is not None and not stated and _counts_lines(cells[:, columns.time]):
+            # Samples, or milliseconds at exactly 1 kHz: as a counter it tells losses, and the host's clock the rate.
+            columns = replace(columns, time=None, counter=columns.time)
+        unit = stated or _unit_of_step(cells, columns.time)
         labels = _labels(columns, names, cells.shape[1], is_mapped=mapping is not None)
-        return LineColumns(labels, columns.time, SECONDS.get(unit, 1e-3), columns.counter)
+        return LineColumns(labels, columns.time, 1e-3 if not unit else seconds_of(unit), columns.counter)
 
     return name
 
@@ -240,6 +245,12 @@ def _by_content(cells: Cells) -> Columns:
     )
 
 
+def _counts_lines(values: Cells) -> bool:
+    """Whether numbers (n,) go up by one from line to line, but where lines are lost or the counter wraps."""
+    steps = np.diff(values)
+    return len(steps) > 1 and bool(np.mean(steps == 1.0) > 0.7) and bool(np.all(values == np.rint(values)))
+
+
 def _unit_of_step(cells: Cells, column: int | None) -> str:
     if column is None:
         return ""
@@ -248,7 +259,7 @@ def _unit_of_step(cells: Cells, column: int | None) -> str:
     if len(steps) == 0:
         return ""
     step = float(np.median(steps))
-    rates = {unit: 1.0 / (step * SECONDS[unit]) for unit in ("s", "ms", "us", "ns")}
+    rates = {unit: 1.0 / (step * seconds_of(unit)) for unit in ("s", "ms", "us", "ns")}
     fitting = {u: hz for u, hz in rates.items() if PLAUSIBLE_HZ[0] <= hz <= PLAUSIBLE_HZ[1]}
     return min(fitting or rates, key=lambda unit: abs(math.log(rates[unit] / USUAL_HZ)))
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.estimate.noise.from_curve import identify_curve
-from trihedron.estimate.noise.grid import readings_of
+from trihedron.estimate.noise.grid import readings_of, refuse_size_of_a_unit
 from trihedron.estimate.noise.identify import identify_noise
 from trihedron.estimate.noise.planning import recording_length_s
 from trihedron.estimate.noise.streamed import stream_noise
@@ -100,8 +100,7 @@ def noise_of_file(
     Raises
     ------
     ValueError
-        When the file cannot be read in pieces, the columns do not fit, stretches are to be left out of a stream, or
-        ``checkpoint`` is a file of something else.
+        When file, columns, stretches to leave out, sizes of counts or ``checkpoint`` do not fit one another.
     """
     log = open_chunks(Path(path), columns)
     factor, names, units = [], [], []
@@ -110,6 +109,7 @@ def noise_of_file(
             rate_unit = RateUnit(gyroscope_unit or "counts")
             scale = rate_to_si(rate_unit) if gyroscope_lsb is None else rate_lsb_to_si(gyroscope_lsb)
             printed, si = rate_unit.value, "rad/s"
+            refuse_size_of_a_unit("gyro", printed, None if gyroscope_lsb is None else scale)
         else:
             force_unit = AccelerationUnit(accelerometer_unit or "counts")
             scale = (
@@ -118,6 +118,7 @@ def noise_of_file(
                 else acceleration_lsb_to_si(accelerometer_lsb)
             )
             printed, si = force_unit.value, "m/s^2"
+            refuse_size_of_a_unit("accel", printed, None if accelerometer_lsb is None else scale)
         names.append(f"{'gyro' if role[0] == 'g' else 'accel'} {role[1]}")
         units.append(printed if scale is None else si)
         factor.append(1.0 if scale is None else scale)

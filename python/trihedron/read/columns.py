@@ -21,6 +21,7 @@ _ALIASES = {
     **{f"{p}{a}": f"a{a}" for p in ("a", "acc", "acc_", "accel_", "f") for a in "xyz"},
     **{f"{p}{a}": f"g{a}" for p in ("g", "w", "gyr", "gyr_", "gyro_", "omega_") for a in "xyz"},
     **{"temp": "temperature", "temperature": "temperature", "supply": "supply", "voltage": "supply", "v": "supply"},
+    **{"counter": "counter", "n": "counter", "seq": "counter", "device": "device"},
 }
 _SKIP = {"-", "_", "skip", ""}
 _BY_PLACE = (3, 4, 6, 7)
@@ -38,6 +39,7 @@ class Columns:
     supply: int | None = None
     counter: int | None = None
     nanoseconds: int | None = None
+    device: int | None = None
     accelerometer_unit: str = ""
     gyroscope_unit: str = ""
     time_unit: str = ""
@@ -73,6 +75,8 @@ def find_columns(table: Table, mapping: str | None, sensor: Sensor | None) -> Co
                 time_unit=chosen.time_unit if explicit.time is None else explicit.time_unit,
                 temperature=chosen.temperature if explicit.temperature is None else explicit.temperature,
                 supply=chosen.supply if explicit.supply is None else explicit.supply,
+                counter=chosen.counter if explicit.counter is None else explicit.counter,
+                device=explicit.device,
             )
     else:
         chosen = _positional(table, sensor)
@@ -134,7 +138,8 @@ def _mapped(table: Table, mapping: str, sensor: Sensor | None) -> Columns:
         if role is None:
             raise ReadError(
                 f"--columns: '{role_text.strip()}' is not a role; "
-                "the roles are time, ax ay az, gx gy gz, temperature, supply (x y z with one file per sensor)."
+                "the roles are time, ax ay az, gx gy gz, temperature, supply, counter, device (x y z with one file per "
+                "sensor)."
             )
         if column_text.strip().lower() in {"none", "-"}:
             continue
@@ -158,6 +163,8 @@ def _mapped(table: Table, mapping: str, sensor: Sensor | None) -> Columns:
         gyroscope=triads["gyroscope"],
         temperature=roles.get("temperature"),
         supply=roles.get("supply"),
+        counter=roles.get("counter"),
+        device=roles.get("device"),
         accelerometer_unit=units["accelerometer"],
         gyroscope_unit=units["gyroscope"],
         time_unit=parse_name(table.names[time]).time_unit if table.names and time is not None else "",
@@ -243,7 +250,8 @@ def _named(table: Table, sensor: Sensor | None) -> Columns:
         units[guess] = parsed[bare[0][0]].unit_for(guess)
         if told is None:
             notes.append(Finding.of(FindingCode.COLUMNS_ASSUMED, "x-y-z"))
-    times = [i for i, p in enumerate(parsed) if p.role == "time"]
+    # A program may keep a column for a clock that it does not have.
+    times = [i for i, p in enumerate(parsed) if p.role == "time" and np.isfinite(table.columns[i]).any()]
     time = max(times, key=lambda i: (parsed[i].rank, -i)) if times else None
     if own_time is not None:
         time = own_time  # the device's clock, beside the one of whoever listened

@@ -3,20 +3,41 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from trihedron.read.errors import ReadError
+from trihedron.read.interleaved import n_interleaved
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
 from trihedron.records.words import Words
 from trihedron.records.words import words as phrase
 
 MAX_DEVICES = 16
+MAX_ROWS = 50_000
 _DEVICE_NAMES = frozenset(
-    {"i", "instance", "imu", "imuid", "imunr", "imunumber", "id", "device", "deviceid", "devicename", "devicenr"}
+    {
+        "i",
+        "ch",
+        "channel",
+        "port",
+        "bus",
+        "slot",
+        "dev",
+        "instance",
+        "imu",
+        "imuid",
+        "imunr",
+        "imunumber",
+        "id",
+        "device",
+        "deviceid",
+        "devicename",
+        "devicenr",
+    }
     | {"sensor", "sensorid", "sensorname", "unit", "unitid", "node", "nodeid", "mac", "macaddress", "address"}
     | {"source", "topic", "topicname", "frameid", "headerframeid"}
 )
@@ -49,15 +70,23 @@ def pick_kind(words: list[str], kind: str) -> str | None:
     return max(fitting, key=lambda w: ("uncal" in w.lower(), -words.index(w)), default=None)
 
 
-def one_device(table: Table, choice: Choice, used: set[int]) -> Table:
-    """The rows of one device, where a column (none of those ``used`` as readings) tells several apart.
+def one_device(
+    table: Table, choice: Choice, used: set[int], device: int | None = None, readings: tuple[int, ...] = ()
+) -> Table:
+    """The rows of one device, where a column tells several apart: ``device``, or one of those not ``used``, by
+    its name, or because the
+    ``readings`` of its devices take turns. Devices that take turns and no column that says so are a serious finding.
 
     Raises
     ------
     ReadError
         When there are several and none was chosen, or the chosen one is not there.
     """
-    column, words, codes = _device_column(table, used)
+    column, words, codes = _device_column(table, used if device is None else set(), device)
+    if column < 0 and (n := _n_in_turn(table, readings)) > 1:
+        column, words, codes = _device_column(table, used, None, lambda codes: bool(np.mean(np.diff(codes) != 0) > 0.5))
+        if column < 0 and choice.instance is None:
+            return replace(table, findings=(*table.findings, Finding.of(FindingCode.DEVICES_INTERLEAVED, n=n)))
     if column < 0:
         if choice.instance is not None:
             raise ReadError(
@@ -93,18 +122,26 @@ def chosen(where: Words, what: str, listed: Words, rows_left_out: int) -> Findin
     )
 
 
-def _device_column(table: Table, used: set[int]) -> tuple[int, list[str], npt.NDArray[np.int64]]:
+def _n_in_turn(table: Table, readings: tuple[int, ...]) -> int:
+    columns = [table.columns[i][:MAX_ROWS] for i in readings if len(table.columns[i])]
+    return n_interleaved(np.stack(columns, axis=1)) if columns else 1
+
+
+def _device_column(
+    table: Table, used: set[int], only: int | None = None, fits: Callable[[npt.NDArray[np.int64]], bool] | None = None
+) -> tuple[int, list[str], npt.NDArray[np.int64]]:
+    """Column, words and codes (n,): of column ``only``, of the first whose codes ``fits``, or of the first whose
+    name says device."""
     none = np.zeros(0, dtype=np.int64)
-    if table.names is None:
-        return -1, [], none
-    for i, name in enumerate(table.names):
+    for i in range(len(table.columns)) if only is None else (only,):
+        name = table.names[i] if table.names is not None else ""
         plain = re.sub(r"[^a-z0-9]", "", re.sub(r"[\[(].*", "", name.lower()))
-        if i in used or plain not in _DEVICE_NAMES:
+        if i in used or (only is None and fits is None and plain not in _DEVICE_NAMES):
             continue
         if i in table.labels:
             words, codes = table.labels[i]
             present, inverse = np.unique(codes, return_inverse=True)
-            if 2 <= len(present) <= MAX_DEVICES:
+            if 2 <= len(present) <= MAX_DEVICES and (fits is None or fits(inverse)):
                 return i, [words[k] for k in present], inverse.astype(np.int64)
             continue
         values = table.columns[i]
@@ -114,7 +151,7 @@ def _device_column(table: Table, used: set[int]) -> tuple[int, list[str], npt.ND
         if len(different) > MAX_DEVICES:
             continue
         different, codes = np.unique(values, return_inverse=True)
-        if 2 <= len(different) <= MAX_DEVICES:
+        if 2 <= len(different) <= MAX_DEVICES and (fits is None or fits(codes)):
             return i, [f"{value:.0f}" for value in different], codes.astype(np.int64)
     return -1, [], none
 

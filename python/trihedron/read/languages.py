@@ -42,7 +42,8 @@ def plain(text: str) -> str:
     """Letters without their accents, ASCII brackets, and a blank where the script changes (``加速度X``)."""
     if text.isascii():
         return text
-    bare = "".join(c for c in unicodedata.normalize("NFD", text) if unicodedata.category(c) != "Mn")
+    # The marks of European letters; those of kana (U+3099) make other syllables.
+    bare = "".join(c for c in unicodedata.normalize("NFD", text) if not "\u0300" <= c <= "\u036f")
     bare = unicodedata.normalize("NFC", bare).replace("μ", "µ").replace("（", "(").replace("）", ")")
     # A word, though nobody knows which: "x" behind letters that are lost is no bare x.
     return _BETWEEN_SCRIPTS.sub(" ", _LOST.sub(" unreadable ", bare))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from trihedron.read.languages import english, plain
@@ -15,15 +15,23 @@ _NOT_A_SENSOR = frozenset(
     | {"status", "heading", "delta", "id", "count", "error", "drift"}
 )
 _SENSOR_WORDS = {
-    "accelerometer": re.compile(r"acc|accl|accel\w*|acceler\w*|specific|specificforce|sf"),
+    "accelerometer": re.compile(r"acc\d*|acce|accl|accel\w*|acceler\w*|specific|specificforce|sf"),
     "gyroscope": re.compile(
-        r"gyr|gyro\w*|angular|omega|rotation|rotationrate|angvel|angrate|rotrate|av|angularvelocity|rate"
+        r"gyr\d*|gyro\w*|angular|omega|rot|rotation|rotationrate|angvel|angrate|rotrate|av|angularvelocity|rate"
     ),
 }
 _LETTER = {"a": "accelerometer", "f": "accelerometer", "g": "gyroscope", "w": "gyroscope", "t": "translation"}
 _GLUED = re.compile(
     r"^(acc|accel|accelero?|accelerometer|acceleration|gyr|gyro|gyroscope|omega|linacc|[agwft])_?([xyz])(raw|adc|out)?$"
 )
+_AXIS_FIRST = re.compile(r"^([xyz])(acc|accel|accelerometer|acceleration|gyr|gyro|gyroscope|rate)$")
+"""As MAVLink writes them: xacc, ygyro."""
+_NUMBERED = re.compile(r"^(acc|accel|gyr|gyro|omega)([0123])$")
+_DEVICE_WORD = re.compile(r"(imu|dev|device|sensor|node|unit|port|ch|mpu|bmi|icm|lsm)\d*$")
+_LOOKS_LIKE_A_UNIT = re.compile(r"[/^²°]|\bper\b|^(ft|hz|rev|gon|grad|ips|rps|kdps|ug|µg)$")
+"""A unit that a bracket states, known or not: one that is not known is asked for."""
+_RATES = {"p": "x", "q": "y", "r": "z"}
+"""An aircraft's names of its angular rates."""
 _TIME_WORDS = {
     "t",
     "time",
@@ -47,24 +55,27 @@ _TIME_WORDS = {
     "tiempo",
     "tempo",
 }
-_TIME_WORDS |= {"millis", "micros", "seconds", "secs", "ticks", "unix"}
+_TICK_WORDS = {"ticks", "tick", "clk", "sensortime"}
+"""What counts, and does not say how fast."""
+_TIME_WORDS |= _TICK_WORDS | {"millis", "micros", "seconds", "secs", "unix"}
 _COUNTER_WORDS = {"index", "counter", "seq", "packet", "frame", "idx", "no", "number", "row", "samplenumber", "nr"}
 _TEMPERATURE = re.compile(r"temp|temperature|tempc|temperature\w*|temp_?\w{0,4}")
 _SUPPLY = {"supply", "vdd", "vcc", "voltage", "vbat", "battery", "vin", "avdd"}
 
 _TIME_UNITS = {
-    "s": ["s", "sec", "secs", "second", "seconds"],
-    "ms": ["ms", "msec", "msecs", "millis", "milliseconds", "millisecond"],
-    "us": ["us", "µs", "usec", "micros", "microseconds", "microsecond"],
-    "ns": ["ns", "nsec", "nanos", "nanoseconds", "nanosecond", "nanosec"],
+    "s": ["s", "sec", "secs", "second", "seconds", "stime"],
+    "ms": ["ms", "msec", "msecs", "millis", "milliseconds", "millisecond", "mstime"],
+    "us": ["us", "µs", "usec", "micros", "microseconds", "microsecond", "ustime"],
+    "ns": ["ns", "nsec", "nanos", "nanoseconds", "nanosecond", "nanosec", "nstime"],
 }
 _TIME_UNIT_OF = {word: unit for unit, words in _TIME_UNITS.items() for word in words}
 _UNITS = {
     "accelerometer": {
         "m/s^2": "ms2 mss mps2 mpers2 msec2 ms-2 m/s2 m/s/s mpss",
-        "g": "g gee gees",
-        "mg": "mg millig",
-        "counts": "adc counts count lsb ticks digits int16",
+        "g": "g g0 gn gee gees",
+        "mg": "mg millig mgee",
+        "cm/s^2": "cms2 gal",
+        "counts": "adc counts count lsb ticks digits int16 v mv volt volts",
         "raw": "raw",
     },
     "gyroscope": {
@@ -72,7 +83,9 @@ _UNITS = {
         "rad/s": "rads radsec rad rads-1 radps radpersec",
         "mrad/s": "mrads mrad mradps",
         "deg/s": "dps degs deg degsec degps °s ° degs-1 °s-1",
-        "counts": "adc counts count lsb ticks digits int16",
+        "deg/h": "dph degh deghr degphr °h °hr degperhour",
+        "rpm": "rpm revmin",
+        "counts": "adc counts count lsb ticks digits int16 v mv volt volts",
         "raw": "raw",
     },
 }
@@ -83,7 +96,8 @@ _UNIT_OF = {
 
 @dataclass(frozen=True)
 class ColumnName:
-    """``role`` is accelerometer, gyroscope, translation, bare, time, temperature, supply, counter, or empty."""
+    """``unit`` as stated, known or not; ``role`` is accelerometer, gyroscope, translation, bare, time,
+    temperature, supply, counter, or empty."""
 
     role: str = ""
     axis: str = ""
@@ -132,13 +146,16 @@ def parse_name(name: str) -> ColumnName:
             bracket = inside.lower()
         text = text_before
     # Another index before a unit in brackets, as in "gyro[0] [rad/s]".
-    inner = re.search(r"\[([012])\]\s*$", text)
+    inner = re.search(r"[\[(]\s*([012xyzXYZ])\s*[\])]\s*$", text)
     if inner:
-        index, text = inner.group(1), text[: inner.start()]
+        index, text = inner.group(1).lower(), text[: inner.start()]
     text = text.replace("m/s^2", "m_s2").replace("m/s²", "m_s2")
     words = english(_WORD.findall(re.sub(r"([a-z])([A-Z])", r"\1 \2", text).lower()))
     unit_words = english(_WORD.findall(bracket.replace("²", "2").replace("-1", "").replace("-2", "2")))
-    return _classify(words, unit_words, index)
+    said = _classify(words, unit_words, index)
+    if said.role in _SENSOR_WORDS and not said.unit and _LOOKS_LIKE_A_UNIT.search(bracket):
+        return replace(said, unit=bracket)
+    return said
 
 
 def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName:
@@ -146,10 +163,18 @@ def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName
         return ColumnName()
     glued_axis = ""
     expanded: list[str] = []
-    for word in words:
+    for i, word in enumerate(words):
         word = {"xout": "x", "yout": "y", "zout": "z"}.get(word, word)
         match = _GLUED.match(word)
-        if match and not glued_axis and not (len(match.group(1)) == 1 and len(words) > 1 and words[0] != word):
+        turned, numbered = _AXIS_FIRST.match(word), _NUMBERED.match(word)
+        is_first = words[0] == word or all(_DEVICE_WORD.match(other) for other in words[:i])
+        if turned and not glued_axis:
+            glued_axis = turned.group(1)
+            expanded.append(turned.group(2))
+        elif numbered and not index and not any(other in ("x", "y", "z") for other in words):
+            index = numbered.group(2)
+            expanded.append(numbered.group(1))
+        elif match and not glued_axis and not (len(match.group(1)) == 1 and len(words) > 1 and not is_first):
             glued_axis = match.group(2)
             expanded.append(match.group(1))
             if match.group(3) in {"adc", "raw"}:
@@ -161,6 +186,9 @@ def _classify(words: list[str], unit_words: list[str], index: str) -> ColumnName
         return single
     axis = index or glued_axis
     rest = list(expanded)
+    if words[0] in _RATES and (len(words) == 1 or _unit("gyroscope", words[1:])):
+        unit = _unit("gyroscope", unit_words) or _unit("gyroscope", words[1:])
+        return ColumnName("gyroscope", _RATES[words[0]], "p q r", unit, rank=-1, words=tuple(unit_words))
     if len(rest) > 1 and "axis" in rest:
         rest.remove("axis")
     if not axis:
@@ -197,7 +225,7 @@ def _unit_words_only(words: list[str]) -> bool:
 
 def _sensor(words: list[str]) -> str:
     hits = {s for s, pattern in _SENSOR_WORDS.items() if any(pattern.fullmatch(w) for w in words)}
-    if {"angular", "acceleration"} <= set(words):
+    if {"angular", "acceleration"} <= set(words) or {"rotation", "vector"} <= set(words):
         return ""
     if len(hits) == 1:
         return hits.pop()
@@ -209,9 +237,9 @@ def _sensor(words: list[str]) -> str:
                     return sensor
     if words and words[0] == "alpha":
         return "translation"  # Kalibr's name for acceleration, beside omega; alone it is an angular acceleration
-    if words and words[0] in _LETTER:
-        return _LETTER[words[0]]
-    return ""
+    while len(words) > 1 and _DEVICE_WORD.match(words[0]):
+        words = words[1:]
+    return _LETTER.get(words[0], "") if words else ""
 
 
 def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
@@ -235,11 +263,14 @@ def _single_role(words: list[str], unit_words: list[str]) -> ColumnName | None:
     ):
         return ColumnName("counter")
     is_time = words[0] in _TIME_WORDS or (len(words) == 1 and words[0] in _TIME_UNIT_OF)
+    is_time = is_time or (words[-1] == "t" and all(_DEVICE_WORD.match(word) for word in words[:-1]))
     is_time = is_time or any(
         w in {"time", "timestamp", "timestamps", "stamp", "datetime", "tow", "itow"} for w in words
     )
     if is_time and not any(w in {"x", "y", "z", "zone", "offset", "valid"} for w in words):
         units = [_TIME_UNIT_OF[w] for w in [*words, *unit_words] if w in _TIME_UNIT_OF]
         rank = 2 if words[0] in {"t", "time", "timestamp"} else 1
-        return ColumnName("time", time_unit=units[-1] if units else "", rank=rank + bool(units))
+        if not units and {*words, joined} & _TICK_WORDS:
+            units = ["tick"]
+        return ColumnName("time", time_unit=units[-1] if units else "", rank=rank + bool(units and units[-1] != "tick"))
     return None

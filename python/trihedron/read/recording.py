@@ -13,19 +13,21 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.channel_facts import facts_in
 from trihedron.channel_facts.limits import Extremes
-from trihedron.channel_facts.quiet import look
+from trihedron.channel_facts.quiet import Windows, look
 from trihedron.read.audit import audit_counter, audit_readings, audit_steps, audit_timing
-from trihedron.read.clock import mean_rate_hz
+from trihedron.read.audit.pace import audit_pace
+from trihedron.read.clock import mean_rate_hz, with_gyro
 from trihedron.read.columns import Sensor
 from trihedron.read.devices import Choice, by_sensor
 from trihedron.read.digest import LateSha256, hexdigest
 from trihedron.read.errors import ReadError, from_os_error
 from trihedron.read.in_turn import by_rows
 from trihedron.read.memory import table_of
-from trihedron.read.sensing import judge_accelerometer, judge_gyroscope
+from trihedron.read.sensing import WHOLE, Judged, judge_accelerometer, judge_gyroscope
 from trihedron.read.sensors import Options, Sensors, sensors_of, settled
 from trihedron.read.source import read_tables
 from trihedron.read.table import Table
+from trihedron.read.turning import PARTS, turning_of
 from trihedron.read.two_files import merge_sensors
 from trihedron.read.unnamed_gyro import unnamed_gyro
 from trihedron.records import Finding, FindingCode, Recording
@@ -184,20 +186,12 @@ def audited(
         acc_unit = AccelerationUnit(judged.unit)
         findings += [*judged.findings, *unnamed_gyro(sensors, rate)]
     if sensors.gyroscope is not None:
-        judged = judge_gyroscope(
-            sensors.gyroscope,
-            sensors.accelerometer,
-            time_s,
-            rate,
-            windows,
-            sensors.gyroscope_unit,
-            gyroscope_unit,
-            extremes["gyroscope"],
-        )
+        judged = _judged_gyro(sensors, rate, windows, gyroscope_unit, extremes["gyroscope"])
         gyr_unit = RateUnit(judged.unit)
-        findings += judged.findings
+        findings = with_gyro(findings, judged.confirms_clock) + list(judged.findings)
     if sensors.has_clock:
         findings += audit_timing(time_s, rate, sensors.place, sensors.sampling, sensors.lost_behind, sensors.stamps_s)
+        findings += audit_pace(time_s if sensors.stamps_s is None else sensors.stamps_s, sensors)
     facts = facts_in(present, windows, extremes)
     counter = sensors.columns.counter
     if counter is not None:
@@ -233,6 +227,30 @@ def audited(
         rows_in_file=sensors.rows_in_file,
         rows_read=sensors.rows_read,
     ).knowing(facts)
+
+
+def _judged_gyro(
+    sensors: Sensors, rate_hz: float, windows: Windows | None, given: str | RateUnit | None, extremes: Extremes
+) -> Judged:
+    """The gyro's unit, and what gravity's turning says of it and of its axes."""
+    assert sensors.gyroscope is not None
+    acc = sensors.accelerometer
+    turning = None if acc is None else turning_of(acc, sensors.gyroscope, rate_hz)
+    clear = turning if turning is not None and turning.is_clear else None
+    judged = judge_gyroscope(sensors.gyroscope, clear, windows, sensors.gyroscope_unit, given, extremes)
+    if turning is None:
+        return judged
+    is_stated = given is not None or sensors.gyroscope_unit not in {"", "raw", WHOLE}
+    fits = (
+        is_stated and clear is not None and judged.unit is not RateUnit.COUNTS and turning.fits(RateUnit(judged.unit))
+    )
+    own, shared = turning.odd_correlation
+    changed = (
+        Finding.of(
+            FindingCode.AXES_CHANGED, part=turning.odd_part, parts=PARTS, correlation=own, correlation_of_all=shared
+        ),
+    )
+    return Judged(judged.unit, (*judged.findings, *(changed if turning.odd_part else ())), fits)
 
 
 def _finite_extremes(triad: FloatArray) -> Extremes:

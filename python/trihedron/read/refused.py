@@ -49,20 +49,7 @@ def refuse_foreign(path: Path, magic: bytes) -> None:
         kind = own[1].decode()
         remedy = "name it with --calibration" if kind.endswith("calibration") else "name a log"
         raise ReadError(f"{path}: this is a {kind}, no log; {remedy}.")
-    if text[:1] in (b"{", b"[") and _is_json(text):
-        raise ReadError(
-            f"{path}: this is JSON, which is not read here because every program nests it otherwise; write its "
-            "readings as CSV, or pass them from Python: trihedron.read({'t': ..., 'ax': ...})."
-        )
     if text[:15].lower().startswith((b"<!doctype html", b"<html")):
         raise ReadError(f"{path}: this is a web page (no line of numbers), not a log; download the file itself.")
     if text.startswith(b"<?xml"):
         raise ReadError(f"{path}: this is XML, which is not read here; {_CSV}.")
-
-
-def _is_json(text: bytes) -> bool:
-    """A brace or bracket that opens a value; a monitor's ``[12:34:56.789]`` opens a stamp."""
-    rest = text[1:].lstrip()
-    if text[:1] == b"{":
-        return rest[:1] in (b'"', b"}", b"")
-    return rest[:1] in (b"{", b"[", b'"', b"]")

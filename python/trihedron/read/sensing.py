@@ -12,46 +12,51 @@ from trihedron.arrays import FloatArray
 from trihedron.channel_facts.limits import Extremes
 from trihedron.channel_facts.quiet import Windows, is_integer, look
 from trihedron.read.errors import ReadError
-from trihedron.read.turning import Turning, unit_by_turning
-from trihedron.read.turning import turn_ratio as gyroscope_turns
+from trihedron.read.turning import CANDIDATES, Turning
 from trihedron.records import Finding, FindingCode
-from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si, rate_to_si
+from trihedron.units import STANDARD_GRAVITY_M_S2, AccelerationUnit, RateUnit, acceleration_to_si
 
 NEAR_GRAVITY = 0.2
 """An uncalibrated accelerometer at rest may be this far off: scale a few per cent, zero offset a tenth of g."""
 WHOLE = "whole numbers"
 """Stands for the unit of readings that were whole numbers before they were interpolated."""
-MIN_TURNS = 3
-MAX_TURN_RATIO = 2.0
-"""Gravity's turn over the gyro's path: 1 at most by geometry, 1.1 with the scale errors of uncalibrated sensors."""
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A unit and what to say about it."""
+    """A unit and what to say about it; whether gravity turns as the gyro's stated unit and the clock say."""
 
     unit: AccelerationUnit | RateUnit
     findings: tuple[Finding, ...]
+    confirms_clock: bool = False
 
 
 def parse_acceleration_unit(text: str | AccelerationUnit) -> AccelerationUnit:
     """A user's unit word."""
     words = {"m/s2": "m/s^2", "m/s²": "m/s^2", "mps2": "m/s^2", "si": "m/s^2", "raw": "counts", "lsb": "counts"}
+    words |= {"g0": "g", "cm/s2": "cm/s^2", "cm/s²": "cm/s^2", "gal": "cm/s^2"}
     key = text.value if isinstance(text, AccelerationUnit) else str(text).strip().lower()
     try:
         return AccelerationUnit(words.get(key, key))
     except ValueError:
-        raise ReadError(f"'{text}' is not an acceleration unit; use m/s^2, g, mg or counts.") from None
+        raise ReadError(
+            f"'{text}' is not an acceleration unit known here; state one with --accel-unit: "
+            f"{', '.join(unit.value for unit in AccelerationUnit)} (counts: of any size)."
+        ) from None
 
 
 def parse_rate_unit(text: str | RateUnit) -> RateUnit:
     """A user's unit word."""
     words = {"dps": "deg/s", "mdps": "mdeg/s", "°/s": "deg/s", "si": "rad/s", "raw": "counts", "lsb": "counts"}
+    words |= {"dph": "deg/h", "°/h": "deg/h", "deg/hr": "deg/h"}
     key = text.value if isinstance(text, RateUnit) else str(text).strip().lower()
     try:
         return RateUnit(words.get(key, key))
     except ValueError:
-        raise ReadError(f"'{text}' is not an angular rate unit; use rad/s, mrad/s, deg/s, mdeg/s or counts.") from None
+        raise ReadError(
+            f"'{text}' is not an angular rate unit known here; state one with --gyro-unit: "
+            f"{', '.join(unit.value for unit in RateUnit)} (counts: of any size)."
+        ) from None
 
 
 def rest_norm(readings: FloatArray, windows: Windows | None) -> float:
@@ -135,74 +140,54 @@ def _stated(
 
 def judge_gyroscope(
     readings: FloatArray,
-    accelerometer: FloatArray | None,
-    time_s: FloatArray,
-    rate_hz: float,
+    turning: Turning | None,
     windows: Windows | None,
     named: str,
     given: str | RateUnit | None,
     extremes: Extremes,
 ) -> Judged:
-    """Unit of the gyro: as given, else as named, else by turning gravity, else by magnitude (a warning)."""
-    turning: Turning | None = None
+    """Unit of the gyro: as given, else as named, else by ``turning`` gravity, else by magnitude (a warning)."""
     whole = is_integer(readings) or named == WHOLE
     named = "" if named == WHOLE else named
-    if accelerometer is not None and windows is not None and not whole:
-        turning = unit_by_turning(accelerometer, readings, time_s, rate_hz, windows)
     if given is not None or named not in {"", "raw"}:
         unit = parse_rate_unit(given if given is not None else named)
-        is_given = given is not None
         against = None
-        if unit is not RateUnit.COUNTS and turning is not None and turning.unit is not unit:
+        if unit is not RateUnit.COUNTS and turning is not None and not turning.fits(unit):
             against = Finding.of(
                 FindingCode.UNIT_CONTRADICTED,
                 "gyro-by-turning",
+                is_given=given is not None,
                 unit=unit.value,
-                is_given=is_given,
-                turning_unit=turning.unit.value,
-                by_path=turning.by_path,
-                n_turns=turning.n_turns,
-                slope=turning.slope,
+                factor=turning.factor(unit),
+                percent=turning.percent,
                 correlation=turning.correlation,
             )
-        elif unit is not RateUnit.COUNTS and turning is None and windows is not None and accelerometer is not None:
-            against = _rate_contradiction(unit, gyroscope_turns(readings, time_s, windows), is_given=is_given)
-        return Judged(unit, _stated("gyro", unit, against, is_given=is_given))
+        return Judged(unit, _stated("gyro", unit, against, is_given=given is not None))
     if whole:
         return Judged(RateUnit.COUNTS, (Finding.of(FindingCode.UNIT_DETECTED, "gyro-counts"),))
-    if turning is not None:
-        return Judged(
-            turning.unit,
-            (
-                Finding.of(
-                    FindingCode.UNIT_DETECTED,
-                    "gyro-by-turning",
-                    turning_unit=turning.unit.value,
-                    by_path=turning.by_path,
-                    n_turns=turning.n_turns,
-                    slope=turning.slope,
-                    correlation=turning.correlation,
-                ),
-            ),
+    if turning is None:
+        return _gyroscope_by_magnitude(extremes, windows)
+    unit = min(CANDIDATES, key=lambda unit: abs(math.log(turning.factor(unit))))
+    factor, percent, correlation = turning.factor(unit), turning.percent, turning.correlation
+    if turning.fits(unit):
+        told = Finding.of(
+            FindingCode.UNIT_DETECTED,
+            "gyro-by-turning",
+            unit=unit.value,
+            factor=factor,
+            percent=percent,
+            correlation=correlation,
         )
-    return _gyroscope_by_magnitude(extremes, windows)
-
-
-def _rate_contradiction(unit: RateUnit, turns: tuple[float, int], *, is_given: bool) -> Finding | None:
-    """Gravity cannot turn further than the gyro's path; where it does by far, unit or time base are wrong."""
-    ratio, n_turns = turns
-    scale = rate_to_si(unit) or math.nan
-    factor = ratio / scale
-    if n_turns < MIN_TURNS or not factor > MAX_TURN_RATIO:
-        return None
-    return Finding.of(
-        FindingCode.UNIT_CONTRADICTED,
-        "gyro-turns-too-far",
-        unit=unit.value,
-        is_given=is_given,
-        turns=n_turns,
-        turn_ratio=factor,
-    )
+    else:
+        told = Finding.of(
+            FindingCode.UNIT_CONTRADICTED,
+            "gyro-no-unit",
+            unit=unit.value,
+            factor=factor,
+            percent=percent,
+            correlation=correlation,
+        )
+    return Judged(unit, (told,))
 
 
 def _gyroscope_by_magnitude(extremes: Extremes, windows: Windows | None) -> Judged:

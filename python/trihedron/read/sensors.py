@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray
-from trihedron.read.clock import Clock, Witness, build_clock, mean_rate_hz, settle_clock
+from trihedron.read.clock import TICKS, Clock, Witness, build_clock, counts_rows, mean_rate_hz, settle_clock
 from trihedron.read.clock.order import in_order
 from trihedron.read.clock.steps import steps_of
 from trihedron.read.columns import Columns, Sensor, find_columns, statement
@@ -116,7 +116,17 @@ def sensors_of(table: Table, sensor: Sensor | None, options: Options) -> Sensors
     """
     path = table.path
     chosen = find_columns(table, options.columns, sensor or table.sensor)
-    table = table if table.is_chosen else one_device(table, options.choice, chosen.used())
+    table = (
+        table
+        if table.is_chosen
+        else one_device(
+            table,
+            options.choice,
+            chosen.used(),
+            chosen.device,
+            (*(chosen.accelerometer or ()), *(chosen.gyroscope or ())),
+        )
+    )
     if table.n_rows < 2:
         raise ReadError(f"{path}: the file holds one row of numbers only ({table.place(0)}); a recording needs many.")
     findings = [*table.findings, *chosen.findings, *_words_left_out(table)]
@@ -255,15 +265,19 @@ def _stated_rate(table: Table) -> float | None:
 
 def _time_base(table: Table, chosen: Columns, options: Options, findings: list[Finding]) -> tuple[Clock, float]:
     if chosen.time is not None:
-        named = chosen.time_unit
+        named, given = chosen.time_unit, options.time_unit
+        told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)
+        if told is not None and given is None and named in {"", TICKS} and counts_rows(table.columns[chosen.time]):
+            # A counter of samples under a name of time: as a clock whose tick is a sample, it tells losses too.
+            given = f"{told!r} Hz"
+            findings.append(_rate_stated(told, is_given=options.rate_hz is not None))
         if named == "100us" and not table.clock.unit:
             named = _sample_time_fine(table, chosen.time, findings)
         clock = build_clock(
-            table, chosen.time, named, options.time_unit, chosen.nanoseconds, _witness(table, chosen), table.is_private
+            table, chosen.time, named, given, chosen.nanoseconds, _witness(table, chosen), table.is_private
         )
         findings += _with_rows_left_out(clock, table.n_rows)
         rate = mean_rate_hz(clock.time_s)
-        told = options.rate_hz if options.rate_hz is not None else _stated_rate(table)
         if told is not None and abs(rate / told - 1.0) > 0.01:
             findings.append(Finding.of(FindingCode.RATE_CONTRADICTED, given_hz=told, clock_hz=rate))
         return clock, rate

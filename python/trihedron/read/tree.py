@@ -123,6 +123,13 @@ def _tables(path: Path, groups: Groups) -> dict[str, Table]:
 
 def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
     tables = _tables(path, groups)
+    single = [
+        a for arrays in groups.values() for a in map(_upright, arrays.values()) if a.ndim == 2 and min(a.shape) >= 3
+    ]
+    if not tables and len(single) == 1 and len(single[0]) >= MIN_ROWS:
+        # One matrix: what its columns are is told by their number, or by --columns.
+        columns = tuple(np.ascontiguousarray(column, dtype=np.float64) for column in single[0].T)
+        return Table(path, None, columns, file_sha256(path))
     if not tables:
         held = ", ".join(f"{g}/{n}".strip("/") for g, arrays in groups.items() for n in arrays)
         raise ReadError(f"{path}: no arrays named as an accelerometer's or a gyro's in {what}; it holds {held[:300]}.")
@@ -137,6 +144,12 @@ def _of_groups(path: Path, groups: Groups, choice: Choice, what: str) -> Table:
     )
 
 
+def _upright(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """MATLAB's 1 x n and 3 x n turned round."""
+    plain = np.squeeze(array)
+    return plain.T if plain.ndim == 2 and plain.shape[0] <= 12 < plain.shape[1] else plain
+
+
 def _table(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> Table | None:
     """Arrays of the group's usual length as columns, those of MATLAB's 1 x n and 3 x n turned round."""
     shaped: dict[str, npt.NDArray[Any]] = {}
@@ -144,10 +157,7 @@ def _table(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> Table | None:
         if array.dtype.names:
             shaped |= {field: array[field] for field in array.dtype.names if array[field].ndim == 1}
             continue
-        plain = np.squeeze(array)
-        if plain.ndim == 2 and plain.shape[0] <= 12 < plain.shape[1]:
-            plain = plain.T
-        shaped[name] = plain
+        shaped[name] = _upright(array)
     lengths = [a.shape[0] for a in shaped.values() if a.ndim in (1, 2) and a.shape[0] >= MIN_ROWS]
     if not lengths:
         return None

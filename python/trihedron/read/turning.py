@@ -1,125 +1,170 @@
-"""The gyro's unit by physics: whatever turns the body turns gravity in the accelerometer's frame by the same angle.
+"""The gyro's scale by physics: whatever turns the body turns gravity in the accelerometer's frame, ``ȧ = -ω × a``.
 
-Two tests that need no calibration. Between two rests gravity cannot turn further than the gyro's path, so
-``angle / ∫|ω - bias| dt`` comes near 1 for rad/s and near π/180 for deg/s, whatever the axes' order and signs. And at
-any time ``ȧ = -ω × a`` but for the body's own acceleration, which averages out: the slope of ȧ over ``-ω × a`` is the
-unit, provided the two sensors' axes agree.
+Least squares of gravity's change over blocks of 0.1 s on what a gyro of scale s predicts, for every order and sign of
+its axes
+(and the rotation that fits best): turns about the vertical, which leave gravity alone, predict no change and say
+nothing.
+Needs no calibration; the body's own acceleration averages out.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron import _core
 from trihedron.arrays import FloatArray
-from trihedron.channel_facts.quiet import Windows
 from trihedron.units import RateUnit, rate_to_si
 
-MIN_TURN_RAD = 0.5
-MAX_MOVES = 400
-_RATIO_LOW, _RATIO_HIGH = 0.25, 1.2
-_SLOPE_LOW, _SLOPE_HIGH = 0.4, 1.6
-"""Wide on purpose: candidate units lie a factor 17 or 57 apart, so the brackets stay disjoint."""
-_MIN_CORRELATION = 0.25
+CANDIDATES = (RateUnit.RAD_S, RateUnit.DEG_S, RateUnit.MRAD_S, RateUnit.MDEG_S)
+TOLERANCE = 1.25
+"""Factor by which the scale of an uncalibrated sensor and its clock may be off; candidates lie a factor 17 or 57
+apart."""
+_MIN_CORRELATION = 0.5
+"""Hands that also accelerate reach 0.7 and more, other motion and other quantities stay below 0.4."""
+PARTS, _FEWEST = 4, 50
+"""Of the log, each of which must fit with the same axes, and the blocks that tell."""
+_AXES_FIT, _MORE_UNEXPLAINED = 0.75, 4.0
+"""A part speaks against the axes of the whole log where its own fit so well, and leave a quarter unexplained."""
 _BLOCK_S = 0.1
 _MAX_BLOCKS = 20_000
-CANDIDATES = (RateUnit.RAD_S, RateUnit.DEG_S, RateUnit.MRAD_S, RateUnit.MDEG_S)
+_MOST_TURN_RAD = 0.7
+_NEAR_GRAVITY = 0.2
+"""Blocks whose |a| leaves the usual one by more are the body's own acceleration."""
+_SIGNED_AXES = tuple(
+    np.eye(3)[list(order)] * np.array(signs)
+    for order in itertools.permutations(range(3))
+    for signs in itertools.product((1.0, -1.0), repeat=3)
+)
 
 
 @dataclass(frozen=True)
 class Turning:
-    """The gyro's unit by turning gravity: from ``n_turns`` turns between rests (``by_path``), or from ``slope`` and
-    ``correlation`` of the two rates while the body turns."""
+    """The gyro's ``scale`` [rad/s per unit] by which gravity turns, its standard uncertainty, the correlation of
+    gravity's change with
+    the gyro's prediction, and the number of blocks behind them. ``odd_part`` (from 1; 0: none) of ``PARTS`` fits
+    with other axes only, with the correlation so and
+    with those of the whole."""
 
-    unit: RateUnit
-    by_path: bool
-    n_turns: int = 0
-    slope: float = 0.0
-    correlation: float = 0.0
+    scale: float
+    sigma: float
+    correlation: float
+    n: int
+    odd_part: int = 0
+    odd_correlation: tuple[float, float] = (0.0, 0.0)
 
+    @property
+    def is_clear(self) -> bool:
+        """Whether it is a rotation that both sensors saw: five deviations, and a share of the motion worth
+        that name."""
+        return self.correlation > max(_MIN_CORRELATION, 5.0 / math.sqrt(max(self.n, 1)))
 
-def unit_by_turning(
-    accelerometer: FloatArray, gyroscope: FloatArray, time_s: FloatArray, rate_hz: float, windows: Windows
-) -> Turning | None:
-    """The one unit in which the gyro agrees with gravity, and the evidence; None where the log cannot tell."""
-    ratio, n_turns = turn_ratio(gyroscope, time_s, windows)
-    if n_turns >= 2 and math.isfinite(ratio):
-        for unit in CANDIDATES:
-            scale = rate_to_si(unit) or 0.0
-            if _RATIO_LOW * scale <= ratio <= _RATIO_HIGH * scale:
-                return Turning(unit, by_path=True, n_turns=n_turns)
-    slopes = turn_slopes(accelerometer, gyroscope, rate_hz, [rate_to_si(unit) or 0.0 for unit in CANDIDATES])
-    agreeing = [
-        (unit, slope, correlation)
-        for unit, (slope, correlation, n) in zip(CANDIDATES, slopes, strict=True)
-        # Five deviations of a correlation of n independent pairs, and a share of the motion worth calling rotation.
-        if _SLOPE_LOW <= slope <= _SLOPE_HIGH and correlation > max(_MIN_CORRELATION, 5.0 / math.sqrt(max(n, 1)))
-    ]
-    if len(agreeing) == 1:
-        unit, slope, correlation = agreeing[0]
-        return Turning(unit, by_path=False, slope=slope, correlation=correlation)
-    return None
+    @property
+    def percent(self) -> float:
+        """Standard uncertainty of the scale in per cent."""
+        return 100.0 * self.sigma / self.scale
 
+    def factor(self, unit: RateUnit) -> float:
+        """Scale over that of a unit."""
+        return self.scale / (rate_to_si(unit) or math.nan)
 
-def turn_ratio(gyroscope: FloatArray, time_s: FloatArray, windows: Windows) -> tuple[float, int]:
-    """(largest usual ratio of gravity's turn [rad] to the gyro's path [raw unit * s], number of turns behind it)."""
-    index = np.flatnonzero(windows.quiet)
-    directions = windows.mean["accelerometer"][index]
-    norms = np.linalg.norm(directions, axis=1)
-    if not len(index) or not np.all(norms > 0):
-        return math.nan, 0
-    directions = directions / norms[:, None]
-    cosine = np.clip(np.einsum("ij,ij->i", directions[:-1], directions[1:]), -1.0, 1.0)
-    angle = np.arccos(cosine)
-    ratios = []
-    for k in np.flatnonzero(angle > MIN_TURN_RAD)[:MAX_MOVES]:
-        first, last = int(windows.start[index[k]]), int(windows.start[index[k + 1]]) + windows.length
-        bias = 0.5 * (windows.mean["gyroscope"][index[k]] + windows.mean["gyroscope"][index[k + 1]])
-        speed = np.linalg.norm(gyroscope[first:last] - bias, axis=1)
-        step = np.diff(time_s[first:last])
-        path = float(np.nansum(0.5 * (speed[1:] + speed[:-1]) * step))
-        if path > 0.0 and math.isfinite(path):
-            ratios.append(float(angle[k]) / path)
-    return (float(np.percentile(ratios, 80.0)), len(ratios)) if ratios else (math.nan, 0)
+    def fits(self, unit: RateUnit) -> bool:
+        """Whether it is the unit's, within what uncalibrated sensors and four deviations allow."""
+        allowed = math.log(TOLERANCE) + 4.0 * self.sigma / self.scale
+        return abs(math.log(self.factor(unit))) <= allowed
 
 
-UNSEEN = math.nan, 0.0, 0
-
-
-def turn_slopes(
-    accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float, scales: list[float]
-) -> list[tuple[float, float, int]]:
-    """Least-squares slope of ``Δa`` over ``-(ω × a) Δt`` with ω = scale * gyro, their correlation, and block pairs, for
-    every one of ``scales``.
-
-    Over blocks of 0.1 s in which the body turns faster than usual but by less than 0.7 rad.
-    """
+def turning_of(accelerometer: FloatArray, gyroscope: FloatArray, rate_hz: float) -> Turning | None:
+    """The scale at which readings (n, 3) of a gyro turn gravity in those of the accelerometer; None where nothing
+    turns."""
     length = max(1, round(_BLOCK_S * rate_hz))
     n = min(len(accelerometer) // length, _MAX_BLOCKS)
     if n < 3:
-        return [UNSEEN] * len(scales)
+        return None
     a = _core.block_mean_readings(accelerometer, length, n)
     w = _core.block_mean_readings(gyroscope, length, n)
-    finite = np.isfinite(w).all(axis=1)
+    norm = np.linalg.norm(a, axis=1)
+    finite = np.isfinite(w).all(axis=1) & np.isfinite(norm) & (norm > 0.0)
     if not finite.any():
-        return [UNSEEN] * len(scales)
-    w -= np.median(w[finite], axis=0)
-    return [_slope(a, scale * w, length / rate_hz) for scale in scales]
-
-
-def _slope(a: FloatArray, w: FloatArray, step_s: float) -> tuple[float, float, int]:
-    mean_a, mean_w = 0.5 * (a[1:] + a[:-1]), 0.5 * (w[1:] + w[:-1])
+        return None
+    usual = float(np.median(norm[finite]))
+    # Raw zeros may be far off (a gyro of 10 bits reads 512 at rest): the median is the bias, or near it.
+    w = w - np.median(w[finite], axis=0)
+    good = finite & (np.abs(norm - usual) < _NEAR_GRAVITY * usual)
+    a = a / np.where(finite, norm, 1.0)[:, None]
+    mean_a, mean_w, seen = 0.5 * (a[1:] + a[:-1]), 0.5 * (w[1:] + w[:-1]), np.diff(a, axis=0)
     speed = np.linalg.norm(mean_w, axis=1)
-    usable = np.isfinite(mean_a).all(axis=1) & np.isfinite(speed)
+    usable = good[1:] & good[:-1]
     if not usable.any():
-        return UNSEEN
-    usable &= (speed > np.median(speed[usable])) & (speed * step_s < 0.7)
-    predicted = -np.cross(mean_w[usable], mean_a[usable]) * step_s
-    seen = np.diff(a, axis=0)[usable]
-    pp, ps, ss = float((predicted**2).sum()), float((predicted * seen).sum()), float((seen**2).sum())
-    if pp <= 0.0 or ss <= 0.0:
-        return UNSEEN
-    return ps / pp, ps / math.sqrt(pp * ss), int(usable.sum())
+        return None
+    usable &= (speed > np.median(speed[usable])) & (np.linalg.norm(seen, axis=1) < _MOST_TURN_RAD)
+    return _fitted(mean_a[usable], mean_w[usable], seen[usable], length / rate_hz)
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Normal matrix (9, 9), right side (9,) and sum of squares of gravity's change on rates, and the number of
+    blocks."""
+
+    normal: FloatArray
+    right: FloatArray
+    total: float
+    n: int
+
+    def on(self, axes: FloatArray) -> Turning | None:
+        """Scale and correlation where the gyro's axes lie so (3, 3) in the accelerometer's."""
+        c = axes.ravel()
+        predicted, shared = float(c @ self.normal @ c), float(c @ self.right)
+        if not (predicted > 0.0 and shared > 0.0 and self.total > 0.0):
+            return None
+        correlation, scale = min(shared / math.sqrt(predicted * self.total), 1.0), shared / predicted
+        spread = math.sqrt((1.0 - correlation**2) / max(self.n - 1, 1)) / correlation
+        return Turning(scale, scale * spread, correlation, self.n)
+
+    def best(self, orientations: Sequence[FloatArray]) -> tuple[Turning, FloatArray] | None:
+        """The orientation that explains gravity's change best."""
+        tried = [(found, axes) for axes in orientations if (found := self.on(axes)) is not None]
+        return max(tried, key=lambda pair: pair[0].correlation) if tried else None
+
+
+def _sums(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> _Sums:
+    """Of directions a (n, 3), rates w (n, 3) [unit] and changes (n, 3) over blocks of ``step_s``."""
+    cross = np.zeros((len(a), 3, 3))
+    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
+    cross -= cross.transpose(0, 2, 1)
+    design = (step_s * cross[:, :, :, None] * w[:, None, None, :]).reshape(-1, 9)
+    return _Sums(design.T @ design, design.T @ seen.ravel(), float((seen**2).sum()), len(a))
+
+
+def _fitted(a: FloatArray, w: FloatArray, seen: FloatArray, step_s: float) -> Turning | None:
+    parts = [
+        _sums(*part, step_s)
+        for part in zip(np.array_split(a, PARTS), np.array_split(w, PARTS), np.array_split(seen, PARTS), strict=True)
+    ]
+    whole = _Sums(
+        sum((p.normal for p in parts), np.zeros((9, 9))),
+        sum((p.right for p in parts), np.zeros(9)),
+        sum(p.total for p in parts),
+        len(a),
+    )
+    if not np.isfinite(whole.normal).all() or not whole.normal.any():
+        return None
+    values, vectors = np.linalg.eigh(whole.normal)
+    kept = values > 0.01 * values[-1]
+    u, _, vt = np.linalg.svd((vectors[:, kept] @ ((vectors[:, kept].T @ whole.right) / values[kept])).reshape(3, 3))
+    found = whole.best((*_SIGNED_AXES, u @ vt))
+    if found is None:
+        return None
+    turning, axes = found
+    for k, part in enumerate(parts):
+        own, shared = part.best(_SIGNED_AXES), part.on(axes)
+        others = shared.correlation if shared is not None else 0.0
+        if part.n < _FEWEST or own is None or own[0].correlation < _AXES_FIT:
+            continue
+        if 1.0 - others**2 > _MORE_UNEXPLAINED * (1.0 - own[0].correlation ** 2):
+            return replace(turning, odd_part=k + 1, odd_correlation=(own[0].correlation, others))
+    return turning

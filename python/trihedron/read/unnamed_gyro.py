@@ -7,9 +7,8 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.read.columns import Triad
 from trihedron.read.sensors import Sensors
-from trihedron.read.turning import CANDIDATES, turn_slopes
+from trihedron.read.turning import turning_of
 from trihedron.records import Finding, FindingCode
-from trihedron.units import rate_to_si
 
 CLEAR_CORRELATION = 0.5
 """Of gravity's change with that predicted from three columns as rates: a gyro's lies above (0.74 in a hand that also
@@ -21,7 +20,7 @@ FEWEST_PAIRS = 50
 def unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
     """A warning for each triad of columns without a known name that turns with the accelerometer's gravity.
 
-    Only where no gyro was recognised; gravity's change in blocks against ``-ω × a`` (``turn_slopes``).
+    Only where no gyro was recognised; gravity's change in blocks against ``-ω × a`` (``turning_of``).
     """
     accelerometer, table, columns = sensors.accelerometer, sensors.table, sensors.columns
     if accelerometer is None or sensors.gyroscope is not None or columns.accelerometer is None or table.names is None:
@@ -30,8 +29,8 @@ def unnamed_gyro(sensors: Sensors, rate_hz: float) -> tuple[Finding, ...]:
     n = len(accelerometer)
     for triad in _triads(table.names, {i for i, c in enumerate(table.columns) if not len(c)} | columns.used()):
         rates = np.stack([_kept(sensors, column, n) for column in triad], axis=1)
-        tried = turn_slopes(accelerometer, rates, rate_hz, [rate_to_si(unit) or 0.0 for unit in CANDIDATES])
-        if not any(correlation > CLEAR_CORRELATION and pairs >= FEWEST_PAIRS for _, correlation, pairs in tried):
+        turning = turning_of(accelerometer, rates, rate_hz)
+        if turning is None or turning.correlation <= CLEAR_CORRELATION or turning.n < FEWEST_PAIRS:
             continue
         roles = zip(("ax", "ay", "az", "gx", "gy", "gz"), (*columns.accelerometer, *triad), strict=True)
         time = [] if columns.time is None else [f"time={columns.time + 1}"]
@@ -48,9 +47,9 @@ def _kept(sensors: Sensors, column: int, n: int) -> FloatArray:
 
 
 def _triads(names: tuple[str, ...], taken: set[int]) -> list[Triad]:
-    """Columns whose names differ in one letter only: x, y, z; or p, q, r, the rates of a flying body."""
+    """Columns whose names differ in one letter only: x, y, z."""
     left = {name.strip().lower(): i for i, name in enumerate(names) if i not in taken}
-    out = [(left["p"], left["q"], left["r"])] if {"p", "q", "r"} <= set(left) else []
+    out: list[Triad] = []
     for name, i in left.items():
         for k in (k for k, letter in enumerate(name) if letter == "x"):
             others = [left.get(f"{name[:k]}{axis}{name[k + 1 :]}") for axis in "yz"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 from dataclasses import replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError
@@ -13,7 +14,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
-from trihedron.printable import one_line
+from trihedron.printable import one_line, printable
 from trihedron.report.document import Block, Code, Document, Facts, FindingList, Paragraph, Picture, Table
 from trihedron.report.drawing import NoFiguresError
 
@@ -32,20 +33,28 @@ WORDY = 28
 
 
 def to_html(document: Document) -> str:
-    """The whole report, figures drawn and embedded."""
+    """The whole report, figures drawn and embedded; it may fetch nothing and run no script but its own."""
     sections = [
         {"heading": one_line(section.heading), "blocks": [_shown(block) for block in section.blocks]}
         for section in document.sections
     ]
     lead = None if document.lead is None else _shown(document.lead)
-    return template("page.html.j2").render(
+    script = _file("page.js")
+    page = template("page.html.j2").render(
         document=replace(document, title=one_line(document.title), subtitle=one_line(document.subtitle)),
         sections=sections,
         lead=lead,
         version=_version(),
         style=Markup(_file("page.css")),
-        script=Markup(_file("page.js")),
+        script=Markup(script),
+        policy=f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src '{_digest(script)}'",
     )
+    return printable(page)
+
+
+def _digest(script: str) -> str:
+    """The one script that a page may run."""
+    return f"sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}"
 
 
 @cache

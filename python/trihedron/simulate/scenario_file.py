@@ -56,8 +56,11 @@ def read_scenario(path: str | Path) -> Scenario:
         raise RefusedError(of_path(path, error)) from None
     except RecursionError:
         raise RefusedError(f"{path}: this is nested too deeply.") from None
-    except tomllib.TOMLDecodeError as error:
-        raise RefusedError(f"{path.name} is not a TOML file: {error}") from None
+    # A whole number of thousands of digits is a ValueError that is no TOMLDecodeError.
+    except ValueError as error:
+        if isinstance(error, RefusedError):
+            raise
+        raise RefusedError(f"{path.name} is not a TOML file: {str(error).split(';')[0][:200]}") from None
     try:
         return scenario_from_table(table, path.stem)
     except (TypeError, OverflowError, LookupError):

@@ -12,6 +12,21 @@ from trihedron.units import acceleration_to_si, rate_to_si
 AXES = ("x", "y", "z")
 
 
+def refuse_size_of_a_unit(sensor: str, unit: str, size: float | None) -> None:
+    """Nothing, where readings are counts or no ``size`` of a count is stated.
+
+    Raises
+    ------
+    ValueError
+        When readings in a unit of their own would be multiplied by the size of a count.
+    """
+    if size is not None and unit != "counts":
+        raise RefusedError(
+            f"the readings of the {sensor} are in {unit}, not in counts: leave --{sensor}-lsb out, or say "
+            f"--{sensor}-unit counts if they are."
+        )
+
+
 def readings_of(
     recording: Recording, rad_s_per_count: float | None = None, m_s2_per_count: float | None = None
 ) -> tuple[FloatArray, tuple[str, ...], tuple[str, ...]]:
@@ -22,11 +37,12 @@ def readings_of(
     Raises
     ------
     ValueError
-        When most of the time has no reading.
+        When most of the time has no reading, or the size of a count is stated of readings that are none.
     """
     columns: list[FloatArray] = []
     names: list[str] = []
     units: list[str] = []
+    stated = {"gyro": rad_s_per_count, "accel": m_s2_per_count}
     for sensor, readings, unit, factor, si_unit in (
         (
             "gyro",
@@ -45,6 +61,7 @@ def readings_of(
     ):
         if readings is None:
             continue
+        refuse_size_of_a_unit(sensor, unit, stated[sensor])
         columns.append(readings if factor in (None, 1.0) else readings * factor)
         names += [f"{sensor} {axis}" for axis in AXES]
         units += [unit if factor is None else si_unit] * 3

@@ -20,6 +20,7 @@ from trihedron.files.calibration import CalibrationFileError, read_calibration
 from trihedron.files.formats.contract import ExportOptions, Format, NoiseFigure, SensorNoise
 from trihedron.files.formats.matrices import lower_orthogonal, upper_frame
 from trihedron.files.plausible import require_plausible
+from trihedron.printable import printable
 from trihedron.records import Calibration
 from trihedron.refused import RefusedError
 
@@ -64,7 +65,9 @@ def export_files(calibration: Calibration, target: str, options: ExportOptions |
     if one is None or one.write is None:
         raise RefusedError(f"there is no export to {target!r}; there are {', '.join(targets())}.")
     made = one.write(require_plausible(calibration), options or ExportOptions())
-    return {"": made} if isinstance(made, str) else made
+    texts = {"": made} if isinstance(made, str) else made
+    # Names of files stand in them, and control characters may stand in names.
+    return {ending: printable(text) for ending, text in texts.items()}
 
 
 def export_calibration(calibration: Calibration, target: str, options: ExportOptions | None = None) -> str:

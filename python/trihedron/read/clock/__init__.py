@@ -3,6 +3,18 @@
 from trihedron.read.clock.base import Clock, build_clock
 from trihedron.read.clock.rate import mean_rate_hz
 from trihedron.read.clock.settle import Settled, settle_clock
-from trihedron.read.clock.unit import SECONDS, Witness, parse_time_unit
+from trihedron.read.clock.unit import TICKS, Witness, counts_rows, parse_time_unit, seconds_of, with_gyro
 
-__all__ = ["SECONDS", "Clock", "Settled", "Witness", "build_clock", "mean_rate_hz", "parse_time_unit", "settle_clock"]
+__all__ = [
+    "TICKS",
+    "Clock",
+    "Settled",
+    "Witness",
+    "build_clock",
+    "counts_rows",
+    "mean_rate_hz",
+    "parse_time_unit",
+    "seconds_of",
+    "settle_clock",
+    "with_gyro",
+]

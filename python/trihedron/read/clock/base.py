@@ -10,7 +10,7 @@ import numpy.typing as npt
 from trihedron.arrays import FloatArray
 from trihedron.read.clock.order import in_order, order_of_rows, unwrap
 from trihedron.read.clock.steps import steps_of
-from trihedron.read.clock.unit import SECONDS, Witness, time_unit
+from trihedron.read.clock.unit import Witness, seconds_of, time_unit
 from trihedron.read.errors import ReadError
 from trihedron.read.table import Table
 from trihedron.records import Finding, FindingCode
@@ -83,7 +83,7 @@ def build_clock(
         raw = in_order(raw, order, np.empty(len(order)))
         rows = order if rows is None else rows[order]
     unit = time_unit(raw, named, given, wraps, witness, findings)
-    scale = SECONDS[unit]
+    scale = seconds_of(unit)
     span = (raw[-1] - raw[0]) * scale
     if len(raw) > 1 and span < _SHORTEST_STEP_S * (len(raw) - 1):
         raise ReadError(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from trihedron.arrays import FloatArray
 from trihedron.read.clock.rate import usual_step
 from trihedron.read.clock.steps import steps_of
 from trihedron.read.errors import ReadError
-from trihedron.records import Finding, FindingCode
+from trihedron.records import Finding, FindingCode, Severity
 from trihedron.records.words import words
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "100us": 1e-4}
@@ -20,7 +21,16 @@ _CANDIDATES = ("s", "ms", "us", "ns")
 PLAUSIBLE_HZ = (0.02, 20000.0)
 _SLOW_TICKS = -1.0
 """Whoever logs slower than 2 Hz writes seconds; a tick counter that slow is rarer than one 1000 times quicker."""
-_BANDS = ((0.2, -5.0), (0.7, -3.0), (2.0, -1.0), (10.0, -1.5), (900.0, 0.0), (2500.0, -1.5), (math.inf, -3.0))
+_BANDS: tuple[tuple[float, float], ...] = (
+    (0.2, -5.0),
+    (0.7, -3.0),
+    (2.0, -1.0),
+    (10.0, -1.5),
+    (900.0, 0.0),
+    (2100.0, -0.5),
+    (2500.0, -1.5),
+)
+_BANDS += ((math.inf, -3.0),)
 """Log odds of a rate below each bound: loggers run between 10 Hz and 1 kHz, some at 1 Hz, hardly any below 0.2 Hz."""
 _FRACTIONS = {"s": 0.0, "ms": -1.5, "us": -4.0, "ns": -6.0}
 """Log odds of digits behind the point: seconds need them, tick counts have none (some programs print ms with them)."""
@@ -28,16 +38,25 @@ _NANOSECONDS = -2.0
 """Nanoseconds come as dates, which settle the unit, or with their name; seldom as a bare count."""
 _SHORTEST_S, _SHORT = 5.0, -2.5
 """Nobody keeps a thousand rows of a log shorter than this."""
-_IMPOSSIBLE = -20.0
-QUICKEST_TURN_S = 0.03
-"""20 degrees from rest to rest in this time take 1500 rad/s², more than a wrist flicks and a table bears."""
+_IMPOSSIBLE, _HASTY = -20.0, -4.0
+QUICKEST_TURN_S, HASTY_TURN_S = 0.03, 0.12
+"""20 degrees from rest to rest in the first take 1500 rad/s², more than a wrist flicks and a table bears; in the
+second 100 rad/s², a knock."""
+LEISURELY_TURN_S, _LEISURELY = 3.0, -1.5
 SLOWEST_TURN_S, _SLOW = 60.0, -3.0
 """The quickest change of pose in a session takes less, unless it is a drift in a chamber."""
 FASTEST_KELVIN_S = 5.0
 """A part in its case does not warm faster; a chamber runs at 0.1 K/s."""
 _TURN_DEG, _SIDE = 20.0, 5
+_NEARLY_ALL = 0.95
 _SURE = 3.9
 """Odds of fifty to one."""
+_OTHER_TICK = -4.6
+"""Log odds of whole numbers being ticks of another size (of 32768 Hz, 25 µs ...) where their name does not say ticks:
+one log in a hundred."""
+TICKS = "tick"
+"""Stands for the unit of a column whose name says that it counts, and not what."""
+_TICK = re.compile(r"(\d+(?:\.\d*)?(?:e[+-]?\d+)?)\s*(k?hz|s|ms|us|µs|ns)", re.IGNORECASE)
 _MOST_ROWS = 200_000
 
 
@@ -53,9 +72,19 @@ def parse_time_unit(text: str) -> str:
     """A user's unit word."""
     words = {"sec": "s", "seconds": "s", "millis": "ms", "micros": "us", "µs": "us", "nanos": "ns"}
     unit = words.get(text.strip().lower(), text.strip().lower())
-    if unit not in SECONDS:
-        raise ReadError(f"'{text}' is not a time unit; use s, ms, us or ns.")
+    if unit not in SECONDS and not seconds_of(unit) > 0.0:
+        raise ReadError(f"'{text}' is not a time unit; use s, ms, us, ns, or the size of a tick: '32768 Hz', '25 us'.")
     return unit
+
+
+def seconds_of(unit: str) -> float:
+    """Seconds that one of a unit (``ms``), or of a tick (``32768 Hz``, ``25 us``), lasts; NaN where it is neither."""
+    tick = _TICK.fullmatch(unit.strip())
+    if tick is None:
+        return SECONDS.get(unit, math.nan)
+    size, of = float(tick[1]), tick[2].lower().replace("µ", "u")
+    hertz = {"hz": 1.0, "khz": 1e3}.get(of)
+    return size * SECONDS[of] if hertz is None else 1.0 / (size * hertz) if size else math.nan
 
 
 def time_unit(
@@ -64,7 +93,7 @@ def time_unit(
     """Unit of stamps (n,) in order: as given, as named, by their date, or the likeliest; a doubt becomes a finding."""
     if given is not None:
         return parse_time_unit(given)
-    if named:
+    if named and named != TICKS:
         return named
     n_steps, n_forward = len(raw) - 1, steps_of(raw).forward
     if not n_forward:
@@ -85,6 +114,9 @@ def time_unit(
         ranked = sorted(possible, key=lambda u: -scores[u])
         choice = ranked[0]
         sure = len(ranked) == 1 or scores[choice] - scores[ranked[1]] > _SURE
+        if choice != "s" and not _has_fractions(raw):
+            sure = sure and named != TICKS and scores[choice] - _OTHER_TICK > _SURE
+        sure = sure and not counts_rows(raw)
         possible = [u for u in ranked if scores[u] > scores[choice] - 2.0 * _SURE]
     else:
         choice, sure = "s", 0.5 * usual < 60.0
@@ -94,7 +126,7 @@ def time_unit(
 
 def _scores(raw: FloatArray, usual: float, possible: list[str], witness: Witness) -> dict[str, float]:
     """Log odds of every unit."""
-    fractions = bool(np.any(raw[:_MOST_ROWS] != np.rint(raw[:_MOST_ROWS])))
+    fractions = _has_fractions(raw)
     rest_to_rest, any_turn = _quickest_turns(witness.accelerometer)
     kelvin = _quickest_warming(witness.temperature)
     scores = {}
@@ -106,14 +138,36 @@ def _scores(raw: FloatArray, usual: float, possible: list[str], witness: Witness
         score += _NANOSECONDS if unit == "ns" else 0.0
         if len(raw) > 1000 and len(raw) * row_s < _SHORTEST_S:
             score += _SHORT
-        if rest_to_rest is not None and rest_to_rest * row_s < QUICKEST_TURN_S:
-            score += _IMPOSSIBLE
-        if any_turn is not None and any_turn * row_s > SLOWEST_TURN_S:
-            score += _SLOW
+        if rest_to_rest is not None and rest_to_rest * row_s < HASTY_TURN_S:
+            score += _IMPOSSIBLE if rest_to_rest * row_s < QUICKEST_TURN_S else _HASTY
+        if any_turn is not None and any_turn * row_s > LEISURELY_TURN_S:
+            score += _SLOW if any_turn * row_s > SLOWEST_TURN_S else _LEISURELY
         if kelvin is not None and kelvin / row_s > FASTEST_KELVIN_S:
             score += _IMPOSSIBLE
         scores[unit] = score
     return scores
+
+
+def _has_fractions(raw: FloatArray) -> bool:
+    return bool(np.any(raw[:_MOST_ROWS] != np.rint(raw[:_MOST_ROWS])))
+
+
+def counts_rows(raw: FloatArray) -> bool:
+    """Whether numbers (n,) go up by one from row to row, but where rows are lost: a counter, or ticks of one row
+    each."""
+    return len(raw) > 2 and not _has_fractions(raw) and bool(np.mean(np.diff(raw[:_MOST_ROWS]) == 1.0) > _NEARLY_ALL)
+
+
+def with_gyro(findings: list[Finding], is_confirmed: bool) -> list[Finding]:
+    """Findings in which a doubt about the time unit is serious, as a gyro's scale hangs on it, or none where
+    gravity settled it."""
+    severity = Severity.NOTE if is_confirmed else Severity.SERIOUS
+    return [
+        replace(f, severity=severity)
+        if f.code is FindingCode.TIME_UNIT_DETECTED and f.severity is Severity.WARNING
+        else f
+        for f in findings
+    ]
 
 
 def _quickest_turns(accelerometer: FloatArray | None) -> tuple[int | None, int | None]:

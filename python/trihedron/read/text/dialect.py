@@ -9,14 +9,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass
-from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
 
 NEARLY_ALL = 0.9
 _SAMPLE_LINES = 400
-_MAX_LINES_OF_ONE_ROW = 6
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _CLOCK = r"\d{1,2}:\d\d:\d\d[.,]\d{1,6}"
 # Arduino IDE and PlatformIO's time filter; dated stamps of CoolTerm and others; minicom's and Tera Term's in brackets.
@@ -26,9 +24,16 @@ _PREFIXES = (
     re.compile(rf"\[(\d{{4}}-\d\d-\d\d {_CLOCK})\][ \t]*"),
     re.compile(rf"\[({_CLOCK})\][ \t]*"),
 )
+_VALUE = rf"\d{{4}}-\d\d-\d\d[T ]{_CLOCK}|{_CLOCK}|{_NUMBER}"
 _PAIR = re.compile(
-    rf"([A-Za-z_][\w.\[\]/^°² -]*?)\s*[:=]\s*({_NUMBER})(?![\d:])(?:\s*([A-Za-zµ°][\w/^°²*]*)(?!\s*[:=\w]))?"
+    rf"([A-Za-z_][\w.\[\]()/^°² -]*?)\s*[:=]\s*({_VALUE})(?![\d:])(?:\s*([A-Za-zµ°][\w/^°²*]*)(?!\s*[:=\w\[(]))?"
 )
+_HAS_LABEL = re.compile(r".*?[A-Za-z_\])]\s*[:=]")
+_BARE_STAMP = re.compile(rf"\s*({_VALUE})\s*[,;]?\s+(?=[A-Za-z])")
+_THREE = re.compile(
+    rf"([A-Za-z_]\w*)\s*[:=]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})\s*[,;\s]\s*({_NUMBER})(?![\d:.])(?!\s*[,;\s]\s*[-+.\d])"
+)
+_MOST_LABELS = 64
 _GROUP = re.compile(r"([A-Za-z]\w*)\s*[:=]?\W*$")
 
 
@@ -52,11 +57,12 @@ def rewrite(text: str) -> Rewritten | None:
         rests = [line[m.end() :] if m else line for line, m in zip(lines, found, strict=True)]
     labelled = _labelled(rests)
     if labelled is not None:
-        names, rows, numbers = labelled
+        preamble, names, rows, numbers = labelled
         if stamps is not None:
             names = ["arrival time", *names]
             rows = [f"{stamps[i - 1]},{row}" if stamps[i - 1] else row for i, row in zip(numbers, rows, strict=True)]
-        return _joined([",".join(names), *rows], [numbers[0], *numbers])
+        first = [numbers[0]] * (len(preamble) + 1)
+        return _joined([*preamble, ",".join(names), *rows], [*first, *numbers])
     if stamps is None:
         return None
     filled = [rest for rest in rests if re.match(rf"\s*{_NUMBER}\s*[,;\t ]", rest)]
@@ -92,60 +98,75 @@ def _nearly_all(pattern: re.Pattern[str], lines: list[str]) -> bool:
     return True
 
 
-def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[int]] | None:
-    """(names, rows of values, line of each row) of lines such as ``ax: 0.1, ay: 0.2``, or of groups of such lines."""
-    every = ((i, line) for i, line in enumerate(lines, start=1) if line.strip())
-    filled = list(islice(every, _SAMPLE_LINES))
-    signatures: list[tuple[str, ...]] = []
-    left = len(filled)
-    if not filled:
+def _labelled(lines: list[str]) -> tuple[list[str], list[str], list[str], list[int]] | None:
+    """(remarks above, names, rows of values, line of each row) of lines such as ``ax: 0.1, ay: 0.2``, or of
+    groups of such lines.
+
+    A row ends where a label comes again, so that lines may change their order, and one that is lost leaves its
+    cells empty.
+    """
+    filled = [(i, line) for i, line in enumerate(lines, start=1) if line.strip()]
+    sample = [line for _, line in filled[:_SAMPLE_LINES]]
+    if len(sample) < 3 or not _nearly_all(_HAS_LABEL, sample):
         return None
-    for _, line in filled:
-        signatures.append(tuple(label for label, _, _ in _PAIR.findall(line)))
-        left -= not signatures[-1]
-        # Most logs are no such text, which their first lines tell.
-        if left < max(3.0, NEARLY_ALL * len(filled)):
-            return None
-    filled += every
-    period = _period([s for s in signatures if s])
-    if period is None:
+    has_stamp = _nearly_all(_BARE_STAMP, sample)
+    known: dict[str, list[str]] = {}
+    parsed = [_pairs(_expanded(line, has_stamp), known) for line in sample]
+    if sum(not pairs for pairs in parsed) > (1.0 - NEARLY_ALL) * len(parsed):
         return None
-    cycle, n_values = period, sum(len(s) for s in period)
-    if n_values < 3:
+    counts = Counter(label for pairs in parsed for label, _ in pairs)
+    names = [label for label, count in counts.items() if count >= 2]
+    if len(names) < 3 or len(names) > _MOST_LABELS:
         return None
-    first = next(k for k in range(len(signatures)) if tuple(signatures[k : k + len(cycle)]) == cycle)
-    names: list[str] = []
-    for k in range(len(cycle)):
-        names += _names(filled[first + k][1])
     rows: list[str] = []
     numbers: list[int] = []
-    k = 0
-    while k < len(filled):
-        group = filled[k : k + len(cycle)]
-        pairs = [_PAIR.findall(line) for _, line in group]
-        if tuple(tuple(label for label, _, _ in p) for p in pairs) == cycle:
-            rows.append(",".join(value for p in pairs for _, value, _ in p))
-            numbers.append(group[0][0])
-            k += len(cycle)
+    row: dict[str, str] = {}
+    begun = 0
+    preamble: list[str] = []
+
+    def end() -> None:
+        if row:
+            rows.append(",".join(row.get(name, "") for name in names))
+            numbers.append(begun)
+            row.clear()
+
+    for number, line in filled:
+        pairs = _pairs(_expanded(line, has_stamp), known)
+        if not pairs or any(label not in counts for label, _ in pairs):
+            # A greeting above the first row is no row, nor is a line drawn between rows; the reader
+            # refuses the rest by number.
+            end()
+            if rows:
+                rows.append(line if any(map(str.isalnum, line)) else f"# {line}")
+                numbers.append(number)
+            elif line.startswith("#"):
+                preamble.append(line)
             continue
-        # A greeting above the first row is no row; anything else is left for the reader to refuse by its number.
-        if pairs[0] or (rows and len(cycle) == 1):
-            rows.append(group[0][1])
-            numbers.append(group[0][0])
-        k += 1
-    return names, rows, numbers
+        if not row.keys().isdisjoint(label for label, _ in pairs):
+            end()
+        begun = begun if row else number
+        row.update(pairs)
+    end()
+    return preamble, names, rows, numbers
 
 
-def _period(signatures: list[tuple[str, ...]]) -> tuple[tuple[str, ...], ...] | None:
-    """The shortest cycle of label sequences that nearly all lines follow."""
-    for length in range(1, _MAX_LINES_OF_ONE_ROW + 1):
-        if len(signatures) < 3 * length:
-            return None
-        cycles = Counter(tuple(signatures[k : k + length]) for k in range(0, len(signatures) - length + 1, length))
-        cycle, count = cycles.most_common(1)[0]
-        if count * length >= NEARLY_ALL * (len(signatures) - length):
-            return cycle
-    return None
+def _expanded(line: str, has_stamp: bool) -> str:
+    """A line with a label before each of three values that share one (``Accel: 1, 2, 3``), and before a bare stamp."""
+    if has_stamp:
+        line = _BARE_STAMP.sub(r"time: \1 ", line, count=1)
+    return _THREE.sub(r"\1 x: \2 \1 y: \3 \1 z: \4", line)
+
+
+def _pairs(line: str, known: dict[str, list[str]]) -> list[tuple[str, str]]:
+    """Labels and values of a line; ``known`` keeps the labels of lines that differ in their values only."""
+    found = list(_PAIR.finditer(line))
+    if not found:
+        return []
+    ends = [0, *(end for m in found for end in m.span(2)), len(line)]
+    between = "|".join(line[a:b] for a, b in zip(ends[::2], ends[1::2], strict=True))
+    if between not in known:
+        known[between] = _names(line)
+    return list(zip(known[between], (m.group(2) for m in found), strict=True))
 
 
 def _names(line: str) -> list[str]:

@@ -17,7 +17,8 @@ _NUMBERS, _NUMBERS_COMMA = (
 )
 """The same of all fields of a line, ends of lines between."""
 _UNIT_WORD = re.compile(
-    r"[\[(]?(s|m?secs?|m?seconds?|m?s|us|µs|ns|utc|m?g|m ?/ ?\(?s(?:ec)?(\^?2|²|/s)\)?|m ?s\^?-2|m?dps|rad|deg"
+    r"[\[(]?(s|m?secs?|m?seconds?|m?s|us|µs|ns|utc|m?g|g0|gal|rpm|milli-g|c?m ?/ ?\(?s(?:ec)?(\^?2|²|/s)\)?"
+    r"|c?m[. ]?s\^?-2|m?dps|dph|(deg|°) ?/ ?hr?|m?rads|rad[. ]s-1|rad|deg"
     r"|(m?rad|m?deg|°) ?(/ ?s(?:ec)?|s\^?-1)|counts?|lsb|raw|adc|no_units|u?t|µt|gauss|local_flux|m?v"
     r"|°?c|degc|degrees celsius|k?pa|y|-)?[\])]?$",
     re.IGNORECASE,

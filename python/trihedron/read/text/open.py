@@ -11,8 +11,11 @@ from trihedron.read.room import check_memory
 from trihedron.read.table import Table
 from trihedron.read.text.blocks import Cursor, as_utf8, beginning, blocks
 from trihedron.read.text.dialect import Rewritten, rewrite
+from trihedron.read.text.json_log import is_json, of_json
+from trihedron.read.text.novatel import of_novatel
 from trihedron.read.text.reader import TextReader
 from trihedron.read.text.records import split_records
+from trihedron.read.text.sensorstream import of_sensorstream
 from trihedron.records import Finding, FindingCode
 from trihedron.records.progress import Progress
 
@@ -43,15 +46,18 @@ def read_text(
     sample = first[:_SAMPLE_BYTES] if b"\x00" in first else as_utf8(path, first, 1)[:_SAMPLE_BYTES]
     head = sample.decode("utf-8", errors="replace")
     head = head[: head.rfind("\n") + 1] or head
+    if is_json(head):
+        return (_of_rewritten(path, size, progress, of_json(path, _whole(path, compression, size, content)), sha256),)
     if split_records(head) is not None:
         found = split_records(_whole(path, compression, size, content))
         if found is not None:
             tables, counts = found
             return _of_records(path, size, progress, tables, dict(counts), sha256)
-    if rewrite(head) is not None:
-        rewritten = rewrite(_whole(path, compression, size, content))
-        if rewritten is not None:
-            return (_of_rewritten(path, size, progress, rewritten, sha256),)
+    for dialect in (of_novatel, of_sensorstream, rewrite):
+        if dialect(head) is not None:
+            rewritten = dialect(_whole(path, compression, size, content))
+            if rewritten is not None:
+                return (_of_rewritten(path, size, progress, rewritten, sha256),)
     return (TextReader(path, compression, size, progress, content, None, sha256).read(),)
 
 

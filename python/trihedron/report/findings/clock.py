@@ -113,6 +113,16 @@ _STAMPS = (
 
 _RATES = (
     Entry(
+        Code.CLOCK_JUMPED,
+        "",
+        SERIOUS,
+        "The clock's rate changes by {percent:.2g} % {where}, and gravity {decided:?turns as if it had "
+        "not|does not tell which part is right}.",
+        "A clock that was set or switched in the middle of the log.",
+        "Split the log there and calibrate the parts one by one: gyro scale is inversely proportional to the rate.",
+        numbers=("sample",),
+    ),
+    Entry(
         Code.RATE_CONTRADICTED,
         "",
         WARNING,

@@ -9,12 +9,12 @@ from trihedron.records.finding import Severity
 from trihedron.report.findings.entry import Entry
 
 NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
-_SAY_ACCEL_UNIT = "Say it with --accel-unit m/s^2, g, mg or counts if this is wrong."
-_SAY_GYRO_UNIT = "Say it with --gyro-unit rad/s, mrad/s, deg/s or counts if this is wrong."
+_SAY_ACCEL_UNIT = "Say it with --accel-unit m/s^2, g, mg, ..., or counts, if this is wrong."
+_SAY_GYRO_UNIT = "Say it with --gyro-unit rad/s, deg/s, ..., or counts, if this is wrong."
 _SOURCE = "{is_given:?as you said|by its column names}"
 _TURNING = (
-    "{by_path:?in {n_turns} turns between rests gravity moved as far as a gyro in {turning_unit} says|"
-    "gravity turns with {slope:.2f} times the rate of a gyro in {turning_unit} (correlation {correlation:.2f})}"
+    "gravity turns {factor:.3g} (± {percent:.1g} %) times as fast as a gyro in {unit} says "
+    "(correlation {correlation:.2f})"
 )
 _INTEGRATED = "Turns that fall into a gap are integrated wrongly; repeat them."
 _CUT_OFF = "A log that was cut off, or a memory card with errors."
@@ -84,17 +84,16 @@ _UNITS = (
         "gyro-by-turning",
         SERIOUS,
         f"The gyro is in {{unit}} {_SOURCE}, but {_TURNING}.",
-        "A wrong unit or a wrong sampling rate.",
-        _SAY_GYRO_UNIT,
+        "A wrong unit; or, if the unit is right, each step of time lasts {factor:.3g} times as long as it was read.",
+        "Check --time-unit, --rate and --gyro-unit: gyro scale is inversely proportional to the rate.",
     ),
     Entry(
         Code.UNIT_CONTRADICTED,
-        "gyro-turns-too-far",
+        "gyro-no-unit",
         SERIOUS,
-        f"The gyro is in {{unit}} {_SOURCE}, but in {{turns}} turns between rests gravity moved {{turn_ratio:.3g}} "
-        "times as far as it can have.",
-        "A wrong unit, or a time base or rate that is wrong by that factor.",
-        "Check --time-unit, --rate and --gyro-unit: gyro scale is inversely proportional to the rate.",
+        f"No known gyro unit fits: {_TURNING}.",
+        "A time base or rate that is wrong by that factor, or a gyro in counts or a unit of its own.",
+        "State the gyro's unit (--gyro-unit, counts if it has none) and the clock (--time-unit, --rate).",
     ),
     Entry(
         Code.UNIT_DETECTED,
@@ -102,7 +101,7 @@ _UNITS = (
         NOTE,
         "The gyro's readings are whole numbers and were taken as counts.",
     ),
-    Entry(Code.UNIT_DETECTED, "gyro-by-turning", NOTE, f"The gyro's unit is {{turning_unit}}: {_TURNING}."),
+    Entry(Code.UNIT_DETECTED, "gyro-by-turning", NOTE, f"The gyro's unit is {{unit}}: {_TURNING}."),
     Entry(
         Code.UNIT_ASSUMED,
         "gyro",

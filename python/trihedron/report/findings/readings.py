@@ -12,6 +12,24 @@ NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 
 ENTRIES = (
     Entry(
+        Code.DEVICES_INTERLEAVED,
+        "",
+        SERIOUS,
+        "Rows alternate between the readings of {n} devices, and no column tells them apart.",
+        "Several sensors written into one log, row by row.",
+        "Log whose row it is, and read with --columns device=COLUMN --instance N; or split the log.",
+    ),
+    Entry(
+        Code.AXES_CHANGED,
+        "",
+        SERIOUS,
+        "In part {part} of {parts} of the log the gyro's axes fit the accelerometer's in another order or sign "
+        "than in the whole "
+        "(correlation {correlation:.2f} instead of {correlation_of_all:.2f}).",
+        "Axes of one sensor were swapped or turned in the middle of the log.",
+        "Split the log there, and calibrate the parts one by one.",
+    ),
+    Entry(
         Code.NON_FINITE,
         "readings",
         WARNING,

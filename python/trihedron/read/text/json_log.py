@@ -1,0 +1,181 @@
+"""JSON logs as tables: one object per line, a list of objects, columns by name, or the packets of known programs.
+
+What nests is named by its path (``imu.acc.x``); arrays of objects inside a packet (Movesense) are its samples, spread
+evenly to the next
+packet's stamp; ``sensors`` and ``values`` are Edge Impulse's.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from trihedron.read.errors import ReadError
+from trihedron.read.text.dialect import Rewritten
+
+_STAMPS = ("timestamp", "time", "t")
+_AXES = "xyz"
+
+
+def is_json(text: str) -> bool:
+    """A brace or bracket that opens a value; a monitor's ``[12:34:56.789]`` opens a stamp."""
+    start = text.lstrip("\ufeff \t\r\n")
+    rest = start[1:].lstrip()
+    return rest[:1] in ('"', "}", "") if start[:1] == "{" else start[:1] == "[" and rest[:1] in ("{", "[", '"', "]")
+
+
+def of_json(path: Path, text: str) -> Rewritten:
+    """The readings of a JSON text as lines of comma-separated values, and the line of each (of a text that is one
+    value: its row).
+
+    Raises
+    ------
+    ReadError
+        When it is damaged, or holds no rows of readings.
+    """
+    lines: list[int] | None
+    try:
+        rows, lines = _of_value(json.loads(text)), None
+    except ValueError:
+        rows, lines = _of_lines(path, text)
+    except RecursionError:
+        raise ReadError(f"{path}: this JSON nests too deep to be a log.") from None
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    if len(rows) < 2 or len(names) < 3:
+        raise ReadError(
+            f"{path}: this JSON holds no rows of readings known here; write them as one object per line, or "
+            "pass them from Python: trihedron.read({'t': ..., 'ax': ...})."
+        )
+    body = [",".join(_cell(row.get(name)) for name in names) for row in rows]
+    numbers = list(range(1, len(rows) + 1)) if lines is None else lines
+    head = ",".join(name.replace(",", " ") for name in names)
+    return Rewritten(
+        ("\n".join([head, *body]) + "\n").encode(),
+        np.array([numbers[0], *numbers, numbers[-1] + 1], dtype=np.int64),
+    )
+
+
+Row = dict[str, Any]
+
+
+def _of_lines(path: Path, text: str) -> tuple[list[Row], list[int]]:
+    rows: list[Row] = []
+    numbers: list[int] = []
+    lines = text.split("\n")
+    last = max((i for i, line in enumerate(lines) if line.strip()), default=-1)
+    packets: list[tuple[int, Any]] = []
+    for i, line in enumerate(lines):
+        if not line.strip():
+            continue
+        try:
+            packets.append((i + 1, json.loads(line)))
+        except (ValueError, RecursionError) as error:
+            if i == last and packets:  # cut off in the middle: a row of which nothing is known
+                packets.append((i + 1, {}))
+                continue
+            raise ReadError(f"{path}: line {i + 1} is no JSON ({str(error)[:80]}); mend or delete it.") from None
+    for (number, _), part in zip(packets, _spread([value for _, value in packets]), strict=True):
+        rows += part
+        numbers += [number] * len(part)
+    return rows, numbers
+
+
+def _of_value(value: Any) -> list[Row]:
+    """Rows of a whole document."""
+    if isinstance(value, Mapping):
+        inner = value.get("payload", value)
+        if (
+            isinstance(inner, Mapping)
+            and isinstance(inner.get("sensors"), list)
+            and isinstance(inner.get("values"), list)
+        ):
+            return _edge_impulse(inner)
+        columns = {k: v for k, v in _flat(value).items() if isinstance(v, list) and v}
+        tables = [v for v in columns.values() if isinstance(v[0], Mapping)]
+        if tables:
+            return _of_value(max(tables, key=len))
+        columns = {k: v for k, v in columns.items() if not isinstance(v[0], Mapping)}
+        longest = max(map(len, columns.values()), default=0)
+        kept = {k: v for k, v in columns.items() if len(v) == longest}
+        return [_flat({k: v[i] for k, v in kept.items()}) for i in range(longest)]
+    if isinstance(value, list) and value and all(isinstance(v, Mapping) for v in value):
+        return [row for part in _spread(value) for row in part]
+    if isinstance(value, list) and value and all(isinstance(v, list) for v in value) and isinstance(value[0][0], str):
+        return [dict(zip(value[0], row, strict=False)) for row in value[1:]]
+    return []
+
+
+def _edge_impulse(payload: Mapping[str, Any]) -> list[Row]:
+    names = [
+        f"{s.get('name', '')} [{s.get('units', '')}]".removesuffix(" []")
+        for s in payload["sensors"]
+        if isinstance(s, Mapping)
+    ]
+    given = payload.get("interval_ms")
+    step = float(given) if isinstance(given, int | float) else 0.0
+    return [
+        ({"time [ms]": i * step} if step > 0.0 else {}) | dict(zip(names, row, strict=False))
+        for i, row in enumerate(payload["values"])
+        if isinstance(row, list)
+    ]
+
+
+def _spread(packets: list[Any]) -> list[list[Row]]:
+    """Rows of every packet; several samples in one have stamps that run evenly to the next packet's."""
+    flat = [_flat(packet) if isinstance(packet, Mapping) else {} for packet in packets]
+    samples = [
+        {k: v for k, v in row.items() if isinstance(v, list) and v and isinstance(v[0], Mapping)} for row in flat
+    ]
+    if not any(samples):
+        return [[row] for row in flat]
+    out: list[list[Row]] = []
+    for i, (row, arrays) in enumerate(zip(flat, samples, strict=True)):
+        stamp = next((k for k in row if k.rsplit(".", 1)[-1].lower() in _STAMPS), "")
+        n = max(map(len, arrays.values()), default=1)
+        near = flat[i + 1] if i + 1 < len(flat) else flat[i - 1]
+        both = [float(x) for x in (row.get(stamp), near.get(stamp)) if isinstance(x, int | float)]
+        step = abs(both[1] - both[0]) / n if len(both) == 2 else 0.0
+        rows = []
+        for j in range(n):
+            one: Row = {k: v for k, v in row.items() if k not in arrays}
+            if step > 0.0:
+                one[stamp] = float(row[stamp]) + j * step
+            for name, values in arrays.items():
+                word = name.rsplit(".", 1)[-1].removeprefix("Array").lower()
+                if j < len(values) and isinstance(values[j], Mapping):
+                    one |= _flat(values[j], f"{word}.")
+            rows.append(one)
+        out.append(rows)
+    return out
+
+
+def _are_numbers(values: Iterable[Any]) -> bool:
+    return all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+
+
+def _flat(value: Mapping[str, Any], prefix: str = "") -> Row:
+    """Leaves by their path; three numbers are x, y, z."""
+    out: Row = {}
+    for key, leaf in value.items():
+        name = f"{prefix}{key}"
+        if isinstance(leaf, Mapping):
+            out |= _flat(leaf, f"{name}.")
+        elif isinstance(leaf, list) and len(leaf) == 3 and _are_numbers(leaf):
+            out |= {f"{name}.{axis}": v for axis, v in zip(_AXES, leaf, strict=True)}
+        else:
+            out[name] = leaf
+    return out
+
+
+def _cell(value: Any) -> str:
+    if value is None or isinstance(value, list):
+        return ""
+    if isinstance(value, bool):
+        return str(int(value))
+    if isinstance(value, str):
+        return " ".join(value.replace(",", " ").replace('"', " ").split())
+    return repr(value)

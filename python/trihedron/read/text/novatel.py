@@ -1,0 +1,45 @@
+"""NovAtel's RAWIMU messages in ASCII (RAWIMUA, RAWIMUXA and their short forms): increments of velocity and angle in
+counts."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from trihedron.read.text.dialect import Rewritten
+
+_COUNTS = r"(-?\d+),(-?\d+),(-?\d+),(-?\d+),(-?\d+),(-?\d+)"
+_MESSAGE = re.compile(
+    rf"\s*[#%]RAWIMUS?X?A,[^;]*;(?:[0-9a-fA-F]+,\d+,)?\d+,(\d+\.\d+),[0-9a-fA-F]+,{_COUNTS}(?:\*[0-9a-fA-F]+)?\s*"
+)
+_ANY = re.compile(r"\s*[#%$<][A-Za-z0-9]+,")
+_HEADER = "tow [s],acc x [counts],acc y [counts],acc z [counts],gyro x [counts],gyro y [counts],gyro z [counts]"
+
+
+def of_novatel(text: str) -> Rewritten | None:
+    """A table of GPS seconds and counts per sample on X, Y, Z; the messages hold them as Z, -Y, X, and -Y is
+    turned round here.
+
+    Other messages become remarks, which the reader counts. None where there is no RAWIMU message.
+    """
+    if "RAWIMU" not in text[:100_000]:
+        return None
+    lines = text.replace("\r\n", "\n").split("\n")
+    rows, numbers, n_messages = [_HEADER], [1], 0
+    for number, line in enumerate(lines, start=1):
+        if not line.strip():
+            continue
+        found = _MESSAGE.fullmatch(line)
+        if found is not None:
+            tow, *counts = found.groups()
+            acc_z, acc_y, acc_x, gyro_z, gyro_y, gyro_x = map(int, counts)
+            rows.append(f"{tow},{acc_x},{-acc_y},{acc_z},{gyro_x},{-gyro_y},{gyro_z}")
+            n_messages += 1
+        else:
+            # A damaged RAWIMU message stays as it is: the reader of tables names its line.
+            rows.append(f"# {line}" if _ANY.match(line) and "RAWIMU" not in line else line.lstrip("#% "))
+        numbers.append(number)
+    if not n_messages:
+        return None
+    return Rewritten(("\n".join(rows) + "\n").encode(), np.array([*numbers, numbers[-1] + 1], dtype=np.int64))

@@ -1,0 +1,308 @@
+"""What would be read wrong without a word: clocks that count, two devices in a stream, swapped axes, unknown units."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trihedron.read import ReadError, read_recording
+from trihedron.records import FindingCode, Severity
+from trihedron.units import AccelerationUnit, RateUnit
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benches" / "formats"))
+from drawn import G, session
+
+HEADER = "t,ax,ay,az,gx,gy,gz"
+
+
+def motion(rate_hz=100.0, seed=1, n_poses=10):
+    made = session(np.random.default_rng(seed), rate_hz, n_poses)
+    return made.time_s, made.force, made.rate
+
+
+def written(path, *columns, header=HEADER, remark=""):
+    body = "\n".join(
+        ",".join(f"{x:.7g}" if isinstance(x, float) else str(x) for x in row) for row in zip(*columns, strict=True)
+    )
+    path.write_text(f"{remark}{header}\n{body}\n")
+    return path
+
+
+def table(stamps, force, rate):
+    return (list(stamps), *(list(map(float, c)) for c in (*force.T, *rate.T)))
+
+
+def serious(recording):
+    return {f.code for f in recording.findings if f.severity is Severity.SERIOUS}
+
+
+@pytest.mark.parametrize("tick_s", [1 / 32768, 25e-6, 39.0625e-6, 62.5e-6])
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("", np.pi / 180), (" [dps]", np.pi / 180), (" [LSB]", np.pi / 180 / 16.4)]
+)
+@pytest.mark.parametrize("name", ["t", "ticks"])
+def test_ticks_of_an_unknown_size_are_asked_for(tmp_path, tick_s, unit, factor, name):
+    t, force, rate = motion()
+    rate = np.rint(rate / factor) if "LSB" in unit else rate / factor
+    header = f"{name},ax,ay,az,gx{unit},gy{unit},gz{unit}"
+    log = written(tmp_path / "log.csv", *table([round(x / tick_s) for x in t], force, rate), header=header)
+    assert serious(read_recording(log)) & {FindingCode.TIME_UNIT_DETECTED, FindingCode.UNIT_CONTRADICTED}
+    said = read_recording(log, time_unit=f"{tick_s * 1e6!r} us")
+    assert said.rate_hz == pytest.approx(100.0, rel=1e-4)
+    assert not serious(said)
+
+
+def test_a_doubtful_clock_is_settled_by_a_stated_gyro_unit_that_gravity_agrees_with(tmp_path):
+    t, force, rate = motion(1000.0, n_poses=4)
+    stamps = [round(x * 1e3) for x in t]
+    header = "t,ax,ay,az,gx [rad/s],gy [rad/s],gz [rad/s]"
+    told = read_recording(written(tmp_path / "log.csv", *table(stamps, force, rate), header=header))
+    assert told.rate_hz == pytest.approx(1000.0)
+    assert not serious(told)
+    untold = read_recording(written(tmp_path / "log.csv", *table(stamps, force, rate)))
+    assert FindingCode.TIME_UNIT_DETECTED in serious(untold)
+
+
+@pytest.mark.parametrize("remark", ["# sampling rate: 100 Hz\n", ""])
+def test_a_counter_under_the_name_of_a_time_runs_at_the_rate_that_is_told_and_tells_losses(tmp_path, remark):
+    t, force, rate = motion()
+    kept = np.delete(np.arange(len(t)), [500, 501, 502])
+    log = written(tmp_path / "log.csv", *table([int(k) for k in kept], force[kept], rate[kept]), remark=remark)
+    recording = read_recording(log, rate_hz=None if remark else 100.0)
+    assert recording.rate_hz == pytest.approx(100.0)
+    assert np.diff(recording.time_s).max() == pytest.approx(0.04)
+
+
+def test_turns_about_the_vertical_do_not_make_a_gyro_look_slow(tmp_path):
+    t, force, rate = motion()
+    # Spun about the vertical for most of the log, between the poses.
+    up = force / np.linalg.norm(force, axis=1)[:, None]
+    rate = rate + 3.0 * np.sin(2 * np.pi * t / 3.0)[:, None] * up
+    recording = read_recording(written(tmp_path / "log.csv", *table([f"{x:.3f}" for x in t], force, rate)))
+    assert recording.gyroscope_unit is RateUnit.RAD_S
+    assert not serious(recording)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("m/s2", 1.0), ("g0", G), ("mg", 1e-3 * G), ("cm/s^2", 1e-2), ("Gal", 1e-2)]
+)
+def test_a_stated_accelerometer_unit_is_obeyed(tmp_path, name, value):
+    t, force, rate = motion(n_poses=3)
+    header = f"t_s,ax [{name}],ay [{name}],az [{name}],gx,gy,gz"
+    recording = read_recording(written(tmp_path / "log.csv", *table(t, force / value, rate), header=header))
+    expected = {1.0: "m/s^2", G: "g", 1e-3 * G: "mg", 1e-2: "cm/s^2"}[value]
+    assert recording.accelerometer_unit is AccelerationUnit(expected)
+    assert not serious(recording)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("rpm", "rpm"), ("deg/h", "deg/h"), ("°/h", "deg/h"), ("mdps", "mdeg/s"), ("rad/s", "rad/s"), ("LSB", "counts")],
+)
+def test_a_stated_gyro_unit_is_obeyed(tmp_path, name, unit):
+    t, force, rate = motion(n_poses=3)
+    scale = {"rpm": np.pi / 30, "deg/h": np.pi / 648000, "mdeg/s": np.pi / 180e3}.get(unit, 1.0)
+    header = f"t_s,ax,ay,az,gx ({name}),gy ({name}),gz ({name})"
+    recording = read_recording(written(tmp_path / "log.csv", *table(t, force, rate / scale), header=header))
+    assert recording.gyroscope_unit is RateUnit(unit)
+    assert not serious(recording)
+
+
+@pytest.mark.parametrize("name", ["ft/s^2", "foo/s²", "1/s"])
+def test_a_unit_that_nobody_knows_is_asked_for_by_name(tmp_path, name):
+    t, force, rate = motion(n_poses=3)
+    header = f"t_s,ax [{name}],ay [{name}],az [{name}],gx,gy,gz"
+    log = written(tmp_path / "log.csv", *table(t, force, rate), header=header)
+    with pytest.raises(ReadError, match=rf"'{name.lower().replace('^', '.')}'.*--accel-unit|'{name}'"):
+        read_recording(log)
+    assert read_recording(log, accelerometer_unit="m/s^2").accelerometer_unit is AccelerationUnit.M_S2
+
+
+@pytest.mark.parametrize("same_stamps", [True, False])
+@pytest.mark.parametrize("name", ["ch", "port", "whose"])
+def test_two_devices_row_by_row_are_asked_for_whatever_the_column_is_called(tmp_path, same_stamps, name):
+    t, *first = motion(seed=1)
+    _, *second = motion(seed=2)
+    force, rate = (np.stack(pair, axis=1).reshape(-1, 3) for pair in zip(first, second, strict=True))
+    stamps = np.stack([t, t if same_stamps else t + 0.005], axis=1).ravel()
+    which = [k % 2 for k in range(len(stamps))]
+    log = written(tmp_path / "log.csv", *table(stamps, force, rate), which, header=f"{HEADER},{name}")
+    with pytest.raises(ReadError, match=rf"'{name}' tells 2 devices apart"):
+        read_recording(log)
+    recording = read_recording(log, instance=1)
+    np.testing.assert_allclose(recording.accelerometer, second[0], atol=1e-5)
+    bare = read_recording(written(tmp_path / "bare.csv", *table(stamps, force, rate)))
+    assert FindingCode.DEVICES_INTERLEAVED in serious(bare)
+
+
+@pytest.mark.parametrize("phi", [-0.5, 0.0, 0.9])
+def test_noise_that_alternates_is_one_device(tmp_path, phi):
+    t, force, rate = motion()
+    rng = np.random.default_rng(3)
+    noise = rng.standard_normal(force.shape)
+    for k in range(1, len(noise)):
+        noise[k] += phi * noise[k - 1]
+    recording = read_recording(written(tmp_path / "log.csv", *table(t, force + 0.03 * noise, rate)))
+    assert FindingCode.DEVICES_INTERLEAVED not in serious(recording)
+
+
+def test_readings_that_toggle_between_two_steps_are_one_device(tmp_path):
+    t, force, rate = motion()
+    force = 0.1 * np.rint(force / 0.1) + 0.1 * (np.arange(len(t)) % 2)[:, None]
+    assert FindingCode.DEVICES_INTERLEAVED not in serious(
+        read_recording(written(tmp_path / "log.csv", *table(t, force, rate)))
+    )
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_axes_swapped_in_the_middle_of_a_log_are_serious(tmp_path, share):
+    t, force, rate = motion(n_poses=16)
+    good = read_recording(written(tmp_path / "good.csv", *table(t, force, rate)))
+    assert not serious(good)
+    at = round(share * len(t))
+    rate[at:] = rate[at:, [1, 2, 0]]
+    swapped = read_recording(written(tmp_path / "log.csv", *table(t, force, rate)))
+    assert FindingCode.AXES_CHANGED in serious(swapped)
+
+
+@pytest.mark.parametrize("is_true", [True, False])
+def test_a_clock_that_changes_its_rate_is_serious_unless_gravity_turns_so_too(tmp_path, is_true):
+    t, force, rate = motion(n_poses=16)
+    half = len(t) // 2
+    stamps = np.where(t < t[half], t, t[half] + 1.25 * (t - t[half]))
+    if is_true:
+        rate[half:] /= 1.25
+    recording = read_recording(written(tmp_path / "log.csv", *table(stamps, force, rate)))
+    assert (FindingCode.CLOCK_JUMPED in serious(recording)) is not is_true
+
+
+def test_labelled_lines_in_changing_order_are_all_read(tmp_path):
+    t, force, rate = motion(n_poses=3)
+    lines = []
+    for k in range(len(t)):
+        pair = ["Acc: {:.5f}, {:.5f}, {:.5f}".format(*force[k]), "Gyro: {:.5f}, {:.5f}, {:.5f}".format(*rate[k])]
+        lines += pair if k % 3 else pair[::-1]
+    (tmp_path / "log.txt").write_text("\n".join(lines) + "\n")
+    recording = read_recording(tmp_path / "log.txt", rate_hz=100)
+    assert recording.rows_in_file == recording.rows_read == len(t)
+    np.testing.assert_allclose(recording.accelerometer, force, atol=1e-5)
+    np.testing.assert_allclose(recording.gyroscope, rate, atol=1e-5)
+
+
+def test_json_lines_lists_and_columns_are_read_alike(tmp_path):
+    import json
+
+    t, force, rate = motion(n_poses=3)
+    rows = [
+        {"t": round(float(x), 3), "acc": {"x": a[0], "y": a[1], "z": a[2]}, "gyro": [*w]}
+        for x, a, w in zip(t, force.tolist(), rate.tolist(), strict=True)
+    ]
+    columns = {"t": t.tolist(), "acc": {k: force[:, i].tolist() for i, k in enumerate("xyz")}}
+    columns |= {"gyro": {k: rate[:, i].tolist() for i, k in enumerate("xyz")}}
+    edge = {
+        "payload": {
+            "interval_ms": 10,
+            "sensors": [{"name": f"{s}{a}", "units": u} for s, u in (("acc", "m/s2"), ("gyr", "rad/s")) for a in "XYZ"],
+            "values": np.hstack([force, rate]).tolist(),
+        }
+    }
+    packets = [
+        {"imu": {"Timestamp": int(1000 * t[k]) + 5, "ArrayAcc": [rows[k + j]["acc"] for j in range(4)],
+                 "ArrayGyro": [dict(zip("xyz", rate[k + j].tolist(), strict=True)) for j in range(4)]}}
+        for k in range(0, len(t) // 4 * 4, 4)
+    ]  # fmt: skip
+    texts = {
+        "lines": "\n".join(map(json.dumps, rows)),
+        "list": json.dumps(rows),
+        "columns": json.dumps(columns),
+        "edge": json.dumps(edge),
+        "movesense": json.dumps({"data": packets}),
+    }
+    for name, text in texts.items():
+        (tmp_path / name).write_text(text)
+        recording = read_recording(tmp_path / name)
+        np.testing.assert_allclose(recording.accelerometer, force[: len(recording.time_s)], err_msg=name)
+        np.testing.assert_allclose(recording.gyroscope, rate[: len(recording.time_s)], err_msg=name)
+        assert recording.rate_hz == pytest.approx(100.0, rel=1e-3), name
+    (tmp_path / "cut").write_text(texts["lines"][:-40])
+    assert read_recording(tmp_path / "cut").rows_read >= len(t) - 1
+    (tmp_path / "bad").write_text(texts["lines"].replace('{"t": 0.05,', "oops", 1))
+    with pytest.raises(ReadError, match="line 6 is no JSON"):
+        read_recording(tmp_path / "bad")
+
+
+@pytest.mark.parametrize("start", [0, 250, 65530])
+@pytest.mark.parametrize("names", [None, ("t", "ax", "ay", "az", "gx", "gy", "gz")])
+def test_a_counter_in_front_of_a_streams_lines_is_no_clock(start, names):
+    from trihedron.pipeline.capturing import column_namer
+
+    wrap = 256 if start == 250 else 65536
+    rows = [[str((start + k) % wrap), *(f"{0.1 * j + k:.1f}" for j in range(6))] for k in range(12)]
+    found = column_namer()(names, rows)
+    assert (found.time, found.counter) == (None, 0)
+    clock = column_namer()(names, [[str(10 * k), *row[1:]] for k, row in enumerate(rows)])
+    assert (clock.time, clock.counter, clock.time_unit_s) == (0, None, 1e-3)
+    stated = column_namer(time_unit="ms")(names, [[str(k), *row[1:]] for k, row in enumerate(rows)])
+    assert (stated.time, stated.counter) == (0, None)
+
+
+def test_the_size_of_a_count_is_refused_where_readings_are_in_a_unit(tmp_path):
+    import trihedron
+
+    t, force, rate = motion(n_poses=3)
+    header = "t_s,ax [m/s^2],ay [m/s^2],az [m/s^2],gx [rad/s],gy [rad/s],gz [rad/s]"
+    log = written(tmp_path / "log.csv", *table(t, force, rate), header=header)
+    with pytest.raises(ValueError, match=r"gyro are in rad/s, not in counts"):
+        trihedron.noise(log, gyroscope_lsb="0.05 deg/s")
+
+
+def test_verbs_are_pickled_under_the_name_that_people_call():
+    import pickle
+
+    import trihedron
+
+    for name in trihedron.__all__:
+        assert pickle.loads(pickle.dumps(getattr(trihedron, name))) == getattr(trihedron, name)
+
+
+def test_mavlinks_and_other_names_are_known(tmp_path):
+    t, force, rate = motion(n_poses=3)
+    for names in (
+        "ustime,xacc,yacc,zacc,xgyro,ygyro,zgyro",
+        "us,imu0_ax,imu0_ay,imu0_az,imu0_gx,imu0_gy,imu0_gz",
+        "us,accX,accY,accZ,rotX,rotY,rotZ",
+        "us,ax,ay,az,p,q,r",
+        "us,acc1,acc2,acc3,gyro1,gyro2,gyro3",
+        "us,加速度X,加速度Y,加速度Z,ジャイロX,ジャイロY,ジャイロZ",
+    ):
+        path = written(tmp_path / "log.csv", *table([round(1e6 * x) for x in t], force, rate), header=names)
+        recording = read_recording(path)
+        assert recording.gyroscope is not None, names
+        assert recording.rate_hz == pytest.approx(100.0), names
+
+
+def test_sensorstream_rawimu_and_kitti_keep_every_reading(tmp_path):
+    t, force, rate = motion(n_poses=3)
+    lines, messages = [], []
+    oxts = tmp_path / "drive" / "oxts"
+    (oxts / "data").mkdir(parents=True)
+    for k, (x, a, w) in enumerate(zip(t, force, rate, strict=True)):
+        acc, gyr = (", ".join(f"{v:.4f}" for v in s) for s in (a, w))
+        lines.append(f"{x:.3f}, 3, {acc}, 4, {gyr}" + (", 5, 1.0, 2.0, 3.0" if k % 2 else ""))
+        c = np.rint(np.r_[a / 1e-3, w / 1e-4]).astype(int)
+        counts = f"{c[2]},{-c[1]},{c[0]},{c[5]},{-c[4]},{c[3]}"
+        messages.append(f"%RAWIMUSA,2105,{x:.3f};2105,{366000 + x:.9f},00000077,{counts}*b5c3d6f8")
+        (oxts / "data" / f"{k:010d}.txt").write_text(" ".join(map(str, [*range(11), *a, *a, *w, *w, *range(7)])))
+    stamps = [f"2011-09-26 13:02:{int(x):02d}.{round(1e9 * (x % 1)):09d}" for x in t]
+    (oxts / "timestamps.txt").write_text("\n".join(stamps) + "\n")
+    (tmp_path / "stream.csv").write_text("\n".join(lines) + "\n")
+    (tmp_path / "rawimu.txt").write_text("\n".join([*messages[:50], "#BESTPOSA,COM1;x,y", *messages[50:]]) + "\n")
+    stream = read_recording(tmp_path / "stream.csv")
+    np.testing.assert_allclose(stream.gyroscope, rate, atol=1e-4)
+    raw = read_recording(tmp_path / "rawimu.txt")
+    np.testing.assert_allclose(raw.accelerometer * 1e-3, force, atol=1e-3)
+    assert raw.rows_in_file == len(t) + 1
+    drive = read_recording(tmp_path / "drive")
+    np.testing.assert_allclose(drive.accelerometer, force)
+    assert drive.rate_hz == pytest.approx(100.0)
