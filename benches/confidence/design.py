@@ -1,4 +1,4 @@
-"""``python benches/confidence --design N``: thirteen factors of a session drawn at once, coverage at each of their levels.
+"""``python benches/confidence --design N``: thirteen factors of a session at once, coverage at each of their levels.
 
 A session is poses of a body that is moved by a hand, seen by two sensors; nothing here is taken from ``trihedron``.
 The bias that a session can know is the mean over its poses.
