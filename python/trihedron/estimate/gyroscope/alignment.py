@@ -112,6 +112,12 @@ class Aligned:
     inflation: float
     n_gyroscope: int
 
+    @property
+    def parameters(self) -> FloatArray:
+        """(24,) in the order of ``covariance``."""
+        S_f, b_f, S_w = self.fit.accelerometer_scale, self.fit.accelerometer_bias, self.fit.gyroscope_scale
+        return np.concatenate([np.ravel(S_f), b_f, np.ravel(S_w), self.gyroscope_bias])
+
 
 def align(
     measured: MoveMeasurements,

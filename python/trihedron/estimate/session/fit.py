@@ -54,6 +54,11 @@ class SessionSolution:
     iterations: int
     core: _core.SessionFit
 
+    @property
+    def parameters(self) -> FloatArray:
+        """(24,) in the order of ``covariance``."""
+        return np.concatenate([self.S_a.ravel(), self.b_a, self.S_w.ravel(), self.b_w])
+
 
 def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> SessionSolution:
     """Fit a session from a start on raw readings (``S_a`` lower triangular).
@@ -69,6 +74,29 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
             break
         inflation = wider
         core = core.widened(inflation)
+    return _solution(observed, core, inflation)
+
+
+def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
+    """The solution with other readings of the moves, from where it stands, at the same strengths of all noise."""
+    core = solution.core
+    state = _core.SessionState(
+        force_scale=core.force_scale,
+        force_bias=core.force_bias,
+        rate_scale=core.rate_scale,
+        up=core.up,
+        rate_zero=core.rate_zero,
+        force_zero=core.force_zero,
+        effect=np.zeros(0),
+    )
+    again = observed.model().fit(
+        state=state, strengths=core.strengths, force_effect=None, rate_effect=None, is_tuned=False
+    )
+    inflation = solution.inflation
+    return _solution(observed, again if inflation == (1.0, 1.0) else again.widened(inflation), inflation)
+
+
+def _solution(observed: Observed, core: _core.SessionFit, inflation: tuple[float, float]) -> SessionSolution:
     chi2, dof = (float(of_domains[MOVES]) for of_domains in _misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)
