@@ -75,3 +75,18 @@ def test_the_averaging_of_a_sensor_is_told_by_its_fit_and_else_by_its_prior():
     back = mean[:, None] + broadening(np.repeat(mean[:, None], 3, axis=1), t)
     # Ninth of a radian a sample: the second difference leaves h⁴/1920 of the value.
     assert np.abs(back[1:-1, 0] - value[1:-1]).max() < 1e-2 * np.abs(mean - value).max()
+
+
+def test_an_accelerometer_whose_bias_drifts_by_milli_g_keeps_its_uncertainties():
+    # The drift hides in the nine numbers of the poses, and S_f was off by up to 4.5, S_w by 7 standard errors.
+    scores = [largest(calibrated(seed, drift="accelerometer")[1]) for seed in (202, 203, 205, 206)]
+    assert max(score["S_f"] for score in scores) < 3.5
+    assert max(score["S_w"] for score in scores) < 4.0
+
+
+def test_a_coarse_gyro_turned_axis_by_axis_tells_the_bias_inside_its_step_from_what_turns():
+    # An axis that stands still reads its bias while another turns: b was off by a third of a step, by up to 96 errors.
+    for seed in (300, 301, 302):
+        _, z = calibrated(seed, bits=10, path="axis by axis", tremor_deg_s=0.0, move_s=2.5, grade="industrial")
+        assert largest(z)["b_w"] < 4.5
+        assert largest(z)["S_w"] < 4.5

@@ -236,10 +236,13 @@ def _pull_allowed(alone: SensorCalibration) -> float:
 
 
 def _pull_on_accelerometer(alone: SensorCalibration, joint: SensorCalibration) -> float:
-    """By how much the moves raise χ² of the still poses' norms: χ² with at most 9 degrees of freedom if both agree."""
+    """By how much the moves raise χ² of the still poses' norms: χ² with at most 9 degrees of freedom if both agree.
+
+    A bias that drifts raises it, and contradicts nothing: it counts in units of what one bias for the session misses.
+    """
     if alone.quality is None or joint.quality is None:
         return 0.0
-    return joint.quality.chi2 - alone.quality.chi2
+    return (joint.quality.chi2 - alone.quality.chi2) / joint.quality.covariance_scale
 
 
 def _joint_fit_left(pull: float) -> Finding:

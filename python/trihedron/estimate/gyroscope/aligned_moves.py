@@ -18,7 +18,7 @@ from trihedron.estimate.gyroscope.averaging import TRIED, averaging_of, broadeni
 from trihedron.estimate.gyroscope.lost_turns import is_asked_for_losses
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.resting_ends import resting_ends
-from trihedron.estimate.gyroscope.rounding import plateau_variance
+from trihedron.estimate.gyroscope.rounding import plateau_variance, resting_axes
 from trihedron.estimate.gyroscope.start import starts, turned_starts
 from trihedron.estimate.gyroscope.verification import is_astray, missed_deg, predict
 from trihedron.quantiles import medians
@@ -29,9 +29,9 @@ from trihedron.units import rate_to_si
 DENIED = 0.1
 """Part of what peaks that were cut would be short of by which gravity is missed, and they were not."""
 
-PASSES = 2
-"""Of the zero inside its step and the readings at rest that stand for it: a pass leaves of the error the part of a
-move that is still, a twentieth to a tenth."""
+LEFT, MOST_PASSES = 0.01, 12
+"""What is to be left of the error of a zero inside its step after fitting it and the readings at rest that stand for it
+in turn: a pass leaves the part of a move that is still, a tenth where all axes turn, two thirds where one does."""
 
 
 def measured_and_aligned(
@@ -110,9 +110,11 @@ def _with_still_ends(
         return measured, aligned, options
     quantum, rest = recording.facts.of("gyroscope").step, medians(segments.gyroscope_mean)
     is_still = resting_ends(recording.gyroscope, quantum, rest, axes, measured.edges)
+    is_still |= resting_axes(recording.gyroscope, quantum, rest, axes)
     still = np.mean(np.concatenate([is_still[a:b] for a, b in measured.edges.tolist()]), axis=0)
     rate = measured.rate
-    for _ in range(PASSES):
+    passes = np.log(LEFT) / np.log(np.clip(still.max(), LEFT, 1.0 - LEFT))
+    for _ in range(int(np.clip(np.ceil(passes), 2, MOST_PASSES))):
         S = np.asarray(aligned.fit.gyroscope_scale)
         hidden = np.linalg.pinv(S) @ np.asarray(aligned.fit.rate_offset)
         zero = measured.zero_mean - np.clip(hidden, -0.5 * quantum, 0.5 * quantum)
