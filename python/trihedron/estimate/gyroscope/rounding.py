@@ -52,9 +52,9 @@ def rounding_variance(
     for axis in np.flatnonzero(axes):
         codes, steady = _steady(readings[:, axis])
         out[:, axis] = _of_runs(codes, steady, float(quantum[axis]), float(rest[axis]))
-    for axis, begin, end in _standing(readings, quantum, rest, axes):
+    for still, begin, end in _standing(readings, quantum, rest, axes):
         # What of the others' turn reaches an axis that stands still stays inside its step, all along.
-        out[begin:end, axis] = np.maximum(out[begin:end, axis], (end - begin) * quantum[axis] ** 2 / 12.0)
+        out[begin:end, still] = np.maximum(out[begin:end, still], (end - begin) * quantum[still] ** 2 / 12.0)
     return out
 
 
