@@ -4,12 +4,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benches"))
 
 from confidence.design import session
 from confidence.motion import G
 from confidence.sensor import lower
+from confidence.sessions import table
 from trihedron import calibrate
 from trihedron.estimate.gyroscope.averaging import Averaging, averaging_of, broadening
 from trihedron.records import Recording
@@ -90,3 +92,21 @@ def test_a_coarse_gyro_turned_axis_by_axis_tells_the_bias_inside_its_step_from_w
         _, z = calibrated(seed, bits=10, path="axis by axis", tremor_deg_s=0.0, move_s=2.5, grade="industrial")
         assert largest(z)["b_w"] < 4.5
         assert largest(z)["S_w"] < 4.5
+
+
+def recorded(made, **more):
+    units = {"accelerometer_unit": "counts", "gyroscope_unit": "counts"}
+    return calibrate(Recording(made[3], made[0], made[1], made[2], **units), gravity_m_s2=G, **more)
+
+
+def test_faces_with_a_pose_left_out_and_faces_of_a_wrong_number_are_answered():
+    f, w, rate, _, motion = table(6, turns=(180.0, -180.0))
+    made = f, w, rate, np.arange(len(f)) / rate
+    n_poses = len(motion.rests)
+    up = [face for face in (1, -1, 2, -2, 3, -3) for _ in range(n_poses // 6)]
+    result = recorded(made, method="faces", faces=[*up[:-1], 0])
+    assert np.isnan(result.accelerometer.quality.residual[-1])
+    with pytest.raises(ValueError, match=f"faces must be {n_poses} numbers"):
+        recorded(made, method="faces", faces=up[:-1])
+    with pytest.raises(ValueError, match="belongs to method=.separate"):
+        recorded(made, loss="huber")
