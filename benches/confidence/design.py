@@ -40,13 +40,14 @@ PER_SAMPLE = {25.0: 24, 100.0: 6, 400.0: 2}
 
 @dataclass(frozen=True)
 class Session:
-    """Stamps (n,), readings (n, 3) of both sensors in counts, the rate [Hz] and the truth."""
+    """Stamps (n,), readings (n, 3) of both sensors in counts, the rate [Hz], the truth, and one entry a pose."""
 
     time_s: np.ndarray
     force: np.ndarray
     rate: np.ndarray
     rate_hz: float
     truth: Truth
+    rests: tuple[float, ...]
 
 
 def drawn(seed):
@@ -159,4 +160,4 @@ def _read_out(of, rates, forces, is_rest, per, rng):
     elif of["stamps"] == "lost rows":
         kept = rng.random(n) > 1e-3
     truth = Truth(units["f"][1], units["f"][2], units["w"][1], units["w"][2])
-    return Session(t[kept], units["f"][0][kept], units["w"][0][kept], rate_hz, truth)
+    return Session(t[kept], units["f"][0][kept], units["w"][0][kept], rate_hz, truth, (0.0,) * of["poses"])
