@@ -154,7 +154,7 @@ def _read_out(of, rates, forces, is_rest, per, rng):
     t = (np.arange(n) + 0.5) / rate_hz
     kept = np.ones(n, dtype=bool)
     if of["stamps"] == "late":
-        t = t + rng.exponential(0.1 / rate_hz, n)
+        t = np.maximum.accumulate(t + rng.exponential(0.1 / rate_hz, n))
     elif of["stamps"] == "milliseconds":
         t = np.round(t, 3)
     elif of["stamps"] == "lost rows":
