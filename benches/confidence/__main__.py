@@ -15,6 +15,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from confidence import design
 from confidence.judge import judge
 from confidence.machine import robot
 from confidence.motion import G
@@ -77,7 +78,7 @@ def answer(make, options, seed):
     method, is_stated = options.pop("method", "joint"), options.pop("is_stated", False)
     lost, is_remade = options.pop("lost", 0.0), options.pop("is_remade", False)
     f, w, rate, truth, motion = make(seed, **options)
-    t = np.arange(len(f)) / rate
+    t = getattr(motion, "time_s", np.arange(len(f)) / rate)
     if lost:
         kept = np.random.default_rng([14, seed]).random(len(t)) >= lost
         f, w, t = f[kept], w[kept], t[kept]
@@ -101,7 +102,11 @@ def main() -> None:
     parser.add_argument("--asked", action="store_true", help="the settings of the table of coverage, no others")
     parser.add_argument("--judge", type=Path, help="print coverage from such a file; run nothing")
     parser.add_argument("names", nargs="*")
+    parser.add_argument("--design", type=int, help="so many sessions of the thirteen-factor design, nothing else")
     given = parser.parse_args()
+    if given.design:
+        by_level(range(given.first, given.first + given.design))
+        return
     if given.judge:
         judge(given.judge)
         return
@@ -116,6 +121,28 @@ def main() -> None:
             with given.rows.open("a") as file:
                 file.writelines(json.dumps(row) + "\n" for row in rows)
         print(line(name, rows), flush=True)
+
+
+def by_level(seeds):
+    """Answers and shares within 1.96 σ of S and b of both sensors, at every level of every factor of the design."""
+    settings = {}
+    for seed in seeds:
+        levels = design.drawn(seed)
+        row = session("design", _designed(levels), {}, seed)
+        for name, level in levels.items():
+            settings.setdefault(f"{name} {level}", []).append(row)
+    for name, rows in settings.items():
+        print(line(name, rows), flush=True)
+
+
+def _designed(levels):
+    """A maker of sessions at these levels, in the shape of the others."""
+
+    def make(seed):
+        made = design.session(seed, **levels)
+        return made.force, made.rate, made.rate_hz, made.truth, made
+
+    return make
 
 
 def session(name, make, options, seed):

@@ -86,28 +86,6 @@ impl Layout {
         (residual, jacobian)
     }
 
-    /// Derivative with respect to all twelve accelerometer parameters, free or not.
-    pub fn wrt_accelerometer(&self, problem: &Alignment, at: &Evaluated) -> DMatrix<f64> {
-        let mut out = DMatrix::zeros(self.n, 12);
-        for (row, &offset) in self.rows.iter().zip(&self.offsets) {
-            match row {
-                Rows::Given(_) => {}
-                Rows::Norm(hold) => out.rows_mut(offset, 1).copy_from(
-                    &(at.forces[*hold].normalize().transpose()
-                        * force_wrt_accelerometer(&problem.holds[*hold].reading)),
-                ),
-                Rows::Move(index, plane) => {
-                    let link = problem.links[*index];
-                    let wrt = at.turns[*index].rotation
-                        * force_wrt_accelerometer(&problem.holds[link.before].reading)
-                        - force_wrt_accelerometer(&problem.holds[link.after].reading);
-                    out.rows_mut(offset, 2).copy_from(&(plane * wrt));
-                }
-            }
-        }
-        out
-    }
-
     /// Factor of C; `weights` below one inflate a move's own block by `1/weight`.
     pub fn covariance(
         &self,

@@ -36,8 +36,6 @@ pub struct Fit {
     /// `(p, p)` of the free parameters (accelerometer, `S_ω`, offset): noise of everything measured; no doubt about fixed
     /// accelerometer parameters.
     pub covariance: DMatrix<f64>,
-    /// `(p, 12)`: what an error of the accelerometer parameters does to the solution when they are fixed.
-    pub wrt_accelerometer: DMatrix<f64>,
     /// `(p, 3)`: covariance of the solution with the weighted mean of the zero readings.
     pub cov_with_zero: DMatrix<f64>,
     /// Weighted sum of squares, robust weights included, and its degrees of freedom.
@@ -259,9 +257,6 @@ fn finish(
     let left = (&jacobian * (&covariance * (jacobian.transpose() * &whitened))).norm();
     // x̂ = x − K ε with K = P Jᵀ in whitened rows: how anything that entered the rows reaches the solution.
     let gain = &covariance * jacobian.transpose();
-    let mut by_accelerometer = layout.wrt_accelerometer(problem, &at);
-    factor.whiten(&mut by_accelerometer);
-    let wrt_accelerometer = -&gain * by_accelerometer;
     let mut cov_with_zero = DMatrix::zeros(problem.n_parameters(), 3);
     for (hold, mut wrt) in layout.wrt_zero(problem, &at).into_iter().enumerate() {
         factor.whiten(&mut wrt);
@@ -277,7 +272,6 @@ fn finish(
     let dof = layout.n.saturating_sub(certainty.rank);
     Ok(Fit {
         covariance,
-        wrt_accelerometer,
         cov_with_zero,
         chi2,
         dof,

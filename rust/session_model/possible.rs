@@ -18,6 +18,8 @@ const POSSIBLE_SCATTER: [f64; 8] = [0.35, 0.55, 0.85, 1.3, 2.0, 3.2, 5.0, 10.0];
 const NONE_ALL_THE_SAME: f64 = 0.1;
 const EXPECTED_TO: f64 = 0.4;
 const POSSIBLE_CORNER_S: [f64; 4] = [20.0, 80.0, 320.0, 2560.0];
+/// Around strengths that the fit itself has beyond these grids.
+const AROUND: [f64; 3] = [0.4, 1.0, 2.5];
 /// Possibilities less likely than this beside the best change no error bar.
 const LEAST_WEIGHT: f64 = 1e-2;
 
@@ -57,12 +59,21 @@ pub(super) fn possible_scatters(fit: &Fit, session: &Session) -> Result<Vec<Poss
     }
     let evidence = Evidence::of(fit);
     let mut tried = Vec::new();
-    let scatters = scatters_beforehand(session.expected_scatter);
+    let mut scatters = scatters_beforehand(session.expected_scatter);
+    let (scatter, corner) = (fit.strengths.scatter[0], fit.strengths.corner_s[0]);
+    let unlikely = -(POSSIBLE_SCATTER.len() as f64).ln();
+    if scatter > POSSIBLE_SCATTER[POSSIBLE_SCATTER.len() - 1] {
+        scatters.extend(AROUND.map(|part| (part * scatter, unlikely)));
+    }
+    let mut corners = POSSIBLE_CORNER_S.to_vec();
+    if corner < POSSIBLE_CORNER_S[0] {
+        corners = AROUND.map(|part| part * corner).to_vec();
+    }
     for (which, (scatter, prior)) in scatters.iter().enumerate() {
-        for corner in POSSIBLE_CORNER_S {
+        for corner in &corners {
             let mut at = fit.strengths;
             at.scatter = [*scatter, fit.likely_scatter[1]];
-            at.corner_s[0] = corner;
+            at.corner_s[0] = *corner;
             tried.push((*prior, which, at));
         }
     }

@@ -10,6 +10,7 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.verdict import covariance_scale
 from trihedron.estimate.gyroscope.aligned_moves import measured_and_aligned
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions
+from trihedron.estimate.gyroscope.averaging import broadening
 from trihedron.estimate.gyroscope.findings import findings_of
 from trihedron.estimate.gyroscope.lost_turns import (
     PossibleLosses,
@@ -25,7 +26,7 @@ from trihedron.estimate.gyroscope.verification import held_out
 from trihedron.estimate.session.carried import carried
 from trihedron.estimate.session.figures import held_out as held_out_of_session
 from trihedron.estimate.session.figures import move_quality, norm_quality
-from trihedron.estimate.session.fit import SessionSolution, far_moves, solve_session
+from trihedron.estimate.session.fit import SessionSolution, far_moves, refitted, solve_session
 from trihedron.estimate.session.observed import Observed, arranged
 from trihedron.records.calibration import Calibration, FitQuality, Frame, SensorCalibration
 from trihedron.records.finding import Finding, FindingCode
@@ -101,7 +102,7 @@ def _by_session(
     anchors = segments.time_mid_s[measured.links]
     seen = carried(recording.time_s, measured, anchors, solution.S_a, solution.b_a, solution.S_w)
     left_out = held_out_of_session(recording.time_s, observed, measured, anchors, solution, options.n_folds)
-    covariance = solution.covariance.copy()
+    covariance = solution.covariance + _by_averaging(recording, segments, measured, aligned, gravity_m_s2, solution)
     if measured.attitude is not None:
         more = solution.S_w @ np.diag(measured.attitude.var_zero) @ solution.S_w.T
         covariance[21:, 21:] += np.diag(np.maximum(np.diag(more) - np.diag(covariance[21:, 21:]), 0.0))
@@ -155,6 +156,26 @@ def _by_session(
             *losses.findings(own_sigma),
         ),
     )
+
+
+def _by_averaging(
+    recording: Recording,
+    segments: Segments,
+    measured: MoveMeasurements,
+    aligned: Aligned,
+    gravity_m_s2: float,
+    solution: SessionSolution,
+) -> FloatArray:
+    """Covariance (24, 24) by what is not known of the sensor's averaging: a step of one standard error, fitted anew."""
+    found = measured.averaging
+    more = replace(
+        measured,
+        rate=measured.rate + found.sigma * broadening(measured.rate, recording.time_s),
+        averaging=replace(found, share=found.share + found.sigma),
+    )
+    observed = arranged(recording, segments, more, gravity_m_s2, aligned.used)
+    along = refitted(observed, solution).parameters - solution.parameters
+    return np.outer(along, along)
 
 
 def _without_far_moves(

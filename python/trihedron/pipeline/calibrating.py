@@ -12,7 +12,7 @@ import numpy as np
 from trihedron import probability
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm, shared_rounding
 from trihedron.estimate.accelerometer.bending import with_bending
-from trihedron.estimate.accelerometer.face_poses import identify
+from trihedron.estimate.accelerometer.face_poses import faces_up
 from trihedron.estimate.accelerometer.shapes import with_shapes
 from trihedron.estimate.gyroscope import (
     MoveOptions,
@@ -100,7 +100,7 @@ def calibrate(
     axis_signs : three of ±1
         Method 2: the sign with which each raw axis follows its axis of the body, by the board's documentation.
     loss : "linear", "huber", "soft_l1" or "cauchy"
-        Method 2: how far outlying poses count.
+        Method 2: how far outlying poses count; other than ``linear`` with ``separate`` or an accelerometer alone.
     gyroscope_nominal : float
         rad/s per raw unit, where readings are counts and too few moves tell it.
     reference : path, Recording or ReferenceMotion
@@ -144,6 +144,10 @@ def calibrate(
     else:
         if faces is not None:
             raise RefusedError(f"faces belong to method 1: say --method faces, or leave them out of {method}.")
+        if loss != "linear" and method == "joint" and recording.gyroscope is not None:
+            raise RefusedError(
+                f"--loss {loss} belongs to --method separate: one fit of both sensors has no robust loss."
+            )
         wanted = frame or "lower"
         options = MoveOptions(nominal_scale=gyroscope_nominal)
         calibration = _by_poses(
@@ -266,10 +270,13 @@ def _pull_allowed(alone: SensorCalibration) -> float:
 
 
 def _pull_on_accelerometer(alone: SensorCalibration, joint: SensorCalibration) -> float:
-    """By how much the moves raise χ² of the still poses' norms: χ² with at most 9 degrees of freedom if both agree."""
+    """By how much the moves raise χ² of the still poses' norms: χ² with at most 9 degrees of freedom if both agree.
+
+    A bias that drifts raises it, and contradicts nothing: it counts in units of what one bias for the session misses.
+    """
     if alone.quality is None or joint.quality is None:
         return 0.0
-    return joint.quality.chi2 - alone.quality.chi2
+    return (joint.quality.chi2 - alone.quality.chi2) / joint.quality.covariance_scale
 
 
 def _joint_fit_left(pull: float) -> Finding:
@@ -290,7 +297,7 @@ def _by_faces(
     unit = recording.accelerometer_unit
     assert mean is not None
     assert sigma_mean is not None
-    up = identify(mean, unit) if faces is None else np.asarray(faces, dtype=np.int64)
+    up = faces_up(mean, unit, faces)
     shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
     opposite = opposite_on_faces(recording, segments, up, turns_deg)
     accelerometer, found = calibrate_faces(

@@ -102,10 +102,10 @@ def shape_findings(calibration: Calibration, segments: Segments) -> tuple[Findin
     fitted, reading = calibration.accelerometer, segments.accelerometer_mean
     if fitted.quality is None or reading is None or len(fitted.quality.residual) != len(reading):
         return ()
-    up = verticals(fitted, reading)
-    seen = fitted.quality
+    seen, is_known = fitted.quality, np.isfinite(fitted.quality.residual)  # a pose that was left out misses nothing
+    up = verticals(fitted, reading)[is_known]
     scale = max(seen.covariance_scale, seen.chi2 / seen.dof if seen.dof > 0 else 1.0, 1.0)
-    shape = shape_of(up, seen.residual, seen.sigma, calibration.gravity_m_s2, scale)
+    shape = shape_of(up, seen.residual[is_known], seen.sigma[is_known], calibration.gravity_m_s2, scale)
     if shape is None:
         return ()
     return (

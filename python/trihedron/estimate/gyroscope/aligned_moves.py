@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from trihedron._core import Moves
 from trihedron.estimate.gyroscope.alignment import (
     AccelerometerPart,
     Aligned,
@@ -15,10 +14,11 @@ from trihedron.estimate.gyroscope.alignment import (
     align_screened,
     finished,
 )
+from trihedron.estimate.gyroscope.averaging import TRIED, averaging_of, broadening
 from trihedron.estimate.gyroscope.lost_turns import is_asked_for_losses
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.resting_ends import resting_ends
-from trihedron.estimate.gyroscope.rounding import plateau_variance
+from trihedron.estimate.gyroscope.rounding import plateau_variance, resting_axes
 from trihedron.estimate.gyroscope.start import starts, turned_starts
 from trihedron.estimate.gyroscope.verification import is_astray, missed_deg, predict
 from trihedron.quantiles import medians
@@ -29,9 +29,9 @@ from trihedron.units import rate_to_si
 DENIED = 0.1
 """Part of what peaks that were cut would be short of by which gravity is missed, and they were not."""
 
-PASSES = 2
-"""Of the zero inside its step and the readings at rest that stand for it: a pass leaves of the error the part of a
-move that is still, a twentieth to a tenth."""
+LEFT, MOST_PASSES = 0.01, 12
+"""What is to be left of the error of a zero inside its step after fitting it and the readings at rest that stand for it
+in turn: a pass leaves the part of a move that is still, a tenth where all axes turn, two thirds where one does."""
 
 
 def measured_and_aligned(
@@ -43,6 +43,14 @@ def measured_and_aligned(
     gyro at its limit does. Had peaks been cut there, the readings as they are would fall short by what bridges them.
     Where gravity is carried far better than that, nothing was cut, unless the code is the end of a converter's word.
     """
+    measured, aligned = _aligned_as_cut_or_not(recording, segments, part, gravity_m_s2, options)
+    measured, aligned, options = _with_still_ends(recording, segments, measured, aligned, part, gravity_m_s2, options)
+    return *_averaged(recording, segments, measured, aligned, part, gravity_m_s2, options), options
+
+
+def _aligned_as_cut_or_not(
+    recording: Recording, segments: Segments, part: AccelerometerPart, gravity_m_s2: float, options: MoveOptions
+) -> tuple[MoveMeasurements, Aligned]:
     bridged = _measured(recording, segments, part, options, is_bridged=True)
     facts = recording.facts.of("gyroscope")
     is_word = any(limit.is_word for limit in facts.limits)
@@ -50,9 +58,37 @@ def measured_and_aligned(
         measured = _measured(recording, segments, part, options, is_bridged=False)
         plain = _aligned(recording, measured, part, gravity_m_s2, options)
         if _denies_cut(plain, bridged, measured):
-            return _with_still_ends(recording, segments, measured, plain, part, gravity_m_s2, options)
-    aligned = _aligned(recording, bridged, part, gravity_m_s2, options)
-    return _with_still_ends(recording, segments, bridged, aligned, part, gravity_m_s2, options)
+            return measured, plain
+    return bridged, _aligned(recording, bridged, part, gravity_m_s2, options)
+
+
+def _averaged(
+    recording: Recording,
+    segments: Segments,
+    measured: MoveMeasurements,
+    aligned: Aligned,
+    part: AccelerometerPart,
+    gravity_m_s2: float,
+    options: MoveOptions,
+) -> tuple[MoveMeasurements, Aligned]:
+    """Moves of a sensor that averages over its interval as far as they show it, and what they leave open of that."""
+    rate, lost, variance = measured.rate, broadening(measured.rate, recording.time_s), measured.reading_variance
+
+    def at(share: float) -> tuple[MoveMeasurements, Aligned]:
+        read = measured.of_rate(recording, segments, rate + share * lost, variance, options.rate_degree)
+        start = np.asarray(aligned.fit.gyroscope_scale)[None]
+        fit = align(read, part, gravity_m_s2, start, options, aligned.used)
+        return read, finished(fit, read, part, aligned.used, aligned.outliers)
+
+    points, half, means = (at(share)[1] for share in TRIED)
+    excess = max(aligned.inflation, 1.0)
+    found = averaging_of((points.fit.chi2 / excess, half.fit.chi2 / excess, means.fit.chi2 / excess))
+    along = found.sigma * (means.parameters - points.parameters)
+    measured, aligned = at(found.share)
+    return (
+        replace(measured, averaging=found),
+        replace(aligned, covariance=aligned.covariance + np.outer(along, along)),
+    )
 
 
 def _with_still_ends(
@@ -74,23 +110,17 @@ def _with_still_ends(
         return measured, aligned, options
     quantum, rest = recording.facts.of("gyroscope").step, medians(segments.gyroscope_mean)
     is_still = resting_ends(recording.gyroscope, quantum, rest, axes, measured.edges)
+    is_still |= resting_axes(recording.gyroscope, quantum, rest, axes)
     still = np.mean(np.concatenate([is_still[a:b] for a, b in measured.edges.tolist()]), axis=0)
     rate = measured.rate
-    for _ in range(PASSES):
+    passes = np.log(LEFT) / np.log(np.clip(still.max(), LEFT, 1.0 - LEFT))
+    for _ in range(int(np.clip(np.ceil(passes), 2, MOST_PASSES))):
         S = np.asarray(aligned.fit.gyroscope_scale)
         hidden = np.linalg.pinv(S) @ np.asarray(aligned.fit.rate_offset)
         zero = measured.zero_mean - np.clip(hidden, -0.5 * quantum, 0.5 * quantum)
         read = np.where(is_still, zero, rate)
-        moves = Moves(
-            recording.time_s,
-            np.ascontiguousarray(read),
-            measured.edges,
-            np.ascontiguousarray(segments.time_mid_s[measured.links]),
-            measured.links,
-            options.rate_degree,
-            measured.reading_variance,
-        )
-        measured = replace(measured, moves=moves, rate=read, still=still)
+        variance = measured.reading_variance
+        measured = replace(measured, still=still).of_rate(recording, segments, read, variance, options.rate_degree)
         aligned = align_screened(measured, part, gravity_m_s2, S[None], options)
     if is_asked_for_losses(recording.time_s, measured, aligned, aligned.fit.chi2, aligned.fit.dof):
         return measured, aligned, options
@@ -114,16 +144,7 @@ def _with_plateaus(
     if shared is None:
         return measured, aligned
     variance = shared if measured.reading_variance is None else np.maximum(measured.reading_variance, shared)
-    moves = Moves(
-        recording.time_s,
-        np.ascontiguousarray(measured.rate),
-        measured.edges,
-        np.ascontiguousarray(segments.time_mid_s[measured.links]),
-        measured.links,
-        options.rate_degree,
-        variance,
-    )
-    measured = replace(measured, moves=moves, reading_variance=variance)
+    measured = measured.of_rate(recording, segments, measured.rate, variance, options.rate_degree)
     start = np.asarray(aligned.fit.gyroscope_scale)[None]
     fit = align(measured, part, gravity_m_s2, start, options, aligned.used)
     return measured, finished(fit, measured, part, aligned.used, aligned.outliers)

@@ -28,6 +28,9 @@ FALSE_ALARM = 1e-3
 LEAST_SHRINK = 0.1
 """Of residuals by what was fitted to them: hardly any freedom is left, and a ratio of noise says no more."""
 
+TINY = 1e-300
+"""Variance of what is known exactly, to divide by."""
+
 AT_LEAST = 0.84
 """One standard error: as much of the rounding charged as misses with this chance would be larger than those seen."""
 
@@ -108,6 +111,12 @@ class Aligned:
     outliers: tuple[int, ...]
     inflation: float
     n_gyroscope: int
+
+    @property
+    def parameters(self) -> FloatArray:
+        """(24,) in the order of ``covariance``."""
+        S_f, b_f, S_w = self.fit.accelerometer_scale, self.fit.accelerometer_bias, self.fit.gyroscope_scale
+        return np.concatenate([np.ravel(S_f), b_f, np.ravel(S_w), self.gyroscope_bias])
 
 
 def align(
@@ -234,30 +243,28 @@ def assemble(
 ) -> Aligned:
     """Covariance of (S_f, b_f, S_ω, b_ω) from that of the fit, of the zero readings and of a fixed accelerometer.
 
-    ``b_ω = −S_ω z̄ + offset``, so ``δb = −δS_ω z̄ − S_ω δz̄ + δoffset``.
+    ``b_ω = −S_ω z̄ + offset``, so ``δb = −δS_ω z̄ − S_ω δz̄ + δoffset``. The fit's own error is independent of ``z̄`` and
+    of the accelerometer, whose errors it follows: what widens or narrows it leaves these alone, and the whole positive.
     """
     S = np.asarray(fit.gyroscope_scale)
     k = accelerometer.basis.shape[1]
     p = fit.covariance.shape[0]
-    inner = inflation * (np.asarray(fit.covariance) + _unseen(fit, S, k))
+    of_fit, sigma_zero = np.asarray(fit.covariance), np.sqrt(measured.var_zero_mean)
+    # How (fit parameters, z̄, given accelerometer) follow errors of unit size: of z̄, and of the given directions.
+    given = accelerometer.basis if accelerometer.is_given else np.zeros((12, 0))
+    follows = np.zeros((p + 15, 3 + given.shape[1]))
+    follows[:p, :3] = fit.cov_with_zero / np.maximum(sigma_zero, TINY)
+    follows[:p, 3:] = of_fit[:, : given.shape[1]]
+    follows[p : p + 3, :3] = np.diag(sigma_zero)
+    follows[p + 3 :, 3:] = given
+    own = _positive(inflation * (of_fit + _unseen(fit, S, k)) - follows[:p] @ follows[:p].T)
     narrower = np.ones(p)
     narrower[k : k + 9] = _narrowing(fit, measured)
     # The core's offset acts on whole moves.
     narrower[k + 9 :] = _narrowing(fit, measured) / (1.0 - min(0.5, float(measured.still.max())))
-    inner = inner * np.outer(narrower, narrower)
-    cov_accelerometer = accelerometer.model.covariance if accelerometer.is_given else np.zeros((12, 12))
-    response = np.asarray(fit.wrt_accelerometer)
-    # y = (fit parameters, z̄, given accelerometer).
-    n = p + 3 + 12
-    joint = np.zeros((n, n))
-    joint[:p, :p] = inner
-    joint[:p, p : p + 3] = fit.cov_with_zero
-    joint[p : p + 3, :p] = np.asarray(fit.cov_with_zero).T
-    joint[p : p + 3, p : p + 3] = np.diag(measured.var_zero_mean)
-    joint[:p, p + 3 :] = response @ cov_accelerometer
-    joint[p + 3 :, :p] = joint[:p, p + 3 :].T
-    joint[p + 3 :, p + 3 :] = cov_accelerometer
-    to_all = np.zeros((24, n))
+    joint = follows @ follows.T
+    joint[:p, :p] += own * np.outer(narrower, narrower)
+    to_all = np.zeros((24, p + 15))
     if accelerometer.is_given:
         to_all[:12, p + 3 :] = np.eye(12)
     else:
@@ -279,6 +286,15 @@ def assemble(
         inflation=inflation,
         n_gyroscope=p - k,
     )
+
+
+def _positive(covariance: FloatArray) -> FloatArray:
+    """A covariance without what rounding leaves below zero, whatever the units of its parameters."""
+    size = np.sqrt(np.maximum(np.diag(covariance), TINY))
+    values, vectors = np.linalg.eigh(covariance / np.outer(size, size))
+    root = size[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    out: FloatArray = root @ root.T
+    return out
 
 
 def _narrowing(fit: AlignmentFit, measured: MoveMeasurements) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from trihedron import _core
 from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
+from trihedron.estimate.gyroscope.averaging import Averaging
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.rounding import (
     common_zero,
@@ -48,7 +49,8 @@ class MoveMeasurements:
     whose zero lies hidden inside a step of the converter. ``zero_read``, ``var_zero_read`` (n, 3) are the zeros as each
     hold alone shows them, ``var_reading_noise`` (n, 3) the variance of the hold means by noise alone,
     ``reading_variance`` (samples, 3) that of gyro readings which were bridged or rounded; ``still`` (3,) the part of
-    the moves' samples in which an axis stands at its zero, so that an offset fitted to moves does not act there.
+    the moves' samples in which an axis stands at its zero, so that an offset fitted to moves does not act there;
+    ``averaging`` by how much ``rate`` was sharpened, the readings being means over their interval.
     """
 
     moves: Moves
@@ -77,6 +79,15 @@ class MoveMeasurements:
     var_reading_noise: FloatArray
     reading_variance: FloatArray | None
     still: FloatArray = field(default_factory=lambda: np.zeros(3))
+    averaging: Averaging = field(default_factory=Averaging)
+
+    def of_rate(
+        self, recording: Recording, segments: Segments, rate: FloatArray, variance: FloatArray | None, degree: int
+    ) -> MoveMeasurements:
+        """The same moves with other gyro readings (n, 3), and what is uncertain of each (n, 3)."""
+        mid_s = np.ascontiguousarray(segments.time_mid_s[self.links])
+        moves = Moves(recording.time_s, np.ascontiguousarray(rate), self.edges, mid_s, self.links, degree, variance)
+        return replace(self, moves=moves, rate=rate, reading_variance=variance)
 
     @property
     def is_lost(self) -> BoolArray:

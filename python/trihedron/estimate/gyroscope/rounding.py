@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -19,6 +20,9 @@ in that for the first, and the samples over which what it still turns, rms over 
 a step's uniform error, for each sample that the first step took."""
 CHATTER = 9
 """Readings whose median is free of toggling between neighbouring codes."""
+LONGER = 4
+"""Times what an axis takes to leave the step of its zero, or what chatter hides, for which it must stay in it while
+others turn to count as standing still."""
 QUIETEST = 0.2
 """Quantile of the variances of steady stretches that is their noise's."""
 LEAST_WHITE = 1e-2
@@ -48,6 +52,9 @@ def rounding_variance(
     for axis in np.flatnonzero(axes):
         codes, steady = _steady(readings[:, axis])
         out[:, axis] = _of_runs(codes, steady, float(quantum[axis]), float(rest[axis]))
+    for still, begin, end in _standing(readings, quantum, rest, axes):
+        # What of the others' turn reaches an axis that stands still stays inside its step, all along.
+        out[begin:end, still] = np.maximum(out[begin:end, still], (end - begin) * quantum[still] ** 2 / 12.0)
     return out
 
 
@@ -125,6 +132,43 @@ def _of_runs(codes: FloatArray, steady: FloatArray, quantum: float, rest: float)
     is_passed = np.zeros(len(level), dtype=bool)
     is_passed[1:-1] = step[1:] * step[:-1] > 0.0
     out = np.repeat(np.where(is_passed, 1.0 / count, count).astype(np.float64), count)
+    for begin, end, left, right in _rests(steady, quantum, rest):
+        n = end - begin
+        part = np.zeros(n)
+        part[:left] = left
+        if right:
+            part[-right:] = np.maximum(part[-right:], right)
+        out[begin:end] = part
+    return out * quantum**2 / 12.0
+
+
+def resting_axes(readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray) -> BoolArray:
+    """Readings (n, 3) of ``axes`` (3,) at which the axis stands still while another one turns."""
+    out = np.zeros(readings.shape, dtype=np.bool_)
+    for axis, begin, end in _standing(readings, quantum, rest, axes):
+        out[begin:end, axis] = True
+    return out
+
+
+def _standing(
+    readings: FloatArray, quantum: FloatArray, rest: FloatArray, axes: BoolArray
+) -> Iterator[tuple[int, int, int]]:
+    """(axis, begin, end) where an axis stays in the step of its zero, others turning, far longer than it takes to leave
+    it: where all axes turn, each passes that step or leaves it with the others."""
+    turns = np.abs(readings - rest) > 1.75 * quantum
+    for axis in np.flatnonzero(axes).tolist():
+        others = np.any(turns[:, np.arange(3) != axis], axis=1)
+        steady = _steady(readings[:, axis])[1]
+        for first, last, left, right in _rests(steady, float(quantum[axis]), float(rest[axis])):
+            inside = first + left, last - right
+            for begin, end in ranges_of(others[inside[0] : inside[1]]):
+                if end - begin > LONGER * max(left, right, CHATTER):
+                    yield axis, inside[0] + begin, inside[0] + end
+
+
+def _rests(steady: FloatArray, quantum: float, rest: float) -> Iterator[tuple[int, int, int, int]]:
+    """Stretches (begin, end) in which an axis stands in the step of its zero, and the samples at either end in which it
+    may turn unseen."""
     away = np.abs(steady - rest)
     # Between the two nearest codes a zero may toggle.
     is_rest, is_next = away < 0.75 * quantum, away < 1.75 * quantum
@@ -137,15 +181,9 @@ def _of_runs(codes: FloatArray, steady: FloatArray, quantum: float, rest: float)
         # Whether the move before and the one after go the same way says nothing.
         outer = next(one for one in beyond if one[0] <= first and last <= one[1])
         left = _hidden(begin - first, first - outer[0]) if first > 0 else 0
-        right = _hidden(last - end, outer[1] - last) if last < len(codes) else 0
-        if n <= min(left, right):
-            continue  # passed on the way, or turned back in
-        part = np.zeros(n)
-        part[:left] = min(left, n)
-        if right:
-            part[-right:] = np.maximum(part[-right:], min(right, n))
-        out[begin:end] = part
-    return out * quantum**2 / 12.0
+        right = _hidden(last - end, outer[1] - last) if last < len(steady) else 0
+        if n > min(left, right):  # else passed on the way, or turned back in
+            yield begin, end, min(left, n), min(right, n)
 
 
 def _hidden(first_step: int, second_step: int) -> int:

@@ -26,12 +26,12 @@ def norm_quality(
     """Norm of every hold at the saved S, b of the accelerometer; ``held`` (n,) is that of fits without the hold."""
     residual, sigma = norm_errors(observed, solution.S_a, solution.b_a)
     dof = max(len(residual) - N_ACCELEROMETER, 0)
-    total = float(np.sum(residual**2))
+    total, chi2 = float(np.sum(residual**2)), float(np.sum((residual / np.maximum(sigma, 1e-300)) ** 2))
     return FitQuality(
         unit="m/s^2",
         residual=residual,
         sigma=sigma,
-        chi2=float(np.sum((residual / np.maximum(sigma, 1e-300)) ** 2)),
+        chi2=chi2,
         dof=dof,
         rms=float(np.sqrt(total / len(residual))),
         rms_dof=float(np.sqrt(total / dof)) if dof else float("nan"),
@@ -41,6 +41,8 @@ def norm_quality(
         held_out_rms=None if held is None else float(np.sqrt(np.mean(held**2))),
         n_iterations=solution.iterations,
         stopped_because=solution.stopped_because,
+        # What one bias for the session misses of a drift is in the covariance.
+        covariance_scale=max(chi2 / dof, 1.0) if solution.is_drifting and dof else 1.0,
     )
 
 

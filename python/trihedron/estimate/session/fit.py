@@ -23,8 +23,15 @@ DEAF = 1e3
 MOST_WIDENINGS = 8
 SETTLED = 1.05
 """χ² per degree of freedom at which moves that were widened are as uncertain as they miss."""
+DRIFTS_S, DRIFT_GATE = (8.0, 3.2, 1.3, 0.5), 5.41
+"""Corner times of the accelerometer's walk beyond the edge of the core's grid, that is of a bias that drifts, and twice
+the gain in log-likelihood of all rows, moves among them, that makes one count: the gate of a scatter (11.12)."""
 STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 """Labels of rows: accelerometer at rest, gravity after a move, velocity over it."""
+
+
+Strengths = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
+"""Corner times [s], scatters, straying between poses; accelerometer, gyro each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +61,16 @@ class SessionSolution:
     iterations: int
     core: _core.SessionFit
 
+    @property
+    def is_drifting(self) -> bool:
+        """Whether the accelerometer's bias drifts beyond the fastest walk of its grid."""
+        return self.core.strengths[0][0] <= max(DRIFTS_S)
+
+    @property
+    def parameters(self) -> FloatArray:
+        """(24,) in the order of ``covariance``."""
+        return np.concatenate([self.S_a.ravel(), self.b_a, self.S_w.ravel(), self.b_w])
+
 
 def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> SessionSolution:
     """Fit a session from a start on raw readings (``S_a`` lower triangular).
@@ -61,7 +78,7 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
     Moves that miss by more than their samples' noise explains count with the noise that they show, and a velocity that
     does is left out: what the linear model lacks there must not be spread over the accelerometer.
     """
-    core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w)
+    core = _with_drift(observed, fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w))
     inflation = (1.0, 1.0)
     for _ in range(MOST_WIDENINGS):
         wider = _inflation(core, inflation)
@@ -69,6 +86,43 @@ def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: Flo
             break
         inflation = wider
         core = core.widened(inflation)
+    return _solution(observed, core, inflation)
+
+
+def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
+    """The solution with other readings of the moves, from where it stands, at the same strengths of all noise."""
+    again, inflation = _again(observed, solution.core, solution.core.strengths), solution.inflation
+    return _solution(observed, again if inflation == (1.0, 1.0) else again.widened(inflation), inflation)
+
+
+def _with_drift(observed: Observed, core: _core.SessionFit) -> _core.SessionFit:
+    """The fit with the accelerometer's bias free to drift, where its walk stands at the edge and the rows ask for more.
+
+    A smooth drift hides in the nine numbers of few poses: moves show it.
+    """
+    if not core.is_walk_at_edge[0] or len(observed.before) == 0:
+        return core
+    (_, of_gyro), scatter, between = core.strengths
+    tried = [_again(observed, core, ((corner, of_gyro), scatter, between)) for corner in DRIFTS_S]
+    best = max(tried, key=lambda one: one.log_marginal)
+    return best if 2.0 * (best.log_marginal - core.log_marginal) > DRIFT_GATE else core
+
+
+def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths) -> _core.SessionFit:
+    """The fit of a session from where another one stands, strengths of all noise given."""
+    state = _core.SessionState(
+        force_scale=core.force_scale,
+        force_bias=core.force_bias,
+        rate_scale=core.rate_scale,
+        up=core.up,
+        rate_zero=core.rate_zero,
+        force_zero=core.force_zero,
+        effect=np.zeros(0),
+    )
+    return observed.model().fit(state=state, strengths=strengths, force_effect=None, rate_effect=None, is_tuned=False)
+
+
+def _solution(observed: Observed, core: _core.SessionFit, inflation: tuple[float, float]) -> SessionSolution:
     chi2, dof = (float(of_domains[MOVES]) for of_domains in _misfits(core))
     covariance, b_w = core.linear_covariance(observed.force_origin, observed.rate_origin)
     S_a, S_w = np.asarray(core.force_scale), np.asarray(core.rate_scale)

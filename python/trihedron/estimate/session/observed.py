@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
+from trihedron.estimate.gyroscope.averaging import broadening
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
@@ -84,6 +85,7 @@ def arranged(
         ranges.append((a, b))
         before.append(hold)
     noise = measure_noise(recording, segments, ranges)
+    force = recording.accelerometer + measured.averaging.share * broadening(recording.accelerometer, recording.time_s)
     assert noise.rate_sigma is not None
     assert noise.rate_density is not None
     unresolved = noise.unresolved
@@ -107,7 +109,7 @@ def arranged(
         moves=_core.SessionMoves(
             hold_time_s=hold_time_s,
             time_s=np.ascontiguousarray(recording.time_s),
-            force=np.ascontiguousarray(recording.accelerometer - force_origin),
+            force=np.ascontiguousarray(force - force_origin),
             rate=np.ascontiguousarray(measured.rate - rate_origin),
             ranges=np.array(ranges, dtype=np.int64).reshape(-1, 2),
             before=np.array(before, dtype=np.int64),

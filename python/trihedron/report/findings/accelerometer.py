@@ -93,9 +93,9 @@ ENTRIES = (
         Code.NONLINEAR_RESIDUAL,
         "not-excluded",
         WARNING,
-        "What the still poses miss of |g| beyond their noise may be zeros that scatter or an axis that bends (odds of "
-        "the latter {weight:.0f %}); error bars of S and b allow for both, up to {widening:.2g} times as wide as for "
-        "scatter alone.",
+        "Poses miss |g| beyond their noise: biases that differ from pose to pose, or axes that are not linear. The "
+        "latter may put the scale off by {scale_part:.2g %} (1 σ); it makes uncertainties of S and b up to "
+        "{widening:.2g} times as large.",
         "Too few poses to tell one from the other, or an accelerometer that is not linear.",
         "Log more poses (24 or more), spread over all directions; `trihedron diagnose` looks for the cause.",
     ),

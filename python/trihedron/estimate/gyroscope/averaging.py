@@ -1,0 +1,47 @@
+"""Sensors that average over the sample interval, as many do whose filter decimates (docs/model-session.md, 11.6d).
+
+A mean m over the interval T is the value in its middle but for T²/24 of its second derivative: ω = m - a/24 (m₋ - 2 m +
+m₊), a = 1 of a sensor that averages, 0 of one that samples points. The turn over a move, a sum of means, knows no
+difference; rotations that do not commute do. Which sensor it is, moves show as far as it matters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+
+EITHER = 0.5
+"""Prior mean and standard deviation of ``a``: a sensor of either kind is one standard deviation off."""
+TRIED = (0.0, 0.5, 1.0)
+"""Values of ``a`` through which the parabola of χ² is laid."""
+GAP = 1.5
+"""A step longer than this many usual ones has lost samples: there is no second difference across."""
+
+
+@dataclass(frozen=True)
+class Averaging:
+    """Share ``a`` of the interval's broadening in the readings, and its standard error."""
+
+    share: float = 0.0
+    sigma: float = 0.0
+
+
+def broadening(readings: FloatArray, time_s: FloatArray) -> FloatArray:
+    """(n, 3) what readings (n, 3) lose of the value in the middle when they are means over their interval."""
+    steps = np.diff(time_s)
+    is_whole = steps < GAP * np.median(steps)
+    out = np.zeros(readings.shape)
+    second = np.diff(readings, 2, axis=0)
+    out[1:-1] = np.where((is_whole[1:] & is_whole[:-1])[:, None] & np.isfinite(second), second / 24.0, 0.0)
+    return -out
+
+
+def averaging_of(chi2: tuple[float, float, float]) -> Averaging:
+    """Posterior of ``a`` from χ² at ``TRIED`` and the prior."""
+    at0, at_half, at1 = chi2
+    curvature, slope = max(2.0 * (at0 + at1 - 2.0 * at_half), 0.0), 4.0 * at_half - 3.0 * at0 - at1
+    precision = curvature + EITHER**-2
+    return Averaging((1.0 / EITHER - 0.5 * slope) / precision, precision**-0.5)
