@@ -62,7 +62,7 @@ def test_the_earths_rate_is_told_with_its_direction_and_is_neither_a_zero_nor_a_
         assert np.all(
             np.abs(found.earth_rate.value - NORTH_OF_48_DEG) < 4.5 * found.earth_rate.std + 0.02 * EARTH_RAD_S
         )
-        assert min(e.p_value for e in found.effects.values()) > 1e-3
+        assert max(e.score for e in found.effects.values()) < 8.0
     # Nine zeros; before the Earth was a part of the model they stood 4.5 error bars off (rms of 24).
     assert np.sqrt(np.mean(np.square(z))) < 2.0
     lean = np.degrees(np.arcsin(np.mean(seen, axis=0)[2] / EARTH_RAD_S))
@@ -78,16 +78,12 @@ def test_the_earths_rate_that_is_not_there_is_not_put_in():
     assert fit_reference(coarse.log, coarse.motion, G).earth_rate is None
 
 
-def test_an_earths_rate_that_the_log_cannot_tell_is_in_the_error_bars_of_the_zeros(monkeypatch):
-    for trial in (measured_table(500, 45), tracked(3, seconds=30)):
-        with_earth = np.diag(fit_reference(trial.log, trial.motion, G).gyroscope.covariance)
-        with monkeypatch.context() as patch:
-            patch.setattr("trihedron.estimate.reference.gyroscope.earth_columns", lambda *_: None)
-            without = np.diag(fit_reference(trial.log, trial.motion, G).gyroscope.covariance)
-        added = np.sqrt(np.maximum(with_earth - without, 0.0))
-        # One component of a vector of any direction; attitudes that turn about average part of it away.
-        assert 0.1 * EARTH_RAD_S < added[9:].max() < 0.7 * EARTH_RAD_S
-        assert np.all(with_earth[9:] > without[9:])
+def test_an_earths_rate_that_the_log_cannot_tell_is_in_the_uncertainty_of_the_bias():
+    trial = tracked(3, seconds=30)
+    found = fit_reference(trial.log, trial.motion, G)
+    assert found.earth_rate is None
+    # One component of a vector of any direction; attitudes that turn about average part of it away.
+    assert np.all(found.gyroscope.sigmas()["sigma_b"] > 0.1 * EARTH_RAD_S)
 
 
 def test_error_bars_of_a_wobbling_table_cover_the_truth():
@@ -124,7 +120,7 @@ def test_g_sensitivity_and_cubic_scale_are_told_from_the_linear_numbers():
     one = result.reference.effects["gyro-g-sensitivity"]
     assert np.abs((one.value - G_true.ravel()) / one.std).max() < 5.0
     assert result.verdict == "missing-physics"
-    assert diagnosis_document(result)["reference"]["effects"]["gyro-g-sensitivity"]["p_value"] < 1e-4
+    assert diagnosis_document(result)["reference"]["effects"]["gyro-g-sensitivity"]["score"] > 20.0
 
 
 def test_attitude_carried_by_the_gyro_is_better_by_the_reference_on_a_part_it_did_not_see():
