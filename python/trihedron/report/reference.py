@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from trihedron.records.reference import AgainstReference, Estimate, FitToReference
-from trihedron.report.document import Block, Facts, Picture, Table
+from trihedron.printable import printable
+from trihedron.records import Calibration
+from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceError
+from trihedron.report.calibration import calibration_report
+from trihedron.report.document import Block, Document, Facts, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.many_charts import residual_chart
 from trihedron.report.numbers import engineering_exponent, plain_number, power_of_ten, with_sigma
@@ -82,6 +86,34 @@ def _latitude(found: AgainstReference) -> str:
     sine = float(np.clip(up @ rate / size, -1.0, 1.0))
     sigma = float(np.sqrt(up @ found.earth_rate.covariance @ up)) / size / max(np.sqrt(1.0 - sine**2), 0.1)
     return f", latitude {with_sigma(degrees_from_radians(np.arcsin(sine)), degrees_from_radians(sigma))}°"
+
+
+def references_report(calibration: Calibration, references: tuple[AgainstReference, ...]) -> Document:
+    """One unit beside several references: its calibration, then what is each recording's own."""
+    document = calibration_report(calibration)
+    own = Table(
+        ("reference", "its slow error", "gyro bias [°/s]", "clock rate [ppm]"),
+        tuple(
+            (
+                printable(one.source),
+                _slow(one.error) + (", not independent" if one.error.signs else ""),
+                ", ".join(
+                    with_sigma(degrees_from_radians(v), degrees_from_radians(s))
+                    for v, s in zip(one.bias.value.mean(axis=0), one.bias.sigma.mean(axis=0), strict=True)
+                ),
+                "–" if one.clock_rate_ppm is None else with_sigma(*one.clock_rate_ppm),
+            )
+            for one in references
+        ),
+        "S and effects are shared; bias (g-sensitivity at the mean force in it) and clock are each recording's own",
+    )
+    effects = tuple(_effect(ident, one) for ident, one in references[0].effects.items())
+    sections = (document.sections[0], Section("References", (own, *effects)), *document.sections[1:])
+    return replace(document, subtitle=f"{len(references)} recordings beside references", sections=sections)
+
+
+def _slow(error: ReferenceError) -> str:
+    return f"{plain_number(degrees_from_radians(error.slow_rad[0]), 2)}° in {plain_number(error.slow_s, 2)} s"
 
 
 def _error(found: AgainstReference) -> str:

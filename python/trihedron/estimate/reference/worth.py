@@ -17,6 +17,8 @@ SQUARE = np.radians(0.01)
 """Nobody mounts a unit within a hundredth of a degree: then the reference's body is the unit's own."""
 QUIET_PARTS = 50
 """Part of the log, its quietest fiftieth, whose scatter from sample to sample is no more than noise at rest."""
+QUIETER = 0.8
+"""The difference holds the gyro's noise, whatever the reference adds; each of the two is told to some per cent."""
 CERTAIN = 1e-4
 SURPRISE = 1e-6
 """False alarms of a block that stands apart, the number of blocks paid for."""
@@ -69,7 +71,7 @@ def signs_of_this_gyro(side: Beside, found: MotionFit, k: int) -> tuple[Sign, ..
         return ()
     out = []
     own, noise = residual_density(side, found, k), noise_at_rest(side, found, k)
-    if own < noise:
+    if own < QUIETER * noise:
         out.append(Sign("quieter-than-gyro", float(own), float(noise)))
     cov = found.covariance(k, ("S", "b"))
     change = reframing(found.value(k, "S").reshape(3, 3), found.value(k, "b"), "symmetric")
@@ -91,7 +93,9 @@ def residual_density(side: Beside, found: MotionFit, k: int) -> float:
     fine = side.problem(found.points[k], found.places[k], found.wider, FINE_S)
     rows = fine.blocks.rows()[:, 0] > 0
     change = np.diff(fine.observed.reshape(-1, 3), axis=0)[rows[1:] & rows[:-1]]
-    return float(np.sqrt(np.median(np.sum(change**2, axis=1)) / (3.0 * FINE_S) / 0.789))
+    # Means over neighbouring blocks of a walk differ by two thirds of what it adds in one; a knock does not move the
+    # median of three squares, that of chi-square.
+    return float(np.sqrt(np.median(np.sum(change**2, axis=1)) / (2.0 / 3.0 * FINE_S * chi2.median(3))))
 
 
 def noise_at_rest(side: Beside, found: MotionFit, k: int) -> float:
