@@ -33,7 +33,7 @@ def main(folder):
         analog / "imuRaw3.csv", reference=motion_of(analog / "viconRot3.csv"), gravity_m_s2=GRAVITY
     ).calibration
     print(
-        "run | clock | scale x, y, z [mrad/s per count] | one scale, zero from rest | own first part | run 3's numbers"
+        "run | clock | scale x, y, z [mrad/s per count] | one scale, bias from rest | own first part | run 3's numbers"
     )
     for k in range(1, 6):
         found = trihedron.diagnose(
@@ -44,7 +44,7 @@ def main(folder):
         offset, sigma = found.clock_offset_s
         print(
             f"{k} | {1e3 * offset:+.2f} ± {1e3 * sigma:.2f} ms | {scale} | "
-            f"{degrees(stages.get('one scale, zero from rest'))} | {degrees(stages.get('by the reference'))} | "
+            f"{degrees(stages.get('one scale, bias from rest'))} | {degrees(stages.get('by the reference'))} | "
             f"{degrees(stages.get('as given'))}"
         )
     for k in (1, 2):

@@ -119,7 +119,8 @@ def most_likely(problems: Sequence[Problem], start: FloatArray | None = None) ->
     """(a recording, 7) logarithms of the strengths of greatest posterior, and the log evidence there."""
     best = np.tile(TYPICAL, (len(problems), 1)) if start is None else start.copy()
     bounds = list(zip(TYPICAL - FARTHEST * SPREAD, TYPICAL + FARTHEST * SPREAD, strict=True))
-    for _ in range(1 if len(problems) == 1 else 2):
+    # From strengths of a neighbouring hypothesis one round over the recordings is enough.
+    for _ in range(1 if len(problems) == 1 or start is not None else 2):
         for k in range(len(problems)):
             height = _heights(problems, best, k)
 

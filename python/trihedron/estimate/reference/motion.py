@@ -16,6 +16,7 @@ ALWAYS = ("S", "b", "clock", "earth", "gyro-g-sensitivity")
 EFFECTS = {"gyro-g-sensitivity": ("gyro-g-sensitivity",), "gyro-scale-nonlinearity": ("quadratic", "cubic")}
 WIDER = (0.3, 1.0, 3.0, 10.0, 30.0)
 """Sizes, in those of data sheets, that a recording may ask for."""
+MARGIN = 2.0
 ACCEPTED = 8.0
 """Score from which an effect is named (docs/decisions.md)."""
 RELINEARISED = 3
@@ -109,7 +110,12 @@ def scores(found: MotionFit) -> list[Scored]:
             continue
         base = tuple(held - set(names))
         without = _tuned(found, base, {})
-        tried = [_tuned(found, (*base, *names), dict.fromkeys(names, by)) for by in WIDER]
+        tried: list[MotionFit] = []
+        for by in WIDER:
+            tried.append(_tuned(found, (*base, *names), dict.fromkeys(names, by)))
+            # Evidence falls off on both sides of the size that the recordings ask for.
+            if len(tried) > 1 and tried[-1].fitted.evidence < tried[-2].fitted.evidence - MARGIN:
+                break
         best = int(np.argmax([one.fitted.evidence for one in tried]))
         paid = 2.0 * np.log(len(WIDER) * len(EFFECTS))
         score = float(2.0 * (tried[best].fitted.evidence - without.fitted.evidence) - paid)
