@@ -313,7 +313,7 @@ def test_an_attitude_that_the_gyro_itself_carried_is_not_independent():
         now = now @ step
     C[-1] = now
     found = fit_reference(other, ReferenceMotion(other.time_s - other.time_s[0], attitude=C), G)
-    assert {sign.kind for sign in found.error.signs} >= {"quieter-than-gyro", "mounted-without-error"}
+    assert "mounted-without-error" in {sign.kind for sign in found.error.signs}
     assert any(f.code is FindingCode.REFERENCE_NOT_INDEPENDENT for f in found.findings)
     assert not fit_reference(*part(tracked(3, seconds=30), 0.0, 30.0), G).error.signs
 

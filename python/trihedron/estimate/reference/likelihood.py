@@ -2,7 +2,7 @@
 
 The parameters enter linearly (``trihedron._core.ReferenceBlocks``); each has a Gaussian prior, and in units of its
 prior σ the evidence of a hypothesis is that of a ridge regression under the covariance that the noise strengths give.
-The strengths are unknown in every hypothesis and integrated out (equations 3 to 5 of docs/reference.md). Several
+The strengths are unknown in every hypothesis and integrated out (docs/reference.md). Several
 recordings share some parameters and have strengths of their own.
 """
 
