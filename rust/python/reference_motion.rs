@@ -129,7 +129,7 @@ impl ReferenceBlocks {
     }
 
     /// `(m, 3)` mean rate in the world, and `(m, 3)` of it times the time from the log's middle.
-    #[expect(clippy::type_complexity, reason = "a pair of arrays")]
+    #[allow(clippy::type_complexity, reason = "a pair of arrays")]
     fn wrt_clock<'py>(
         &self,
         py: Python<'py>,
@@ -179,7 +179,7 @@ impl ReferenceBlocks {
     }
 
     /// The bias walk as a combination `(3 m, p)` of the columns, and its covariance `(m, 3, 3)` beside them.
-    #[expect(clippy::type_complexity, reason = "a pair of arrays")]
+    #[allow(clippy::type_complexity, reason = "a pair of arrays")]
     fn bias<'py>(
         &self,
         py: Python<'py>,

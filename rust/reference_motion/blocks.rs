@@ -109,14 +109,13 @@ pub fn blocks(of: &Log<'_>, truth: &Truth<'_>, block: usize) -> Result<Vec<Block
             continue;
         };
         let seen = seen(&path, &start, &moments, angle, middle_s);
-        let (is_seen, mean, one) = match seen {
-            Some((mean, one)) => (true, mean, one),
-            None => {
-                let mut one = unseen(of, first, block, angle, moments.clone());
-                one.wrt_bias = [start * path.bias, 0.5 * start * path.bias];
-                one.is_lost = path.is_lost;
-                (false, Vector3::zeros(), one)
-            }
+        let (is_seen, mean, one) = if let Some((mean, one)) = seen {
+            (true, mean, one)
+        } else {
+            let mut one = unseen(of, first, block, angle, moments.clone());
+            one.wrt_bias = [start * path.bias, 0.5 * start * path.bias];
+            one.is_lost = path.is_lost;
+            (false, Vector3::zeros(), one)
         };
         if is_seen {
             angle = one.angle;
