@@ -84,7 +84,7 @@ def test_an_earths_rate_that_the_log_cannot_tell_is_in_the_uncertainty_of_the_bi
     found = fit_reference(trial.log, trial.motion, G)
     assert found.earth_rate is None
     # One component of a vector of any direction; attitudes that turn about average part of it away.
-    assert np.all(found.gyroscope.sigmas()["sigma_b"] > 0.1 * EARTH_RAD_S)
+    assert np.all(np.array(found.gyroscope.sigmas()["sigma_b"]) > 0.1 * EARTH_RAD_S)
 
 
 def test_error_bars_of_a_wobbling_table_cover_the_truth():

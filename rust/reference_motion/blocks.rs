@@ -156,6 +156,21 @@ fn turned(start: &Matrix3<f64>, moments: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
+/// Change of the rate over a step, by its neighbours where they hold.
+fn slope(of: &Log<'_>, i: usize) -> Vector3<f64> {
+    let before = if i > 0 && of.is_valid[i - 1] {
+        i - 1
+    } else {
+        i
+    };
+    let after = if i + 1 < of.rate.len() && of.is_valid[i + 1] {
+        i + 1
+    } else {
+        i
+    };
+    (of.rate[after] - of.rate[before]) / (after - before).max(1) as f64
+}
+
 fn path(of: &Log<'_>, truth: &Truth<'_>, first: usize, block: usize, next: &mut usize) -> Path {
     let (h, q) = (of.step_s, of.n_signals);
     let mut at = Path {
@@ -169,9 +184,15 @@ fn path(of: &Log<'_>, truth: &Truth<'_>, first: usize, block: usize, next: &mut 
         let (w0, w1) = (of.rate[i], of.rate[i + 1]);
         let is_valid = of.is_valid[i] && of.is_valid[i + 1];
         let from_s = of.start_s + h * i as f64;
-        // A straight line between samples, and the commutator of that line.
+        let (d0, d1) = (slope(of, i), slope(of, i + 1));
+        // The cubic between samples (a straight line is off by (ωh)²/12), and the commutator of the straight line.
         let part = |x: f64| {
-            let (sum, change) = (w0 * x + (w1 - w0) * (0.5 * x * x), w0.cross(&w1));
+            let (x2, x3, x4) = (x * x, x * x * x, x * x * x * x);
+            let sum = w0 * (0.5 * x4 - x3 + x)
+                + w1 * (x3 - 0.5 * x4)
+                + d0 * (0.25 * x4 - x3 / 1.5 + 0.5 * x2)
+                + d1 * (0.25 * x4 - x3 / 3.0);
+            let change = w0.cross(&w1);
             exp(&(sum * h + change * (h * h * x * x * x / 12.0)))
         };
         let middle = at.turned * part(0.5);

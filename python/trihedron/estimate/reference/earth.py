@@ -24,7 +24,7 @@ def earth_of(found: MotionFit, k: int) -> Estimate | None:
     value, covariance = found.value(k, "earth"), found.covariance(k, ("earth",))
     sigma = float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
     length = float(np.linalg.norm(value))
-    if np.sqrt(3.0) * sigma > RESOLVED * EARTH_RATE_RAD_S or EARTH_RATE_RAD_S - length > FAR * sigma:
+    if sigma > RESOLVED * EARTH_RATE_RAD_S or EARTH_RATE_RAD_S - length > FAR * sigma:
         return None
     along = value / length
     gain = covariance @ along / float(along @ covariance @ along)
