@@ -29,6 +29,7 @@ pub mod number_text;
 pub mod order_statistics;
 pub mod poisson;
 pub mod ranges;
+pub mod reference_motion;
 pub mod rotation;
 pub mod running;
 pub mod screening;

@@ -28,6 +28,7 @@ mod number_text;
 mod order_statistics;
 mod poisson;
 mod ranges;
+mod reference_motion;
 mod rotation;
 mod screening;
 mod session_model;
@@ -65,6 +66,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     kalman::register(module)?;
     accelerometer::register(module)?;
     kalman_norm::register(module)?;
+    reference_motion::register(module)?;
     rotation::register(module)?;
     screening::register(module)?;
     session_model::register(module)?;

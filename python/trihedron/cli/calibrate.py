@@ -7,7 +7,7 @@ from typing import Annotated, Any, Optional
 
 import typer
 
-from trihedron.cli.calibrate_sessions import By, Labels, calibrate_many
+from trihedron.cli.calibrate_sessions import By, Labels, calibrate_beside, calibrate_many
 from trihedron.cli.options import Force, GravitySource, Json, LogsSource, Report, progress, with_options
 from trihedron.cli.output import Ending, check_outputs
 from trihedron.cli.streamed import Kept, Stream, calibrate_stream, needs_stream
@@ -44,8 +44,10 @@ GyroNominal = Annotated[
     typer.Option(metavar="X", help="Nominal rad/s per gyro unit, where counts and few moves cannot tell it."),
 ]
 Reference = Annotated[
-    Optional[Path],  # noqa: UP045
-    typer.Option("--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log."),
+    Optional[list[Path]],  # noqa: UP045
+    typer.Option(
+        "--reference", metavar="MOTION", help="Known motion beside the log: attitude, rate, pose or a log; one a log."
+    ),
 ]
 ReferenceColumns = Annotated[
     Optional[str],  # noqa: UP045
@@ -93,6 +95,9 @@ def calibrate(
     needs_stream(checkpoint, stream=stream)
     ending = Ending(output, json, report, full, force)
     choices = _choices(method, frame, faces, turns, axis_signs, loss)
+    if reference and sources.are_many(by):
+        calibrate_beside(sources, reference, reference_columns, place, choices["frame"], ending)
+        return
     if sources.are_many(by):
         if extended or gyro_nominal is not None or {k for k, v in choices.items() if v} - {"method", "loss", "frame"}:
             raise typer.BadParameter(
@@ -121,7 +126,7 @@ def calibrate(
             latitude_deg=place.latitude,
             height_m=place.height,
             gyroscope_nominal=gyro_nominal,
-            reference=reference,
+            reference=_only(reference),
             reference_columns=reference_columns,
             progress=tell,
             **choices,
@@ -137,6 +142,12 @@ def calibrate(
         return calibration_record(result.calibration, result.segments, recording)
 
     ending.tell(document, machine, result.calibration, FIRST_SCREEN, more)
+
+
+def _only(references: list[Path] | None) -> Path | None:
+    if references and len(references) > 1:
+        raise typer.BadParameter(f"{len(references)} references are for as many logs, not for one")
+    return references[0] if references else None
 
 
 def _choices(

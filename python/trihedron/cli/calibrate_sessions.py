@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Optional
 
 import typer
@@ -28,6 +29,41 @@ Labels = Annotated[
     typer.Option("--labels", metavar="LIST", help="Several logs: day or device of each, with commas between."),
 ]
 FIRST_SCREEN = 2
+
+
+def calibrate_beside(
+    sources: LogsSource,
+    references: list[Path],
+    columns: str | None,
+    place: GravitySource,
+    frame: Any,
+    ending: Ending,
+) -> None:
+    """Calibrate one unit from several logs, each beside its own reference, and print what is shared and what is not."""
+    given = sources.each()
+    if len(given) != len(references):
+        raise typer.BadParameter(f"{len(given)} logs need as many references, not {len(references)}")
+    from trihedron import pipeline
+    from trihedron.files.calibration import calibration_document
+    from trihedron.report.reference import references_report
+
+    with progress("calibrating"):
+        result = pipeline.calibrate_references(
+            [source.read() for source in given],
+            references,
+            reference_columns=columns,
+            frame=frame,
+            gravity_m_s2=place.gravity,
+            latitude_deg=place.latitude,
+            height_m=place.height,
+        )
+    document = references_report(result.calibration, result.references)
+
+    def machine() -> dict[str, Any]:
+        record = calibration_document(result.calibration)
+        return {**record, "references": [one.to_dict() for one in result.references]}
+
+    ending.tell(document, machine, result.calibration, 2, "Bias over time: --json FILE.")
 
 
 def calibrate_many(

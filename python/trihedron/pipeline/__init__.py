@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from trihedron.pipeline.presenting import plot, report
     from trihedron.pipeline.ranking import rank
     from trihedron.pipeline.reading import read, segment
+    from trihedron.pipeline.references import ReferencesResult, calibrate_references
     from trihedron.pipeline.replaying import guide
     from trihedron.pipeline.results import CalibrationResult, CheckResult, DiagnosisResult, VerificationResult
     from trihedron.pipeline.sessions import SessionsResult, calibrate_sessions
@@ -37,11 +38,13 @@ __all__ = [
     "CheckResult",
     "DiagnosisResult",
     "KalmanResult",
+    "ReferencesResult",
     "SessionsResult",
     "VerificationResult",
     "allan_deviation",
     "apply",
     "calibrate",
+    "calibrate_references",
     "calibrate_sessions",
     "capture",
     "check",
@@ -87,6 +90,8 @@ _HOME = {
     "capture": "trihedron.pipeline.capturing",
     "METHODS": "trihedron.pipeline.calibrating",
     "calibrate": "trihedron.pipeline.calibrating",
+    "ReferencesResult": "trihedron.pipeline.references",
+    "calibrate_references": "trihedron.pipeline.references",
     "check": "trihedron.pipeline.checking",
     "convert": "trihedron.pipeline.converting",
     "settle_gravity": "trihedron.pipeline.choices",

@@ -83,7 +83,7 @@ def beside(
     if found.kind == ANOTHER_UNIT:
         return replace(result, reference=found, findings=(*result.findings, *found.findings, _shared(found)))
     # What the poses found stands; the reference adds what it alone sees, and never takes away.
-    effects = (*result.effects, *(e for e in effects_of(found, alpha) if e.id not in {o.id for o in result.effects}))
+    effects = (*result.effects, *(e for e in effects_of(found) if e.id not in {o.id for o in result.effects}))
     verdict = result.verdict
     if len(effects) > len(result.effects) and verdict in ("consistent", "parameters-differ", "not-testable"):
         verdict = "missing-physics"

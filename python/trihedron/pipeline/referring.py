@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from trihedron.diagnose.against import FittedModel, compare_numbers, model_of_calibration
-from trihedron.estimate.reference import fit_reference
+from trihedron.estimate.reference import ACCEPTED, fit_reference
 from trihedron.pipeline.reading import read
 from trihedron.read import ReadError
 from trihedron.read.reference import of_recording, read_reference
@@ -22,11 +22,9 @@ from trihedron.records.diagnosis import (
     EffectParameter,
     LinearModel,
     ParameterDifference,
-    Stage,
-    StageDomain,
     Verdict,
 )
-from trihedron.records.domains import DomainTest, HeldOut
+from trihedron.records.domains import DomainTest
 from trihedron.records.reference import AgainstReference, Estimate, ReferenceMotion
 from trihedron.refused import RefusedError
 from trihedron.sensor_model import in_frame
@@ -34,8 +32,6 @@ from trihedron.units import acceleration_to_si
 
 AnyReference = ReferenceMotion | Recording | str | os.PathLike[str]
 
-LEAST_SIGMAS = 3.0
-"""An effect's largest coefficient must stand this far from zero, as in the catalogue."""
 NOMINAL_SCALE, NOMINAL_ZERO_M_S2 = 0.1, 0.5
 """How wrong an accelerometer is that nobody calibrated: 10 % where only its reading at rest tells the scale."""
 
@@ -156,32 +152,20 @@ def _nominal(recording: Recording, gravity: float) -> tuple[SensorCalibration, F
     return SensorCalibration(scale * np.eye(3), np.zeros(3), covariance, unit, "m/s^2", "nominal"), finding
 
 
-def effects_of(found: AgainstReference, alpha: float) -> tuple[AcceptedEffect, ...]:
-    """Effects that the reference demands: far from zero, and better on rows left out in turn."""
-    out = []
-    for ident, one in found.effects.items():
-        if one.p_value is None or one.held_out is None:
-            continue
-        before, after = one.held_out
-        is_far = float(np.max(np.abs(one.value / one.std))) > LEAST_SIGMAS
-        p = min(1.0, len(found.effects) * one.p_value)
-        if p < alpha and after < before and is_far:
-            out.append((1.0 - (after / before) ** 2, _accepted(ident, one, p, found)))
-    return tuple(effect for _, effect in sorted(out, key=lambda pair: -pair[0]))
+def effects_of(found: AgainstReference) -> tuple[AcceptedEffect, ...]:
+    """Effects that the evidence names, the strongest first (the Bayes factor bounds p)."""
+    named = [(one.score or 0.0, ident, one) for ident, one in found.effects.items()]
+    return tuple(_accepted(ident, one) for score, ident, one in sorted(named, reverse=True) if score > ACCEPTED)
 
 
-def _accepted(ident: str, one: Estimate, p: float, found: AgainstReference) -> AcceptedEffect:
-    assert one.held_out is not None
-    before, after = one.held_out
+def _accepted(ident: str, one: Estimate) -> AcceptedEffect:
+    assert one.score is not None
     units = one.unit.split(", ")
     per = len(one.names) // len(units)
     parameters = tuple(
         EffectParameter(_written(ident, name), float(v), float(s), units[min(k // per, len(units) - 1)])
         for k, (name, v, s) in enumerate(zip(one.names, one.value, one.std, strict=True))
     )
-    floor = found.gyroscope.rms
-    held = HeldOut("dynamics", (before / floor) ** 2, (after / floor) ** 2, before, after, "rad/s")
-    n = 3 * (found.gyroscope.n_rows - found.gyroscope.n_left_out)
     largest = int(np.argmax(np.abs(one.value / one.std)))
     what = (
         "reads a rate that follows specific force"
@@ -192,10 +176,9 @@ def _accepted(ident: str, one: Estimate, p: float, found: AgainstReference) -> A
         ident,
         f"The gyro {what} ({parameters[largest].name} stands out most).",
         parameters,
-        p,
-        float(n * np.log((after / before) ** 2) + len(one.names) * np.log(n)),
-        (held,),
-        share=float(1.0 - (after / before) ** 2),
+        float(np.exp(-0.5 * one.score)),
+        -one.score,
+        (),
         # Stated in the reference's body: another recording of the unit may lie in it otherwise.
         model=MappingProxyType(
             {
@@ -205,7 +188,7 @@ def _accepted(ident: str, one: Estimate, p: float, found: AgainstReference) -> A
                 "applies_to_other_recordings": False,
             }
         ),
-    )  # fmt: skip
+    )
 
 
 def _written(ident: str, name: str) -> str:
@@ -232,26 +215,25 @@ def diagnosis_by(
     found: AgainstReference, recording: Recording, gravity: float, given: Calibration | None, alpha: float
 ) -> dict[str, Any]:
     """A diagnosis of a log that holds no poses to speak of: what its reference alone says, as fields."""
-    effects = effects_of(found, alpha)
+    effects = effects_of(found)
     parameters = () if given is None or given.gyroscope is None else parameters_of(found, given, alpha)
-    test = _dynamics(found, alpha)
+    test = _dynamics(found)
     left = replace(test, disagrees=False) if effects else test
     verdict: Verdict = "consistent"
     if any(p.significant for p in parameters):
         verdict = "parameters-differ"
     if effects:
         verdict = "missing-physics"
-    rows = [
-        Stage("numbers", (StageDomain("dynamics", found.gyroscope.rms_held_out, None, "rad/s"),)),
-    ]
-    rows += [Stage("effects", (StageDomain("dynamics", e.held_out[0].rms_after, None, "rad/s"),)) for e in effects[:1]]
     linear = _linear(found, recording)
     base = Diagnosis(
         verdict=verdict,
         domains=(test,),
         effects=effects,
         remaining=(left,),
-        candidates=tuple(Candidate(name, one.p_value, True) for name, one in found.effects.items()),
+        candidates=tuple(
+            Candidate(name, float(np.exp(-0.5 * max(one.score or 0.0, 0.0))), True)
+            for name, one in found.effects.items()
+        ),
         baseline=linear,
         extended=linear,
         noise=MappingProxyType({}),
@@ -260,19 +242,15 @@ def diagnosis_by(
         recording_source=recording.source,
         recording_sha256=recording.sha256,
         parameters=parameters,
-        stages=tuple(rows) if given is not None else (),
     )
     return dict(vars(base))
 
 
-def _dynamics(found: AgainstReference, alpha: float) -> DomainTest:
-    """Rate sample by sample inside the motion: p is that of the effects tried on it, the search paid for."""
-    p = [one.p_value for one in found.effects.values() if one.p_value is not None]
-    least = min([1.0, *(len(p) * v for v in p)])
-    accepted = effects_of(found, alpha)
-    chi2 = found.gyroscope.rms_held_out / max(found.gyroscope.rms, 1e-300)
+def _dynamics(found: AgainstReference) -> DomainTest:
+    """Rate inside the motion: p is that of the effects tried on it, the search paid for."""
+    score = max([0.0, *(one.score or 0.0 for one in found.effects.values())])
     return DomainTest(
-        "dynamics", chi2**2, float(3 * found.gyroscope.n_rows), least, bool(accepted),
+        "dynamics", 1.0, float(3 * found.gyroscope.n_rows), float(np.exp(-0.5 * score)), score > ACCEPTED,
         rms=found.gyroscope.rms, unit="rad/s",
     )  # fmt: skip
 

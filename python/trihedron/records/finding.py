@@ -100,7 +100,8 @@ class FindingCode(str, Enum):
     EFFECT_NOT_APPLIED = "effect-not-applied"
     PROTOCOL_DIFFERS = "protocol-differs"
     # reference
-    REFERENCE_LAG_AMBIGUOUS = "reference-lag-ambiguous"
+    REFERENCE_NOT_INDEPENDENT = "reference-not-independent"
+    REFERENCE_APART = "reference-apart"
     REFERENCE_MISFIT = "reference-misfit"
     REFERENCE_OUTLIERS = "reference-outliers"
     REFERENCE_UPSIDE_DOWN = "reference-upside-down"

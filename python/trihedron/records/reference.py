@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -64,18 +64,17 @@ class ReferenceMotion:
 class Estimate(Plain):
     """Named numbers (n,) with their covariance (n, n) in one SI unit.
 
-    ``p_value`` that all of them are zero; ``held_out`` rms [SI] of rows left out in turn, without and with them.
+    ``score`` of an effect: twice its gain in log evidence over its absence, what was tried paid for.
     """
 
     names: tuple[str, ...]
     value: FloatArray
     covariance: FloatArray
     unit: str
-    p_value: float | None = None
-    held_out: tuple[float, float] | None = None
+    score: float | None = None
     LAYOUT: ClassVar[Layout] = Layout(
-        {"held_out": "rms_held_out"},
-        ("names", "value", "std", "unit", "p_value", "rms_held_out"),
+        {},
+        ("names", "value", "std", "unit", "score"),
         lambda estimate, _: {"std": estimate.std.tolist()},
     )
 
@@ -125,6 +124,55 @@ class ReplayStage:
     n: int
 
 
+SignKind = Literal["quieter-than-gyro", "mounted-without-error", "S-depends-on-duration"]
+
+
+@dataclass(frozen=True)
+class Sign(Plain):
+    """A sign that a reference was computed from this very gyro: what was seen, and against what.
+
+    White density of gyro minus reference and that of the gyro at rest [rad/s/√Hz]; angle between their frames and its
+    standard uncertainty [rad]; χ² of S from long blocks against that from short ones and its degrees of freedom.
+    """
+
+    kind: SignKind
+    seen: float
+    against: float
+
+
+@dataclass(frozen=True)
+class ReferenceError(Plain):
+    """What a reference is worth: its own error, per axis, and the rows that it lacks.
+
+    ``white_rad`` of the mean over a second; ``slow_rad`` the rms of its slow error with a 95 % interval, ``slow_s``
+    its time constant, ``is_of_body`` whether it turns with the body (markers) or stands in the room (tracker). ``rows``
+    that were used and ``rows_left_out`` as outliers; ``gaps_s`` and stretches ``apart_s`` from the rest, beginning and
+    end in the log's time; ``signs`` that it is not independent of this gyro.
+    """
+
+    white_rad: float
+    slow_rad: tuple[float, float, float]
+    slow_s: float
+    is_of_body: bool
+    rows: int
+    rows_left_out: int
+    gaps_s: tuple[tuple[float, float], ...]
+    apart_s: tuple[tuple[float, float], ...]
+    signs: tuple[Sign, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class BiasOverTime(Plain):
+    """The gyro's bias b in ``ω = S w' + b`` over the log's time (m,), (m, 3) [rad/s] with σ (m, 3).
+
+    A g-sensitivity within the limits of data sheets is in it, at the recording's mean specific force.
+    """
+
+    time_s: FloatArray
+    value: FloatArray
+    sigma: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class AgainstReference(Plain):
     """Everything that a reference says of a log: clocks, mounting, lever arm, both sensors, effects, replay.
@@ -148,6 +196,8 @@ class AgainstReference(Plain):
     vertical: Estimate | None
     effects: MappingProxyType[str, Estimate]
     replay: tuple[ReplayStage, ...]
+    error: ReferenceError
+    bias: BiasOverTime
     findings: tuple[Finding, ...] = ()
     residual_time_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     residual_rate: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
@@ -155,8 +205,8 @@ class AgainstReference(Plain):
     LAYOUT: ClassVar[Layout] = Layout(
         {},
         (
-            "source", "kind", "overlap_s", "correlation", "clock", "mounting", "lever_arm", "vertical", "gyroscope",
-            "accelerometer", "earth_rate", "effects", "replay",
+            "source", "kind", "overlap_s", "correlation", "error", "clock", "mounting", "lever_arm", "vertical",
+            "gyroscope", "accelerometer", "bias", "earth_rate", "effects", "replay",
         ),
         lambda found, _: {"clock": found.clock()},
     )  # fmt: skip

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from trihedron.records.reference import AgainstReference, Estimate, FitToReference
-from trihedron.report.document import Block, Facts, Picture, Table
+from trihedron.printable import printable
+from trihedron.records import Calibration
+from trihedron.records.reference import AgainstReference, Estimate, FitToReference, ReferenceError
+from trihedron.report.calibration import calibration_report
+from trihedron.report.document import Block, Document, Facts, Picture, Section, Table
 from trihedron.report.drawing import later
 from trihedron.report.many_charts import residual_chart
 from trihedron.report.numbers import engineering_exponent, plain_number, power_of_ten, with_sigma
@@ -15,6 +19,11 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, ms_from_s
 
 SECONDS_PER_HOUR = 3600.0
 _EFFECTS = {"gyro-g-sensitivity": "g-sensitivity", "gyro-scale-nonlinearity": "nonlinearity of the scale"}
+_SIGNS = {
+    "quieter-than-gyro": "the difference between the two is quieter than the gyro at rest",
+    "mounted-without-error": "it lies along the gyro's own axes",
+    "S-depends-on-duration": "S changes with the time over which attitude is carried",
+}
 
 
 def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
@@ -22,6 +31,11 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
     facts = [
         ("reference", f"{found.kind}: {found.source}"),
         ("shared motion", f"{found.overlap_s:.1f} s, correlation of the turning rates {found.correlation:.3f}"),
+        ("its error", _error(found)),
+        *(
+            [("independent", f"no: {'; '.join(_SIGNS[sign.kind] for sign in found.error.signs)}")]
+            * bool(found.error.signs)
+        ),
         ("clock", _clock(found)),
         (
             "mounting",
@@ -43,7 +57,7 @@ def reference_blocks(found: AgainstReference) -> tuple[Block, ...]:
                 f" the axes of the reference's world{_latitude(found)}",
             )
         )
-    facts.append(("gyro", _left(found.gyroscope, degrees_from_radians(1.0), "°/s")))
+    facts.append(("gyro bias", _bias(found)))
     if found.accelerometer is not None:
         facts.append(("accelerometer", _left(found.accelerometer, mm_s2_from_m_s2(1.0), "mm/s²")))
     facts += [(f"attitude, {r.stage}", _replayed(r.error_rad, r.horizon_s, r.n)) for r in found.replay]
@@ -72,6 +86,63 @@ def _latitude(found: AgainstReference) -> str:
     sine = float(np.clip(up @ rate / size, -1.0, 1.0))
     sigma = float(np.sqrt(up @ found.earth_rate.covariance @ up)) / size / max(np.sqrt(1.0 - sine**2), 0.1)
     return f", latitude {with_sigma(degrees_from_radians(np.arcsin(sine)), degrees_from_radians(sigma))}°"
+
+
+def references_report(calibration: Calibration, references: tuple[AgainstReference, ...]) -> Document:
+    """One unit beside several references: its calibration, then what is each recording's own."""
+    document = calibration_report(calibration)
+    own = Table(
+        ("reference", "its slow error", "gyro bias [°/s]", "clock rate [ppm]"),
+        tuple(
+            (
+                printable(one.source),
+                _slow(one.error) + (", not independent" if one.error.signs else ""),
+                ", ".join(
+                    with_sigma(degrees_from_radians(v), degrees_from_radians(s))
+                    for v, s in zip(one.bias.value.mean(axis=0), one.bias.sigma.mean(axis=0), strict=True)
+                ),
+                "–" if one.clock_rate_ppm is None else with_sigma(*one.clock_rate_ppm),
+            )
+            for one in references
+        ),
+        "S and effects are shared; bias (g-sensitivity at the mean force in it) and clock are each recording's own",
+    )
+    effects = tuple(_effect(ident, one) for ident, one in references[0].effects.items())
+    sections = (document.sections[0], Section("References", (own, *effects)), *document.sections[1:])
+    return replace(document, subtitle=f"{len(references)} recordings beside references", sections=sections)
+
+
+def _slow(error: ReferenceError) -> str:
+    return f"{plain_number(degrees_from_radians(error.slow_rad[0]), 2)}° in {plain_number(error.slow_s, 2)} s"
+
+
+def _error(found: AgainstReference) -> str:
+    """What the reference itself gets wrong."""
+    error = found.error
+    size, low, high = (plain_number(degrees_from_radians(v), 2) for v in error.slow_rad)
+    where = "with the body" if error.is_of_body else "in the room"
+    text = f"wanders by {size}° ({low} to {high}) within {plain_number(error.slow_s, 2)} s, mostly {where}"
+    text += f"; {plain_number(degrees_from_radians(error.white_rad), 2)}° white (means of a second)"
+    if error.gaps_s:
+        longest = max(end - start for start, end in error.gaps_s)
+        text += f"; {len(error.gaps_s)} gap{'s' * (len(error.gaps_s) > 1)}, the longest {plain_number(longest, 2)} s"
+    if error.rows_left_out:
+        text += f"; {error.rows_left_out} of {error.rows + error.rows_left_out} rows left out as outliers"
+    return text
+
+
+def _bias(found: AgainstReference) -> str:
+    """The bias as it acts in this recording: in the middle, and how far it moves."""
+    bias = found.bias
+    k = len(bias.value) // 2
+    middle = ", ".join(
+        with_sigma(degrees_from_radians(v), degrees_from_radians(s))
+        for v, s in zip(bias.value[k], bias.sigma[k], strict=True)
+    )
+    moved = plain_number(degrees_from_radians(float(np.ptp(bias.value, axis=0).max())), 2)
+    return (
+        f"[{middle}] °/s at {bias.time_s[k]:.0f} s, moves by up to {moved} °/s (g-sensitivity at the mean force in it)"
+    )
 
 
 def _clock(found: AgainstReference) -> str:
@@ -144,5 +215,7 @@ def _effect(ident: str, one: Estimate) -> Table:
         rows.append(
             (", ".join(one.names[k : k + per]), *cells, f"{power_of_ten(exponent)} {unit.replace('^2', '²')}".strip())
         )
-    p = "–" if one.p_value is None else plain_number(one.p_value, 2)
-    return Table(("", "", "", "", ""), tuple(rows), f"{_EFFECTS.get(ident, ident).capitalize()}   p of all zero: {p}")
+    score = "–" if one.score is None else plain_number(one.score, 3)
+    return Table(
+        ("", "", "", "", ""), tuple(rows), f"{_EFFECTS.get(ident, ident).capitalize()}   score {score} (named from 8)"
+    )

@@ -1,5 +1,6 @@
 """Both sensors held against motion that is known beside the log (docs/reference.md)."""
 
-from trihedron.estimate.reference.fit import fit_reference, moves_along
+from trihedron.estimate.reference.fit import fit_reference, fit_references, moves_along
+from trihedron.estimate.reference.motion import ACCEPTED
 
-__all__ = ["fit_reference", "moves_along"]
+__all__ = ["ACCEPTED", "fit_reference", "fit_references", "moves_along"]

@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from trihedron.arrays import FloatArray, IntArray
-from trihedron.estimate.reference.earth import EarthColumns, EarthRate, earth_rate
 from trihedron.refused import RefusedError
 
 Mask = npt.NDArray[np.bool_]
@@ -41,11 +40,7 @@ class NoiseModel:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """θ (p,), covariance (p, p), residuals (k, 3) as they are, rows used (k,), and rms of rows left out in turn.
-
-    ``earth`` is the Earth's rate beside them where its columns were given: θ is free of it, and the covariance holds
-    what is not known of it.
-    """
+    """θ (p,), covariance (p, p), residuals (k, 3) as they are, rows used (k,), and rms of rows left out in turn."""
 
     theta: FloatArray
     covariance: FloatArray
@@ -54,17 +49,15 @@ class Solution:
     widened: float
     rms_held_out: float
     model: NoiseModel
-    earth: EarthRate | None = None
 
 
 def solve(
-    design: FloatArray, target: FloatArray, index: IntArray, size: FloatArray, model: NoiseModel | None = None,
-    earth: EarthColumns | None = None,
-) -> Solution:  # fmt: skip
+    design: FloatArray, target: FloatArray, index: IntArray, size: FloatArray, model: NoiseModel | None = None
+) -> Solution:
     """θ of ``target (k, 3) = design (k, 3, p) θ``.
 
     ``index`` (k,) counts windows, gaps included; ``size`` (k,) is the motion with which noise may grow; ``model`` the
-    noise where it was settled before; ``earth`` what the Earth's rate adds.
+    noise where it was settled before.
 
     Raises
     ------
@@ -82,21 +75,20 @@ def solve(
     for one in tried:
         if one.order * ROWS_PER_POLE > k:
             continue
-        spread, solution = _solve(X, target, index, size, one, earth)
+        spread, solution = _solve(X, target, index, size, one)
         if best is None or spread < best[0]:
             best = spread, solution
     assert best is not None
     found = best[1]
     return Solution(
         found.theta / scale, found.covariance / np.outer(scale, scale), found.residual, found.is_used, found.widened,
-        found.rms_held_out, found.model, found.earth,
+        found.rms_held_out, found.model,
     )  # fmt: skip
 
 
 def _solve(
-    X: FloatArray, target: FloatArray, index: IntArray, size: FloatArray, model: NoiseModel,
-    earth: EarthColumns | None = None,
-) -> tuple[float, Solution]:  # fmt: skip
+    X: FloatArray, target: FloatArray, index: IntArray, size: FloatArray, model: NoiseModel
+) -> tuple[float, Solution]:
     """The answer under one noise model, and how far it scatters from block to block (mean log variance)."""
     k, _, p = X.shape
     used = np.ones(k, dtype=bool)
@@ -129,17 +121,7 @@ def _solve(
     widened = float(np.median(wide))
     spread = float(np.mean(np.log(np.maximum(jackknife, predicted)[is_known]))) if np.any(is_known) else np.inf
     covariance = variance * inverse * np.outer(wide, wide)
-    found: EarthRate | None = None
-    residual = target - X @ theta
-    if earth is not None:
-        E = _whitened(earth.values * weight[:, None, None], yw, index, used, filters)[0]
-        # How far each number goes for one rad/s that nobody took off.
-        moved = inverse @ (Z.T @ E)
-        found = earth_rate(left, E - Z @ moved, variance * widened**2, earth)
-        theta = theta - moved @ found.value
-        covariance = covariance + moved @ found.covariance @ moved.T
-        residual = target - X @ theta - earth.values @ found.value
-    return spread, Solution(theta, covariance, residual, used, widened, held_out, model, found)
+    return spread, Solution(theta, covariance, target - X @ theta, used, widened, held_out, model)
 
 
 def _least_squares(X: FloatArray, y: FloatArray) -> FloatArray:

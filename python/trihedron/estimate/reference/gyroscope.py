@@ -1,4 +1,4 @@
-"""A gyro held against known attitude or rate: its 12 numbers, the clock, and the effects that a reference shows."""
+"""A gyro's 12 numbers and the clock to begin with, by windows: what the model of the whole motion starts from."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.reference.coloured import NoiseModel, Solution, solve
-from trihedron.estimate.reference.earth import earth_columns
 from trihedron.estimate.reference.together import Grid, Reference
 from trihedron.estimate.reference.windows import Windows
 
+WHITE = NoiseModel(grows=False, order=0)
 TURNS = 6
 """Gauss-Newton steps of the clock: from a sample off, three reach a microsecond."""
 
 
 @dataclass(frozen=True, eq=False)
 class GyroFit:
-    """θ = A (3, 3) row by row, a (3), clock offset at ``middle_s`` and rate, then effects; ``offset_s`` is that at
+    """θ = A (3, 3) row by row, a (3), clock offset at ``middle_s`` and rate; ``offset_s`` is that at
     zero; ``size`` (k,) the reference's rate in each window."""
 
     A: FloatArray
@@ -32,34 +32,21 @@ class GyroFit:
     size: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Signals:
-    """Columns beside the linear ones: signals (n, q) on the grid and the directions (q, 3) in which they act."""
-
-    values: FloatArray
-    directions: FloatArray
-
-
 def fit_gyroscope(
-    grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, *,
-    clock: int = 2, extra: Signals | None = None, settled_noise: NoiseModel | None = None,
-) -> GyroFit:  # fmt: skip
-    """``ω_reference(t (1 + ε) + τ) = A w' + a - Cᵀ e`` by windows; ``clock`` 0 holds τ and ε, 1 frees τ, 2 both."""
+    grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, *, clock: int = 2
+) -> GyroFit:
+    """``ω_reference(t (1 + ε) + τ) = A w' + a`` by windows; ``clock`` 0 holds τ and ε, 1 frees τ, 2 both."""
     middle = float(np.mean(grid.time_s[windows.middle]))
     n_clock = clock
-    earth = earth_columns(grid, reference, windows, offset_s, rate)
-    noise = settled_noise
     solution: Solution | None = None
     for _ in range(TURNS if clock else 1):
-        target, design = _rows(grid, reference, windows, offset_s, rate, extra)
+        target, design = _rows(grid, reference, windows, offset_s, rate)
         if n_clock:
             theta = _quick(target, design) if solution is None else solution.theta[: design.shape[2]]
             half = 0.25 * grid.step_s
             slope = [
                 t - d @ theta
-                for t, d in (
-                    _rows(grid, reference, windows, offset_s + side * half, rate, extra) for side in (1.0, -1.0)
-                )
+                for t, d in (_rows(grid, reference, windows, offset_s + side * half, rate) for side in (1.0, -1.0))
             ]
             by_offset = -(slope[0] - slope[1]) / (2.0 * half)
             columns = [by_offset]
@@ -67,8 +54,7 @@ def fit_gyroscope(
                 columns.append(by_offset * (grid.time_s[windows.middle] - middle)[:, None])
             design = np.concatenate([design, np.stack(columns, axis=2)], axis=2)
         size = np.linalg.norm(target, axis=1)
-        solution = solve(design, target, windows.start // windows.spacing, size, noise, earth)
-        noise = solution.model
+        solution = solve(design, target, windows.start // windows.spacing, size, WHITE)
         if not n_clock:
             break
         moved = solution.theta[-n_clock:]
@@ -92,17 +78,15 @@ def _quick(target: FloatArray, design: FloatArray) -> FloatArray:
 
 
 def _rows(
-    grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float, extra: Signals | None
+    grid: Grid, reference: Reference, windows: Windows, offset_s: float, rate: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Target (k, 3) and design (k, 3, 12 + q): A row by row, a, then the extra columns."""
+    """Target (k, 3) and design (k, 3, 12): A row by row, a."""
     time = grid.time_s * (1.0 + rate) + offset_s
     signals = np.column_stack([grid.gyroscope, np.ones(len(time))])
-    if extra is not None:
-        signals = np.column_stack([signals, extra.values])
     k, q = len(windows.start), signals.shape[1]
     if reference.motion.attitude is None:
         # The area of a window is one: averages of both.
-        target = windows.of(windows.weight, reference.rate(time)) * (1.0 + rate)
+        target = windows.of(windows.weight, reference.rate(time))
         mean = windows.of(windows.weight, signals)
         per = np.zeros((k, 3, 3, q))
         for i in range(3):
@@ -116,12 +100,10 @@ def _rows(
         # vee of the skew part of R [e]x is ½ (tr R - Rᵀ) e.
         trace = np.einsum("kaaq->kq", turned)
         per = 0.5 * (np.eye(3)[None, :, :, None] * trace[:, None, None, :] - np.swapaxes(turned, 1, 2))
-    design = np.zeros((k, 3, 12 + max(q - 4, 0)))
+    design = np.zeros((k, 3, 12))
     # A row i, column j: component i of the rate by signal j.
     design[:, :, :9] = per[:, :, :, :3].reshape(k, 3, 9)
     design[:, :, 9:12] = per[:, :, :, 3]
-    if extra is not None:
-        design[:, :, 12:] = np.einsum("kriq,qi->krq", per[:, :, :, 4:], extra.directions)
     return target, design
 
 

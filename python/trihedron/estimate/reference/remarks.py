@@ -4,35 +4,42 @@ from __future__ import annotations
 
 import numpy as np
 
-from trihedron.estimate.reference.clocks import Alignment
 from trihedron.records import Finding, FindingCode
 from trihedron.records.reference import AgainstReference
 
 TILT_DEG = 10.0
 """A world whose z leans more than this from the plumb line is some other frame than a floor's."""
 COLOURED = 3.0
-"""Blocks that disagree three times more than the noise model says: something other than noise is left."""
+"""Windows of an accelerometer that disagree three times more than the noise model says: more than noise is left."""
 LEFT_OUT = 0.05
 
 
-def remarks(result: AgainstReference, found: Alignment, is_turned: bool) -> tuple[Finding, ...]:
-    """Findings of a fit: which way is up, doubts of the clock, rows left out, what the noise model does not hold."""
-    out = []
+def remarks(result: AgainstReference, is_turned: bool) -> tuple[Finding, ...]:
+    """Findings of a fit: what the reference is worth, which way is up, rows left out, what the noise does not hold."""
+    error, out = result.error, []
     if is_turned:
         out.append(Finding.of(FindingCode.REFERENCE_TURNED_ROUND))
-    if found.is_ambiguous:
-        out.append(Finding.of(FindingCode.REFERENCE_LAG_AMBIGUOUS, offset_s=result.clock_offset_s[0]))
     if result.vertical is not None:
         out += _up(result)
-    for name, fit in (("gyro", result.gyroscope), ("accelerometer", result.accelerometer)):
-        if fit is None:
-            continue
-        if fit.widened > COLOURED:
-            out.append(Finding.of(FindingCode.REFERENCE_MISFIT, sensor=name, widened=fit.widened))
-        if fit.n_left_out > LEFT_OUT * fit.n_rows:
-            out.append(
-                Finding.of(FindingCode.REFERENCE_OUTLIERS, left_out=fit.n_left_out, rows=fit.n_rows, sensor=name)
+    if error.signs:
+        seen = {sign.kind: sign.seen for sign in error.signs}
+        out.append(
+            Finding.of(
+                FindingCode.REFERENCE_NOT_INDEPENDENT,
+                is_quiet="quieter-than-gyro" in seen,
+                is_square="mounted-without-error" in seen,
+                angle_rad=seen.get("mounted-without-error", float("nan")),
+                varies="S-depends-on-duration" in seen,
             )
+        )
+    if error.rows_left_out > LEFT_OUT * (error.rows + error.rows_left_out):
+        rows = error.rows + error.rows_left_out
+        out.append(Finding.of(FindingCode.REFERENCE_OUTLIERS, left_out=error.rows_left_out, rows=rows))
+    for start, end in error.apart_s:
+        out.append(Finding.of(FindingCode.REFERENCE_APART, start_s=start, end_s=end))
+    force = result.accelerometer
+    if force is not None and force.widened > COLOURED:
+        out.append(Finding.of(FindingCode.REFERENCE_MISFIT, sensor="accelerometer", widened=force.widened))
     return tuple(out)
 
 

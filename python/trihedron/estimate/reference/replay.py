@@ -2,18 +2,70 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
 from trihedron._core import rotation_from_vector
 from trihedron.arrays import FloatArray
+from trihedron.estimate.reference.beside import Beside
+from trihedron.estimate.reference.gyroscope import GyroFit, fit_gyroscope
 from trihedron.estimate.reference.together import Grid, Reference
+from trihedron.estimate.reference.windows import Windows
 from trihedron.records.reference import ReplayStage
+from trihedron.refused import REFUSALS
 
 Mask = npt.NDArray[np.bool_]
 
 HORIZON_S = 10.0
-"""Time over which attitude is carried: some turns of a hand, and a zero of 0.1 °/s adds a degree."""
+"""Time over which attitude is carried: some turns of a hand, and a bias of 0.1 °/s adds a degree."""
+TRAINED = 0.6
+"""Part of the time that the replay's fits see; the rest is held out."""
+LEAST_HELD_OUT_S = 12.0
+
+
+def held_out(
+    side: Beside, seen: Mask, gyro: GyroFit, given: tuple[FloatArray, FloatArray] | None,
+    windows: Callable[[Grid, Reference, Mask], Windows],
+) -> tuple[ReplayStage, ...]:  # fmt: skip
+    """Replay on the last part of a log by what the first part teaches, and by what was known without the reference."""
+    grid, reference = side.grid, side.reference
+    inside = np.flatnonzero(seen)
+    cut = inside[int(TRAINED * len(inside))]
+    first, last = seen.copy(), seen.copy()
+    first[cut:], last[:cut] = False, False
+    if last.sum() * grid.step_s < LEAST_HELD_OUT_S:
+        return ()
+    try:
+        taught = fit_gyroscope(grid, reference, windows(grid, reference, first), gyro.offset_s, gyro.rate, clock=1)
+    except REFUSALS:
+        return ()
+    time = grid.time_s * (1.0 + taught.rate) + taught.offset_s
+    stages: list[tuple[str, FloatArray]] = [
+        ("one scale, bias from rest", _nominal(grid, taught, reference.rate(time), first))
+    ]
+    if given is not None:
+        # The given numbers lie in a frame of their own: the turn between the two is the mounting, no fault of theirs.
+        S, b = given
+        u, _, vt = np.linalg.svd(taught.A @ S.T)
+        turn = (u * np.array([1.0, 1.0, np.linalg.det(u @ vt)])) @ vt
+        stages.append(("as given", (grid.gyroscope @ S.T + b) @ turn.T))
+    stages.append(("by the reference", grid.gyroscope @ taught.A.T + taught.a))
+    done = [replay(name, rate, grid, reference, time, last) for name, rate in stages]
+    return tuple(stage for stage in done if stage is not None)
+
+
+def _nominal(grid: Grid, gyro: GyroFit, rate: FloatArray, seen: Mask) -> FloatArray:
+    """What a data sheet gives: one scale for all axes, axes square, and the bias read where it stands stillest."""
+    u, s, vt = np.linalg.svd(gyro.A)
+    A = (u @ vt) * float(np.mean(s))
+    n = max(round(1.0 / grid.step_s), 8)
+    m = len(grid.gyroscope) // n
+    turning = np.linalg.norm(rate[: m * n].reshape(m, n, 3).mean(axis=1), axis=1)
+    turning[~seen[: m * n].reshape(m, n).all(axis=1)] = np.inf
+    still = int(np.argmin(turning))
+    return np.asarray((grid.gyroscope - grid.gyroscope[still * n : (still + 1) * n].mean(axis=0)) @ A.T)
 
 
 def replay(

@@ -18,27 +18,38 @@ ENTRIES = (
         "Nothing, unless another program will read this file.",
     ),
     Entry(
-        Code.REFERENCE_LAG_AMBIGUOUS,
+        Code.REFERENCE_NOT_INDEPENDENT,
         "",
         WARNING,
-        "The motion repeats itself: more than one offset of the reference's clock fits as well as {offset_s:.4g} s.",
-        "Turns that are alike.",
-        "Shake the unit once, irregularly, at the start.",
+        "The reference is not independent of this gyro"
+        "{is_quiet:?: it follows the gyro's own noise|}"
+        "{is_square:?: it lies within {angle_rad:.2g deg} of the gyro's axes|}"
+        "{varies:?: S changes with the time over which attitude is carried|}.",
+        "An attitude computed with this unit's own readings (a filter or smoother over camera, tracker and IMU).",
+        "Take S and b as confirmed by it, not as measured; use the tracker's own poses to measure them.",
+    ),
+    Entry(
+        Code.REFERENCE_APART,
+        "",
+        WARNING,
+        "From {start_s:.0f} to {end_s:.0f} s of the log the reference lies apart from the rest.",
+        "A tracker that lost its markers or was re-initialised, or a stretch that was computed otherwise.",
+        "Look at the reference's own quality flags there, or leave the stretch out.",
     ),
     Entry(
         Code.REFERENCE_MISFIT,
         "",
         WARNING,
         "Parts of the log disagree about the {sensor} by {widened:.2g} times what its residuals' noise explains; the "
-        "error bars were widened by that.",
-        "A reference that wobbles or was corrected on the way, a zero that drifts, an effect.",
+        "uncertainties were widened by that.",
+        "A reference that wobbles or was corrected on the way, a bias that drifts, an effect.",
         "Look at --report FILE.html for where; repeat the motion.",
     ),
     Entry(
         Code.REFERENCE_OUTLIERS,
         "",
         WARNING,
-        "{left_out} of {rows} windows of the {sensor} were left out as outliers.",
+        "{left_out} of {rows} rows of the reference were left out as outliers.",
         "Jumps of a tracker that lost its markers, or knocks.",
         "Look at the reference's own quality flags.",
     ),

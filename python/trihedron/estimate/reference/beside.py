@@ -1,0 +1,207 @@
+"""One recording beside its reference: parameters, their point of linearisation, and the blocks there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from trihedron._core import ReferenceLog, rotation_from_vector
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.estimate.reference.likelihood import Problem
+from trihedron.estimate.reference.together import Grid, Reference
+from trihedron.gravity import EARTH_RATE_RAD_S
+
+Mask = npt.NDArray[np.bool_]
+
+BLOCK_S = 1.0
+"""Length of a block: a gyro carries a second without error that matters, and a reference's slow error lasts longer."""
+
+NUMBERS = {
+    "S": 9, "gyro-g-sensitivity": 9, "quadratic": 3, "cubic": 3, "b": 3, "clock": 2, "earth": 3, "mounting": 3,
+}  # fmt: skip
+"""Parameters and how many numbers each has."""
+SHARED = ("S", "gyro-g-sensitivity", "quadratic", "cubic")
+"""Those that are the instrument's in every recording."""
+SIZES = {
+    "gyro-g-sensitivity": np.radians(0.1) / 9.81, "quadratic": 2.5e-4, "cubic": 5e-5, "b": 0.3,
+    "earth": EARTH_RATE_RAD_S / np.sqrt(3.0), "mounting": np.radians(0.3),
+}  # fmt: skip
+"""Prior σ. Data sheets: 0.1 °/s/g; 0.1 % of full scale at 250 °/s, in 1/(rad/s) and 1/(rad/s)². The Earth's rate is a
+vector of its length and of unknown direction; markers are put back within some tenths of a degree."""
+OF_SCALE, CLOCK = 0.3, (0.1, 1e-3)
+"""Prior σ of S beside its start (a third of each scale), and of the clock's offset [s] and rate."""
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Where the model is linearised: ω = S w' + b - G f - bends in the reference's body turned by ``mounting``;
+    t_reference = t (1 + rate) + offset."""
+
+    S: FloatArray
+    b: FloatArray
+    offset_s: float
+    rate: float
+    g: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
+    bend: FloatArray = field(default_factory=lambda: np.zeros(6))
+    mounting: FloatArray = field(default_factory=lambda: np.eye(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """A log on its grid, its reference, which samples hold, the specific force (n, 3) in the reference's body if known,
+    and the numbers to begin with."""
+
+    grid: Grid
+    reference: Reference
+    seen: Mask
+    start: Point
+    force: FloatArray | None
+
+    @property
+    def middle_s(self) -> float:
+        """Time of the log about which the clock's rate turns."""
+        return float(self.grid.time_s[0] + 0.5 * self.grid.step_s * len(self.grid.time_s))
+
+    def has(self, name: str) -> bool:
+        """Whether a parameter means anything beside this reference."""
+        motion = self.reference.motion
+        is_without = {
+            "clock": motion.is_stepwise,
+            "earth": motion.specific_force is not None,
+            "gyro-g-sensitivity": self.force is None,
+        }
+        return not is_without.get(name, False)
+
+    def sigma(self, name: str) -> FloatArray:
+        """(k,) prior σ of a parameter, SI."""
+        if name == "S":
+            return OF_SCALE * np.tile(np.linalg.norm(self.start.S, axis=0), 3)
+        return np.array(CLOCK) if name == "clock" else np.full(NUMBERS[name], SIZES[name])
+
+    def values(self, point: Point, name: str) -> FloatArray:
+        """(k,) a parameter at a point, SI."""
+        by = {
+            "S": point.S.ravel(), "b": point.b, "earth": np.zeros(3), "gyro-g-sensitivity": point.g.ravel(),
+            "clock": np.array([point.offset_s + point.rate * self.middle_s, point.rate]),
+            "quadratic": point.bend[:3], "cubic": point.bend[3:],
+            "mounting": Rotation.from_matrix(point.mounting).as_rotvec(),
+        }  # fmt: skip
+        return np.asarray(by[name], dtype=np.float64)
+
+    def moved(self, point: Point, change: Mapping[str, FloatArray]) -> Point:
+        """The point after changes in SI."""
+        clock = change.get("clock", np.zeros(2))
+        rate = float(point.rate + clock[1])
+        bend = np.concatenate([change.get("quadratic", np.zeros(3)), change.get("cubic", np.zeros(3))])
+        return Point(
+            S=point.S + change["S"].reshape(3, 3),
+            b=point.b + change["b"],
+            # The offset is that of the log's middle.
+            offset_s=float(point.offset_s + point.rate * self.middle_s + clock[0] - rate * self.middle_s),
+            rate=rate,
+            g=point.g + change.get("gyro-g-sensitivity", np.zeros(9)).reshape(3, 3),
+            bend=point.bend + bend,
+            mounting=point.mounting @ Rotation.from_rotvec(change.get("mounting", np.zeros(3))).as_matrix(),
+        )
+
+    def _own(self, point: Point) -> tuple[FloatArray, FloatArray]:
+        """Rates (n, 3) along the gyro's own axes, and those axes' directions (3, 3) in columns."""
+        scale = np.linalg.norm(point.S, axis=0)
+        return (self.grid.gyroscope + np.linalg.solve(point.S, point.b)) * scale, point.S / scale
+
+    def corrected(self, point: Point) -> FloatArray:
+        """(n, 3) rates in the reference's body."""
+        rate = self.grid.gyroscope @ point.S.T + point.b
+        if self.force is not None:
+            rate = rate - self.force @ point.g.T
+        if np.any(point.bend):
+            own, along = self._own(point)
+            rate = rate - (own**2 * point.bend[:3] + own**3 * point.bend[3:]) @ along.T
+        return np.ascontiguousarray(rate)
+
+    def problem(
+        self, point: Point, places: Mapping[str, IntArray], wider: Mapping[str, float], block_s: float = BLOCK_S
+    ) -> Problem:
+        """The linear problem about a point; ``places`` of the parameters wanted, priors ``wider`` than usual."""
+        own, along = self._own(point)
+        n = len(self.grid.time_s)
+        force = np.zeros((n, 0)) if self.force is None else self.force
+        signals = np.ascontiguousarray(np.column_stack([self.grid.gyroscope, np.ones(n), own**2, own**3, force]))
+        log = ReferenceLog(float(self.grid.time_s[0]), self.grid.step_s, self.seen, signals)
+        time, attitude = self.attitudes(point)
+        blocks = log.blocks(self.corrected(point), time, attitude, max(2, round(block_s / self.grid.step_s)))
+        M = blocks.moments().reshape(-1, 3, 3, signals.shape[1])
+        m = len(M)
+        # A reference stamped later by dτ is compared with the gyro earlier by it.
+        clock = [-c for c in blocks.wrt_clock()]
+        if self.reference.motion.attitude is None:
+            # A rate is summed over the log's own time: its clock moves rows, and does not stretch what they say.
+            clock[1] = clock[1] + np.einsum("maij,ij->ma", M[:, :, :, :3], point.S) + M[:, :, :, 3] @ point.b
+        columns = {
+            "S": M[:, :, :, :3].reshape(m, 3, 9),
+            "b": M[:, :, :, 3],
+            "clock": np.stack(clock, axis=2),
+            "earth": -(blocks.time_s() - self.grid.time_s[0])[:, None, None] * np.eye(3),
+            "quadratic": -np.einsum("maik,ik->mak", M[:, :, :, 4:7], along),
+            "cubic": -np.einsum("maik,ik->mak", M[:, :, :, 7:10], along),
+            "gyro-g-sensitivity": -M[:, :, :, 10:].reshape(m, 3, -1),
+            "mounting": -blocks.attitude(),
+        }
+        names = list(places)
+        sigma = np.concatenate([wider.get(name, 1.0) * self.sigma(name) for name in names])
+        about = np.concatenate([self._prior(name) - self.values(point, name) for name in names])
+        first = sum(NUMBERS[name] for name in names[: names.index("b")])
+        return Problem(
+            blocks=blocks,
+            observed=blocks.angle().ravel(),
+            columns=np.concatenate([columns[name] for name in names], axis=2).reshape(3 * m, -1) * sigma,
+            sigma=sigma,
+            centre=about / sigma,
+            index=np.concatenate([places[name] for name in names]),
+            bias=slice(first, first + 3),
+        )
+
+    def _prior(self, name: str) -> FloatArray:
+        """(k,) where a prior stands: an effect's at none."""
+        return self.values(replace(self.start, g=np.zeros((3, 3)), bend=np.zeros(6)), name)
+
+    def attitudes(self, point: Point) -> tuple[FloatArray, FloatArray]:
+        """The reference's attitudes (m, 3, 3) at times (m,) of the log; rates are summed to one."""
+        motion = self.reference.motion
+        if motion.attitude is not None:
+            return (motion.time_s - point.offset_s) / (1.0 + point.rate), motion.attitude @ point.mounting
+        if motion.is_stepwise:
+            time = self.grid.time_s
+            rate = self.reference.rate(time * (1.0 + point.rate) + point.offset_s)
+        else:
+            assert motion.rate is not None
+            time, rate = (motion.time_s - point.offset_s) / (1.0 + point.rate), motion.rate
+        rate, h = rate @ point.mounting, np.diff(time)[:, None]
+        turn = 0.5 * h * (rate[1:] + rate[:-1]) + h**2 / 12.0 * np.cross(rate[:-1], rate[1:])
+        out = np.empty((len(time), 3, 3))
+        out[0] = now = np.eye(3)
+        for k, step in enumerate(rotation_from_vector(np.ascontiguousarray(turn))):
+            out[k + 1] = now = now @ step
+        return time, out
+
+
+def places(sides: list[Beside], wanted: tuple[str, ...]) -> list[dict[str, IntArray]]:
+    """Where each recording's parameters stand among all: those of the instrument first, then the recording's own."""
+    at, shared, out = 0, {}, []
+    for name in SHARED:
+        if name in wanted and any(side.has(name) for side in sides):
+            shared[name] = np.arange(at, at + NUMBERS[name])
+            at += NUMBERS[name]
+    for k, side in enumerate(sides):
+        own = {name: place for name, place in shared.items() if side.has(name)}
+        for name in NUMBERS:
+            if name in SHARED or name not in wanted or not side.has(name) or (name == "mounting" and k == 0):
+                continue
+            own[name] = np.arange(at, at + NUMBERS[name])
+            at += NUMBERS[name]
+        out.append(own)
+    return out

@@ -1,0 +1,203 @@
+"""Attitude of gyros against their references over whole recordings: parameters and noise strengths by one evidence.
+
+The parameters enter linearly (``trihedron._core.ReferenceBlocks``); each has a Gaussian prior, and in units of its
+prior σ the evidence of a hypothesis is that of a ridge regression under the covariance that the noise strengths give.
+The strengths are unknown in every hypothesis and integrated out (docs/reference.md). Several
+recordings share some parameters and have strengths of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from trihedron._core import ReferenceBlocks
+from trihedron.arrays import FloatArray, IntArray
+
+STRENGTHS = ("angle_walk", "bias_walk", "white", "world", "world_s", "body", "body_s")
+TYPICAL = np.log([2e-4, 2e-5, 3e-4, 1e-3, 8.0, 1e-3, 8.0])
+"""Consumer gyros and optical trackers: rad/√s, rad/s/√s, rad, rad, s, rad, s."""
+SPREAD = np.log([30.0, 30.0, 30.0, 30.0, 4.0, 30.0, 4.0])
+"""A prior σ of a factor of 30 either way; the time constants of a factor of 4."""
+FARTHEST = 4.0
+"""Strengths beyond four prior σ are strengths of nothing."""
+STEP = 0.02
+CURVATURE_STEP = 0.25
+"""Steps in the logarithm of a strength for the slope, and for the curvature that a walk begins with."""
+STEPS, ADAPTED, THINNED = 600, 150, 12
+"""Steps of the walk over strengths; its steps learn from the last 150; every twelfth counts after the first 150."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One recording: its blocks, observations (3 m,), and columns (3 m, p) of parameters in units of ``sigma`` (p,).
+
+    ``centre`` (p,) is where each prior stands from the point of linearisation, in the same units; ``index`` (p,) their
+    place among all parameters of the fit; ``bias`` the places here of the bias at the start.
+    """
+
+    blocks: ReferenceBlocks
+    observed: FloatArray
+    columns: FloatArray
+    sigma: FloatArray
+    centre: FloatArray
+    index: IntArray
+    bias: slice
+
+    def table(self) -> FloatArray:
+        """Columns and observations side by side, as the filter takes them."""
+        return np.ascontiguousarray(np.column_stack([self.columns, self.observed]))
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """Normal equations under strengths: information (p, p), moment (p,), and what does not depend on parameters.
+
+    ``mean_bias`` (3, p + 1) and its covariance (3, 3) are the bias walk's mean over time by columns.
+    """
+
+    information: FloatArray
+    moment: FloatArray
+    constant: float
+    mean_bias: FloatArray
+    cov_mean_bias: FloatArray
+
+
+def equations(problem: Problem, strengths: FloatArray) -> Equations:
+    """Normal equations of a recording under ``strengths``, logarithms in the order of :data:`STRENGTHS`."""
+    found = problem.blocks.normal(problem.table(), np.exp(strengths).tolist())
+    gram, far = found.gram, (strengths - TYPICAL) / SPREAD
+    constant = -0.5 * (gram[-1, -1] + found.log_det + 3 * found.rows * np.log(2.0 * np.pi) + float(far @ far))
+    return Equations(gram[:-1, :-1], gram[:-1, -1], constant, found.mean_bias, found.cov_mean_bias)
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """Posterior of all parameters under given strengths: mean (p,), covariance (p, p), log evidence."""
+
+    mean: FloatArray
+    covariance: FloatArray
+    evidence: float
+
+
+def together(problems: Sequence[Problem], found: Sequence[Equations]) -> Together:
+    """Recordings in one fit, the prior of every parameter counted once."""
+    n = 1 + max(int(p.index.max()) for p in problems)
+    information, moment, centre, constant = np.eye(n), np.zeros(n), np.zeros(n), 0.0
+    for problem, one in zip(problems, found, strict=True):
+        information[np.ix_(problem.index, problem.index)] += one.information
+        moment[problem.index] += one.moment
+        centre[problem.index] = problem.centre
+        constant += one.constant
+    moment += centre
+    L = np.linalg.cholesky(information)
+    half = np.linalg.solve(L, moment)
+    evidence = constant - 0.5 * float(centre @ centre) + 0.5 * float(half @ half) - float(np.sum(np.log(np.diag(L))))
+    inverse = np.linalg.inv(L)
+    return Together(inverse.T @ half, inverse.T @ inverse, evidence)
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Parameters of one hypothesis with the strengths integrated out: mean (p,) and covariance (p, p) in prior units.
+
+    The biases among them are their means over time. ``strengths`` (a recording, 7) are the likeliest logarithms and
+    ``evidence`` that at them; ``draws`` (k, a recording, 7) their posterior.
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+    evidence: float
+    strengths: FloatArray
+    draws: FloatArray
+
+
+def most_likely(problems: Sequence[Problem], start: FloatArray | None = None) -> tuple[FloatArray, float]:
+    """(a recording, 7) logarithms of the strengths of greatest posterior, and the log evidence there."""
+    best = np.tile(TYPICAL, (len(problems), 1)) if start is None else start.copy()
+    bounds = list(zip(TYPICAL - FARTHEST * SPREAD, TYPICAL + FARTHEST * SPREAD, strict=True))
+    # From strengths of a neighbouring hypothesis one round over the recordings is enough.
+    for _ in range(1 if len(problems) == 1 or start is not None else 2):
+        for k in range(len(problems)):
+            height = _heights(problems, best, k)
+
+            def descent(x: FloatArray, height: Callable[[FloatArray], float] = height) -> tuple[float, FloatArray]:
+                here = height(x)
+                return -here, np.array([(here - height(x + STEP * e)) / STEP for e in np.eye(len(x))])
+
+            best[k] = minimize(
+                descent, best[k], jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 3e-6, "maxiter": 60}
+            ).x
+    return best, height(best[-1])
+
+
+def _heights(problems: Sequence[Problem], strengths: FloatArray, k: int) -> Callable[[FloatArray], float]:
+    """Log evidence as a function of the strengths of one recording, those of the others as they are."""
+    found = [equations(p, s) if j != k else None for j, (p, s) in enumerate(zip(problems, strengths, strict=True))]
+
+    def height(x: FloatArray) -> float:
+        own = equations(problems[k], x)
+        return together(problems, [own if one is None else one for one in found]).evidence
+
+    return height
+
+
+def fit(problems: Sequence[Problem], start: FloatArray | None = None) -> Fitted:
+    """Mode of the strengths, a walk over their posterior for each recording, and the parameters averaged over it."""
+    best, evidence = most_likely(problems, start)
+    walks = [_walk(_heights(problems, best, k), best[k]) for k in range(len(problems))]
+    draws = np.stack(walks, axis=1)
+    solved = [_with_mean_bias(problems, draw) for draw in draws]
+    means = np.array([mean for mean, _ in solved])
+    covariance = np.mean([cov for _, cov in solved], axis=0) + np.cov(means.T, bias=True)
+    return Fitted(means.mean(axis=0), covariance, evidence, best, draws)
+
+
+def _walk(height: Callable[[FloatArray], float], start: FloatArray) -> FloatArray:
+    """(k, 7) draws by a Metropolis walk: Haario's steps, from the curvature first and then from the walk itself."""
+    n = len(start)
+    values, vectors = np.linalg.eigh(_curvature(height, start))
+    covariance = (vectors / np.maximum(values, 1.0 / SPREAD.max() ** 2)) @ vectors.T
+    rng = np.random.default_rng(0)
+    now, here = start, height(start)
+    seen: list[FloatArray] = []
+    root = np.linalg.cholesky(covariance)
+    for k in range(STEPS):
+        if k and k % ADAPTED == 0:
+            root = np.linalg.cholesky(0.9 * np.cov(np.array(seen[-ADAPTED:]).T) + 0.1 * covariance)
+        other = now + 2.4 / np.sqrt(n) * root @ rng.normal(size=n)
+        there = -np.inf if np.any(np.abs(other - TYPICAL) > FARTHEST * SPREAD) else height(other)
+        if np.log(rng.uniform()) < there - here:
+            now, here = other, there
+        seen.append(now)
+    return np.array(seen[ADAPTED::THINNED])
+
+
+def _with_mean_bias(problems: Sequence[Problem], strengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Posterior where every bias is its mean over time instead of its value at the start."""
+    found = [equations(p, s) for p, s in zip(problems, strengths, strict=True)]
+    all_of = together(problems, found)
+    change, shift = np.eye(len(all_of.mean)), np.zeros(len(all_of.mean))
+    added = np.zeros_like(all_of.covariance)
+    for problem, one in zip(problems, found, strict=True):
+        b, sigma = problem.index[problem.bias], problem.sigma[problem.bias]
+        change[np.ix_(b, problem.index)] -= one.mean_bias[:, :-1] / sigma[:, None]
+        shift[b] = one.mean_bias[:, -1] / sigma
+        added[np.ix_(b, b)] = one.cov_mean_bias / np.outer(sigma, sigma)
+    return change @ all_of.mean + shift, change @ all_of.covariance @ change.T + added
+
+
+def _curvature(function: Callable[[FloatArray], float], at: FloatArray) -> FloatArray:
+    """Minus the second derivatives (n, n) of a function of (n,)."""
+    n, h = len(at), CURVATURE_STEP * np.eye(len(at))
+    here = function(at)
+    ahead = [function(at + h[i]) for i in range(n)]
+    out = np.empty((n, n))
+    for i in range(n):
+        out[i, i] = ahead[i] + function(at - h[i]) - 2.0 * here
+        for j in range(i):
+            out[i, j] = out[j, i] = function(at + h[i] + h[j]) - ahead[i] - ahead[j] + here
+    return -out / CURVATURE_STEP**2

@@ -1,0 +1,69 @@
+"""What a reference and a log cannot answer together, in one sentence each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.estimate.reference.gyroscope import GyroFit
+from trihedron.records import Recording
+from trihedron.records.reference import ReferenceMotion
+from trihedron.refused import RefusedError
+from trihedron.units import rate_to_si
+
+STRANGERS = 0.6
+"""A fit that leaves this part of the reference's rate has found no shared motion, whatever the sizes correlate."""
+TURNING = 0.5
+"""Part of the rate's rms from which on a row turns: of a session of poses its moves, of a restless hand most."""
+
+
+def share_left(gyro: GyroFit) -> float:
+    """What is left over the reference's rate, middle rows (medians: knocks do not decide) of those that turn."""
+    turns = gyro.size >= TURNING * float(np.sqrt(np.mean(gyro.size**2)))
+    left = np.linalg.norm(gyro.solution.residual, axis=1)[turns]
+    return float(np.median(left) / max(float(np.median(gyro.size[turns])), 1e-300))
+
+
+def refuse_strangers(gyro: GyroFit, motion: ReferenceMotion) -> None:
+    """Raise ``RefusedError`` where the rates are alike in size and no mounting makes them one."""
+    left = share_left(gyro)
+    if left > STRANGERS and not motion.is_stepwise:
+        raise RefusedError(
+            f"{motion.source}: this reference and the log share no motion: their turning rates look alike in size, but "
+            f"no mounting makes them one ({100 * left:.0f} % of the rate is left); name the reference of this very log."
+        )
+
+
+def refuse_units(recording: Recording, gyro: GyroFit, motion: ReferenceMotion) -> None:
+    """Raise ``RefusedError`` at a factor of 57.3 or of a power of ten between two that both state their unit."""
+    nominal = rate_to_si(recording.gyroscope_unit)
+    if nominal is None:
+        return
+    scale = float(np.exp(np.mean(np.log(np.linalg.svd(gyro.A, compute_uv=False))))) / nominal
+    for factor, words in (
+        (np.degrees(1.0), "its angles or rates are in deg"),
+        (np.radians(1.0), "its angles or rates are in rad"),
+        (1000.0, "it is in thousandths"),
+        (0.001, "it is in thousandths"),
+        (2.0 * np.pi / 60.0, "it is in rpm"),
+        (60.0 / (2.0 * np.pi), "it is in rpm"),
+        (60.0, "it is in rpm or per minute"),
+    ):
+        if abs(scale / factor - 1.0) < 0.2:
+            raise RefusedError(
+                f"{motion.source}: the reference turns {scale:.3g} times as fast as the gyro says: {words}, or the "
+                "log's unit is misread; name the unit in its columns ('wx [deg/s]', --reference-columns) or with "
+                "--gyro-unit."
+            )
+
+
+def refuse_still(motion: ReferenceMotion, S: FloatArray, covariance: FloatArray) -> None:
+    """Raise ``RefusedError`` for axes of S (9,) that its covariance (9, 9) leaves open."""
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0)).reshape(3, 3)
+    size = np.linalg.norm(S.reshape(3, 3), axis=0)
+    weak = ["XYZ"[j] for j in range(3) if not np.linalg.norm(sigma[:, j]) < 0.5 * size[j]]
+    if weak:
+        raise RefusedError(
+            f"{motion.source}: the log's gyro axis {' and '.join(weak)} hardly turns while the reference is there, and "
+            "its scale stays open: turn the unit about every axis (a rate table: one mounting for each)."
+        )

@@ -1,0 +1,196 @@
+//! A gyro beside known motion across the seam.
+
+use nalgebra::{DMatrix, Dyn, OMatrix, U3};
+use numpy::{
+    PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
+};
+use pyo3::prelude::*;
+
+use super::arrays::{
+    as_vectors, dmatrix, flat1, flat2, flat3, matrices3, matrix, of3, stack3, vectors,
+};
+use crate::reference_motion::{Block, Log, Strengths, Truth, blocks, normal, smoothed_bias};
+
+pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<ReferenceLog>()?;
+    module.add_class::<ReferenceBlocks>()?;
+    module.add_class::<ReferenceNormal>()
+}
+
+/// A log on even times: its first time and step, which samples hold, and the signals `(n, q)` whose integrals are wanted.
+#[pyclass(frozen, module = "trihedron._core")]
+struct ReferenceLog {
+    start_s: f64,
+    step_s: f64,
+    is_valid: Vec<bool>,
+    signals: Vec<f64>,
+    n_signals: usize,
+}
+
+#[pymethods]
+impl ReferenceLog {
+    #[new]
+    fn new(
+        start_s: f64,
+        step_s: f64,
+        is_valid: PyReadonlyArray1<'_, bool>,
+        signals: PyReadonlyArray2<'_, f64>,
+    ) -> Self {
+        Self {
+            start_s,
+            step_s,
+            is_valid: flat1(&is_valid).into_owned(),
+            signals: flat2(&signals).into_owned(),
+            n_signals: signals.shape()[1],
+        }
+    }
+
+    /// Blocks of `block` samples of the corrected `rate` `(n, 3)` against attitudes `(m, 3, 3)` at times `(m,)` of the log.
+    fn blocks(
+        &self,
+        py: Python<'_>,
+        rate: PyReadonlyArray2<'_, f64>,
+        time_s: PyReadonlyArray1<'_, f64>,
+        attitude: PyReadonlyArray3<'_, f64>,
+        block: usize,
+    ) -> PyResult<ReferenceBlocks> {
+        let (rate, time_s) = (flat3("rate", &rate)?, flat1(&time_s));
+        let attitude = matrices3("attitude", &attitude)?;
+        let found = super::run(py, || {
+            let log = Log {
+                start_s: self.start_s,
+                step_s: self.step_s,
+                rate: as_vectors(&rate),
+                is_valid: &self.is_valid,
+                signals: &self.signals,
+                n_signals: self.n_signals,
+            };
+            let truth = Truth {
+                time_s: &time_s,
+                attitude: &attitude,
+            };
+            blocks(&log, &truth, block)
+        })?;
+        Ok(ReferenceBlocks(found))
+    }
+}
+
+/// A log cut into blocks beside a reference.
+#[pyclass(frozen, module = "trihedron._core")]
+struct ReferenceBlocks(Vec<Block>);
+
+fn named(of: [f64; 7]) -> Strengths {
+    Strengths {
+        angle_walk: of[0],
+        bias_walk: of[1],
+        white: of[2],
+        world: [of[3], of[4]],
+        body: [of[5], of[6]],
+    }
+}
+
+fn columns_of(rows: &OMatrix<f64, U3, Dyn>) -> DMatrix<f64> {
+    DMatrix::from_fn(3, rows.ncols(), |i, j| rows[(i, j)])
+}
+
+/// Normal equations: `gram` `(p, p)`, `log_det` of the covariance of `rows` observations of three; standardised
+/// `innovations` `(3 m, p)`; the bias walk's mean over time `(3, p)` by columns, with its covariance `(3, 3)` beside them.
+#[pyclass(frozen, get_all, module = "trihedron._core")]
+struct ReferenceNormal {
+    gram: Py<PyArray2<f64>>,
+    log_det: f64,
+    rows: usize,
+    innovations: Py<PyArray2<f64>>,
+    mean_bias: Py<PyArray2<f64>>,
+    cov_mean_bias: Py<PyArray2<f64>>,
+}
+
+#[pymethods]
+impl ReferenceBlocks {
+    /// `(m,)` middles of the rows seen, s.
+    fn time_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.0
+            .iter()
+            .map(|b| b.time_s)
+            .collect::<Vec<_>>()
+            .to_pyarray(py)
+    }
+
+    /// `(m, 2)` rows of the reference that hold, and that were left out.
+    fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<usize>>> {
+        let flat: Vec<usize> = self.0.iter().flat_map(|b| b.rows).collect();
+        flat.to_pyarray(py).reshape([self.0.len(), 2])
+    }
+
+    /// `(m, 3)` rotation from the gyro's attitude to the reference's, in the world, rad.
+    fn angle<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        vectors(py, &self.0.iter().map(|b| b.angle).collect::<Vec<_>>())
+    }
+
+    /// `(m, 3)` mean rate in the world, and `(m, 3)` of it times the time from the log's middle.
+    #[allow(clippy::type_complexity, reason = "a pair of arrays")]
+    fn wrt_clock<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let of = |k: usize| {
+            vectors(
+                py,
+                &self.0.iter().map(|b| b.wrt_clock[k]).collect::<Vec<_>>(),
+            )
+        };
+        Ok((of(0)?, of(1)?))
+    }
+
+    /// `(m, 3, 3)` mean attitudes.
+    fn attitude<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        stack3(py, self.0.iter().map(|b| b.attitude))
+    }
+
+    /// `(m, 9, q)` means of `∫ C_ai s_j dt`, row 3 a + i.
+    fn moments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let q = self.0.first().map_or(0, |b| b.moments.ncols());
+        let flat: Vec<f64> = self
+            .0
+            .iter()
+            .flat_map(|b| b.moments.transpose().as_slice().to_vec())
+            .collect();
+        flat.to_pyarray(py).reshape([self.0.len(), 9, q])
+    }
+
+    /// Normal equations of columns `(3 m, p)`.
+    fn normal<'py>(
+        &self,
+        py: Python<'py>,
+        columns: PyReadonlyArray2<'py, f64>,
+        strengths: [f64; 7],
+    ) -> PyResult<ReferenceNormal> {
+        let columns = dmatrix(&columns);
+        let found = super::run(py, || normal(&self.0, &columns, &named(strengths)))?;
+        Ok(ReferenceNormal {
+            gram: matrix(py, &found.gram)?.unbind(),
+            log_det: found.log_det,
+            rows: found.rows,
+            innovations: matrix(py, &found.innovations)?.unbind(),
+            mean_bias: matrix(py, &columns_of(&found.mean_bias))?.unbind(),
+            cov_mean_bias: of3(py, &found.cov_mean_bias)?.unbind(),
+        })
+    }
+
+    /// The bias walk as a combination `(3 m, p)` of the columns, and its covariance `(m, 3, 3)` beside them.
+    #[allow(clippy::type_complexity, reason = "a pair of arrays")]
+    fn bias<'py>(
+        &self,
+        py: Python<'py>,
+        columns: PyReadonlyArray2<'py, f64>,
+        strengths: [f64; 7],
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+        let columns = dmatrix(&columns);
+        let found = super::run(py, || smoothed_bias(&self.0, &columns, &named(strengths)))?;
+        Ok((
+            matrix(py, &found.columns)?,
+            stack3(py, found.cov.into_iter())?,
+        ))
+    }
+}
