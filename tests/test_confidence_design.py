@@ -108,5 +108,5 @@ def test_faces_with_a_pose_left_out_and_faces_of_a_wrong_number_are_answered():
     assert np.isnan(result.accelerometer.quality.residual[-1])
     with pytest.raises(ValueError, match=f"faces must be {n_poses} numbers"):
         recorded(made, method="faces", faces=up[:-1])
-    with pytest.raises(ValueError, match="belongs to method=.separate"):
+    with pytest.raises(ValueError, match=r"belongs to method=.separate"):
         recorded(made, loss="huber")

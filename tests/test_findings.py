@@ -1,6 +1,7 @@
 """The catalogue of findings is closed: stages give codes and values, every sentence stands under report/."""
 
 import ast
+import re
 from pathlib import Path
 
 import numpy as np
