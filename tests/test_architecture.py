@@ -196,7 +196,10 @@ def functions():
     for path in PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                yield f"{path.relative_to(PACKAGE)}:{node.name}", node.end_lineno - node.lineno + 1
+                first = node.body[0]
+                said = ast.get_docstring(node) is not None and first.end_lineno - first.lineno + 1
+                # What it says of itself is no part of what has to be held in one head.
+                yield f"{path.relative_to(PACKAGE)}:{node.name}", node.end_lineno - node.lineno + 1 - said
 
 
 def test_no_function_outgrows_its_reader():
@@ -331,8 +334,8 @@ def test_no_handler_takes_a_defect_of_a_whole_fit_for_a_refusal():
 
 # Arrows between the rooms of the diagnosis, each once: what stands in a row may import what stands before it.
 ROOMS_OF_THE_DIAGNOSIS = (
-    "session", "context", "zeros", "laws", "residuals", "effects", "selection", "application", "diagnosis", "against",
-    "rest",
+    "session", "context", "zeros", "laws", "residuals", "effects", "hypothesis", "relations", "candidates", "search",
+    "sample_evidence", "bias_strengths", "accepted", "verdict", "application", "diagnosis", "against", "rest",
 )  # fmt: skip
 
 

@@ -9,8 +9,8 @@ import pytest
 import trihedron
 from trihedron.diagnose import diagnose_recording
 from trihedron.diagnose.effects import catalogue
+from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import search, threshold
-from trihedron.diagnose.session.hypothesis import Term, hypothesis
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.diagnose.session.twin import contiguous

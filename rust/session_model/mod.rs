@@ -26,6 +26,7 @@ mod rest_rows;
 pub mod rows;
 pub mod session_zero;
 pub mod state;
+pub mod strength_search;
 pub mod strengths;
 mod zero_rows;
 

@@ -143,12 +143,7 @@ impl Session {
     ) {
         for (c, size) in distortion.sizes.iter().enumerate() {
             if size.is_finite() {
-                out.push(size_row(
-                    layout.border,
-                    N_MODEL + c,
-                    state.effect[c],
-                    *size,
-                ));
+                out.push(size_row(layout.border, N_MODEL + c, state.effect[c], *size));
             }
         }
         let Some(prior) = &self.prior else { return };

@@ -8,15 +8,17 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtrc
 
 from trihedron.diagnose.bias_strengths import BiasStrength
+from trihedron.diagnose.candidates import Tried
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Effect
+from trihedron.diagnose.hypothesis import Hypothesis
 from trihedron.diagnose.residuals.goodness_of_fit import LEAST_DOF, ROW_DOMAINS, physical_rms
 from trihedron.diagnose.sample_evidence import Seen
-from trihedron.diagnose.search import Found, Tried
-from trihedron.diagnose.session.hypothesis import Hypothesis
+from trihedron.diagnose.search import Found
 from trihedron.diagnose.session.solve import Fit, leverage
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, EffectParameter, Stage, StageDomain
 from trihedron.records.domains import HeldOut
@@ -25,6 +27,7 @@ HEADLINE = 0.5
 """What carries less than half of the samples' own variance (a faint line) or poses (one bump) follows behind whatever
 explains poses and moves."""
 LEAST_P = 1e-300
+"""The rarest chance that a double holds with all its digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +154,6 @@ def _of_samples(answer: Answer) -> list[dict[str, Any]]:
 
 
 def _p_of(value: np.ndarray, covariance: np.ndarray) -> float:
-    from scipy.special import chdtrc
 
     return float(chdtrc(len(value), float(value @ np.linalg.solve(covariance, value))))
 

@@ -13,7 +13,7 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.session.hypothesis import ANYTHING, Bounds, Hypothesis, again
+from trihedron.diagnose.hypothesis import ANYTHING, Bounds, Hypothesis, again
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
 from trihedron.session.noise import scatter_unit

@@ -16,6 +16,7 @@ from trihedron.diagnose.effects.direct import DirectEffect, Evidence
 from trihedron.diagnose.effects.dropped_samples import DroppedSamples
 from trihedron.diagnose.effects.sample_steps import step_errors
 from trihedron.diagnose.effects.timing_jitter import TimingJitter, common_time_error
+from trihedron.diagnose.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.laws.find import find_laws
 from trihedron.diagnose.relations import with_room_field
 from trihedron.diagnose.residuals.before_after import residuals_before_after, with_covariance
@@ -25,7 +26,6 @@ from trihedron.diagnose.residuals.timing import judge_timing
 from trihedron.diagnose.residuals.within_holds import judge_within_holds
 from trihedron.diagnose.sample_evidence import Observed, look
 from trihedron.diagnose.search import Found, search, with_shapes
-from trihedron.diagnose.session.hypothesis import Hypothesis, again, hypothesis
 from trihedron.diagnose.session.observations import Observations, observe
 from trihedron.diagnose.session.solve import Fit, tune_noise
 from trihedron.diagnose.session.starting_point import is_open, linear_model, nominal_start, prior_of, start_twin

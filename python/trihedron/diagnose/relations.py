@@ -8,7 +8,7 @@ from trihedron.arrays import FloatArray
 from trihedron.diagnose.context import Context
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.contract import Variant, rate_only
-from trihedron.diagnose.session.hypothesis import Hypothesis, Term, again
+from trihedron.diagnose.hypothesis import Hypothesis, Term, again
 
 ROOM_RAD_S = 1e-3
 """0.05 °/s: what a magnet near a consumer gyro, or a drive's field, is known to do."""

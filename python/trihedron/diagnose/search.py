@@ -6,19 +6,19 @@ its shapes and the whole catalogue costs. It stands where that is more than the 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.special import chdtrc
 
 from trihedron.arrays import FloatArray
+from trihedron.diagnose.candidates import Tried, candidates_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import Variant
+from trihedron.diagnose.hypothesis import Hypothesis, Term, again, hypothesis
 from trihedron.diagnose.relations import without_doubtful
 from trihedron.diagnose.residuals.goodness_of_fit import physical_rms
-from trihedron.diagnose.session.hypothesis import Asked, Hypothesis, Term, again, hypothesis
 from trihedron.diagnose.session.twin import (
     DYNAMICS,
     MOVES,
@@ -28,44 +28,24 @@ from trihedron.diagnose.session.twin import (
 )
 from trihedron.session.noise import Strengths
 
-PRIOR_SCALES = (1.0, 0.3, 0.1)
-"""Parts differ by ten from what data sheets of their kind say: the size expected is one of these times that."""
-RESCALED = (3.0, 0.3)
-N_LEADERS = 3
-"""Effects taken from every look at the whole catalogue to the full evidence."""
-SHAPES_KEPT = 2
-"""Shapes of one effect that go along."""
 NEAR = 6.0
 """Difference of scores below which two explanations are named together: odds of twenty to one."""
 WORTH_FITTING = 20.0
 """Difference of scores, one linear step from the fit, within which rivals are fitted in full."""
 N_RIVALS = 3
+"""Rivals fitted in full."""
 MOST_EFFECTS = 4
 """Mechanisms of one session at most; poses that were pushed are none."""
 MOST_STEPS = 8
+"""Effects and pushed poses together, at most."""
 SHAPE_STEPS = np.array([-0.6, -0.3, 0.0, 0.3, 0.6])
 """Logarithms of a shape number about the grid's best, over which a parabola is laid."""
 N_RESHAPED = 2
+"""Rounds of sizes and shapes: the second changes them by a tenth of what the first did."""
 STEP_LOG = 0.02
 """Half-step of the derivative by the logarithm of a shape."""
 OWN_DOMAINS = {"force": (STATIC_ACCEL, DYNAMICS), "rate": (STATIC_GYRO, MOVES, DYNAMICS)}
 """Where a flaw of one sensor must show: velocity needs both, a tilted force being half of it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Tried:
-    """A candidate beside a hypothesis: its score, and what it comes to there."""
-
-    term: Term
-    score: float
-    asked: Asked
-
-    @property
-    def p_value(self) -> float:
-        """Wald's test of its parameters, in the noise found beside them."""
-        value, covariance = self.asked.value, self.asked.covariance
-        wald = float(value @ np.linalg.solve(covariance, value))
-        return float(max(chdtrc(len(value), max(wald, 0.0)), 1e-300))
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +91,7 @@ def search(base: Hypothesis, alpha: float) -> Found:
 def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
     """Effects added one at a time until none is demanded, those that become needless dropped at once."""
     limit, judged = threshold(alpha), state.judged
-    tried, missing = _tried(judged.model, exclude)
+    tried, missing = candidates_beside(judged.model, exclude)
     for _ in range(MOST_STEPS):
         standing = [one for one in tried if one.score > limit and one.term.effect.id not in state.dropped]
         if not standing or sum(not t.effect.is_local for t in judged.model.terms) >= MOST_EFFECTS:
@@ -126,7 +106,7 @@ def _added(state: _State, alpha: float, exclude: Collection[str]) -> _State:
         others = [one for one in standing if one.term.effect is not chosen.effect]
         state.rivals[chosen.effect.id] = others[:N_RIVALS]
         state.against.update({one.term.effect.id: chosen.effect.id for one in standing})
-        tried, missing = _tried(judged.model, exclude)
+        tried, missing = candidates_beside(judged.model, exclude)
     state.tried.update({one.term.effect.id: one for one in reversed(tried)})
     state.missing.update(missing)
     return replace(state, judged=judged)
@@ -144,7 +124,7 @@ def _concluded(state: _State, alpha: float) -> Found:
     if doubted is not judged.model:
         judged = _pruned(doubted, threshold(alpha))
     model = judged.model
-    tried, missing = _tried(model, (), len(catalogue()))
+    tried, missing = candidates_beside(model, (), len(catalogue()))
     held = {term.effect.id for term in model.terms}
     return Found(
         model, {one.term.effect.id: one for one in reversed(tried)},
@@ -172,86 +152,6 @@ class _State:
     against: dict[str, str] = field(default_factory=dict)
     tried: dict[str, Tried] = field(default_factory=dict)
     missing: dict[str, str] = field(default_factory=dict)
-
-
-def _tried(
-    model: Hypothesis, exclude: Collection[str], n_leaders: int = N_LEADERS
-) -> tuple[list[Tried], dict[str, str]]:
-    """Candidates beside a hypothesis, best first, one an effect; and why others do not apply."""
-    terms, missing = _terms(model, exclude)
-    if not terms:
-        return [], missing
-    leading = _leaders(model, terms, n_leaders)
-    asked = model.asked(leading)
-    # Columns made for one size (a delay) are made again for the size that they come out with.
-    sized = {
-        k: replace(term, variant=made)
-        for k, (term, one) in enumerate(zip(leading, asked, strict=True))
-        if (made := term.effect.rescaled(model.context, term.variant, one.value)) is not None
-    }
-    for k, one in zip(sized, model.asked(list(sized.values())), strict=True):
-        leading[k], asked[k] = sized[k], one
-    plain = model.plain([one.strengths for one in asked])
-    best = _best_of_each(leading, asked, plain)
-    # What leads may be larger or smaller than the look at fixed strengths took it to be.
-    first = [one.term for one in best[:N_RIVALS]]
-    other = [replace(t, sizes=t.sizes * scale) for t in first for scale in RESCALED]
-    found = _best_of_each([*leading, *other], [*asked, *(model.asked(other) if other else [])], plain)
-    return found, missing
-
-
-def _best_of_each(terms: Sequence[Term], asked: Sequence[Asked], plain: float) -> list[Tried]:
-    """The best shape of every effect that is a possible one, best effect first."""
-    best: dict[str, Tried] = {}
-    for term, one in zip(terms, asked, strict=True):
-        score = 2.0 * (one.log_evidence - plain) - term.paid
-        known = best.get(term.effect.id)
-        if (known is None or score > known.score) and _is_possible(term, one):
-            best[term.effect.id] = Tried(term, score, one)
-    return sorted(best.values(), key=lambda one: -one.score)
-
-
-def _terms(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dict[str, str]]:
-    """Every shape of every effect that applies and is not there yet."""
-    context = model.context
-    held = {t.effect.id for t in model.terms if not t.effect.repeatable} | set(exclude)
-    places = {(t.effect.id, t.variant.label) for t in model.terms}
-    terms, missing = [], {}
-    applying = []
-    for effect in catalogue():
-        reason = None if effect.id in held else effect.unavailable(context)
-        if reason is not None:
-            missing[effect.id] = reason
-        elif effect.id not in held:
-            applying.append(effect)
-    for effect in applying:
-        variants = [v for v in effect.variants(context) if (effect.id, v.label) not in places]
-        paid = 2.0 * float(np.log(max(len(variants), 1) * len(PRIOR_SCALES)) + np.log(len(applying)))
-        # A shape that stands for a family, a filter of any order, costs as much again as one that stands for itself.
-        terms += [Term(effect, v, effect.sizes(context, v), paid + NEAR * v.stands_for_many) for v in variants]
-    return terms, missing
-
-
-def _leaders(model: Hypothesis, terms: list[Term], n: int) -> list[Term]:
-    """The candidates that gain most one linear step from the fit, at its strengths and at others, as large as fits."""
-    scaled = [[replace(t, sizes=t.sizes * scale) for t in terms] for scale in PRIOR_SCALES]
-    gains = np.array([model.looked_at(some) for some in scaled])
-    kept: dict[int, int] = {}
-    for look in range(gains.shape[2]):
-        best = gains[:, :, look].max(axis=0)
-        count: dict[str, int] = {}
-        for k in np.argsort(-best).tolist():
-            effect_id = terms[k].effect.id
-            if count.get(effect_id, 0) < (SHAPES_KEPT if n == N_LEADERS else 1) and (
-                effect_id in count or len(count) < n
-            ):
-                count[effect_id] = count.get(effect_id, 0) + 1
-                kept.setdefault(k, int(gains[:, k, look].argmax()))
-    return [scaled[scale][k] for k, scale in kept.items()]
-
-
-def _is_possible(term: Term, asked: Asked) -> bool:
-    return term.effect.is_plausible_variant(term.variant, asked.value, asked.covariance)
 
 
 def _with_best(model: Hypothesis, standing: list[Tried]) -> tuple[Hypothesis, Term | None]:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
-from trihedron import probability
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm, shared_rounding
 from trihedron.estimate.accelerometer.bending import with_bending
 from trihedron.estimate.accelerometer.face_poses import faces_up
@@ -26,10 +25,11 @@ from trihedron.estimate.gyroscope.findings import scale_findings
 from trihedron.estimate.gyroscope.missing_samples import missing_samples, unless_seen
 from trihedron.estimate.gyroscope.turn_angles import AMBIGUOUS, SCALE_TOLERANCE
 from trihedron.estimate.joint import calibrate_joint
+from trihedron.estimate.pull import pull_allowed, pull_on_accelerometer
 from trihedron.pipeline.choices import settle_gravity
 from trihedron.pipeline.reading import AnyRecording, recording_of, segments_of
 from trihedron.pipeline.results import CalibrationResult
-from trihedron.pipeline.turns_on_faces import opposite_on_faces, turns_on_faces
+from trihedron.pipeline.turns_on_faces import opposite_on_faces, resting_spans, turns_on_faces
 from trihedron.quantiles import median
 from trihedron.records import Calibration, Finding, FindingCode, Frame, Recording, Segments, SensorCalibration, Severity
 from trihedron.records.plain import as_plain
@@ -48,9 +48,6 @@ METHODS: tuple[Method, ...] = get_args(Method)
 ``faces``: faces of the case and turns by known angles (method 1)."""
 
 Loss = Literal["linear", "huber", "soft_l1", "cauchy"]
-
-FALSE_ALARM = 1e-3
-"""Chance that a sound recording is taken for one whose moves contradict its still poses."""
 
 MOST_CREEPING = 0.05
 """Share of holds that may be seen to creep. The creep that is seen is the top of what is not: with one of 18 seen, on a
@@ -244,8 +241,8 @@ def _by_poses(
         # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's error bars.
         if method == "joint" and alone.is_trustworthy:
             both = calibrate_joint(recording, segments, accelerometer, gravity, source, options)
-            pull = _pull_on_accelerometer(accelerometer, both.accelerometer)
-            if pull <= _pull_allowed(accelerometer):
+            pull = pull_on_accelerometer(accelerometer, both.accelerometer)
+            if pull <= pull_allowed(accelerometer):
                 return replace(both, findings=(*_still_said(found, both.accelerometer), *both.findings))
             alone = replace(alone, findings=(*found, _joint_fit_left(pull)))
         gyroscope, more = calibrate_moves(recording, segments, accelerometer, gravity, options)
@@ -259,24 +256,6 @@ def _still_said(found: Found, joint: SensorCalibration) -> Found:
     if joint.quality is None or joint.quality.covariance_scale > 1.0:
         return found
     return tuple(finding for finding in found if finding.code is not FindingCode.RESIDUAL_ABOVE_NOISE)
-
-
-def _pull_allowed(alone: SensorCalibration) -> float:
-    """Limit of that rise; where the norms alone exceed their noise, χ² counts in units of that excess (F test)."""
-    quality = alone.quality
-    if quality is None or quality.dof < 1 or probability.chdtrc(quality.dof, quality.chi2) >= 0.01:
-        return float(probability.chdtri(9, FALSE_ALARM))
-    return float(9.0 * quality.chi2 / quality.dof * probability.fdtri(9, quality.dof, 1.0 - FALSE_ALARM))
-
-
-def _pull_on_accelerometer(alone: SensorCalibration, joint: SensorCalibration) -> float:
-    """By how much the moves raise χ² of the still poses' norms: χ² with at most 9 degrees of freedom if both agree.
-
-    A bias that drifts raises it, and contradicts nothing: it counts in units of what one bias for the session misses.
-    """
-    if alone.quality is None or joint.quality is None:
-        return 0.0
-    return (joint.quality.chi2 - alone.quality.chi2) / joint.quality.covariance_scale
 
 
 def _joint_fit_left(pull: float) -> Finding:
@@ -315,17 +294,13 @@ def _by_faces(
             scale, tolerance = by_gravity.S, by_gravity.tolerance
     try:
         gyroscope, more = calibrate_turns(
-            recording, turns, _zero_turns(segments), nominal_scale=scale, nominal_tolerance=tolerance
+            recording, turns, resting_spans(segments), nominal_scale=scale, nominal_tolerance=tolerance
         )
     except REFUSALS as error:
         if turns_deg is not None:
             raise
         return _without_gyroscope(alone, str(error))
     return _together(alone, gyroscope, more)
-
-
-def _zero_turns(segments: Segments) -> list[tuple[int, int]]:
-    return [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2]
 
 
 def _alone(

@@ -15,6 +15,7 @@ from trihedron.pipeline.results import CalibrationResult, CheckResult, Diagnosis
 from trihedron.pipeline.sessions import SessionsResult
 from trihedron.records import AllanCurve, Calibration, Noise, Recording, Segments, Verification
 from trihedron.records.plan import ExperimentPlan
+from trihedron.records.ranking import Ranking
 from trihedron.refused import RefusedError
 from trihedron.report import document, frames, machine, summaries
 from trihedron.report.calibration import calibration_report
@@ -26,6 +27,7 @@ from trihedron.report.noise import noise_picture, noise_report
 from trihedron.report.noise_files import noise_record
 from trihedron.report.page import to_html
 from trihedron.report.plan import plan_record, plan_report
+from trihedron.report.ranking import ranking_record, ranking_report
 from trihedron.report.sessions import sessions_columns, sessions_record, sessions_report
 from trihedron.report.text import to_text
 from trihedron.report.verification import verification_report
@@ -76,6 +78,7 @@ _KINDS: dict[type, _Shown] = {
         lambda r: sessions_report(r.model), lambda r: sessions_record(r.model), lambda r: sessions_columns(r.model)
     ),
     Calibration: _Shown(calibration_report, calibration_document, frames.calibration_columns),
+    Ranking: _Shown(ranking_report, ranking_record),
     Verification: _Shown(verification_report, machine.verification_record, frames.verification_columns),
     Noise: _Shown(noise_report, noise_record, frames.noise_columns),
     AllanCurve: _Shown(summaries.curve_summary, machine.curve_record, frames.curve_columns),
@@ -102,6 +105,11 @@ def as_dict(result: object) -> dict[str, Any]:
 def as_frame(result: object, library: str) -> Any:
     """See :meth:`trihedron.records.presented.Presented.to_dataframe`."""
     return frames.made_by(library, _kind(result).columns(result))
+
+
+def as_text(result: object) -> str:
+    """The report of a result as plain text."""
+    return to_text(_kind(result).document(result))
 
 
 def as_html(result: object) -> str:

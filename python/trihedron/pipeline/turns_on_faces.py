@@ -57,3 +57,8 @@ def turns_on_faces(
         for move, angle in zip(moves, turns_deg, strict=True)
         if angle != 0.0
     ]
+
+
+def resting_spans(segments: Segments) -> list[tuple[int, int]]:
+    """Half-open ranges of the static poses: turns by nothing, which tell the bias."""
+    return [(hold.start, hold.stop) for hold in segments.holds if hold.stop - hold.start >= 2]

@@ -25,6 +25,12 @@ class Presented(Frozen):
 
         return as_dict(self)
 
+    def as_text(self) -> str:
+        """The report as plain text, as ``print`` gives it."""
+        from trihedron.pipeline.presenting import as_text
+
+        return as_text(self)
+
     def to_dataframe(self, library: Library = "polars") -> Any:
         """One row per parameter, pose, axis and term, or sample; units in the names.
 

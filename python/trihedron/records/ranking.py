@@ -14,7 +14,7 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class Suspicion:
-    """One mistake which, undone, makes a calibration fit: ``kind`` of :data:`trihedron.report.ranking.MISTAKES`.
+    """One mistake which, undone, makes a calibration fit: ``kind`` of the list of mistakes that reports have words for.
 
     ``rms`` and ``rms_undone`` are the misses before and after, [m/s²] of gravity at rest, [deg] of tilt or [rad/s] of
     the rate at rest; ``factor`` belongs to a wrong gravity or unit.
@@ -74,7 +74,4 @@ class Ranking(Presented):
         return f"<Ranking of {len(self.candidates)} calibrations on {self.source}: {self.best.name} first>"
 
     def __str__(self) -> str:
-        from trihedron.report import to_text
-        from trihedron.report.ranking import ranking_report
-
-        return to_text(ranking_report(self))
+        return self.as_text()

@@ -11,19 +11,17 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
+use super::evidence::{Answer, Asked, at_each, tuned};
 use super::read_out::{Blocks, Rows, flagged, labels, moves, path};
-use super::{AllStrengths, Corners, all_strengths, distortion, sizes_fit, strengths_of};
+use super::{AllStrengths, Corners, all_strengths, distortion};
 use crate::error::Result;
 use crate::python::arrays::{dmatrix, matrix, of3, vector3, vectors};
 use crate::python::{run, run_long};
-use crate::session_model::{Session, Strengths};
+use crate::session_model::Session;
 use crate::session_model::fit::{Fit, widened};
-use crate::session_model::hypothesis::{Hypothesis, Within};
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
-/// Columns of force and rate of further effects, and their sizes beforehand.
-type Asked<'py> = (Option<Array3<'py>>, Option<Array3<'py>>, Vec<f64>);
 /// `S_a`, `b_a`, `S_w`, covariance.
 type Rest<'py> = (
     Bound<'py, PyArray2<f64>>,
@@ -48,38 +46,6 @@ impl SessionFit {
             fit: Arc::new(fit),
             leverage: OnceLock::new(),
         }
-    }
-}
-
-impl SessionFit {
-    /// What is asked of every hypothesis, side by side.
-    fn each<T: Send + 'static>(
-        &self,
-        py: Python<'_>,
-        hypotheses: &[Asked<'_>],
-        ask: impl Fn(&Hypothesis) -> Result<T> + Send + Sync + 'static,
-    ) -> PyResult<Vec<T>> {
-        let n_points = self.session.n_points();
-        let mut asked = Vec::with_capacity(hypotheses.len());
-        for (force, rate, sizes) in hypotheses {
-            let effects = distortion(force.as_ref(), rate.as_ref(), n_points)?;
-            sizes_fit(sizes, effects.k)?;
-            asked.push((effects, sizes.clone()));
-        }
-        let (fit, session) = (Arc::clone(&self.fit), Arc::clone(&self.session));
-        run_long(py, || {
-            let each = asked.par_iter().map(|(effects, sizes)| {
-                let columns = session.columns(
-                    &fit.state,
-                    &fit.groups,
-                    &fit.weights,
-                    &fit.passed,
-                    effects,
-                )?;
-                ask(&Hypothesis::of(&session, &fit, &columns, sizes)?)
-            });
-            each.collect::<Result<Vec<_>>>()
-        })
     }
 }
 
@@ -268,38 +234,14 @@ impl SessionFit {
     /// Log-evidence of every hypothesis (force, rate, sizes beforehand of further effects), all but the strengths of the
     /// noise integrated out; strengths are sought from the best of those given, `within` shortest corner times, largest
     /// scatter and largest excess. With each its strengths, its parameters one linear step from here, their covariance.
-    #[allow(clippy::type_complexity)]
     fn evidence<'py>(
         &self,
         py: Python<'py>,
         hypotheses: Vec<Asked<'py>>,
         strengths: Vec<AllStrengths>,
         within: (Corners, Corners, Corners),
-    ) -> PyResult<
-        Vec<(
-            f64,
-            AllStrengths,
-            Bound<'py, PyArray1<f64>>,
-            Bound<'py, PyArray2<f64>>,
-        )>,
-    > {
-        let starts: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
-        let ((a, b), (c, d), (e, f)) = within;
-        let within = Within {
-            corner_s: [a, b],
-            scatter: [c, d],
-            excess: [e, f],
-        };
-        let found = self.each(py, &hypotheses, move |one| one.tuned(&starts, &within))?;
-        let lent = found.iter().map(|one| {
-            Ok((
-                one.log_evidence,
-                all_strengths(&one.strengths),
-                one.estimate.as_slice().to_pyarray(py),
-                matrix(py, &one.covariance)?,
-            ))
-        });
-        lent.collect()
+    ) -> PyResult<Vec<Answer<'py>>> {
+        tuned(self, py, &hypotheses, strengths, within)
     }
 
     /// `(hypotheses, strengths)` log-evidence of every hypothesis at each of some strengths.
@@ -309,11 +251,7 @@ impl SessionFit {
         hypotheses: Vec<Asked<'py>>,
         strengths: Vec<AllStrengths>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let at: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
-        let n = at.len();
-        let found = self.each(py, &hypotheses, move |one| Ok(one.at_each(&at)))?;
-        let flat: Vec<f64> = found.concat();
-        flat.to_pyarray(py).reshape([found.len(), n])
+        at_each(self, py, &hypotheses, strengths)
     }
 
     /// `(rows,)` share of every row that the fit used up.

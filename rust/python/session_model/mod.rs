@@ -1,5 +1,6 @@
 //! The joint model of a session across the seam.
 
+mod evidence;
 mod fit;
 mod poses;
 mod read_out;

@@ -22,6 +22,7 @@ AXES = ("x", "y", "z")
 TYPICAL_M_S2, TYPICAL_RAD_S = 0.03, 2e-3
 """3 mg and 0.1 °/s: what consumer parts stray by."""
 LEAST_RMS = 1e-12
+"""Columns that never add anything have any size."""
 SHAPE_NAMES = ("time_constant", "half_width", "pose")
 """Nonlinear parameters, chosen from a grid and refined on the profile likelihood."""
 

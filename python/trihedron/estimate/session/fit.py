@@ -12,7 +12,7 @@ from trihedron.estimate.gyroscope.alignment import are_far
 from trihedron.estimate.session.observed import Observed
 from trihedron.probability import fdtrc
 from trihedron.records.words import words
-from trihedron.session.noise import START_STRENGTHS
+from trihedron.session.noise import START_STRENGTHS, Strengths
 
 FALSE_ALARM = 1e-3
 """Chance that the moves of a sound session are taken for noisier than their samples."""
@@ -28,10 +28,6 @@ DRIFTS_S, DRIFT_GATE = (8.0, 3.2, 1.3, 0.5), 5.41
 the gain in log-likelihood of all rows, moves among them, that makes one count: the gate of a scatter (11.12)."""
 STATIC_FORCE, MOVES, DYNAMICS = 0, 2, 3
 """Labels of rows: accelerometer at rest, gravity after a move, velocity over it."""
-
-
-Strengths = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
-"""Corner times [s], scatters, straying between poses; accelerometer, gyro each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +98,8 @@ def _with_drift(observed: Observed, core: _core.SessionFit) -> _core.SessionFit:
     """
     if not core.is_walk_at_edge[0] or len(observed.before) == 0:
         return core
-    (_, of_gyro), scatter, between = core.strengths
-    tried = [_again(observed, core, ((corner, of_gyro), scatter, between)) for corner in DRIFTS_S]
+    (_, of_gyro), scatter, between, excess = core.strengths
+    tried = [_again(observed, core, ((corner, of_gyro), scatter, between, excess)) for corner in DRIFTS_S]
     best = max(tried, key=lambda one: one.log_marginal)
     return best if 2.0 * (best.log_marginal - core.log_marginal) > DRIFT_GATE else core
 

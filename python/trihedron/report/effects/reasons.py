@@ -16,10 +16,7 @@ REASONS: Mapping[str, str] = MappingProxyType(
         "steady-supply": "the supply voltage does not change",
         "even-vibration": "no pose vibrates more than the others",
         "no-table-turns": "the session has no turns on a table against a wall",
-        "flickers": "the zero wanders as 1/f noise would, and the errors of its poses hold that",
-        "few-poses": "fewer than {fewest} still poses",
         "six-poses": "fewer than six still poses",
         "few-orientations": "the log holds too few orientations",
-        "imitated": "the calibration itself imitates it in this recording",
     }
 )

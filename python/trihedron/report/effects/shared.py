@@ -21,9 +21,8 @@ def drifts(sensor: str, unit: str, walk: str, at_rest: str = "") -> Mapping[str,
     """A zero that drifts from pose to pose, by its kind; in a log of one orientation ``at_rest`` is said beside it."""
     whole = f"The {sensor}'s zero drifts {{how}} through {{sizes}} (x, y, z); no logged channel explains it."
     sizes = f"{{range:all .2g {unit}}}"
-    said = {kind: (how, sizes) for kind, how in (("drift", "smoothly"), ("walk", walk), ("slow", "slowly"))}
     rest = {case: whole.format(how="smoothly", sizes=_at_rest("range", own)) + at_rest for case, own in _units(unit)}
-    return MappingProxyType({kind: whole.format(how=how, sizes=own) for kind, (how, own) in said.items()} | rest)
+    return MappingProxyType({"walk": whole.format(how=walk, sizes=sizes)} | rest)
 
 
 def follows_temperature(sensor: str, unit: str) -> Mapping[str, str]:
