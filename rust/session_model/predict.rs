@@ -161,6 +161,22 @@ impl Fit {
         Ok((self.state.moved(&step, layout), factor.inner(&map)))
     }
 
+    /// `(rows, unknowns)` the Jacobian in full: border, then pose after pose. For tests and small sessions.
+    #[must_use]
+    pub fn jacobian(&self) -> DMatrix<f64> {
+        let layout = self.layout();
+        let mut out = DMatrix::zeros(self.n_rows(), layout.n());
+        for (group, first) in self.groups.iter().zip(self.first_rows()) {
+            let rows = group.rows.len();
+            let mut part = DMatrix::zeros(layout.n(), rows);
+            group
+                .rows
+                .add_transposed(layout, &DMatrix::identity(rows, rows), &mut part);
+            out.rows_mut(first, rows).copy_from(&part.transpose());
+        }
+        out
+    }
+
     /// Covariance of the five residuals of each move, SI, before the fit used any of it up.
     #[must_use]
     pub fn move_covariance(&self) -> Vec<SMatrix<f64, 5, 5>> {

@@ -138,6 +138,7 @@ const STRENGTHS: Strengths = Strengths {
     corner_s: [40.0, 40.0],
     scatter: [1.0, 1.0],
     between: [0.6, 0.6],
+    excess: [1.0, 1.0],
 };
 
 fn residuals(
@@ -189,6 +190,7 @@ fn effects(session: &Session) -> Distortion {
         force: Some((0..n).map(|_| random.next()).collect()),
         rate: Some((0..n).map(|_| 0.1 * random.next()).collect()),
         k: 2,
+        sizes: Vec::new(),
     }
 }
 

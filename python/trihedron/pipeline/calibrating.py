@@ -236,7 +236,7 @@ def _by_poses(
     if turns_deg is not None:
         turns = stated_turns(recording, segments, accelerometer, gravity, turns_deg)
         shared = shared_errors(turns, accelerometer, gravity)
-        return _together(alone, *calibrate_turns(recording, turns, _zero_turns(segments), shared_errors=shared))
+        return _together(alone, *calibrate_turns(recording, turns, resting_spans(segments), shared_errors=shared))
     try:
         # An accelerometer that is not determined is not refined by the moves: it goes into the gyro's error bars.
         if method == "joint" and alone.is_trustworthy:

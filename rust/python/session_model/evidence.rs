@@ -6,14 +6,14 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray3, ToPyArray};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use super::fit::SessionFit;
 use super::{AllStrengths, Corners, all_strengths, distortion, sizes_fit, strengths_of};
 use crate::error::Result;
 use crate::python::arrays::matrix;
 use crate::python::run_long;
-use crate::session_model::Strengths;
+use crate::session_model::fit::Fit;
 use crate::session_model::hypothesis::Hypothesis;
 use crate::session_model::strength_search::Within;
+use crate::session_model::{Session, Strengths};
 
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
 /// Columns of force and rate of further effects, and their sizes beforehand.
@@ -28,7 +28,7 @@ pub(super) type Answer<'py> = (
 
 /// Every hypothesis at the strengths that make it likeliest.
 pub(super) fn tuned<'py>(
-    fit: &SessionFit,
+    of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'py>,
     hypotheses: &[Asked<'py>],
     strengths: Vec<AllStrengths>,
@@ -41,7 +41,7 @@ pub(super) fn tuned<'py>(
         scatter: [c, d],
         excess: [e, f],
     };
-    let found = each(fit, py, hypotheses, move |one| one.tuned(&starts, &within))?;
+    let found = each(of, py, hypotheses, move |one| one.tuned(&starts, &within))?;
     let lent = found.iter().map(|one| {
         Ok((
             one.log_evidence,
@@ -55,33 +55,33 @@ pub(super) fn tuned<'py>(
 
 /// Every hypothesis at each of some strengths.
 pub(super) fn at_each<'py>(
-    fit: &SessionFit,
+    of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'py>,
     hypotheses: &[Asked<'py>],
     strengths: Vec<AllStrengths>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let at: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
     let n = at.len();
-    let found = each(fit, py, hypotheses, move |one| Ok(one.at_each(&at)))?;
+    let found = each(of, py, hypotheses, move |one| Ok(one.at_each(&at)))?;
     let flat: Vec<f64> = found.concat();
     flat.to_pyarray(py).reshape([found.len(), n])
 }
 
 /// What is asked of every hypothesis, side by side.
 fn each<T: Send + 'static>(
-    one: &SessionFit,
+    of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'_>,
     hypotheses: &[Asked<'_>],
     ask: impl Fn(&Hypothesis) -> Result<T> + Send + Sync + 'static,
 ) -> PyResult<Vec<T>> {
-    let n_points = one.session.n_points();
+    let n_points = of.0.n_points();
     let mut asked = Vec::with_capacity(hypotheses.len());
     for (force, rate, sizes) in hypotheses {
         let effects = distortion(force.as_ref(), rate.as_ref(), n_points)?;
         sizes_fit(sizes, effects.k)?;
         asked.push((effects, sizes.clone()));
     }
-    let (fit, session) = (Arc::clone(&one.fit), Arc::clone(&one.session));
+    let (session, fit) = (Arc::clone(of.0), Arc::clone(of.1));
     run_long(py, || {
         let each = asked.par_iter().map(|(effects, sizes)| {
             let columns =

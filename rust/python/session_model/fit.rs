@@ -2,7 +2,6 @@
 
 use std::sync::{Arc, OnceLock};
 
-use nalgebra::DMatrix;
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
     PyReadonlyArray3, PyUntypedArrayMethods, ToPyArray,
@@ -12,7 +11,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use super::evidence::{Answer, Asked, at_each, tuned};
-use super::read_out::{Blocks, Rows, flagged, labels, moves, path};
+use super::read_out::{Blocks, Rows, flagged, labels, moves, path, stacked};
 use super::{AllStrengths, Corners, all_strengths, distortion};
 use crate::error::Result;
 use crate::python::arrays::{dmatrix, matrix, of3, vector3, vectors};
@@ -104,8 +103,7 @@ impl SessionFit {
 
     #[getter]
     fn is_walk_at_edge(&self) -> (bool, bool) {
-        let [a, b] = self.fit.is_walk_at_edge();
-        (a, b)
+        self.fit.is_walk_at_edge().into()
     }
 
     #[getter]
@@ -138,7 +136,7 @@ impl SessionFit {
         self.fit.iterations
     }
 
-    /// `(undamped step in standard errors of all rows, orthogonality of the residual)` where it stopped.
+    /// `(undamped step in standard errors of all rows, orthogonality of the residual)`.
     #[getter]
     fn convergence(&self) -> (f64, f64) {
         (self.fit.step, self.fit.gradient)
@@ -200,16 +198,11 @@ impl SessionFit {
         let effects = distortion(force.as_ref(), rate.as_ref(), self.session.n_points())?;
         let fit = Arc::clone(&self.fit);
         let session = Arc::clone(&self.session);
-        // Some tenths of a millisecond, hundreds of times: a thread of its own would take longer to begin.
+        // Tenths of a millisecond: a thread of its own would take longer to begin.
         let parts = run(py, || {
             session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, &effects)
         })?;
-        let n = self.fit.n_rows();
-        let mut flat = Vec::with_capacity(n * effects.k);
-        for part in &parts {
-            flat.extend_from_slice(part.transpose().as_slice());
-        }
-        flat.to_pyarray(py).reshape([n, effects.k])
+        stacked(py, &parts, effects.k)
     }
 
     /// Columns `(rows, k)` minus what the unknowns of the fit can imitate.
@@ -241,7 +234,13 @@ impl SessionFit {
         strengths: Vec<AllStrengths>,
         within: (Corners, Corners, Corners),
     ) -> PyResult<Vec<Answer<'py>>> {
-        tuned(self, py, &hypotheses, strengths, within)
+        tuned(
+            (&self.session, &self.fit),
+            py,
+            &hypotheses,
+            strengths,
+            within,
+        )
     }
 
     /// `(hypotheses, strengths)` log-evidence of every hypothesis at each of some strengths.
@@ -251,7 +250,7 @@ impl SessionFit {
         hypotheses: Vec<Asked<'py>>,
         strengths: Vec<AllStrengths>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        at_each(self, py, &hypotheses, strengths)
+        at_each((&self.session, &self.fit), py, &hypotheses, strengths)
     }
 
     /// `(rows,)` share of every row that the fit used up.
@@ -344,18 +343,8 @@ impl SessionFit {
         lent.collect()
     }
 
-    /// `(rows, unknowns)` the Jacobian in full: border, then pose after pose. For tests and small sessions.
+    /// `(rows, unknowns)` the Jacobian in full, border first. For tests.
     fn jacobian<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let layout = self.fit.layout();
-        let mut out = DMatrix::zeros(self.fit.n_rows(), layout.n());
-        for (group, first) in self.fit.groups.iter().zip(self.fit.first_rows()) {
-            let rows = group.rows.len();
-            let mut part = DMatrix::zeros(layout.n(), rows);
-            group
-                .rows
-                .add_transposed(layout, &DMatrix::identity(rows, rows), &mut part);
-            out.rows_mut(first, rows).copy_from(&part.transpose());
-        }
-        matrix(py, &out)
+        matrix(py, &self.fit.jacobian())
     }
 }

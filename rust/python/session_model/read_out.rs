@@ -1,6 +1,6 @@
 //! Rows and motion of a fitted session as arrays.
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 use numpy::{
     PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods, ToPyArray,
 };
@@ -96,4 +96,18 @@ pub(super) fn flagged(fit: &Fit, folds: &PyReadonlyArray2<'_, bool>) -> PyResult
         .into_iter()
         .map(|row| (0..firsts.len()).filter(|&g| row[firsts[g]]).collect());
     Ok(groups.collect())
+}
+
+/// Rows of `k` columns, block after block, as one array.
+pub(super) fn stacked<'py>(
+    py: Python<'py>,
+    parts: &[DMatrix<f64>],
+    k: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let flat: Vec<f64> = parts
+        .iter()
+        .flat_map(|part| part.transpose().as_slice().to_vec())
+        .collect();
+    let n: usize = parts.iter().map(DMatrix::nrows).sum();
+    flat.to_pyarray(py).reshape([n, k])
 }
