@@ -43,6 +43,7 @@ def right(folder, recording, result, tmp_path_factory):
     return {
         "allan_deviation": {"x": x, "rate_hz": 100.0},
         "apply": both,
+        "calibrate_references": {"recordings": [recording], "references": [recording]},
         "calibrate_sessions": {"recordings": [recording, recording]},
         "capture": {"port": "none", "output": place / "x.csv"},
         "convert": {"log": recording, "output": place / "x.csv"},
@@ -105,6 +106,9 @@ BY_KIND = {
     "Scenario": (object(), 3, np.zeros(3), b"x", "a\0b", "no-such", [1]),
     "AccelerationUnit": (*NO_WORD, 1.5),
     "RateUnit": (*NO_WORD, 1.5),
+    "Sequence[AnyRecording]": (*NO_LIST, [], [3], [object()], ["none.csv"]),
+    "Sequence[AnyReference]": (*NO_LIST, [], [3], [object()], ["none.csv"]),
+    "Axes | Sequence[Axes]": (3, "x", object(), [3], {}),
     "Sequence[AnyCalibration]": (*NO_LIST, [], [3], [object(), object()], ["none.json"] * 2),
     "Sequence[AnyRecording | CalibrationResult]": (*NO_LIST, [], [3], [object(), object()], ["none.csv"] * 2),
     "Sequence[str | os.PathLike[str]]": (3, b"x", object(), [], [3], {1}, "", "a\0b", "n" * 300, "none", [""]),

@@ -291,7 +291,9 @@ def test_every_command_that_takes_a_calibration_is_asked_about_an_untrusted_one(
     from trihedron.cli import build_app
 
     commands = typer.main.get_command(build_app()).commands
-    takes = {name for name, command in commands.items() if any(p.name == "calibration" for p in command.params)}
+    takes = {name for name, command in commands.items() if any(p.name == "calibration" for p in command.params)} | {
+        "verify"
+    }
     # Where it is an output (capture, guide) nothing is read.
     assert takes - {"capture", "guide", "calibrate", "kalman"} == set(UNTRUSTED)
 

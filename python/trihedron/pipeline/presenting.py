@@ -159,7 +159,10 @@ def plot(result: object, name: str | None = None, *, ax: Axes | Sequence[Axes] |
             raise RefusedError(f"the figure {chosen!r} has a layout of its own: leave ax out.")
         from trihedron.report.chart_figures import draw_onto
 
-        return draw_onto(picture.chart, list(ax) if isinstance(ax, Iterable) else [ax])
+        axes = list(ax) if isinstance(ax, Iterable) else [ax]
+        if not all(hasattr(one, "fill_between") for one in axes):
+            raise RefusedError(f"ax is matplotlib Axes, or a list of them, not {type(ax).__name__}.")
+        return draw_onto(picture.chart, axes)
     assert picture.draw is not None
     return picture.draw()
 

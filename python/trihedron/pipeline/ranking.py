@@ -47,6 +47,11 @@ def rank(
     gravity_m_s2 or latitude_deg, height_m : float
         As for :func:`calibrate`; else that which the calibrations of ours state.
 
+    Returns
+    -------
+    Ranking
+        ``candidates``, the best first, each with verification, intervals and suspected mistakes; ``print`` shows it.
+
     Raises
     ------
     ValueError

@@ -46,6 +46,11 @@ def calibrate_references(
 
     The calibration's bias is the mean over the recordings, and how far it repeats counts in its uncertainty.
 
+    Returns
+    -------
+    ReferencesResult
+        The shared calibration, and what each recording says beside its reference.
+
     Raises
     ------
     ValueError

@@ -11,6 +11,7 @@ import numpy as np
 
 from trihedron.diagnose.against import FittedModel, compare_numbers, model_of_calibration
 from trihedron.estimate.reference import ACCEPTED, fit_reference
+from trihedron.pipeline.asking import WrongTypeError
 from trihedron.pipeline.reading import read
 from trihedron.read import ReadError
 from trihedron.read.reference import of_recording, read_reference
@@ -48,6 +49,8 @@ def motion_of(reference: AnyReference, columns: str | None = None) -> ReferenceM
         return reference
     if isinstance(reference, Recording):
         return of_recording(reference)
+    if not isinstance(reference, str | os.PathLike):
+        raise WrongTypeError(f"a reference is a file, a recording or a motion, not {type(reference).__name__}.")
     if columns is None:
         try:
             log = read(reference)
