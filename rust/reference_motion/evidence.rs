@@ -99,7 +99,7 @@ pub fn smoothed_bias(blocks: &[Block], columns: &DMatrix<f64>, with: &Strengths)
         if let Some((seen, inverse, innovation)) = &step.seen {
             let left = State::identity() - step.gain * seen;
             let weight = seen.transpose() * inverse;
-            adjoint = left.transpose() * adjoint - &weight * innovation;
+            adjoint = left.transpose() * adjoint - weight * innovation;
             information = left.transpose() * information * left + weight * seen;
         }
         let at = step.cov.fixed_rows::<3>(BIAS);

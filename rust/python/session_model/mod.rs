@@ -176,6 +176,10 @@ impl SessionModel {
     }
 
     /// Fits from a state; of the `strengths`, corner times and scatter are chosen by marginal likelihood when `is_tuned`.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "named, and a thin seam: each is one array of the caller"
+    )]
     #[pyo3(signature = (*, state, strengths, force_effect, rate_effect, is_tuned, sizes=None))]
     fn fit(
         &self,
