@@ -22,6 +22,7 @@ const STRENGTHS: Strengths = Strengths {
     corner_s: [160.0; 2],
     scatter: [1.0; 2],
     between: [0.6; 2],
+    excess: [1.0; 2],
 };
 
 /// Poses joined by smooth turns of 1.8 rad in 2 s at 100 Hz, read by a plain instrument.
