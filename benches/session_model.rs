@@ -20,7 +20,7 @@ const GRAVITY: f64 = 9.81;
 const SAMPLES_PER_MOVE: usize = 200;
 const STRENGTHS: Strengths = Strengths {
     corner_s: [160.0; 2],
-    scatter: [1.0; 2],
+    scatter: [1.0; 4],
     between: [0.6; 2],
     excess: [1.0; 2],
 };
@@ -71,11 +71,9 @@ fn session(n_poses: usize) -> (Session, State) {
             rate_density: Vector3::repeat(2e-4),
             jitter_s: 0.0,
             nominal_step_s: 0.01,
-            inflation: [1.0; 2],
         },
         prior: None,
         scatter: Some([Vector3::repeat(1e-3), Vector3::repeat(1e-4)]),
-        is_scatter_given: false,
         expected_scatter: 0.0,
     };
     let state = State {

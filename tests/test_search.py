@@ -13,11 +13,12 @@ from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_twin
-from trihedron.diagnose.session.twin import contiguous
+from trihedron.diagnose.session.twin import contiguous, core_model, core_state
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.segment import resegment, segment_recording
 from trihedron.session.coloured_noise import coloured_variance
+from trihedron.session.noise import ANYTHING
 from trihedron.simulate import hand_session, simulate
 from trihedron.simulate.effects import with_effect
 from trihedron.simulate.named import _of
@@ -53,6 +54,13 @@ def fitted(effect_id="", seed=3, n_poses=20, **size):
     return hypothesis(obs, start_twin(obs, calibration), None)
 
 
+def refitted(model, strengths):
+    """The model's session without effects at given strengths."""
+    twin = model.fitted.twin
+    session = core_model(model.obs, twin.gravity, None, is_scatter_free=True)
+    return session.fit(state=core_state(twin), strengths=strengths, force_effect=None, rate_effect=None)
+
+
 def term(model, effect_id, label=""):
     effect = next(one for one in catalogue() if one.id == effect_id)
     variant = next(v for v in effect.variants(model.context) if label in v.label)
@@ -65,25 +73,30 @@ def test_the_evidence_of_columns_is_that_of_the_linear_problem_written_out(effec
     one = term(model, effect_id)
     core = model.fitted.line.core
     columns = (contiguous(one.distortion.force), contiguous(one.distortion.rate))
-    asked = [(*columns, one.sizes.tolist()), (None, None, [])]
-    with_it, plain = core.evidence_at(asked, [core.strengths])[:, 0]
+    asked = [(*columns, one.sizes.tolist())]
+    ((seen, _, _),) = core.looks(asked, [1.0], [core.strengths])
     # What the fit's unknowns imitate is projected out; the rest is a Gaussian with a prior of the sizes.
     projected = core.project(np.ascontiguousarray(core.columns(*columns))) * one.sizes
     normal, gradient = projected.T @ projected, projected.T @ core.residual
     inner = np.eye(len(normal)) + normal
     gain = 0.5 * gradient @ np.linalg.solve(inner, gradient) - 0.5 * np.linalg.slogdet(inner)[1]
-    assert with_it - plain == pytest.approx(gain, abs=1e-4 * max(abs(gain), 1.0))
+    assert seen[0, 0] == pytest.approx(gain, abs=1e-4 * max(abs(gain), 1.0))
+    # The strengths found with it, and what a look there says beside the plain session at the same strengths.
+    ((tuned, strengths, value, covariance),) = core.evidence(asked, [core.strengths], ANYTHING)
+    ((looked, at, spread),) = core.looks(asked, [1.0], [strengths])
+    plain = refitted(model, strengths).log_marginal
+    assert tuned - plain == pytest.approx(looked[0, 0], abs=0.05)  # moves are carried anew: second order
+    np.testing.assert_allclose(at, value, atol=0.02 * np.sqrt(np.diag(covariance)).max())
+    np.testing.assert_allclose(spread, covariance, rtol=1e-6)
 
 
 def test_strengths_only_raise_the_evidence_and_bounds_only_lower_it():
     model = fitted()
     core = model.fitted.line.core
-    anything = ((0.0, 0.0), (np.inf, np.inf), (np.inf, np.inf))
     none = ((2560.0, 2560.0), (1e-3, 1e-3), (1.0, 1.0))
     bare = (None, None, [])
-    given = core.evidence_at([bare], [core.strengths])[0, 0]
-    free, bound = (core.evidence([bare], [core.strengths], within)[0][0] for within in (anything, none))
-    assert free >= given - 1e-9
+    free, bound = (core.evidence([bare], [core.strengths], within)[0][0] for within in (ANYTHING, none))
+    assert free >= core.log_marginal - 1e-6  # the same rows, solved once by blocks and once forward alone
     assert bound <= free + 0.1  # the search ends where a pass gains less than a tenth
 
 

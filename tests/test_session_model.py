@@ -11,7 +11,7 @@ from trihedron import calibrate
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.solve import folds_of, leverage, predict_held_out, reduce, tune_noise
 from trihedron.diagnose.session.starting_point import start_twin
-from trihedron.diagnose.session.twin import DYNAMICS, MOVES, NO_DISTORTION
+from trihedron.diagnose.session.twin import DYNAMICS, MOVES, NO_DISTORTION, core_model, core_state
 from trihedron.estimate.accelerometer import calibrate_norm
 from trihedron.estimate.joint import calibrate_joint
 from trihedron.read import read_recording
@@ -140,9 +140,13 @@ def test_moves_that_are_believed_less_cost_their_normalisation():
     fitted, _ = fitted_to(recording, truth.gravity_m_s2)
     core = fitted.line.core
     moves = (fitted.system.domain == MOVES) | (fitted.system.domain == DYNAMICS)
-    bare = [(None, None, [])]
-    corner, scatter, between, _ = core.strengths
-    gain = core.evidence_at(bare, [(corner, scatter, between, (w, w)) for w in (1.0, 3.0)])[0]
+    session = core_model(fitted.line.obs, fitted.twin.gravity, fitted.line.prior)
+    gain = [
+        session.fit(
+            state=core_state(fitted.twin), strengths=(*core.strengths[:3], (w, w)), force_effect=None, rate_effect=None
+        ).log_marginal
+        for w in (1.0, 3.0)
+    ]
     n, chi2 = int(moves.sum()), float((fitted.system.residual[moves] ** 2).sum())
     # Gaussian: chi-square gained less n log 3; the other unknowns' determinant moves it by far less.
     expected = 0.5 * chi2 * (1.0 - 1.0 / 9.0) - n * np.log(3.0)

@@ -1,7 +1,6 @@
 """Moves that miss more than their samples' noise, or that lost samples: what the error bars carry, and what not."""
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,8 +13,8 @@ import trihedron.estimate.joint as joint
 from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import hand
-from trihedron import _core, calibrate
-from trihedron.estimate.session.fit import DEAF, DYNAMICS, MOVES, far_moves, fitted
+from trihedron import calibrate
+from trihedron.estimate.session.fit import DEAF, DYNAMICS, MOVES, far_moves
 from trihedron.records import Recording
 from trihedron.session.aliasing import unresolved_variance
 
@@ -44,7 +43,7 @@ def test_a_velocity_that_is_not_heard_says_nothing_by_way_of_its_noise(seed, sol
     result = calibrate(recording_of(f, w, np.arange(len(f)) / rate, rate), gravity_m_s2=G)
     solution = solved[-1]
     assert solution.inflation[0] > 10.0
-    assert solution.inflation[1] == DEAF
+    assert solution.inflation[1] == pytest.approx(DEAF)
     domain, leverage = solution.core.labels[:, 0], solution.core.leverage()
     # Widened along with gravity, as one error common to both, velocities told six of the gyro's nine numbers.
     assert leverage[domain == DYNAMICS].sum() < 0.1
@@ -120,26 +119,3 @@ def test_nine_poses_are_as_certain_as_their_moves_let_them_be():
     rms = np.sqrt(np.mean(np.square(scores)))
     # 54 numbers, correlated within a session: 1 +- 0.2. It was 0.36 to 0.40 over 40 and 60 sessions.
     assert 0.55 < rms < 1.4
-
-
-def test_moves_widened_from_a_fit_end_where_a_fit_begun_anew_does(monkeypatch):
-    given, plain = [], joint.solve_session
-    monkeypatch.setattr(joint, "solve_session", lambda *asked: (given.append(asked), plain(*asked))[1])
-    f, w, rate, _, _ = hand(820058, rate_hz=50.0)
-    calibrate(recording_of(f, w, np.arange(len(f)) / rate, rate), gravity_m_s2=G)
-    observed, S_a, b_a, S_w = given[-1]
-    first = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w)
-    widened, force = first.widened((7.0, 30.0)), observed.hold_force @ S_a.T + b_a + S_a @ observed.force_origin
-    anew = replace(observed, inflation=(7.0, 30.0)).model().fit(
-        state=_core.SessionState(
-            force_scale=S_a, force_bias=b_a + S_a @ observed.force_origin, rate_scale=S_w,
-            up=force / np.linalg.norm(force, axis=1, keepdims=True),
-            rate_zero=observed.hold_rate, force_zero=np.zeros_like(force), effect=np.zeros(0),
-        ),
-        strengths=first.strengths, force_effect=None, rate_effect=None, is_tuned=False,
-    )  # fmt: skip
-    bars = [np.sqrt(np.diag(one.linear_covariance(np.zeros(3), np.zeros(3))[0])) for one in (widened, anew)]
-    # Either ends within 10⁻³ standard errors, all rows together; in between the moves' noise changed 49-fold.
-    assert np.abs(widened.rate_scale - anew.rate_scale).ravel() / bars[0][12:21] == pytest.approx(0.0, abs=2e-3)
-    assert np.abs(widened.force_bias - anew.force_bias) / bars[0][9:12] == pytest.approx(0.0, abs=2e-3)
-    np.testing.assert_allclose(bars[0], bars[1], rtol=1e-3)

@@ -625,7 +625,7 @@ class SessionState:
     ) -> SessionState: ...
 
 _Pair = tuple[float, float]
-_Strengths = tuple[_Pair, _Pair, _Pair, _Pair]
+_Strengths = tuple[_Pair, tuple[float, float, float, float], _Pair, _Pair]
 _Asked = tuple[FloatArray | None, FloatArray | None, list[float]]
 
 @final
@@ -636,9 +636,9 @@ class SessionModel:
         gravity_m_s2: float,
         poses: SessionPoses,
         moves: SessionMoves,
-        noise: tuple[float, float, tuple[float, float]],
+        noise: _Pair,
         prior: tuple[FloatArray, FloatArray, bool] | None,
-        scatter: tuple[FloatArray, bool, float] | None,
+        scatter: tuple[FloatArray, float] | None,
     ) -> SessionModel: ...
     def fit(
         self,
@@ -647,7 +647,7 @@ class SessionModel:
         strengths: _Strengths,
         force_effect: FloatArray | None,
         rate_effect: FloatArray | None,
-        is_tuned: bool,
+        within: tuple[_Pair, _Pair, _Pair] | None = None,
         sizes: Sequence[float] | None = None,
     ) -> SessionFit: ...
     def move_residuals(self, state: SessionState) -> FloatArray: ...
@@ -673,13 +673,9 @@ class SessionFit:
     @property
     def strengths(self) -> _Strengths: ...
     @property
-    def is_walk_at_edge(self) -> tuple[bool, bool]: ...
-    @property
     def chi2(self) -> float: ...
     @property
     def log_marginal(self) -> float: ...
-    @property
-    def log_profile(self) -> float: ...
     @property
     def is_converged(self) -> bool: ...
     @property
@@ -700,9 +696,10 @@ class SessionFit:
     def evidence(
         self, hypotheses: Sequence[_Asked], strengths: Sequence[_Strengths], within: tuple[_Pair, _Pair, _Pair]
     ) -> list[tuple[float, _Strengths, FloatArray, FloatArray]]: ...
-    def evidence_at(self, hypotheses: Sequence[_Asked], strengths: Sequence[_Strengths]) -> FloatArray: ...
+    def looks(
+        self, candidates: Sequence[_Asked], scales: Sequence[float], strengths: Sequence[_Strengths]
+    ) -> list[tuple[FloatArray, FloatArray, FloatArray]]: ...
     def leverage(self) -> FloatArray: ...
-    def widened(self, inflation: tuple[float, float]) -> SessionFit: ...
     def held_out(
         self, folds: npt.NDArray[np.bool_]
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]: ...

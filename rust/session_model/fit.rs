@@ -10,7 +10,6 @@ use super::held::Held;
 use super::move_rows::{Passed, Weights};
 use super::moves::Move;
 use super::rows::Group;
-use super::strengths::CORNER_GRID_S;
 use super::{Distortion, Session, State, Strengths};
 use crate::error::Result;
 use crate::gauss_newton::{Local, Options, Stop, descend};
@@ -38,8 +37,6 @@ pub struct Fit {
     pub state: State,
     /// Strengths of the processes there.
     pub strengths: Strengths,
-    /// Scatter (accelerometer, gyro) that is likely, though it may be too small to be taken into the fit.
-    pub likely_scatter: [f64; 2],
     /// Effects in it.
     pub distortion: Distortion,
     /// Whitening of the moves.
@@ -84,21 +81,6 @@ impl Fit {
     pub fn log_marginal(&self) -> f64 {
         -0.5 * self.chi2() - 0.5 * self.factor.log_det() + self.log_weight()
     }
-
-    /// Log-likelihood with the poses integrated out and what they share at its optimum, up to a constant.
-    #[must_use]
-    pub fn log_profile(&self) -> f64 {
-        -0.5 * self.chi2() - 0.5 * self.factor.log_det_poses() + self.log_weight()
-    }
-
-    /// Whether the walk of either zero (accelerometer, gyro) is as strong as the grid allows: it then stands in for
-    /// something else, a drift or a scatter.
-    #[must_use]
-    pub fn is_walk_at_edge(&self) -> [bool; 2] {
-        self.strengths
-            .corner_s
-            .map(|corner| corner <= CORNER_GRID_S[0])
-    }
 }
 
 pub(super) fn chi2_of<'a>(groups: impl IntoIterator<Item = &'a Group>) -> f64 {
@@ -141,32 +123,6 @@ pub fn fit(
     distortion: &Distortion,
 ) -> Result<Fit> {
     fit_from(session, start, None, strengths, distortion)
-}
-
-/// The same with other factors on the standard errors of the moves, from where the session was fitted.
-///
-/// # Errors
-/// As [`fit`].
-pub fn widened(session: &Session, found: &Fit, inflation: [f64; 2]) -> Result<(Session, Fit)> {
-    let mut session = session.clone();
-    session.noise.inflation = inflation;
-    let passed = found.passed.iter().cloned();
-    let passed = passed.map(|one| Passed { inflation, ..one }).collect();
-    let again = fit_from(
-        &session,
-        found.state.clone(),
-        Some(passed),
-        found.strengths,
-        &found.distortion,
-    )?;
-    let likely_scatter = found.likely_scatter;
-    Ok((
-        session,
-        Fit {
-            likely_scatter,
-            ..again
-        },
-    ))
 }
 
 /// [`fit`], with the moves as they were carried at the start where that is known.
@@ -227,7 +183,6 @@ pub(super) fn fit_from(
             return Ok(Fit {
                 state,
                 strengths,
-                likely_scatter: strengths.scatter,
                 distortion: distortion.clone(),
                 weights,
                 passed,

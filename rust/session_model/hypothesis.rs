@@ -3,15 +3,23 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::chain::{Chain, Layout};
+use super::Strengths;
+use super::chain::{Chain, Layout, Scratch};
 use super::elimination::eliminated;
-use super::evidence::Part;
 use super::fit::{Fit, RIDGE, chi2_of, gradient};
+use super::move_rows::{Passed, Whitening};
 use super::moves::N_MOVE;
 use super::rows::{Domain, Group, N_PROCESSES, size_row};
 use super::strength_search::{Search, Within};
-use super::{Session, Strengths};
 use crate::error::{Error, Result};
+
+/// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.
+pub(super) struct Part {
+    pub chain: Chain,
+    pub side: DMatrix<f64>,
+    pub sum: f64,
+    pub n: usize,
+}
 
 /// A session at a point with its rows laid open: those of moves not yet weighed.
 pub struct Hypothesis {
@@ -21,14 +29,43 @@ pub struct Hypothesis {
     fixed_weight: f64,
     pub(super) process: Vec<Part>,
     pub(super) moves: Vec<Open>,
-    pub(super) has_rate: bool,
     n_added: usize,
 }
 
-/// A move in SI, and what its covariance is made of.
+/// A move in SI: derivatives by border, by the pose before, by the pose after, and the residual, column after column; and
+/// what its covariance is made of.
 pub(super) struct Open {
-    group: Group,
-    passed: super::move_rows::Passed,
+    pose: usize,
+    columns: DMatrix<f64>,
+    passed: Passed,
+}
+
+impl Open {
+    fn of(group: &Group, back: &Whitening, passed: &Passed) -> Self {
+        let rows = &group.rows;
+        let parts = [&rows.border, &rows.here, &rows.next].map(|part| part.as_slice());
+        let flat: Vec<f64> = parts
+            .into_iter()
+            .flatten()
+            .chain(rows.residual.as_slice())
+            .copied()
+            .collect();
+        let white = DMatrix::from_vec(N_MOVE, flat.len() / N_MOVE, flat);
+        Self {
+            pose: rows.pose.unwrap_or(group.segment),
+            columns: DMatrix::from_column_slice(N_MOVE, white.ncols(), (back * &white).as_slice()),
+            passed: passed.clone(),
+        }
+    }
+
+    /// `L⁻¹` of its covariance `L Lᵀ` at some strengths.
+    fn whitening(&self, strengths: &Strengths) -> Option<Whitening> {
+        self.passed
+            .covariance(strengths)
+            .cholesky()?
+            .l()
+            .try_inverse()
+    }
 }
 
 /// What a hypothesis comes to.
@@ -50,12 +87,7 @@ impl Hypothesis {
     ///
     /// # Errors
     /// When a move's weight cannot be undone.
-    pub fn of(
-        session: &Session,
-        fit: &Fit,
-        columns: &[DMatrix<f64>],
-        sizes: &[f64],
-    ) -> Result<Self> {
+    pub fn of(fit: &Fit, columns: &[DMatrix<f64>], sizes: &[f64]) -> Result<Self> {
         let k = sizes.len();
         let layout = Layout {
             border: fit.layout().border + k,
@@ -82,13 +114,9 @@ impl Hypothesis {
                 fixed.push(group);
                 continue;
             }
-            let back = fit.weights.white[group.segment]
-                .try_inverse()
-                .ok_or_else(|| Error::not_determined("the weight of a move cannot be undone"))?;
-            let back = DMatrix::from_column_slice(N_MOVE, N_MOVE, back.as_slice());
-            weigh(&mut group, &back);
-            let passed = fit.passed[group.segment].clone();
-            moves.push(Open { group, passed });
+            let m = group.segment;
+            let back = unweighed(&fit.weights.white[m])?;
+            moves.push(Open::of(&group, &back, &fit.passed[m]));
         }
         for (c, size) in sizes.iter().enumerate() {
             let column = fit.layout().border + c;
@@ -113,7 +141,6 @@ impl Hypothesis {
             fixed_weight,
             process: process.iter().map(|groups| part(groups, false)).collect(),
             moves,
-            has_rate: session.rate.is_some(),
             n_added: k,
         })
     }
@@ -121,34 +148,44 @@ impl Hypothesis {
     /// The rows that no process changes, at some strengths, and the logarithm of their normalisation.
     pub(super) fn heard(&self, strengths: &Strengths) -> Option<(Part, f64)> {
         let mut weight = self.fixed_weight;
-        let mut groups = Vec::with_capacity(self.moves.len());
+        let mut chain = self.fixed.chain.clone();
+        let mut side = self.fixed.side.clone();
+        let mut sum = self.fixed.sum;
+        let mut scratch = Scratch::default();
         for open in &self.moves {
-            let half = open.passed.covariance(strengths).cholesky()?;
-            let white = half.l().try_inverse()?;
+            let white = open.whitening(strengths)?;
             weight += white.diagonal().map(f64::ln).sum();
-            let mut group = open.group.clone();
-            let white = DMatrix::from_column_slice(N_MOVE, N_MOVE, white.as_slice());
-            weigh(&mut group, &white);
-            groups.push(group);
+            sum += chain.add_move(open.pose, &open.columns, &white, &mut side, &mut scratch);
         }
-        let mut chain = Chain::of(self.layout, groups.iter().map(|group| &group.rows));
-        chain.add_scaled(&self.fixed.chain, 1.0);
-        let part = Part {
-            chain,
-            side: gradient(self.layout, &groups) + &self.fixed.side,
-            sum: chi2_of(&groups) + self.fixed.sum,
-            n: N_MOVE * groups.len() + self.fixed.n,
-        };
-        Some((part, weight))
+        chain.mirror();
+        let n = N_MOVE * self.moves.len() + self.fixed.n;
+        Some((
+            Part {
+                chain,
+                side,
+                sum,
+                n,
+            },
+            weight,
+        ))
+    }
+
+    /// `L⁻¹` of every move's covariance at some strengths, by number of the move.
+    pub(super) fn whitenings(&self, strengths: &Strengths) -> Option<Vec<Whitening>> {
+        self.moves
+            .iter()
+            .map(|open| open.whitening(strengths))
+            .collect()
     }
 
     fn factors(&self, strengths: &Strengths) -> [f64; N_PROCESSES] {
-        [
-            strengths.corner_s[0] / self.at.corner_s[0],
-            strengths.corner_s[1] / self.at.corner_s[1],
-            self.at.scatter[0] / strengths.scatter[0],
-            self.at.scatter[1] / strengths.scatter[1],
-        ]
+        std::array::from_fn(|p| {
+            if p < 2 {
+                strengths.corner_s[p] / self.at.corner_s[p]
+            } else {
+                self.at.scatter[p - 2] / strengths.scatter[p - 2]
+            }
+        })
     }
 
     /// Log-evidence at some strengths beside rows that were weighed for them.
@@ -174,8 +211,7 @@ impl Hypothesis {
     }
 
     /// Log-evidence at each of some strengths.
-    #[must_use]
-    pub fn at_each(&self, strengths: &[Strengths]) -> Vec<f64> {
+    fn at_each(&self, strengths: &[Strengths]) -> Vec<f64> {
         let one = |s: &Strengths| {
             let heard = self.heard(s);
             heard.map_or(f64::NEG_INFINITY, |heard| self.beside(s, &heard))
@@ -183,11 +219,16 @@ impl Hypothesis {
         strengths.iter().map(one).collect()
     }
 
-    /// The strengths that make the rows likeliest, sought from the best of some, and all that follows there.
+    /// The strengths that make the rows likeliest, sought from the best of some, near it or anywhere.
     ///
     /// # Errors
-    /// When there are none, or nothing determines the session there.
-    pub fn tuned(&self, starts: &[Strengths], within: &Within) -> Result<Found> {
+    /// When there are none.
+    pub fn likeliest(
+        &self,
+        starts: &[Strengths],
+        within: &Within,
+        is_near: bool,
+    ) -> Result<Strengths> {
         let values = self.at_each(starts);
         let best = starts
             .iter()
@@ -195,25 +236,34 @@ impl Hypothesis {
             .max_by(|a, b| a.1.total_cmp(&b.1))
             .ok_or_else(|| Error::bad_input("strengths to begin from are missing"))?;
         let mut search = Search::new(self, best.0, within);
-        search.run();
-        self.found(&search.strengths())
+        search.run(is_near);
+        Ok(search.strengths())
     }
 
-    /// All that follows at given strengths.
+    /// Normal equations and `Jᵀr` at some strengths.
     ///
     /// # Errors
-    /// When nothing determines the session there.
-    pub fn found(&self, strengths: &Strengths) -> Result<Found> {
-        let heard = self
+    /// When a move has no noise.
+    pub(super) fn system(&self, strengths: &Strengths) -> Result<(Chain, DMatrix<f64>)> {
+        let (part, _) = self
             .heard(strengths)
             .ok_or_else(|| Error::not_determined("a move has no noise"))?;
-        let log_evidence = self.beside(strengths, &heard);
-        let mut chain = heard.0.chain;
-        let mut side = heard.0.side;
+        let (mut chain, mut side) = (part.chain, part.side);
         for (process, factor) in self.process.iter().zip(self.factors(strengths)) {
             chain.add_scaled(&process.chain, factor * factor);
             side += &process.side * (factor * factor);
         }
+        Ok((chain, side))
+    }
+
+    /// The strengths that make the rows likeliest, sought from the best of some, and all that follows there.
+    ///
+    /// # Errors
+    /// When there are none, or nothing determines the session there.
+    pub fn tuned(&self, starts: &[Strengths], within: &Within) -> Result<Found> {
+        let strengths = self.likeliest(starts, within, true)?;
+        let log_evidence = self.at_each(&[strengths])[0];
+        let (chain, side) = self.system(&strengths)?;
         let factor = chain.factor(RIDGE, None)?;
         let first = self.layout.border - self.n_added;
         let mut columns = DMatrix::zeros(self.layout.n(), self.n_added + 1);
@@ -224,7 +274,7 @@ impl Hypothesis {
         let solved = factor.solve(&columns);
         Ok(Found {
             log_evidence,
-            strengths: *strengths,
+            strengths,
             estimate: -solved.view((first, 0), (self.n_added, 1)).column(0),
             covariance: solved
                 .view((first, 1), (self.n_added, self.n_added))
@@ -233,10 +283,9 @@ impl Hypothesis {
     }
 }
 
-/// Multiplies the rows of a move by a lower triangular matrix.
-fn weigh(group: &mut Group, by: &DMatrix<f64>) {
-    group.rows.residual = by * &group.rows.residual;
-    group.rows.border = by * &group.rows.border;
-    group.rows.here = by * &group.rows.here;
-    group.rows.next = by * &group.rows.next;
+/// From whitened rows of a move back to SI.
+pub(super) fn unweighed(white: &Whitening) -> Result<Whitening> {
+    white
+        .try_inverse()
+        .ok_or_else(|| Error::not_determined("the weight of a move cannot be undone"))
 }

@@ -9,7 +9,6 @@ mod blocks;
 pub mod chain;
 mod elimination;
 mod ends;
-mod evidence;
 pub mod factor;
 pub mod fit;
 mod gaps;
@@ -17,6 +16,7 @@ mod held;
 pub mod held_out;
 pub mod hypothesis;
 mod lanes;
+pub mod looks;
 pub mod move_rows;
 pub mod moves;
 mod possible;
@@ -43,6 +43,8 @@ pub use state::{Distortion, State, tangent_plane};
 pub const N_MODEL: usize = 18;
 /// Unknowns of a pose without scatter: vertical (2), zero of the gyro (3), of the accelerometer (3).
 pub const N_POSE: usize = 8;
+/// Strengths of scatter: lengths of gravity do not tell the accelerometer's axes apart, the gyro's are.
+pub const N_SCATTER: usize = 4;
 /// With the share of either zero that is this pose's alone.
 pub const N_POSE_SCATTER: usize = 14;
 /// `(row, column)` of the free elements of the accelerometer's `S`.
@@ -144,8 +146,6 @@ pub struct Session {
     pub prior: Option<Prior>,
     /// Scatter of the zeros that strength one means, raw units (accelerometer, gyro); `None`: zeros only walk.
     pub scatter: Option<[Vector3<f64>; 2]>,
-    /// Whether that scatter is known and not to be searched for.
-    pub is_scatter_given: bool,
     /// Strength of the accelerometer's that the noise inside poses lets expect; 0 where it shows none (11.12d).
     pub expected_scatter: f64,
 }
@@ -155,8 +155,8 @@ pub struct Session {
 pub struct Strengths {
     /// Corner time at which white noise and walk meet, s: accelerometer, gyro.
     pub corner_s: [f64; 2],
-    /// Scatter from pose to pose in units of [`Session::scatter`].
-    pub scatter: [f64; 2],
+    /// Scatter from pose to pose in units of [`Session::scatter`]: accelerometer, then each axis of the gyro.
+    pub scatter: [f64; N_SCATTER],
     /// How far a zero that scatters leaves, during a move, the line between its poses: in units of its scatter.
     pub between: [f64; 2],
     /// Factors, at least 1, on the standard errors of gravity after moves and of the velocity over them.
@@ -167,10 +167,22 @@ impl Strengths {
     /// Zeros that neither walk nor scatter to speak of.
     pub const NONE: Self = Self {
         corner_s: [f64::INFINITY; 2],
-        scatter: [0.0; 2],
+        scatter: [0.0; N_SCATTER],
         between: [0.0; 2],
         excess: [1.0; 2],
     };
+}
+
+impl Strengths {
+    /// Largest change of a logarithm from other ones; 0 where none differs.
+    #[must_use]
+    pub fn changed_from(&self, other: &Self) -> f64 {
+        let pairs = (self.corner_s.iter().zip(&other.corner_s))
+            .chain(self.scatter.iter().zip(&other.scatter))
+            .chain(self.between.iter().zip(&other.between))
+            .chain(self.excess.iter().zip(&other.excess));
+        pairs.fold(0.0, |most, (a, b)| most.max((a / b).ln().abs()))
+    }
 }
 
 impl Session {

@@ -9,7 +9,7 @@ use super::chain::{Layout, Rows};
 use super::moves::{Carried, MoveCovariance, N_MOVE, Sees, carry};
 use super::response::{Response, Sums, effect_columns, loosened, respond, sums, widen};
 use super::rows::{Domain, Group, Kind};
-use super::{Distortion, LOWER, N_MODEL, Session, State, Strengths, tangent_plane};
+use super::{Distortion, LOWER, N_MODEL, N_SCATTER, Session, State, Strengths, tangent_plane};
 use crate::error::{Error, Result};
 
 /// `L⁻¹` of a move's covariance `L Lᵀ`.
@@ -63,10 +63,9 @@ pub struct Passed {
     pub sums: Sums,
     /// Plane of comparison.
     pub plane: Matrix3x2<f64>,
-    /// What zeros of unit scatter (accelerometer, gyro) add to the covariance by leaving the line between the poses.
-    pub loose: Option<[MoveCovariance; 2]>,
-    /// Factors on the standard errors by noise of the samples: gravity after the move, velocity over it.
-    pub inflation: [f64; 2],
+    /// What zeros of unit scatter (accelerometer, each axis of the gyro) add to the covariance by leaving the line between
+    /// the poses.
+    pub loose: Option<[MoveCovariance; N_SCATTER]>,
 }
 
 impl Passed {
@@ -74,14 +73,10 @@ impl Passed {
     #[must_use]
     pub fn covariance(&self, strengths: &Strengths) -> MoveCovariance {
         let mut out = self.response.covariance;
-        let [gravity, velocity] = strengths.excess;
-        widen(
-            &mut out,
-            [self.inflation[0] * gravity, self.inflation[1] * velocity],
-        );
+        widen(&mut out, strengths.excess);
         if let Some(loose) = &self.loose {
-            for s in 0..2 {
-                out += loose[s] * (strengths.scatter[s] * strengths.between[s]).powi(2);
+            for (s, loose) in loose.iter().enumerate() {
+                out += loose * (strengths.scatter[s] * strengths.between[s.min(1)]).powi(2);
             }
         }
         out
@@ -162,7 +157,6 @@ impl Session {
                     sums,
                     plane: planes[m],
                     loose,
-                    inflation: self.noise.inflation,
                 }
             })
             .collect()

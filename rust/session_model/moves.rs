@@ -140,8 +140,6 @@ pub struct MoveNoise {
     pub jitter_s: f64,
     /// Usual sample step, s.
     pub nominal_step_s: f64,
-    /// Factors on the standard errors of the two kinds of residuals.
-    pub inflation: [f64; 2],
 }
 
 /// One step of the attitude.

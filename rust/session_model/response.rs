@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, Matrix2x3, Matrix3, SMatrix, Vector3};
 
+use super::N_SCATTER;
 use super::gaps::GAP;
 use super::moves::{Carried, Move, MoveCovariance, MoveNoise, N_MOVE, Sees};
 use crate::rotation::skew;
@@ -94,11 +95,11 @@ pub fn respond(one: &Move, sees: &Sees<'_>, carried: &Carried, noise: &MoveNoise
 
 /// Widens gravity and velocity, each by its own factor. What they miss beyond the noise of the samples is not known to be
 /// common to both: widened along, their correlation would make a velocity that is not heard tell gravity's noise.
-pub(super) fn widen(covariance: &mut MoveCovariance, inflation: [f64; 2]) {
+pub(super) fn widen(covariance: &mut MoveCovariance, excess: [f64; 2]) {
     let mut gravity = covariance.fixed_view_mut::<2, 2>(0, 0);
-    gravity *= inflation[0] * inflation[0];
+    gravity *= excess[0] * excess[0];
     let mut velocity = covariance.fixed_view_mut::<3, 3>(2, 2);
-    velocity *= inflation[1] * inflation[1];
+    velocity *= excess[1] * excess[1];
 }
 
 /// `M [v]×`.
@@ -209,7 +210,7 @@ pub fn sums(one: &Move, sees: &Sees<'_>, response: &Response, lower: &[(usize, u
     }
 }
 
-/// Covariance of the residuals where the zeros (accelerometer, gyro) leave the line between their poses during the move,
+/// Covariance of the residuals where the zeros (accelerometer, each axis of the gyro) leave the line between their poses during the move,
 /// by `scatter` at its first and at its last sample, independently (11.6).
 ///
 /// A zero that is another in every pose leaps somewhere, or is a third one on the way: the line is then wrong by about
@@ -220,7 +221,7 @@ pub fn loosened(
     sees: &Sees<'_>,
     response: &Response,
     scatter: &[Vector3<f64>; 2],
-) -> [MoveCovariance; 2] {
+) -> [MoveCovariance; N_SCATTER] {
     let mut rates = [SMatrix::<f64, N_MOVE, 3>::zeros(); 2];
     let mut forces = [Matrix3::zeros(); 2];
     for k in 0..one.n_samples() {
@@ -231,10 +232,12 @@ pub fn loosened(
         forces[0] += f * (1.0 - y);
         forces[1] += f * y;
     }
-    let mut out = [MoveCovariance::zeros(); 2];
+    let mut out = [MoveCovariance::zeros(); N_SCATTER];
     for end in 0..2 {
         let rate = rates[end] * sees.rate_scale * Matrix3::from_diagonal(&scatter[1]);
-        out[1] += rate * rate.transpose();
+        for axis in 0..3 {
+            out[1 + axis] += rate.column(axis) * rate.column(axis).transpose();
+        }
         let force = forces[end] * sees.force_scale * Matrix3::from_diagonal(&scatter[0]);
         let mut velocity = out[0].fixed_view_mut::<3, 3>(2, 2);
         velocity += force * force.transpose();

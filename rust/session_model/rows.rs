@@ -7,7 +7,7 @@ use super::chain::{Layout, Rows};
 use super::move_rows::{Effects, Passed, Weights};
 use super::moves::{Carried, N_MOVE, carry};
 use super::rest_rows::{rest_columns, weight_of};
-use super::{Distortion, N_MODEL, Session, State, Strengths};
+use super::{Distortion, N_MODEL, N_SCATTER, Session, State, Strengths};
 use crate::error::{Error, Result};
 
 /// Which part of the recording a row judges.
@@ -36,14 +36,18 @@ pub enum Kind {
     RateWalk = 2,
     /// Scatter of the accelerometer's zero.
     ForceScatter = 3,
-    /// Scatter of the gyro's zero.
-    RateScatter = 4,
+    /// Scatter of the gyro's zero, by axis.
+    RateScatterX = 4,
+    /// The same.
+    RateScatterY = 5,
+    /// The same.
+    RateScatterZ = 6,
     /// Prior or pin.
-    Prior = 5,
+    Prior = 7,
 }
 
 /// Number of kinds whose strength is free.
-pub const N_PROCESSES: usize = 4;
+pub const N_PROCESSES: usize = 2 + N_SCATTER;
 
 impl Kind {
     /// Number of the process, if its strength is free.
@@ -53,7 +57,9 @@ impl Kind {
             Self::ForceWalk => Some(0),
             Self::RateWalk => Some(1),
             Self::ForceScatter => Some(2),
-            Self::RateScatter => Some(3),
+            Self::RateScatterX => Some(3),
+            Self::RateScatterY => Some(4),
+            Self::RateScatterZ => Some(5),
             Self::Reading | Self::Prior => None,
         }
     }

@@ -1,19 +1,43 @@
 //! The strengths of noise that make a hypothesis likeliest: a search along one after the other, in logarithms
 //! (docs/model-session.md, 11.18).
 
-use super::Strengths;
-use super::evidence::Part;
-use super::hypothesis::Hypothesis;
-use super::strengths::NO_SCATTER;
+use std::ops::Range;
 
-/// Number of strengths: corner time, scatter, straying between poses of either sensor, excess of both kinds of rows.
-const N_STRENGTHS: usize = 8;
+use super::hypothesis::{Hypothesis, Part};
+use super::{N_SCATTER, Strengths};
+
+/// Scatter that counts as none, in units of the session's reference.
+pub const NO_SCATTER: f64 = 1e-3;
+/// Where each kind of strength begins among all: corner times, scatters, straying between poses, excess of moves.
+const SCATTER_AT: usize = 2;
+const BETWEEN_AT: usize = SCATTER_AT + N_SCATTER;
+const EXCESS_AT: usize = BETWEEN_AT + 2;
+const N_STRENGTHS: usize = EXCESS_AT + 2;
+/// Scatters of either sensor.
+const SCATTER_OF: [Range<usize>; 2] = [SCATTER_AT..SCATTER_AT + 1, SCATTER_AT + 1..BETWEEN_AT];
+/// What is changed together, one after the other: the axes of a gyro scatter alike more often than not.
+const DIRECTIONS: [Range<usize>; N_STRENGTHS + 1] = [
+    0..1,
+    1..2,
+    SCATTER_AT..SCATTER_AT + 1,
+    SCATTER_AT + 1..BETWEEN_AT,
+    SCATTER_AT + 1..SCATTER_AT + 2,
+    SCATTER_AT + 2..SCATTER_AT + 3,
+    SCATTER_AT + 3..SCATTER_AT + 4,
+    BETWEEN_AT..BETWEEN_AT + 1,
+    BETWEEN_AT + 1..EXCESS_AT,
+    EXCESS_AT..EXCESS_AT + 1,
+    EXCESS_AT + 1..N_STRENGTHS,
+];
+type Point = [f64; N_STRENGTHS];
 /// Natural logarithms between which each kind is sought. No bound on noise is physical: these only end the search, a
 /// walk that meets white noise in a fifth of a second, scatter of thousands of errors of a pose, rows thousands of times off.
 const CORNER: (f64, f64) = (-1.6, 8.5);
 const SCATTER: (f64, f64) = (-6.9, 9.2);
 const BETWEEN: (f64, f64) = (-3.0, 1.6);
 const EXCESS: (f64, f64) = (0.0, 9.2);
+/// Rows with this excess are not heard, and stay so: a search leaves it as it is given.
+const UNHEARD: f64 = 6.9;
 /// Scatter, and excess of moves, that are sought from nothing begin at these: near nothing the evidence is flat.
 const FROM_NOTHING: [f64; 2] = [1.0, 6.0];
 /// What a walk and a scatter are exchanged for one another by: a bias that wanders may be either, and the evidence has an
@@ -32,6 +56,8 @@ const MOST_PASSES: usize = 8;
 /// Steps, of the logarithm, at which the search along one strength begins and ends.
 const FIRST_STEP: f64 = 0.8;
 const LAST_STEP: f64 = 0.1;
+/// Changes smaller than this change no evidence by a hundredth.
+const LEAST_MOVE: f64 = 0.02;
 
 /// Bounds of some strengths, where a hypothesis says that they are no larger than noise alone makes them.
 #[derive(Debug, Clone, Copy)]
@@ -53,15 +79,13 @@ impl Within {
     };
 
     fn bounds(&self) -> [(f64, f64); N_STRENGTHS] {
-        let kinds = [CORNER, SCATTER, BETWEEN, EXCESS];
-        std::array::from_fn(|i| {
-            let ((low, high), k) = (kinds[i / 2], i % 2);
-            match i / 2 {
-                0 => (self.corner_s[k].ln().clamp(low, high), high),
-                1 => (low, self.scatter[k].ln().clamp(low, high)),
-                3 => (low, self.excess[k].ln().clamp(low, high)),
-                _ => (low, high),
-            }
+        let below = |most: f64, (low, high): (f64, f64)| (low, most.ln().clamp(low, high));
+        std::array::from_fn(|i| match i {
+            0 | 1 => (self.corner_s[i].ln().clamp(CORNER.0, CORNER.1), CORNER.1),
+            SCATTER_AT => below(self.scatter[0], SCATTER),
+            _ if i < BETWEEN_AT => below(self.scatter[1], SCATTER),
+            _ if i < EXCESS_AT => BETWEEN,
+            _ => below(self.excess[i - EXCESS_AT], EXCESS),
         })
     }
 }
@@ -70,25 +94,19 @@ impl Within {
 pub(super) struct Search<'a> {
     hypothesis: &'a Hypothesis,
     bounds: [(f64, f64); N_STRENGTHS],
-    x: [f64; N_STRENGTHS],
+    x: Point,
     value: f64,
     /// The rows of moves as they were weighed last, and for what.
-    heard: Option<([u64; 6], (Part, f64))>,
+    heard: Option<([u64; N_STRENGTHS - SCATTER_AT], (Part, f64))>,
 }
 
 impl<'a> Search<'a> {
     pub(super) fn new(hypothesis: &'a Hypothesis, start: &Strengths, within: &Within) -> Self {
-        let s = start;
-        let x = [
-            s.corner_s[0],
-            s.corner_s[1],
-            s.scatter[0],
-            s.scatter[1],
-            s.between[0],
-            s.between[1],
-            s.excess[0],
-            s.excess[1],
-        ];
+        let mut x = [0.0; N_STRENGTHS];
+        x[..SCATTER_AT].copy_from_slice(&start.corner_s);
+        x[SCATTER_AT..BETWEEN_AT].copy_from_slice(&start.scatter);
+        x[BETWEEN_AT..EXCESS_AT].copy_from_slice(&start.between);
+        x[EXCESS_AT..].copy_from_slice(&start.excess);
         let mut x = x.map(f64::ln);
         let bounds = within.bounds();
         for (value, (low, high)) in x.iter_mut().zip(bounds) {
@@ -109,9 +127,9 @@ impl<'a> Search<'a> {
         strengths_of(&self.x)
     }
 
-    fn at(&mut self, x: &[f64; N_STRENGTHS]) -> f64 {
+    fn at(&mut self, x: &Point) -> f64 {
         let strengths = strengths_of(x);
-        let key = [x[2], x[3], x[4], x[5], x[6], x[7]].map(f64::to_bits);
+        let key = std::array::from_fn(|i| x[SCATTER_AT + i].to_bits());
         if self.heard.as_ref().is_none_or(|(known, _)| *known != key) {
             let Some(heard) = self.hypothesis.heard(&strengths) else {
                 return f64::NEG_INFINITY;
@@ -128,25 +146,28 @@ impl<'a> Search<'a> {
         let h = self.hypothesis;
         let has_moves = !h.moves.is_empty();
         match i {
-            0 => h.process[0].n > 0,
-            1 => h.has_rate && h.process[1].n > 0,
-            2 => h.process[2].n > 0,
-            3 => h.has_rate && h.process[3].n > 0,
-            4 | 5 => has_moves && self.x[i - 2] > LEAST_SCATTER.ln(),
-            _ => has_moves,
+            _ if i < BETWEEN_AT => h.process[i].n > 0 && self.bounds[i].0 < self.bounds[i].1,
+            _ if i < EXCESS_AT => {
+                let mut scatters = self.x[SCATTER_OF[i - BETWEEN_AT].clone()].iter();
+                has_moves && scatters.any(|x| *x > LEAST_SCATTER.ln())
+            }
+            _ => has_moves && self.bounds[i].0 < self.bounds[i].1 && self.x[i] < UNHEARD,
         }
     }
 
-    pub(super) fn run(&mut self) {
-        let mut step = [FIRST_STEP; N_STRENGTHS];
+    /// From strengths that are likeliest for nearly the same rows (`is_near`) nothing leaps.
+    pub(super) fn run(&mut self, is_near: bool) {
+        let mut step = [FIRST_STEP; DIRECTIONS.len()];
         for pass in 0..MOST_PASSES {
             let before = self.value;
-            for i in 0..N_STRENGTHS {
-                if self.is_free(i) {
-                    self.along(i, &mut step[i]);
+            for (direction, step) in DIRECTIONS.iter().zip(&mut step) {
+                // Axes go their own way once they have gone together.
+                let is_first = direction.start == SCATTER_AT + 1 && direction.len() == 1;
+                if self.is_free(direction.start) && !(is_first && pass == 0) {
+                    self.along(direction, step, is_near);
                 }
             }
-            if pass == 0 {
+            if pass == 0 && !is_near {
                 self.exchange();
             }
             if self.value - before < ENOUGH {
@@ -158,13 +179,16 @@ impl<'a> Search<'a> {
     /// Tries a walk for a scatter, and a scatter for a walk, of either sensor.
     fn exchange(&mut self) {
         for sensor in 0..2 {
-            if !(self.is_free(sensor) && self.is_free(sensor + 2)) {
+            let scatters = SCATTER_OF[sensor].clone();
+            if !(self.is_free(sensor) && self.is_free(scatters.start)) {
                 continue;
             }
             for (corner, scatter) in EXCHANGED {
                 let mut x = self.x;
-                for (i, value) in [(sensor, corner.ln()), (sensor + 2, scatter.ln())] {
-                    x[i] = value.clamp(self.bounds[i].0, self.bounds[i].1);
+                x[sensor] = corner.ln();
+                x[scatters.clone()].fill(scatter.ln());
+                for (value, (low, high)) in x.iter_mut().zip(self.bounds) {
+                    *value = value.clamp(low, high);
                 }
                 let value = self.at(&x);
                 if value > self.value {
@@ -174,44 +198,62 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn tried(&mut self, i: usize, value: f64) -> f64 {
+    /// The strengths of a direction changed by a factor, none beyond its bounds.
+    fn moved(&self, direction: &Range<usize>, by: f64) -> Point {
         let mut x = self.x;
-        x[i] = value;
-        self.at(&x)
+        for i in direction.clone() {
+            x[i] = (x[i] + by).clamp(self.bounds[i].0, self.bounds[i].1);
+        }
+        x
+    }
+
+    fn take(&mut self, x: Point) -> bool {
+        let value = self.at(&x);
+        let is_better = value > self.value;
+        if is_better {
+            (self.x, self.value) = (x, value);
+        }
+        is_better
+    }
+
+    /// Whether strengths are so small that the evidence is flat there.
+    fn is_nothing(&self, direction: &Range<usize>) -> bool {
+        let nothing = match direction.start {
+            SCATTER_AT..BETWEEN_AT => LEAST_SCATTER.ln(),
+            EXCESS_AT.. => LAST_STEP,
+            _ => return false,
+        };
+        self.x[direction.clone()].iter().all(|x| *x < nothing)
+    }
+
+    /// Whether a leap from nothing gains.
+    fn rises(&mut self, direction: &Range<usize>) -> bool {
+        for value in FROM_NOTHING {
+            let mut x = self.x;
+            x[direction.clone()].fill(value.ln().min(self.bounds[direction.start].1));
+            self.take(x);
+        }
+        !self.is_nothing(direction)
     }
 
     /// A step either way, doubled while it gains; then where a parabola is highest.
-    fn along(&mut self, i: usize, step: &mut f64) {
-        let (low, high) = self.bounds[i];
-        let nothing = if i < 4 { LEAST_SCATTER.ln() } else { LAST_STEP };
-        if matches!(i, 2 | 3 | 6 | 7) && self.x[i] < nothing {
-            for value in FROM_NOTHING {
-                if value.ln() > low && value.ln() < high {
-                    self.take(i, value.ln());
-                }
-            }
-            if self.x[i] < LEAST_SCATTER.ln() {
-                *step *= 0.5;
-                return;
-            }
+    fn along(&mut self, direction: &Range<usize>, step: &mut f64, is_near: bool) {
+        if self.is_nothing(direction) && (is_near || !self.rises(direction)) {
+            return;
         }
-        let here = self.x[i];
-        let (down, up) = ((here - *step).max(low), (here + *step).min(high));
-        let (below, above) = (
-            if down < here {
-                self.tried(i, down)
-            } else {
+        let (here, i) = (self.x, direction.start);
+        let (down, up) = (self.moved(direction, -*step), self.moved(direction, *step));
+        let mut value_of = |x: &Point| {
+            if *x == here {
                 f64::NEG_INFINITY
-            },
-            if up > here {
-                self.tried(i, up)
             } else {
-                f64::NEG_INFINITY
-            },
-        );
+                self.at(x)
+            }
+        };
+        let (below, above) = (value_of(&down), value_of(&up));
         if below.max(above) > self.value {
             let sign = if above > below { 1.0 } else { -1.0 };
-            let (mut to, mut value) = if above > below {
+            (self.x, self.value) = if above > below {
                 (up, above)
             } else {
                 (down, below)
@@ -219,49 +261,33 @@ impl<'a> Search<'a> {
             let mut stride = *step;
             loop {
                 stride *= 2.0;
-                let next = (to + sign * stride).clamp(low, high);
-                if (next - to).abs() < LAST_STEP {
-                    break;
-                }
-                let further = self.tried(i, next);
-                if further <= value {
-                    break;
-                }
-                (to, value) = (next, further);
-            }
-            (self.x[i], self.value) = (to, value);
-        } else {
-            if down < here && up > here {
-                let (a, b) = (here - down, up - here);
-                // A parabola through three points.
-                let (p, q) = ((below - self.value) / a, (above - self.value) / b);
-                let bend = (p + q) / (a + b);
-                if bend < 0.0 && bend.is_finite() {
-                    let slope = (q * a - p * b) / (a + b);
-                    let to = (here - slope / (2.0 * bend)).clamp(down, up);
-                    if (to - here).abs() > 0.02 {
-                        self.take(i, to);
-                    }
+                let next = self.moved(direction, sign * stride);
+                if (next[i] - self.x[i]).abs() < LAST_STEP || !self.take(next) {
+                    return;
                 }
             }
-            *step = (*step * 0.5).max(LAST_STEP);
         }
-    }
-
-    fn take(&mut self, i: usize, value: f64) {
-        let found = self.tried(i, value);
-        if found > self.value {
-            (self.x[i], self.value) = (value, found);
+        let (a, b) = (here[i] - down[i], up[i] - here[i]);
+        // A parabola through three points.
+        let (p, q) = ((below - self.value) / a, (above - self.value) / b);
+        let bend = (p + q) / (a + b);
+        if bend < 0.0 && bend.is_finite() {
+            let by = (-(q * a - p * b) / (a + b) / (2.0 * bend)).clamp(-a, b);
+            if by.abs() > LEAST_MOVE {
+                self.take(self.moved(direction, by));
+            }
         }
+        *step = (*step * 0.5).max(LAST_STEP);
     }
 }
 
-fn strengths_of(x: &[f64; N_STRENGTHS]) -> Strengths {
+fn strengths_of(x: &Point) -> Strengths {
     let e = x.map(f64::exp);
+    let pair = |at: usize| [e[at], e[at + 1]];
     Strengths {
-        corner_s: [e[0], e[1]],
-        scatter: [e[2].max(NO_SCATTER), e[3].max(NO_SCATTER)],
-        between: [e[4], e[5]],
-        excess: [e[6], e[7]],
+        corner_s: pair(0),
+        scatter: std::array::from_fn(|i| e[SCATTER_AT + i].max(NO_SCATTER)),
+        between: pair(BETWEEN_AT),
+        excess: pair(EXCESS_AT),
     }
 }

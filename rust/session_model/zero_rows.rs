@@ -9,6 +9,14 @@ use super::{N_POSE_SCATTER, Session, State, Strengths};
 /// Standard error that holds the accelerometer's constant zero at nothing (it is `b`), in units of its noise of 1 s.
 const PINNED: f64 = 1e-3;
 
+/// Processes of scatter: kind, number of the strength, axes.
+const OF_FORCE: [(Kind, usize, &[usize]); 1] = [(Kind::ForceScatter, 0, &[0, 1, 2])];
+const OF_RATE: [(Kind, usize, &[usize]); 3] = [
+    (Kind::RateScatterX, 1, &[0]),
+    (Kind::RateScatterY, 2, &[1]),
+    (Kind::RateScatterZ, 3, &[2]),
+];
+
 impl Session {
     /// (11.8): walks between poses, and the scatter of each.
     pub(super) fn process_rows(
@@ -19,22 +27,10 @@ impl Session {
         out: &mut Vec<Group>,
     ) {
         let sensors = [
-            (
-                Some(&self.force),
-                &state.force_zero,
-                5,
-                Kind::ForceWalk,
-                Kind::ForceScatter,
-            ),
-            (
-                self.rate.as_ref(),
-                &state.rate_zero,
-                2,
-                Kind::RateWalk,
-                Kind::RateScatter,
-            ),
+            (Some(&self.force), &state.force_zero, 5, Kind::ForceWalk),
+            (self.rate.as_ref(), &state.rate_zero, 2, Kind::RateWalk),
         ];
-        for (s, (sensor, zero, column, walk, scatter)) in sensors.into_iter().enumerate() {
+        for (s, (sensor, zero, column, walk)) in sensors.into_iter().enumerate() {
             let domain = [Domain::StaticForce, Domain::StaticRate][s];
             let Some(sensor) = sensor else {
                 pin_missing_gyro(layout, column, out);
@@ -79,13 +75,18 @@ impl Session {
                 }
                 out.push(group);
             }
-            if let Some(reference) = &self.scatter {
-                for (i, share) in own.iter().enumerate() {
-                    let mut group = Group::of(DVector::zeros(3), layout, i, domain, scatter);
-                    for c in 0..3 {
-                        let inverse = 1.0 / (reference[s][c] * strengths.scatter[s]);
-                        group.rows.residual[c] = share[c] * inverse;
-                        group.rows.here[(c, own_column + c)] = inverse;
+            let Some(reference) = &self.scatter else {
+                continue;
+            };
+            for (i, share) in own.iter().enumerate() {
+                let scatters: &[_] = if s == 0 { &OF_FORCE } else { &OF_RATE };
+                for (scatter, strength, axes) in scatters {
+                    let mut group =
+                        Group::of(DVector::zeros(axes.len()), layout, i, domain, *scatter);
+                    for (r, &c) in axes.iter().enumerate() {
+                        let inverse = 1.0 / (reference[s][c] * strengths.scatter[*strength]);
+                        group.rows.residual[r] = share[c] * inverse;
+                        group.rows.here[(r, own_column + c)] = inverse;
                         group.log_weight += inverse.ln();
                     }
                     out.push(group);

@@ -13,14 +13,11 @@ import numpy as np
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
-from trihedron.diagnose.hypothesis import ANYTHING, Bounds, Hypothesis, again
+from trihedron.diagnose.hypothesis import Hypothesis, again
 from trihedron.records.diagnosis import EffectParameter
 from trihedron.records.words import Words
-from trihedron.session.noise import scatter_unit
+from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, Bounds, scatter_unit
 
-NOISE_CORNER_S = 20.0
-"""Shortest corner time, where white noise and bias walk meet: Allan deviations of consumer parts turn up there or
-later. A walk of any strength is allowed in every hypothesis; a stronger one than this is called drift."""
 LEAST_WALK = 1.5
 """Rms of a bias over the error of a pose's mean from which its walk is called drift: of 120 healthy sessions, half of
 them with 1/f noise as consumer parts have it, 1.3 was the most."""
@@ -125,7 +122,8 @@ def _size(model: Hypothesis, effect: BiasProcess) -> tuple[FloatArray, FloatArra
     sensor = ("accelerometer", "gyroscope")[effect.sensor]
     n = model.obs.n_holds
     if not effect.walks:
-        raw = model.strengths[1][effect.sensor] * _units(model)[effect.sensor]
+        scatter = np.array(model.strengths[1])
+        raw = (scatter[1:] if effect.sensor else scatter[0]) * _units(model)[effect.sensor]
         size = raw * model.context.si_per_raw(sensor)
         return size, size / np.sqrt(2.0 * max(n - 1, 1))
     twin = model.fitted.twin

@@ -41,14 +41,23 @@ class Tried:
         return float(max(chdtrc(len(value), max(wald, 0.0)), 1e-300))
 
 
-def candidates_beside(
-    model: Hypothesis, exclude: Collection[str], n_leaders: int = N_LEADERS
-) -> tuple[list[Tried], dict[str, str]]:
+def all_beside(model: Hypothesis) -> tuple[list[Tried], dict[str, str]]:
+    """The whole catalogue beside a hypothesis, its noise as strong as it is there; and why others do not apply."""
+    terms, missing = _terms(model, ())
+    looks = model.looked_at(terms, PRIOR_SCALES) if terms else []
+    asked = [
+        Asked(model.log_evidence + float(look.gain[:, 0].max()), model.strengths, look.value, look.covariance)
+        for look in looks
+    ]
+    return _best_of_each(terms, asked, model.log_evidence), missing
+
+
+def candidates_beside(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Tried], dict[str, str]]:
     """Candidates beside a hypothesis, best first, one an effect; and why others do not apply."""
     terms, missing = _terms(model, exclude)
     if not terms:
         return [], missing
-    leading = _leaders(model, terms, n_leaders)
+    leading = _leaders(model, terms)
     asked = model.asked(leading)
     # Columns made for one size (a delay) are made again for the size that they come out with.
     sized = {
@@ -99,22 +108,19 @@ def _terms(model: Hypothesis, exclude: Collection[str]) -> tuple[list[Term], dic
     return terms, missing
 
 
-def _leaders(model: Hypothesis, terms: list[Term], n: int) -> list[Term]:
+def _leaders(model: Hypothesis, terms: list[Term]) -> list[Term]:
     """The candidates that gain most one linear step from the fit, at its strengths and at others, as large as fits."""
-    scaled = [[replace(t, sizes=t.sizes * scale) for t in terms] for scale in PRIOR_SCALES]
-    gains = np.array([model.looked_at(some) for some in scaled])
+    gains = np.stack([look.gain for look in model.looked_at(terms, PRIOR_SCALES)], axis=1)
     kept: dict[int, int] = {}
     for look in range(gains.shape[2]):
         best = gains[:, :, look].max(axis=0)
         count: dict[str, int] = {}
         for k in np.argsort(-best).tolist():
             effect_id = terms[k].effect.id
-            if count.get(effect_id, 0) < (SHAPES_KEPT if n == N_LEADERS else 1) and (
-                effect_id in count or len(count) < n
-            ):
+            if count.get(effect_id, 0) < SHAPES_KEPT and (effect_id in count or len(count) < N_LEADERS):
                 count[effect_id] = count.get(effect_id, 0) + 1
                 kept.setdefault(k, int(gains[:, k, look].argmax()))
-    return [scaled[scale][k] for k, scale in kept.items()]
+    return [replace(terms[k], sizes=terms[k].sizes * PRIOR_SCALES[scale]) for k, scale in kept.items()]
 
 
 def _is_possible(term: Term, asked: Asked) -> bool:

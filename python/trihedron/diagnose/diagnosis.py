@@ -118,13 +118,13 @@ def _noise(model: Hypothesis) -> MappingProxyType[str, object]:
         {
             "accelerometer_density": np.sqrt((twin.accel_S**2) @ obs.force_density**2).tolist(),
             "accelerometer_unit": "m/s^2/sqrt(Hz)",
-            "accelerometer_corner_s": twin.accel_corner_s,
+            "accelerometer_corner_s": twin.strengths[0][0],
             "accelerometer_zero": asdict(accel),
             "gyroscope_density": None
             if obs.rate_density is None
             else np.sqrt((twin.gyro_S**2) @ obs.rate_density**2).tolist(),
             "gyroscope_unit": "rad/s/sqrt(Hz)",
-            "gyroscope_corner_s": twin.gyro_corner_s,
+            "gyroscope_corner_s": twin.strengths[0][1],
             "gyroscope_zero": None if gyro is None else asdict(gyro),
         }
     )
@@ -172,7 +172,7 @@ def _run(obs: Observations, start: Twin, prior: Prior | None, alpha: float, tell
     return _Run(predicted, bare, answer, domains, remaining, known, asked)
 
 
-LOUD: Strengths = ((2.0, 2.0), (5.0, 5.0), (1.0, 1.0), (5.0, 5.0))
+LOUD: Strengths = ((2.0, 2.0), (5.0,) * 4, (1.0, 1.0), (5.0, 5.0))
 
 
 def _searched(observed: Observed, prior: Prior | None, alpha: float) -> tuple[Hypothesis, Found]:

@@ -24,22 +24,15 @@ from trihedron.diagnose.session.twin import (
     stacked,
     twin_of,
 )
-from trihedron.session.noise import START_STRENGTHS, Strengths
+from trihedron.session.noise import ANYTHING, NO_SCATTER, START_STRENGTHS, Bounds, Strengths
 
-Bounds = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
-"""Shortest corner times [s], largest scatter, largest excess of moves: accelerometer and gyro, gravity and velocity."""
-ANYTHING: Bounds = ((0.0, 0.0), (np.inf, np.inf), (np.inf, np.inf))
 NOTHING: tuple[None, None, list[float]] = (None, None, [])
 ELSEWHERE: tuple[Strengths, ...] = (
-    ((640.0, 640.0), (1e-3, 1e-3), (1.0, 1.0), (1.0, 1.0)),
-    ((300.0, 300.0), (3.0, 3.0), (0.5, 0.5), (2.0, 2.0)),
-    ((2.0, 2.0), (1e-3, 1e-3), (1.0, 1.0), (5.0, 5.0)),
+    ((640.0, 640.0), (NO_SCATTER,) * 4, (1.0, 1.0), (1.0, 1.0)),
+    ((300.0, 300.0), (3.0,) * 4, (0.5, 0.5), (2.0, 2.0)),
+    ((2.0, 2.0), (NO_SCATTER,) * 4, (1.0, 1.0), (5.0, 5.0)),
 )
 """A quiet part, biases that scatter, that walk: where strengths have swallowed an effect it is seen elsewhere."""
-MOST_ROUNDS = 4
-"""Rounds of fit and strengths: each finds the other almost where it left it."""
-SETTLED_LOG = 0.25
-"""Change of the logarithm of every strength below which another fit changes no number by a tenth of its error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +66,16 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
+class Look:
+    """What adding columns gains in log-evidence at fixed strengths, ``gain`` (scales of its size, strengths); ``value``
+    (k,) and ``covariance`` (k, k) at the first strengths and their best scale."""
+
+    gain: FloatArray
+    value: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class Hypothesis:
     """A session fitted with the effects of its ``terms``; the strengths of noise lie ``within`` their bounds."""
 
@@ -80,8 +83,12 @@ class Hypothesis:
     prior: Prior | None
     terms: tuple[Term, ...]
     fitted: Fit
-    log_evidence: float
     within: Bounds = ANYTHING
+
+    @property
+    def log_evidence(self) -> float:
+        """Log-likelihood with everything but the strengths of noise integrated out, up to a constant."""
+        return self.fitted.line.core.log_marginal
 
     @property
     def strengths(self) -> Strengths:
@@ -103,10 +110,10 @@ class Hypothesis:
         found = self.fitted.line.core.evidence(_columns(terms), [self.strengths, *ELSEWHERE], self.within)
         return [Asked(*one) for one in found]
 
-    def looked_at(self, terms: Sequence[Term]) -> FloatArray:
-        """(terms, looks) log-evidence gained by each of some terms at the strengths found here and elsewhere."""
-        looks, core = [self.strengths, *ELSEWHERE], self.fitted.line.core
-        return np.asarray(core.evidence_at(_columns(terms), looks) - core.evidence_at([NOTHING], looks))
+    def looked_at(self, terms: Sequence[Term], scales: Sequence[float]) -> list[Look]:
+        """What each of some terms gains at the strengths found here and elsewhere, its sizes times each of ``scales``."""
+        found = self.fitted.line.core.looks(_columns(terms), list(scales), [self.strengths, *ELSEWHERE])
+        return [Look(*one) for one in found]
 
     def plain(self, strengths: Sequence[Strengths]) -> float:
         """Log-evidence without another term, at the best of its strengths sought from some."""
@@ -143,20 +150,13 @@ def hypothesis(
     sizes = np.concatenate([term.sizes for term in terms]) if terms else np.zeros(0)
     if len(start.effect) != len(sizes):
         start = replace(start, effect=np.zeros(len(sizes)))
-    model, state = core_model(obs, start.gravity, prior, is_scatter_free=True), core_state(start)
-    for _ in range(MOST_ROUNDS):
-        core = model.fit(
-            state=state, strengths=strengths, force_effect=contiguous(distortion.force),
-            rate_effect=contiguous(distortion.rate), is_tuned=False, sizes=sizes.tolist(),
-        )  # fmt: skip
-        ((log_evidence, found, _, _),) = core.evidence([NOTHING], [strengths], within)
-        twin = twin_of(core, start.gravity)
-        moved = float(np.abs(np.log(found) - np.log(strengths)).max())
-        strengths, state = found, core_state(twin)
-        if moved < SETTLED_LOG:
-            break
+    core = core_model(obs, start.gravity, prior, is_scatter_free=True).fit(
+        state=core_state(start), strengths=strengths, force_effect=contiguous(distortion.force),
+        rate_effect=contiguous(distortion.rate), within=within, sizes=sizes.tolist(),
+    )  # fmt: skip
+    twin = twin_of(core, start.gravity)
     fitted = Fit(twin, Linearisation(obs, twin, distortion, prior, core), has_free_strengths=True)
-    return Hypothesis(obs, prior, tuple(terms), fitted, log_evidence, within)
+    return Hypothesis(obs, prior, tuple(terms), fitted, within)
 
 
 def again(known: Hypothesis, terms: Sequence[Term], within: Bounds | None = None) -> Hypothesis:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from trihedron.arrays import FloatArray
-from trihedron.diagnose.candidates import Tried, candidates_beside
+from trihedron.diagnose.candidates import Tried, all_beside, candidates_beside
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.effects.bias_process import BiasProcess
 from trihedron.diagnose.effects.contract import Variant
@@ -124,7 +124,7 @@ def _concluded(state: _State, alpha: float) -> Found:
     if doubted is not judged.model:
         judged = _pruned(doubted, threshold(alpha))
     model = judged.model
-    tried, missing = candidates_beside(model, (), len(catalogue()))
+    tried, missing = all_beside(model)
     held = {term.effect.id for term in model.terms}
     return Found(
         model, {one.term.effect.id: one for one in reversed(tried)},

@@ -20,10 +20,22 @@ LEAST_SHARE = 1e-9
 """Where nothing scatters (a simulation without noise) a billionth of a unit stands for the rounding of the log."""
 Along = tuple[FloatArray, FloatArray]
 """Directions (h, 3) and the standard errors (h,) of pose means along them."""
-Strengths = tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
-START_STRENGTHS: Strengths = ((160.0, 160.0), (1e-3, 1e-3), (1.0, 1.0), (1.0, 1.0))
-"""Where the search of the zeros' strengths begins: corner times [s], scatter that counts as none, straying between
+Pair = tuple[float, float]
+Strengths = tuple[Pair, tuple[float, float, float, float], Pair, Pair]
+"""Corner times of walks [s], scatter from pose to pose in its units (accelerometer, gyro by axis), straying between
 poses in units of the scatter, excess of moves over their noise; accelerometer and gyro (gravity and velocity) each."""
+NO_SCATTER = 1e-3
+"""Scatter that counts as none."""
+START_STRENGTHS: Strengths = ((160.0, 160.0), (NO_SCATTER,) * 4, (1.0, 1.0), (1.0, 1.0))
+"""Where the search of strengths begins."""
+Bounds = tuple[Pair, Pair, Pair]
+"""Shortest corner times [s], largest scatter, largest excess of moves: accelerometer and gyro, gravity and velocity."""
+ANYTHING: Bounds = ((0.0, 0.0), (np.inf, np.inf), (np.inf, np.inf))
+NOISE_CORNER_S = 20.0
+"""Shortest corner time, where white noise and bias walk meet: Allan deviations of consumer parts turn up there or
+later. A walk of any strength is allowed in every hypothesis; a stronger one than this is called drift."""
+PART_NOISE: Bounds = ((NOISE_CORNER_S, NOISE_CORNER_S), (NO_SCATTER, NO_SCATTER), (1.0, 1.0))
+"""Strengths of a part that is as its samples show it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,18 +2,18 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray3, ToPyArray};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray3, ToPyArray};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use super::{AllStrengths, Corners, all_strengths, distortion, sizes_fit, strengths_of};
+use super::{AllStrengths, Bounds, all_strengths, distortion, sizes_fit, strengths_of, within_of};
 use crate::error::Result;
 use crate::python::arrays::matrix;
 use crate::python::run_long;
 use crate::session_model::fit::Fit;
 use crate::session_model::hypothesis::Hypothesis;
-use crate::session_model::strength_search::Within;
-use crate::session_model::{Session, Strengths};
+use crate::session_model::looks::Looks;
+use crate::session_model::{Distortion, Session, Strengths};
 
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
 /// Columns of force and rate of further effects, and their sizes beforehand.
@@ -26,21 +26,23 @@ pub(super) type Answer<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
+/// Gains `(scales, strengths)`, parameters and their covariance at the first strengths.
+pub(super) type Glance<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<f64>>,
+);
+
 /// Every hypothesis at the strengths that make it likeliest.
 pub(super) fn tuned<'py>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'py>,
     hypotheses: &[Asked<'py>],
     strengths: Vec<AllStrengths>,
-    within: (Corners, Corners, Corners),
+    within: Bounds,
 ) -> PyResult<Vec<Answer<'py>>> {
     let starts: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
-    let ((a, b), (c, d), (e, f)) = within;
-    let within = Within {
-        corner_s: [a, b],
-        scatter: [c, d],
-        excess: [e, f],
-    };
+    let within = within_of(within);
     let found = each(of, py, hypotheses, move |one| one.tuned(&starts, &within))?;
     let lent = found.iter().map(|one| {
         Ok((
@@ -53,18 +55,43 @@ pub(super) fn tuned<'py>(
     lent.collect()
 }
 
-/// Every hypothesis at each of some strengths.
-pub(super) fn at_each<'py>(
+/// What every candidate gains at each of some strengths (11.19).
+pub(super) fn seen<'py>(
     of: (&Arc<Session>, &Arc<Fit>),
     py: Python<'py>,
-    hypotheses: &[Asked<'py>],
+    candidates: &[Asked<'py>],
+    scales: Vec<f64>,
     strengths: Vec<AllStrengths>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+) -> PyResult<Vec<Glance<'py>>> {
     let at: Vec<Strengths> = strengths.into_iter().map(strengths_of).collect();
-    let n = at.len();
-    let found = each(of, py, hypotheses, move |one| Ok(one.at_each(&at)))?;
-    let flat: Vec<f64> = found.concat();
-    flat.to_pyarray(py).reshape([found.len(), n])
+    let asked = asked_of(of.0, candidates)?;
+    let (session, fit) = (Arc::clone(of.0), Arc::clone(of.1));
+    let found = run_long(py, || {
+        let looks = Looks::of(&fit, &at)?;
+        let each = asked.par_iter().map(|(effects, sizes)| {
+            let columns =
+                session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, effects)?;
+            looks.seen(&columns, sizes, &scales)
+        });
+        each.collect::<Result<Vec<_>>>()
+    })?;
+    let lent = found.iter().map(|one| {
+        Ok((
+            matrix(py, &one.gain)?,
+            one.estimate.as_slice().to_pyarray(py),
+            matrix(py, &one.covariance)?,
+        ))
+    });
+    lent.collect()
+}
+
+fn asked_of(session: &Session, hypotheses: &[Asked<'_>]) -> PyResult<Vec<(Distortion, Vec<f64>)>> {
+    let each = hypotheses.iter().map(|(force, rate, sizes)| {
+        let effects = distortion(force.as_ref(), rate.as_ref(), session.n_points())?;
+        sizes_fit(sizes, effects.k)?;
+        Ok((effects, sizes.clone()))
+    });
+    each.collect()
 }
 
 /// What is asked of every hypothesis, side by side.
@@ -74,19 +101,13 @@ fn each<T: Send + 'static>(
     hypotheses: &[Asked<'_>],
     ask: impl Fn(&Hypothesis) -> Result<T> + Send + Sync + 'static,
 ) -> PyResult<Vec<T>> {
-    let n_points = of.0.n_points();
-    let mut asked = Vec::with_capacity(hypotheses.len());
-    for (force, rate, sizes) in hypotheses {
-        let effects = distortion(force.as_ref(), rate.as_ref(), n_points)?;
-        sizes_fit(sizes, effects.k)?;
-        asked.push((effects, sizes.clone()));
-    }
+    let asked = asked_of(of.0, hypotheses)?;
     let (session, fit) = (Arc::clone(of.0), Arc::clone(of.1));
     run_long(py, || {
         let each = asked.par_iter().map(|(effects, sizes)| {
             let columns =
                 session.columns(&fit.state, &fit.groups, &fit.weights, &fit.passed, effects)?;
-            ask(&Hypothesis::of(&session, &fit, &columns, sizes)?)
+            ask(&Hypothesis::of(&fit, &columns, sizes)?)
         });
         each.collect::<Result<Vec<_>>>()
     })

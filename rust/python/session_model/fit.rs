@@ -10,14 +10,14 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use super::evidence::{Answer, Asked, at_each, tuned};
+use super::evidence::{Answer, Asked, Glance, seen, tuned};
 use super::read_out::{Blocks, Rows, flagged, labels, moves, path, stacked};
-use super::{AllStrengths, Corners, all_strengths, distortion};
+use super::{AllStrengths, Bounds, all_strengths, distortion};
 use crate::error::Result;
 use crate::python::arrays::{dmatrix, matrix, of3, vector3, vectors};
 use crate::python::{run, run_long};
 use crate::session_model::Session;
-use crate::session_model::fit::{Fit, widened};
+use crate::session_model::fit::Fit;
 
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
@@ -95,15 +95,11 @@ impl SessionFit {
         self.fit.state.effect.as_slice().to_pyarray(py)
     }
 
-    /// Corner times, s; scatter in its units; straying between poses in units of the scatter: accelerometer, gyro each.
+    /// Corner times, s; scatter in its units (accelerometer, gyro by axis); straying between poses in units of the scatter;
+    /// excess of moves.
     #[getter]
     fn strengths(&self) -> AllStrengths {
         all_strengths(&self.fit.strengths)
-    }
-
-    #[getter]
-    fn is_walk_at_edge(&self) -> (bool, bool) {
-        self.fit.is_walk_at_edge().into()
     }
 
     #[getter]
@@ -114,11 +110,6 @@ impl SessionFit {
     #[getter]
     fn log_marginal(&self) -> f64 {
         self.fit.log_marginal()
-    }
-
-    #[getter]
-    fn log_profile(&self) -> f64 {
-        self.fit.log_profile()
     }
 
     #[getter]
@@ -232,7 +223,7 @@ impl SessionFit {
         py: Python<'py>,
         hypotheses: Vec<Asked<'py>>,
         strengths: Vec<AllStrengths>,
-        within: (Corners, Corners, Corners),
+        within: Bounds,
     ) -> PyResult<Vec<Answer<'py>>> {
         tuned(
             (&self.session, &self.fit),
@@ -243,28 +234,28 @@ impl SessionFit {
         )
     }
 
-    /// `(hypotheses, strengths)` log-evidence of every hypothesis at each of some strengths.
-    fn evidence_at<'py>(
+    /// What every candidate gains in log-evidence at each of some strengths, its sizes beforehand times each of some
+    /// scales: `(scales, strengths)`; its parameters and their covariance at the first strengths and their best scale.
+    fn looks<'py>(
         &self,
         py: Python<'py>,
-        hypotheses: Vec<Asked<'py>>,
+        candidates: Vec<Asked<'py>>,
+        scales: Vec<f64>,
         strengths: Vec<AllStrengths>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        at_each((&self.session, &self.fit), py, &hypotheses, strengths)
+    ) -> PyResult<Vec<Glance<'py>>> {
+        seen(
+            (&self.session, &self.fit),
+            py,
+            &candidates,
+            scales,
+            strengths,
+        )
     }
 
     /// `(rows,)` share of every row that the fit used up.
     fn leverage<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (fit, known) = (&self.fit, &self.leverage);
         Ok(run(py, || Ok(known.get_or_init(|| fit.leverage())))?.to_pyarray(py))
-    }
-
-    /// The fit with other factors on the standard errors of gravity after moves and of the velocity over them, from here.
-    fn widened(&self, py: Python<'_>, inflation: Corners) -> PyResult<Self> {
-        let (fit, session) = (Arc::clone(&self.fit), Arc::clone(&self.session));
-        let (session, found) =
-            run_long(py, || widened(&session, &fit, [inflation.0, inflation.1]))?;
-        Ok(Self::new(Arc::new(session), found))
     }
 
     /// Held-out prediction of folds of rows, `(folds, rows)` flags: χ² `(folds, 4)`, log-determinants `(folds,)`,

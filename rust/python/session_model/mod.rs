@@ -19,6 +19,7 @@ use super::arrays::rows3;
 use crate::session_model::fit::fit;
 use crate::session_model::move_rows::Weights;
 use crate::session_model::moves::MoveNoise;
+use crate::session_model::strength_search::Within;
 use crate::session_model::strengths::tune;
 use crate::session_model::{Distortion, N_MODEL, Prior, Session, Strengths};
 use fit::SessionFit;
@@ -27,9 +28,12 @@ use poses::{SessionMoves, SessionPoses, SessionState};
 type Array2<'py> = PyReadonlyArray2<'py, f64>;
 type Array3<'py> = PyReadonlyArray3<'py, f64>;
 /// A figure of the accelerometer and of the gyro.
-type Corners = (f64, f64);
-/// Corner times s, scatter, straying between poses, excess of moves: accelerometer and gyro (gravity and velocity) each.
-type AllStrengths = (Corners, Corners, Corners, Corners);
+type Pair = (f64, f64);
+/// Corner times s, scatter, straying between poses, excess of moves: accelerometer and gyro (gravity and velocity) each,
+/// scatter of the gyro by axis.
+type AllStrengths = (Pair, (f64, f64, f64, f64), Pair, Pair);
+/// Shortest corner times s, largest scatter, largest excess of moves.
+type Bounds = (Pair, Pair, Pair);
 
 pub(super) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<SessionPoses>()?;
@@ -89,23 +93,29 @@ fn distortion(
 }
 
 fn strengths_of(given: AllStrengths) -> Strengths {
-    let pair = |(a, b): Corners| [a, b];
     Strengths {
-        corner_s: pair(given.0),
-        scatter: pair(given.1),
-        between: pair(given.2),
-        excess: pair(given.3),
+        corner_s: given.0.into(),
+        scatter: given.1.into(),
+        between: given.2.into(),
+        excess: given.3.into(),
     }
 }
 
 fn all_strengths(given: &Strengths) -> AllStrengths {
-    let pair = |[a, b]: [f64; 2]| (a, b);
     (
-        pair(given.corner_s),
-        pair(given.scatter),
-        pair(given.between),
-        pair(given.excess),
+        given.corner_s.into(),
+        given.scatter.into(),
+        given.between.into(),
+        given.excess.into(),
     )
+}
+
+fn within_of(given: Bounds) -> Within {
+    Within {
+        corner_s: given.0.into(),
+        scatter: given.1.into(),
+        excess: given.2.into(),
+    }
 }
 
 fn sizes_fit(sizes: &[f64], k: usize) -> PyResult<()> {
@@ -120,10 +130,9 @@ fn sizes_fit(sizes: &[f64], k: usize) -> PyResult<()> {
 
 #[pymethods]
 impl SessionModel {
-    /// `noise`: jitter of the sample instants s, usual step s, factors on the standard errors of both kinds of residuals of
-    /// moves. `prior`: mean `(18,)`, covariance `(18, 18)`, whether it is weak. `scatter`: `(2, 3)` raw, what strength one
-    /// means, whether that is known, and the strength of the accelerometer's that its noise inside poses lets expect, 0 where
-    /// it shows none.
+    /// `noise`: jitter of the sample instants s, usual step s. `prior`: mean `(18,)`, covariance `(18, 18)`, whether it is
+    /// weak. `scatter`: `(2, 3)` raw, what strength one means, and the strength of the accelerometer's that its noise inside
+    /// poses lets expect, 0 where it shows none.
     #[new]
     #[pyo3(signature = (*, gravity_m_s2, poses, moves, noise, prior, scatter))]
     fn new(
@@ -131,22 +140,21 @@ impl SessionModel {
         gravity_m_s2: f64,
         poses: &SessionPoses,
         moves: &SessionMoves,
-        noise: (f64, f64, Corners),
+        noise: Pair,
         prior: Option<(PyReadonlyArray1<'_, f64>, Array2<'_>, bool)>,
-        scatter: Option<(Array2<'_>, bool, f64)>,
+        scatter: Option<(Array2<'_>, f64)>,
     ) -> PyResult<Self> {
         let prior = prior
             .map(|(mean, covariance, is_weak)| prior_of(&mean, &covariance, is_weak))
             .transpose()?;
-        let is_scatter_given = scatter.as_ref().is_some_and(|(_, is_given, _)| *is_given);
-        let expected_scatter = scatter.as_ref().map_or(0.0, |(_, _, expected)| *expected);
+        let expected_scatter = scatter.as_ref().map_or(0.0, |(_, expected)| *expected);
         let scatter = scatter
             .map(|(array, ..)| match rows3("scatter", &array)?.as_slice() {
                 [a, b] => Ok([*a, *b]),
                 _ => Err(PyValueError::new_err("scatter must have shape (2, 3)")),
             })
             .transpose()?;
-        let (jitter_s, nominal_step_s, inflation) = noise;
+        let (jitter_s, nominal_step_s) = noise;
         let noise = MoveNoise {
             force_density: poses.force.density,
             rate_density: poses
@@ -155,7 +163,6 @@ impl SessionModel {
                 .map_or_else(Vector3::zeros, |rate| rate.density),
             jitter_s,
             nominal_step_s,
-            inflation: [inflation.0, inflation.1],
         };
         let session = Session {
             gravity: gravity_m_s2,
@@ -166,7 +173,6 @@ impl SessionModel {
             noise,
             prior,
             scatter,
-            is_scatter_given,
             expected_scatter,
         };
         super::run(py, || session.check())?;
@@ -175,12 +181,12 @@ impl SessionModel {
         })
     }
 
-    /// Fits from a state; of the `strengths`, corner times and scatter are chosen by marginal likelihood when `is_tuned`.
+    /// Fits from a state, at the `strengths` given, or at the likeliest found from there `within` some bounds.
     #[expect(
         clippy::too_many_arguments,
         reason = "named, and a thin seam: each is one array of the caller"
     )]
-    #[pyo3(signature = (*, state, strengths, force_effect, rate_effect, is_tuned, sizes=None))]
+    #[pyo3(signature = (*, state, strengths, force_effect, rate_effect, within=None, sizes=None))]
     fn fit(
         &self,
         py: Python<'_>,
@@ -188,7 +194,7 @@ impl SessionModel {
         strengths: AllStrengths,
         force_effect: Option<Array3<'_>>,
         rate_effect: Option<Array3<'_>>,
-        is_tuned: bool,
+        within: Option<Bounds>,
         sizes: Option<Vec<f64>>,
     ) -> PyResult<SessionFit> {
         let start = self.checked(state)?;
@@ -210,12 +216,9 @@ impl SessionModel {
         }
         let strengths = strengths_of(strengths);
         let session = Arc::clone(&self.session);
-        let found = super::run_long(py, || {
-            if is_tuned {
-                tune(&session, start, strengths, &effects)
-            } else {
-                fit(&session, start, strengths, &effects)
-            }
+        let found = super::run_long(py, || match within {
+            Some(within) => tune(&session, start, strengths, &effects, &within_of(within)),
+            None => fit(&session, start, strengths, &effects),
         })?;
         Ok(SessionFit::new(Arc::clone(&self.session), found))
     }

@@ -13,6 +13,7 @@ from trihedron.diagnose.residuals.jumps import jumps_in_poses
 from trihedron.diagnose.session.solve import Fit, leverage
 from trihedron.diagnose.session.twin import DYNAMICS, MOVES, STATIC_ACCEL, STATIC_GYRO
 from trihedron.records.domains import Domain, DomainTest, Where
+from trihedron.session.noise import NOISE_CORNER_S
 
 ROW_DOMAINS: dict[int, Domain] = {
     STATIC_ACCEL: "static-accel",
@@ -98,6 +99,8 @@ def _inside_poses(fitted: Fit, label: int) -> tuple[float, float, Where]:
     return found.p_value[k], found.ratio[k], Where((), tuple(f"hold {i}" for i in holds), spans)
 
 
+AT_END = 1.01
+"""Share of a bound within which a search ends there."""
 AT_EDGE = 1.5
 """Rms of the walk over the error of a pose's mean, its strength at the end of its range: of 120 healthy sessions (60
 with consumer 1/f noise), in which it is there for 57 gyros and 74 accelerometers, 1.05 is the most
@@ -131,7 +134,7 @@ class HiddenZero:
 def hidden_zeros(fitted: Fit) -> tuple[HiddenZero, HiddenZero | None]:
     """Accelerometer, gyro: zeros of the holds about their session mean, absorbed by hidden states."""
     twin, obs = fitted.twin, fitted.line.obs
-    edge = fitted.line.core.is_walk_at_edge
+    edge = [corner <= AT_END * NOISE_CORNER_S for corner in fitted.line.core.strengths[0]]
     out: list[HiddenZero | None] = []
     rates = obs.hold_rate_sigma
     sides = (

@@ -18,7 +18,7 @@ from trihedron.diagnose.residuals.within_holds import judge_within_holds
 from trihedron.diagnose.rest.heat import Curve, branch_gap, thermal_curve
 from trihedron.diagnose.rest.pieces import RestPieces, rest_pieces
 from trihedron.diagnose.session.observations import Observations
-from trihedron.diagnose.session.solve import CORNER_GRID_S, Fit
+from trihedron.diagnose.session.solve import Fit
 from trihedron.diagnose.zeros.curve import DriftCurve, smooth_curve
 from trihedron.diagnose.zeros.evidence import KIND_LIMIT, examine
 from trihedron.diagnose.zeros.process import ZeroReadings
@@ -26,6 +26,7 @@ from trihedron.records import Hold, Recording
 from trihedron.records.diagnosis import AcceptedEffect, Candidate, Diagnosis, EffectParameter, LinearModel
 from trihedron.records.domains import Domain, DomainTest, HeldOut, Where
 from trihedron.records.words import effect_words, experiment_for, why_not
+from trihedron.session.noise import NOISE_CORNER_S
 from trihedron.units import rate_to_si
 
 Sensor = Literal["accelerometer", "gyroscope"]
@@ -152,7 +153,7 @@ def _zeros(
         candidates.append(Candidate(f"{prefix}-hidden-drift", p, True))
         span = float(pieces.time_s[-1] - pieces.time_s[0])
         walk = np.sqrt(3.0) * size * sigma * np.sqrt(float(np.median(pieces.length_s / pieces.count)))
-        walk = walk / CORNER_GRID_S[0] * np.sqrt(span / 6.0)
+        walk = walk / NOISE_CORNER_S * np.sqrt(span / 6.0)
         least = BEYOND_NOISE * (own if is_smooth else np.hypot(walk, own))
         if drift is not None and p * n_effects < alpha and (drift.rms * size > least).any():
             effect = _drifting(sensor, drift, raw, size, unit, p, n_effects)

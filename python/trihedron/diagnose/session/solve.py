@@ -28,7 +28,7 @@ from trihedron.diagnose.session.twin import (
     core_state,
     twin_of,
 )
-from trihedron.session.noise import START_STRENGTHS
+from trihedron.session.noise import PART_NOISE, START_STRENGTHS, Bounds
 
 N_DOMAINS = 4
 """Domains of residual rows: the first four labels."""
@@ -76,11 +76,6 @@ class Fit:
         """Log-likelihood, up to a constant, with every unknown integrated out."""
         return self.line.core.log_marginal
 
-    @property
-    def log_profile(self) -> float:
-        """The same with S, b and effects at their optimum and only the holds' states integrated out."""
-        return self.line.core.log_profile
-
     def covariance(self) -> FloatArray:
         """(18 + effects, same) covariance of what all holds share: S_a lower, b_a, S_w on centred readings, effects."""
         return self.line.core.border_covariance()
@@ -96,21 +91,21 @@ class Fit:
             core = core_model(obs, self.twin.gravity, self.line.prior, is_scatter_free=True).fit(
                 state=core_state(self.twin), strengths=(core.strengths[0], *START_STRENGTHS[1:]),
                 force_effect=contiguous(self.line.distortion.force), rate_effect=contiguous(self.line.distortion.rate),
-                is_tuned=False,
             )  # fmt: skip
         return core.linear_covariance(np.ascontiguousarray(obs.force_origin), np.ascontiguousarray(obs.rate_origin))
 
 
-def _fitted(obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None, *, is_tuned: bool) -> Fit:
+def _fitted(
+    obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None, within: Bounds | None = None
+) -> Fit:
     if len(start.effect) != distortion.n_parameters:
         start = replace(start, effect=np.zeros(distortion.n_parameters))
-    corners = (float(start.accel_corner_s), float(start.gyro_corner_s))
     core = core_model(obs, start.gravity, prior).fit(
         state=core_state(start),
-        strengths=(corners, *START_STRENGTHS[1:]),
+        strengths=(start.strengths[0], *START_STRENGTHS[1:]),
         force_effect=contiguous(distortion.force),
         rate_effect=contiguous(distortion.rate),
-        is_tuned=is_tuned,
+        within=within,
     )
     twin = twin_of(core, start.gravity)
     return Fit(twin, Linearisation(obs, twin, distortion, prior, core))
@@ -121,15 +116,15 @@ def fit(
 ) -> Fit:
     """Gauss-Newton on every row to convergence, noise corners as they are (eq. 11.9)."""
     del n_iterations
-    return _fitted(obs, start, distortion, prior, is_tuned=False)
+    return _fitted(obs, start, distortion, prior)
 
 
 def tune_noise(
     obs: Observations, start: Twin, distortion: Distortion, prior: Prior | None, n_iterations: int = 4
 ) -> Fit:
-    """The same with the two corner times chosen by marginal likelihood on a grid (eq. 11.12)."""
+    """The same with walks as strong as is likeliest, no stronger than the noise of parts makes them (eq. 11.18)."""
     del n_iterations
-    return _fitted(obs, start, distortion, prior, is_tuned=True)
+    return _fitted(obs, start, distortion, prior, PART_NOISE)
 
 
 def move_misfit(obs: Observations, twin: Twin) -> FloatArray:
@@ -258,7 +253,3 @@ def predict_held_out(fitted: Fit, folds: list[npt.NDArray[np.bool_]], n_domains:
     del n_domains
     flags = np.array(folds, dtype=bool).reshape(len(folds), len(fitted.system.residual))
     return Prediction(*fitted.line.core.held_out(np.ascontiguousarray(flags)))
-
-
-CORNER_GRID_S = (20.0, 40.0, 80.0, 160.0, 320.0, 640.0, 2560.0)
-"""Corner times where white noise and bias walk meet. A bias that walks faster than 20 s is drift."""

@@ -59,8 +59,6 @@ def start_twin(obs: Observations, calibration: Calibration) -> Twin:
         up=force / np.linalg.norm(force, axis=1, keepdims=True),
         gyro_bias=bias,
         accel_bias=np.zeros((n, 3)),
-        gyro_corner_s=START_CORNER_S,
-        accel_corner_s=START_CORNER_S,
         effect=np.zeros(0),
     )
 
@@ -103,8 +101,6 @@ def nominal_start(obs: Observations, calibration: Calibration) -> tuple[Twin, Pr
         up=up,
         gyro_bias=np.zeros((n, 3)) if obs.hold_rate is None else rate_scales * obs.hold_rate,
         accel_bias=np.zeros((n, 3)),
-        gyro_corner_s=START_CORNER_S,
-        accel_corner_s=START_CORNER_S,
         effect=np.zeros(0),
     )
     mean = np.concatenate([[twin.accel_S[i, j] for i, j in _LOWER], twin.accel_b, twin.gyro_S.ravel()])

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.diagnose.session.observations import Observations
-from trihedron.session.noise import START_STRENGTHS, scatter_unit
+from trihedron.session.noise import START_STRENGTHS, Strengths, scatter_unit
 
 STATIC_ACCEL, STATIC_GYRO, MOVES, DYNAMICS, PRIOR = range(5)
 """Labels of residual rows; ``PRIOR`` rows keep flat directions finite and belong to no domain."""
@@ -42,8 +42,7 @@ class Prior:
 class Twin:
     """State of the model. ``accel_S``, ``accel_b``, ``gyro_S`` act on centred raw readings; the rest is per hold.
 
-    Biases are in SI; ``between`` is how far those that scatter leave, during a move, the line from hold to hold, in
-    units of their scatter (accelerometer, gyro), ``scatter`` how strong that is in units of the one that was named.
+    Biases are in SI; ``strengths`` are those of the session's noise.
     """
 
     gravity: float
@@ -53,12 +52,8 @@ class Twin:
     up: FloatArray
     gyro_bias: FloatArray
     accel_bias: FloatArray
-    gyro_corner_s: float
-    accel_corner_s: float
     effect: FloatArray
-    between: tuple[float, float] = START_STRENGTHS[2]
-    scatter: tuple[float, float] = START_STRENGTHS[1]
-    excess: tuple[float, float] = START_STRENGTHS[3]
+    strengths: Strengths = START_STRENGTHS
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,16 +208,12 @@ def core_model(
     scatter = None
     if is_scatter_free:
         unit = scatter_unit(obs.hold_force_sigma, obs.hold_rate_sigma, obs.force_up)
-        scatter = (unit, False, obs.force_scatter / float(unit[0, 0]))
+        scatter = (unit, obs.force_scatter / float(unit[0, 0]))
     return _core.SessionModel(
         gravity_m_s2=gravity_m_s2,
         poses=core_poses(obs),
         moves=obs.core_moves,
-        noise=(
-            float(obs.jitter_s),
-            1.0 / obs.recording.rate_hz,
-            (1.0, 1.0),
-        ),
+        noise=(float(obs.jitter_s), 1.0 / obs.recording.rate_hz),
         prior=None
         if prior is None
         else (np.ascontiguousarray(prior.mean), np.ascontiguousarray(prior.covariance), prior.is_weak),
@@ -246,10 +237,8 @@ def core_state(twin: Twin) -> _core.SessionState:
 def twin_of(core: _core.SessionFit, gravity_m_s2: float) -> Twin:
     """The point where a fit ended, biases in SI."""
     accel_S, gyro_S = np.asarray(core.force_scale), np.asarray(core.rate_scale)
-    accel_corner, gyro_corner = core.strengths[0]
     return Twin(
         gravity=gravity_m_s2, accel_S=accel_S, accel_b=np.asarray(core.force_bias), gyro_S=gyro_S,
         up=np.asarray(core.up), gyro_bias=core.rate_zero @ gyro_S.T, accel_bias=core.force_zero @ accel_S.T,
-        gyro_corner_s=gyro_corner, accel_corner_s=accel_corner, effect=np.asarray(core.effect),
-        between=core.strengths[2], scatter=core.strengths[1], excess=core.strengths[3],
+        effect=np.asarray(core.effect), strengths=core.strengths,
     )  # fmt: skip

@@ -21,8 +21,7 @@ class Observed:
     """One session for the core, readings minus ``force_origin``, ``rate_origin`` (3,).
 
     Hold means and standard errors (n, 3), densities (3,) raw · √s, the samples of the ``moves`` with the holds
-    ``before`` (m,) they begin in; ``inflation`` on the standard errors of gravity after a move and of the velocity over
-    it; ``force_up``, ``force_scatter`` as in :class:`SessionNoise`.
+    ``before`` (m,) they begin in; ``force_up``, ``force_scatter`` as in :class:`SessionNoise`.
     """
 
     gravity_m_s2: float
@@ -39,7 +38,6 @@ class Observed:
     before: npt.NDArray[np.int64]
     sigma_time_s: float
     nominal_step_s: float
-    inflation: tuple[float, float] = (1.0, 1.0)
     force_up: Along | None = None
     force_scatter: float = 0.0
 
@@ -60,9 +58,9 @@ class Observed:
             gravity_m_s2=self.gravity_m_s2,
             poses=poses,
             moves=self.moves,
-            noise=(self.sigma_time_s, self.nominal_step_s, self.inflation),
+            noise=(self.sigma_time_s, self.nominal_step_s),
             prior=None,
-            scatter=(unit, False, self.force_scatter / float(unit[0, 0])),
+            scatter=(unit, self.force_scatter / float(unit[0, 0])),
         )
 
 

@@ -1,0 +1,169 @@
+//! Many candidates at a few strengths: what each gains beside a fit with everything else integrated out, from its columns
+//! once what the unknowns imitate is projected out (docs/model-session.md, 11.19).
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::Strengths;
+use super::factor::Factor;
+use super::fit::{Fit, RIDGE};
+use super::hypothesis::{Hypothesis, unweighed};
+use super::move_rows::Whitening;
+use super::moves::N_MOVE;
+use super::rows::{Domain, Group, Kind};
+use crate::error::{Error, Result};
+
+/// A fit at some strengths: normal equations factored, `Jᵀr`, what its moves' rows are multiplied by to get there, and
+/// those rows.
+struct Look {
+    factor: Factor,
+    side: DMatrix<f64>,
+    turned: Vec<DMatrix<f64>>,
+    moves: Vec<Group>,
+}
+
+/// A fit at several strengths.
+pub struct Looks<'a> {
+    fit: &'a Fit,
+    each: Vec<Look>,
+}
+
+/// What a candidate comes to.
+#[derive(Debug, Clone)]
+pub struct Seen {
+    /// Log-evidence gained, `(scales, strengths)`, sizes beforehand being a scale times those given.
+    pub gain: DMatrix<f64>,
+    /// Its parameters at the first strengths and their best scale, one linear step from the fit.
+    pub estimate: DVector<f64>,
+    /// Their covariance there.
+    pub covariance: DMatrix<f64>,
+}
+
+impl<'a> Looks<'a> {
+    /// # Errors
+    /// When nothing determines the session at some of the strengths.
+    pub fn of(fit: &'a Fit, strengths: &[Strengths]) -> Result<Self> {
+        let hypothesis = Hypothesis::of(fit, &[], &[])?;
+        let back: Vec<Whitening> = fit
+            .weights
+            .white
+            .iter()
+            .map(unweighed)
+            .collect::<Result<_>>()?;
+        let look = |at: &Strengths| {
+            let (chain, side) = hypothesis.system(at)?;
+            let white = hypothesis
+                .whitenings(at)
+                .ok_or_else(|| Error::not_determined("a move has no noise"))?;
+            let turned: Vec<_> = white
+                .iter()
+                .zip(&back)
+                .map(|(new, old)| new * old)
+                .collect();
+            let turned: Vec<_> = turned
+                .iter()
+                .map(|by| DMatrix::from_column_slice(N_MOVE, N_MOVE, by.as_slice()))
+                .collect();
+            let moves = fit.groups.iter().filter(|group| is_move(group));
+            let moves = moves.map(|group| weighed(group, &turned[group.segment]));
+            Ok(Look {
+                factor: chain.factor(RIDGE, None)?,
+                side,
+                moves: moves.collect(),
+                turned,
+            })
+        };
+        Ok(Self {
+            fit,
+            each: strengths.iter().map(look).collect::<Result<_>>()?,
+        })
+    }
+
+    /// A candidate's columns, whitened as the fit's rows are, group after group; `sizes` beforehand times each scale.
+    ///
+    /// # Errors
+    /// When a candidate has no size.
+    pub fn seen(&self, columns: &[DMatrix<f64>], sizes: &[f64], scales: &[f64]) -> Result<Seen> {
+        let k = sizes.len();
+        let sizes = DVector::from_column_slice(sizes);
+        let readings = || {
+            let pairs = self.fit.groups.iter().zip(columns);
+            pairs.filter(|(group, _)| group.kind == Kind::Reading)
+        };
+        let at_rest = self.sums(k, readings().filter(|(group, _)| !is_move(group)));
+        let mut gain = DMatrix::zeros(scales.len(), self.each.len());
+        let mut first: Option<(f64, DVector<f64>, DMatrix<f64>)> = None;
+        for (l, look) in self.each.iter().enumerate() {
+            let of_moves: Vec<DMatrix<f64>> = readings()
+                .filter(|(group, _)| is_move(group))
+                .map(|(group, own)| &look.turned[group.segment] * own)
+                .collect();
+            let sums = self.sums(k, look.moves.iter().zip(&of_moves));
+            let (own, beside) = (at_rest.0.clone() + sums.0, at_rest.1.clone() + sums.1);
+            let mut side = DMatrix::zeros(look.side.nrows(), k + 1);
+            side.columns_mut(0, k).copy_from(&beside);
+            side.column_mut(k).copy_from(&look.side.column(0));
+            let imitated = look.factor.inner(&side);
+            let normal = own.columns(0, k) - imitated.view((0, 0), (k, k));
+            let slope = own.column(k) - imitated.view((0, k), (k, 1)).column(0);
+            for (s, scale) in scales.iter().enumerate() {
+                // In units of the sizes: a prior of one, and no term for its width.
+                let d = &sizes * *scale;
+                let inner = DMatrix::from_fn(k, k, |i, j| {
+                    d[i] * d[j] * 0.5 * (normal[(i, j)] + normal[(j, i)]) + f64::from(i == j)
+                });
+                let slope = slope.component_mul(&d);
+                let half = Cholesky::new(inner)
+                    .ok_or_else(|| Error::not_determined("a candidate's columns are not finite"))?;
+                let step = half.solve(&slope);
+                gain[(s, l)] = 0.5 * slope.dot(&step) - half.l().diagonal().map(f64::ln).sum();
+                if l == 0 && first.as_ref().is_none_or(|(best, ..)| gain[(s, l)] > *best) {
+                    let scaled = DMatrix::from_diagonal(&d);
+                    first = Some((
+                        gain[(s, l)],
+                        -step.component_mul(&d),
+                        &scaled * half.inverse() * &scaled,
+                    ));
+                }
+            }
+        }
+        let (_, estimate, covariance) =
+            first.ok_or_else(|| Error::bad_input("strengths or scales are missing"))?;
+        Ok(Seen {
+            gain,
+            estimate,
+            covariance,
+        })
+    }
+
+    /// `CᵀC` with `Cᵀr` behind it, and `JᵀC`.
+    fn sums<'b>(
+        &self,
+        k: usize,
+        rows: impl Iterator<Item = (&'b Group, &'b DMatrix<f64>)>,
+    ) -> (DMatrix<f64>, DMatrix<f64>) {
+        let layout = self.fit.layout();
+        let mut own = DMatrix::zeros(k, k + 1);
+        let mut beside = DMatrix::zeros(layout.n(), k);
+        for (group, columns) in rows {
+            own.columns_mut(0, k).gemm_tr(1.0, columns, columns, 1.0);
+            own.column_mut(k)
+                .gemv_tr(1.0, columns, &group.rows.residual, 1.0);
+            group.rows.add_transposed(layout, columns, &mut beside);
+        }
+        (own, beside)
+    }
+}
+
+fn is_move(group: &Group) -> bool {
+    group.domain == Domain::Moves && group.rows.len() == N_MOVE
+}
+
+/// Rows of a move multiplied by a triangular matrix.
+fn weighed(group: &Group, by: &DMatrix<f64>) -> Group {
+    let mut group = group.clone();
+    group.rows.residual = by * &group.rows.residual;
+    group.rows.border = by * &group.rows.border;
+    group.rows.here = by * &group.rows.here;
+    group.rows.next = by * &group.rows.next;
+    group
+}
