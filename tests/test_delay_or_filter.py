@@ -27,7 +27,6 @@ def first_effect(behind):
     return effect.id, effect.confounded_with, {p.name: (p.value, p.std) for p in effect.parameters}
 
 
-@pytest.mark.xfail(strict=False, reason="a delay far ahead of a filter is not named with it")
 def test_a_filter_of_first_order_is_fitted_beside_the_delay_that_is_ahead_of_it():
     keep = np.exp(-0.01 / 0.04)
     name, shared, values = first_effect(lambda w: lfilter([1.0 - keep], [1.0, -keep], w - w[0], axis=0) + w[0])

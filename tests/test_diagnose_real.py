@@ -30,7 +30,6 @@ def diagnosed(gravity: float, **arguments: object):
     )
 
 
-@pytest.mark.xfail(strict=False, reason="the one evidence answers otherwise than the rules it replaced")
 def test_xsens_holds_g_sensitivity_and_gravity_after_moves_gains_threefold(real_data: Path) -> None:
     folder = real_data / "xsens_mti"
     d = diagnosed(9.81744, accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")
@@ -51,7 +50,6 @@ def test_a_session_with_wild_rotation_at_its_end_is_healthy_but_for_the_range(re
     assert {"static-accel", "static-gyro", "moves", "dynamics"} <= set(agree)
 
 
-@pytest.mark.xfail(strict=False, reason="the one evidence answers otherwise than the rules it replaced")
 def test_two_runs_of_one_unit_give_one_g_sensitivity_and_scatter_under_restless_poses(real_data: Path) -> None:
     sizes = []
     for run in (2, 3):
@@ -115,7 +113,6 @@ def test_a_rate_that_steps_between_samples_is_charged_with_what_its_integral_mis
     assert np.mean(missed**2) == pytest.approx(np.mean(charged), rel=0.25)
 
 
-@pytest.mark.xfail(strict=False, reason="the one evidence answers otherwise than the rules it replaced")
 def test_two_recordings_of_one_phone_hold_one_g_sensitivity_though_its_walk_takes_it_up(real_data: Path) -> None:
     def of(k):
         return next((real_data / "phone").glob(f"rec_{k}*__Acceleration.csv")), next(
@@ -132,7 +129,6 @@ def test_two_recordings_of_one_phone_hold_one_g_sensitivity_though_its_walk_take
     assert abs(a - b) < 3.0 * np.hypot(sigma_a, sigma_b) < 0.9 * abs(a)
 
 
-@pytest.mark.xfail(strict=False, reason="the one evidence answers otherwise than the rules it replaced")
 def test_zeros_that_run_over_a_session_are_said_though_the_walk_takes_them_up(real_data: Path) -> None:
     d = diagnosed(9.8184, path=real_data / "mimu4444/exp_7.npz", device=1)
     drift = next(e for e in d.effects if e.id == "accel-hidden-drift")
@@ -169,7 +165,6 @@ def test_an_answer_that_poses_support_stands_though_moves_are_spoilt(
     assert held.chi2_per_dof_after < 1.5
 
 
-@pytest.mark.xfail(strict=False, reason="the one evidence answers otherwise than the rules it replaced")
 def test_calibrate_diagnose_and_the_readme_give_one_figure_each_for_xsens(real_data: Path) -> None:
     folder = real_data / "xsens_mti"
     recording = read_recording(accelerometer_path=folder / "xsens_acc.txt", gyroscope_path=folder / "xsens_gyro.txt")

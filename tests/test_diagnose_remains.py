@@ -80,7 +80,6 @@ def test_footnotes_are_no_answer_while_something_else_disagrees():
     assert verdict.verdict_of(answer, (left,), (left,)) == "missing-physics"
 
 
-@pytest.mark.xfail(strict=False, reason="one size of scatter for three axes hides a g-sensitivity of a quiet axis")
 def test_restless_poses_hide_neither_a_scatter_nor_the_g_sensitivity_beside_it():
     # One axis scatters, another follows gravity, three poses sway: means over poses and axes show only the swaying.
     rng = np.random.default_rng(77)

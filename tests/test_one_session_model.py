@@ -22,9 +22,6 @@ def healthy(request):
     return recording, truth.gravity_m_s2, result, diagnose(recording, gravity_m_s2=truth.gravity_m_s2)
 
 
-@pytest.mark.xfail(
-    strict=False, reason="calibrate and verify have not yet the strengths of noise that the diagnosis has"
-)
 def test_calibrate_and_diagnose_agree_on_every_parameter_within_a_tenth_of_its_error(healthy):
     _, _, result, diagnosis = healthy
     for sensor, model in (
@@ -62,9 +59,6 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
             assert all(part in flat for part in value.split("; "))
 
 
-@pytest.mark.xfail(
-    strict=False, reason="calibrate and verify have not yet the strengths of noise that the diagnosis has"
-)
 def test_a_calibration_verified_on_its_own_session_shows_the_figures_that_it_published(healthy):
     recording, gravity, result, _ = healthy
     checked = verify(result.calibration, recording, gravity_m_s2=gravity)
@@ -85,9 +79,6 @@ def test_the_held_out_figure_at_rest_is_that_of_the_saved_model_refitted_without
     np.testing.assert_allclose(np.linalg.norm(force, axis=1) - gravity, quality.residual, atol=1e-12)
 
 
-@pytest.mark.xfail(
-    strict=False, reason="calibrate and verify have not yet the strengths of noise that the diagnosis has"
-)
 def test_a_zero_that_drifts_is_named_and_the_table_shows_what_the_calibration_leaves():
     scenario = replace(scenario_by_name("hand-session"), motion=hand_session(24, layout=131))
     drifting = with_effect(scenario, "accel-hidden-drift", amplitude=(0.03, -0.02, 0.025), tau_s=60.0)

@@ -15,7 +15,6 @@ def relative(S, truth):
     return np.abs(np.linalg.solve(truth, S) - np.eye(3)).max()
 
 
-@pytest.mark.xfail(strict=False, reason="the share of averaging is known to 1e-9 of the scale at 800 Hz")
 @pytest.mark.parametrize(
     ("rate_hz", "gyro_tolerance"),
     # Poses have no sampling error; the integral over a sampled move has one, of about fourth order in the step.

@@ -12,7 +12,7 @@ from trihedron.estimate.gyroscope.alignment import are_far
 from trihedron.estimate.session.observed import Observed
 from trihedron.probability import fdtrc
 from trihedron.records.words import words
-from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, START_STRENGTHS, Bounds, Strengths
+from trihedron.session.noise import ANYTHING, NOISE_CORNER_S, START_STRENGTHS, Strengths
 
 FALSE_ALARM = 1e-3
 """Chance that the moves of a sound session are taken for noisier than their samples."""
@@ -63,16 +63,16 @@ class SessionSolution:
 def solve_session(observed: Observed, S_a: FloatArray, b_a: FloatArray, S_w: FloatArray) -> SessionSolution:
     """Fit a session from a start on raw readings (``S_a`` lower triangular).
 
-    Moves that miss by more than their samples' noise explains count with the noise that they show, and a velocity that
-    does is left out: what makes it miss (arms between the accelerometers, a delay) follows the motion and is no noise.
-    Widened to its size it still pulled a real accelerometer by five of its standard errors.
+    How strong the noise of the session is, poses and gravity after moves say. A velocity that they do not expect is left
+    out: what makes it miss (arms between the accelerometers, a delay) follows the motion and is no noise. Widened to its
+    size it still pulled a real accelerometer by five of its standard errors.
     """
     core = fitted(observed, S_a, b_a + S_a @ observed.force_origin, S_w)
-    _, dof = _misfits(core)
-    corner, scatter, between, (gravity, velocity) = core.strengths
-    if dof[DYNAMICS] >= 1.0 and fdtrc(float(dof[DYNAMICS]), NOISE_DOF, velocity**2) < FALSE_ALARM:
-        core = _again(observed, core, (corner, scatter, between, (gravity, DEAF)), ANYTHING)
-    return _solution(observed, core)
+    corner, scatter, between, (gravity, _) = core.strengths
+    heard = _again(observed, core, (corner, scatter, between, (gravity, 1.0)))
+    chi2, dof = (float(of_domains[DYNAMICS]) for of_domains in _misfits(heard))
+    is_expected = dof < 1.0 or fdtrc(dof, NOISE_DOF, chi2 / dof) >= FALSE_ALARM
+    return _solution(observed, heard if is_expected else core)
 
 
 def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
@@ -80,10 +80,8 @@ def refitted(observed: Observed, solution: SessionSolution) -> SessionSolution:
     return _solution(observed, _again(observed, solution.core, solution.core.strengths))
 
 
-def _again(
-    observed: Observed, core: _core.SessionFit, strengths: Strengths, within: Bounds | None = None
-) -> _core.SessionFit:
-    """The fit of a session from where another one stands, at given strengths of all noise or sought from them."""
+def _again(observed: Observed, core: _core.SessionFit, strengths: Strengths) -> _core.SessionFit:
+    """The fit of a session from where another one stands, strengths of all noise given."""
     state = _core.SessionState(
         force_scale=core.force_scale,
         force_bias=core.force_bias,
@@ -93,9 +91,7 @@ def _again(
         force_zero=core.force_zero,
         effect=np.zeros(0),
     )
-    return observed.model().fit(
-        state=state, strengths=strengths, force_effect=None, rate_effect=None, within=within
-    )
+    return observed.model().fit(state=state, strengths=strengths, force_effect=None, rate_effect=None)
 
 
 def _solution(observed: Observed, core: _core.SessionFit) -> SessionSolution:
@@ -137,7 +133,7 @@ def fitted(
     b_a: FloatArray,
     S_w: FloatArray,
 ) -> _core.SessionFit:
-    """One fit on centred readings, its strengths chosen."""
+    """One fit on centred readings, its strengths chosen; velocities are not heard."""
     force = observed.hold_force @ S_a.T + b_a
     state = _core.SessionState(
         force_scale=np.ascontiguousarray(S_a),
@@ -150,7 +146,7 @@ def fitted(
     )
     return observed.model().fit(
         state=state,
-        strengths=START_STRENGTHS,
+        strengths=(*START_STRENGTHS[:3], (1.0, DEAF)),
         force_effect=None,
         rate_effect=None,
         within=ANYTHING,
