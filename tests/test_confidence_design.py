@@ -13,7 +13,7 @@ from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import table
 from trihedron import calibrate
-from trihedron.estimate.gyroscope.averaging import Averaging, averaging_of, broadening
+from trihedron.session.averaging import Averaging, averaging_of, broadening
 from trihedron.records import Recording
 
 

@@ -6,10 +6,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::blocks::{add_gram, add_product, add_rows, forward, mirror, solve};
+use super::blocks::{add_gram, add_product, forward, mirror, solve};
 use super::factor::Factor;
-use super::move_rows::Whitening;
-use super::moves::N_MOVE;
 use crate::error::{Error, Result};
 
 /// Sizes of the unknowns: border, one pose, number of poses.
@@ -140,13 +138,6 @@ impl Rows {
     }
 }
 
-/// Room for the rows of a move, used again by the next.
-#[derive(Debug, Default)]
-pub(super) struct Scratch {
-    weighed: Vec<f64>,
-    rows: Vec<f64>,
-}
-
 /// `JᵀJ` in blocks.
 #[derive(Debug, Clone)]
 pub struct Chain {
@@ -220,54 +211,6 @@ impl Chain {
                 add_product(&mut self.border[pose + 1], 1.0, &rows.next, &rows.border);
             }
         }
-    }
-
-    /// Adds the rows of a move, given as `columns` by border, pose, next pose and residual, once weighed by a lower
-    /// triangular matrix; `Jᵀr` to `side`. Their sum of squares. Blocks are then to be mirrored.
-    pub(super) fn add_move(
-        &mut self,
-        pose: usize,
-        columns: &DMatrix<f64>,
-        white: &Whitening,
-        side: &mut DMatrix<f64>,
-        scratch: &mut Scratch,
-    ) -> f64 {
-        let Layout {
-            border: b, pose: p, ..
-        } = self.layout;
-        let n = columns.ncols();
-        let Scratch { weighed, rows } = scratch;
-        weighed.clear();
-        for column in columns.as_slice().chunks_exact(N_MOVE) {
-            for r in 0..N_MOVE {
-                weighed.push((0..=r).map(|k| white[(r, k)] * column[k]).sum());
-            }
-        }
-        let residual = &weighed[N_MOVE * (n - 1)..];
-        let at = self.layout.at(pose);
-        for (unknown, column) in (0..b)
-            .chain(at..at + 2 * p)
-            .zip(weighed.chunks_exact(N_MOVE))
-        {
-            let product: f64 = column.iter().zip(residual).map(|(a, r)| a * r).sum();
-            side[(unknown, 0)] += product;
-        }
-        let part = |first: usize, width: usize| &weighed[N_MOVE * first..N_MOVE * (first + width)];
-        let mut laid = |first: usize, width: usize| {
-            rows.clear();
-            for r in 0..N_MOVE {
-                rows.extend(part(first, width).iter().skip(r).step_by(N_MOVE));
-            }
-            rows.clone()
-        };
-        let (of_border, here, next) = (laid(0, b), laid(b, p), laid(b + p, p));
-        add_gram(&mut self.corner, 1.0, &of_border, b);
-        add_gram(&mut self.diagonal[pose], 1.0, &here, p);
-        add_gram(&mut self.diagonal[pose + 1], 1.0, &next, p);
-        add_rows(&mut self.border[pose], &here, part(0, b));
-        add_rows(&mut self.border[pose + 1], &next, part(0, b));
-        add_rows(&mut self.next[pose], &here, part(b + p, p));
-        residual.iter().map(|r| r * r).sum()
     }
 
     /// Completes symmetric blocks of which the lower triangle was added to.

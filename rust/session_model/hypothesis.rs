@@ -4,13 +4,14 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Strengths;
-use super::chain::{Chain, Layout, Scratch};
+use super::chain::{Chain, Layout};
 use super::elimination::eliminated;
 use super::fit::{Fit, RIDGE, chi2_of, gradient};
 use super::move_rows::{Passed, Whitening};
 use super::moves::N_MOVE;
 use super::rows::{Domain, Group, N_PROCESSES, size_row};
 use super::strength_search::{Search, Within};
+use super::weighed_moves::Scratch;
 use crate::error::{Error, Result};
 
 /// Normal equations of some rows: `JᵀJ`, `Jᵀr`, `Σ r²`, number of rows.

@@ -28,6 +28,7 @@ pub mod session_zero;
 pub mod state;
 pub mod strength_search;
 pub mod strengths;
+mod weighed_moves;
 mod zero_rows;
 
 use std::sync::Arc;

@@ -73,7 +73,7 @@ def diagnose_recording(
     tell = progress or (lambda _fraction, _text: None)
     if not 0.0 < alpha < LARGEST_ALPHA:
         raise RefusedError(f"alpha is a small probability such as 0.01, got {alpha}")
-    obs = observe(recording, segments)
+    obs = observe(recording, segments, calibration.averaging)
     start = start_twin(obs, calibration)
     prior = prior_of(obs, calibration) if calibration_is_given else None
     if prior is None and is_open(calibration):
@@ -85,9 +85,8 @@ def diagnose_recording(
     laws = find_laws(model.context, disagree)
     verdict = verdict_of(answer, run.domains, run.remaining, has_laws=bool(laws))
     # Without anything missing the numbers are those of a calibration of this recording.
-    base, final = (
-        (run.predicted, run.predicted) if verdict == "consistent" else (run.bare.fitted, answer.numbers.fitted)
-    )
+    base = run.bare.fitted
+    final = base if verdict == "consistent" else answer.numbers.fitted
     result = Diagnosis(
         verdict=verdict,
         domains=run.domains,

@@ -10,7 +10,6 @@ from trihedron.arrays import FloatArray
 from trihedron.estimate.accelerometer.verdict import covariance_scale
 from trihedron.estimate.gyroscope.aligned_moves import measured_and_aligned
 from trihedron.estimate.gyroscope.alignment import AccelerometerPart, Aligned, MoveOptions
-from trihedron.estimate.gyroscope.averaging import broadening
 from trihedron.estimate.gyroscope.findings import findings_of
 from trihedron.estimate.gyroscope.lost_turns import (
     PossibleLosses,
@@ -34,6 +33,7 @@ from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
 from trihedron.records.words import words
 from trihedron.sensor_model import in_frame, reframing
+from trihedron.session.averaging import broadening
 
 
 def calibrate_joint(
@@ -155,6 +155,7 @@ def _by_session(
             *_findings(aligned, measured, solution),
             *losses.findings(own_sigma),
         ),
+        averaging=measured.averaging.share,
     )
 
 

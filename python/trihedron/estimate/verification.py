@@ -23,6 +23,7 @@ from trihedron.records import (
     Verification,
 )
 from trihedron.refused import RefusedError
+from trihedron.session.averaging import broadening
 
 FALSE_ALARM = 1e-3
 """Chance that a calibration that holds is said to be exceeded."""
@@ -176,6 +177,9 @@ def _carried(
     """
     accelerometer = calibration.accelerometer
     measured = measure_moves(recording, segments, accelerometer, 3)
+    if calibration.averaging:
+        rate = measured.rate + calibration.averaging * broadening(measured.rate, recording.time_s)
+        measured = measured.of_rate(recording, segments, rate, measured.reading_variance, 3)
     seen = carried(
         recording.time_s, measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b,
         gyroscope.S, gyroscope.covariance[:9, :9],

@@ -120,6 +120,7 @@ def calibration_document(calibration: Calibration) -> dict[str, Any]:
         "frame_meaning": FRAME_MEANING[calibration.frame],
         "gravity_m_s2": calibration.gravity_m_s2,
         "gravity_source": calibration.gravity_source,
+        "averaging": calibration.averaging,
         "is_trustworthy": calibration.is_trustworthy,
         "accelerometer": _sensor_document(calibration.accelerometer),
         "gyroscope": None if calibration.gyroscope is None else _sensor_document(calibration.gyroscope),
@@ -261,6 +262,7 @@ def _from_checked(document: dict[str, Any]) -> Calibration:
         recording_sha256=document["recording"]["sha256"],
         findings=tuple(from_plain(finding, Finding) for finding in document["findings"]),
         extensions=MappingProxyType(document["extensions"]),
+        averaging=document.get("averaging", 0.0),
     )
 
 

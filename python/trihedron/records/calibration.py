@@ -124,6 +124,8 @@ class Calibration(Presented):
     """Both sensors in one instrument trihedron, with what they were determined from.
 
     ``covariance`` (24, 24): accelerometer's 12 parameters, then the gyro's, with cross terms; (12, 12) without.
+    ``averaging``: 0 for a sensor that samples points, 1 for one that averages over its sample interval
+    (docs/model-session.md, 11.6d); between them as far as its rotations tell.
     """
 
     accelerometer: SensorCalibration
@@ -136,8 +138,10 @@ class Calibration(Presented):
     recording_sha256: str = ""
     findings: tuple[Finding, ...] = ()
     extensions: MappingProxyType[str, object] = field(default_factory=lambda: MappingProxyType({}))
+    averaging: float = 0.0
 
     def __post_init__(self) -> None:
+        number_of("averaging", self.averaging)
         kind_of("accelerometer", self.accelerometer, SensorCalibration)
         kind_of("gyroscope", self.gyroscope, SensorCalibration, type(None))
         if not isinstance(self.frame, str) or self.frame not in get_args(Frame):

@@ -81,7 +81,7 @@ def _gained_by_cutting(context: Context) -> tuple[HeldOut, ...]:
     obs, twin = context.obs, context.fitted.twin
     if len(twin.effect):
         return ()
-    whole = replace(observe(obs.recording, obs.whole), jitter_s=obs.jitter_s)
+    whole = replace(observe(obs.recording, obs.whole, obs.averaging), jitter_s=obs.jitter_s)
     force = whole.hold_force @ twin.accel_S.T + twin.accel_b
     n = whole.n_holds
     start = replace(

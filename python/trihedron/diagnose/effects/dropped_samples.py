@@ -134,7 +134,7 @@ class DroppedSamples(DirectEffect):
 
         def reweigh(old: Observations) -> Observations:
             recording, segments = insert_samples(old.recording, old.segments, counts)
-            mended = observe(recording, segments)
+            mended = observe(recording, segments, old.averaging)
             return replace(mended, jitter_s=old.jitter_s)
 
         where = Where(

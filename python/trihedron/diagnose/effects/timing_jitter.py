@@ -72,7 +72,7 @@ class TimingJitter(DirectEffect):
         def reweigh(obs: Observations) -> Observations:
             if len(even) != len(obs.time_s):
                 return obs  # samples were put in since
-            again = observe(obs.recording.with_same_readings(time_s=even), obs.segments)
+            again = observe(obs.recording.with_same_readings(time_s=even), obs.segments, obs.averaging)
             return replace(
                 again,
                 move_ranges=obs.move_ranges,

@@ -13,6 +13,7 @@ from trihedron import _core
 from trihedron.arrays import FloatArray
 from trihedron.records import Recording, Segments
 from trihedron.refused import RefusedError
+from trihedron.session.averaging import broadening
 from trihedron.session.lines_at_rest import means_beside_lines
 from trihedron.session.noise import Along, along_gradient, measure_noise
 
@@ -40,7 +41,8 @@ class Observations:
     ``hold_creep`` (h, 3), once it was seen: by how much (one sigma,
     raw units) poses turn that settle; it is in ``hold_rate_sigma``.
     ``force_up`` are verticals (h, 3), raw unit vectors, and the errors (h,) of the means along them; ``force_scatter``
-    and ``rate_scatter`` are how far 1/f noise lets a bias scatter, raw.
+    and ``rate_scatter`` are how far 1/f noise lets a bias scatter, raw; ``averaging`` by how much the sensors average
+    over the sample interval (0 to 1).
     """
 
     recording: Recording
@@ -67,6 +69,7 @@ class Observations:
     force_up: Along | None = None
     force_scatter: float = 0.0
     rate_scatter: float = 0.0
+    averaging: float = 0.0
 
     @property
     def n_holds(self) -> int:
@@ -133,6 +136,11 @@ class Observations:
             out[i] = away.T @ away / len(away)
         return out
 
+    def _sharpened(self, readings: FloatArray) -> FloatArray:
+        """Readings (n, 3) in the middle of the intervals over which they were averaged."""
+        more = self.averaging * broadening(readings, self.time_s) if self.averaging else 0.0
+        return np.ascontiguousarray(readings + more)
+
     @cached_property
     def core_moves(self) -> _core.SessionMoves:
         """The samples of the moves, arranged once for many fits."""
@@ -144,15 +152,15 @@ class Observations:
         return _core.SessionMoves(
             hold_time_s=np.ascontiguousarray(self.hold_time_s, dtype=np.float64),
             time_s=np.ascontiguousarray(self.time_s),
-            force=np.ascontiguousarray(self.raw_force),
-            rate=None if self.raw_rate is None else np.ascontiguousarray(self.raw_rate),
+            force=self._sharpened(self.raw_force),
+            rate=None if self.raw_rate is None else self._sharpened(self.raw_rate),
             ranges=np.array(self.move_ranges, dtype=np.int64).reshape(-1, 2),
             before=np.ascontiguousarray(self.move_holds[:, 0] if self.n_moves else np.zeros(0), dtype=np.int64),
             unresolved=unresolved,
         )
 
 
-def observe(recording: Recording, segments: Segments) -> Observations:
+def observe(recording: Recording, segments: Segments, averaging: float = 0.0) -> Observations:
     """Arrange a segmented recording for the twin.
 
     Raises
@@ -216,6 +224,7 @@ def observe(recording: Recording, segments: Segments) -> Observations:
         force_scatter=noise.force_scatter,
         rate_scatter=noise.rate_scatter,
         unresolved=dict(zip(holds, unresolved, strict=True)),
+        averaging=averaging,
     )
 
 

@@ -30,8 +30,6 @@ LEAST_ANGLE_RAD = 0.5
 FEWEST_TURNS, BEST_MISS = 4, 0.5
 """Turns of an axis, and how much better than the median of all trial scales the best must make them right angles: turns
 by any angle miss by 22° whatever the scale."""
-START_CORNER_S = 160.0
-"""Where the search for the noise corner begins."""
 
 
 def lower_frame(S: FloatArray) -> tuple[FloatArray, FloatArray]:

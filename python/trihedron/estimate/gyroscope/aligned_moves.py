@@ -14,7 +14,6 @@ from trihedron.estimate.gyroscope.alignment import (
     align_screened,
     finished,
 )
-from trihedron.estimate.gyroscope.averaging import TRIED, averaging_of, broadening
 from trihedron.estimate.gyroscope.lost_turns import is_asked_for_losses
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
 from trihedron.estimate.gyroscope.resting_ends import resting_ends
@@ -24,6 +23,7 @@ from trihedron.estimate.gyroscope.verification import is_astray, missed_deg, pre
 from trihedron.quantiles import medians
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.session.averaging import TRIED, averaging_of, broadening
 from trihedron.units import rate_to_si
 
 DENIED = 0.1

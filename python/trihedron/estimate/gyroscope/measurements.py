@@ -11,7 +11,6 @@ from trihedron import _core
 from trihedron._core import Moves
 from trihedron.arrays import BoolArray, FloatArray, IntArray
 from trihedron.estimate.gyroscope.attitude import AttitudeDependence, attitude_dependence
-from trihedron.estimate.gyroscope.averaging import Averaging
 from trihedron.estimate.gyroscope.clipping import LONGEST_BRIDGE_S, Clipped, bridge_clipping, clipped_time
 from trihedron.estimate.gyroscope.rounding import (
     common_zero,
@@ -27,6 +26,7 @@ from trihedron.records.finding import Finding, FindingCode
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Move, Segments
 from trihedron.refused import RefusedError
+from trihedron.session.averaging import Averaging
 
 GAP_STEPS = 5.0
 """A step of time so much longer than the usual one is a gap: the rate in it is unknown."""

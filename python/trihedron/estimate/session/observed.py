@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from trihedron import _core
 from trihedron.arrays import BoolArray, FloatArray
-from trihedron.estimate.gyroscope.averaging import broadening
 from trihedron.estimate.gyroscope.measurements import MoveMeasurements
 from trihedron.records.recording import Recording
 from trihedron.records.segments import Segments
+from trihedron.session.averaging import broadening
 from trihedron.session.noise import Along, measure_noise, scatter_unit
 
 
