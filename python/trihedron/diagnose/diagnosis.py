@@ -101,7 +101,7 @@ def diagnose_recording(
         recording_source=recording.source,
         recording_sha256=recording.sha256,
         references=MappingProxyType(model.context.references),
-        residuals=residuals_before_after(run.predicted, answer.judged),
+        residuals=residuals_before_after(run.predicted, answer.judged, {one.effect.sensor for one in answer.biases}),
         laws=laws,
         stages=held_out_stages(run.bare, answer),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,12 +30,13 @@ class _Shown:
     sigma: FloatArray
 
 
-def residuals_before_after(before: Fit, after: Fit) -> tuple[DomainResiduals, ...]:
+def residuals_before_after(before: Fit, after: Fit, named: Collection[int] = ()) -> tuple[DomainResiduals, ...]:
     """Both fits' residuals in physical units, for the domains that the recording has.
 
-    At rest slow bias walk is *not* taken off: the numbers are those that S, b and the effects alone leave.
+    At rest the bias is one for the session: the numbers are those that S, b and the effects alone leave. Of sensors
+    (0, 1) whose bias was ``named`` to drift or to differ from pose to pose it is each pose's own after.
     """
-    a, b = _shown(before), _shown(after)
+    a, b = _shown(before), _shown(after, named)
     out = []
     for domain, quantity, unit, kind, channels in _ROWS:
         if domain in a and domain in b:
@@ -48,11 +50,13 @@ def residuals_before_after(before: Fit, after: Fit) -> tuple[DomainResiduals, ..
     return tuple(out)
 
 
-def _shown(fitted: Fit) -> dict[str, _Shown]:
+def _shown(fitted: Fit, named: Collection[int] = ()) -> dict[str, _Shown]:
     line, twin, obs = fitted.line, fitted.twin, fitted.line.obs
     h = obs.n_holds
     out: dict[str, _Shown] = {}
-    force = obs.hold_force @ twin.accel_S.T + line.core.session_force_bias
+    force = obs.hold_force @ twin.accel_S.T + (
+        line.core.force_bias - twin.accel_bias if 0 in named else line.core.session_force_bias
+    )
     if line.distortion.force is not None:
         force = force - line.distortion.force[:h] @ twin.effect
     size = np.linalg.norm(force, axis=1)
@@ -64,7 +68,8 @@ def _shown(fitted: Fit) -> dict[str, _Shown]:
         if line.distortion.rate is not None:
             rate = rate - line.distortion.rate[:h] @ twin.effect
         spread = np.sqrt((obs.hold_rate_sigma**2 @ (twin.gyro_S**2).T).mean(axis=1))
-        out["static-gyro"] = _Shown(obs.hold_time_s, rate - rate.mean(axis=0), spread)
+        bias = twin.gyro_bias if 1 in named else rate.mean(axis=0)
+        out["static-gyro"] = _Shown(obs.hold_time_s, rate - bias, spread)
     if obs.n_moves:
         residual, noise = line.move_errors
         variance = np.einsum("mii->mi", noise)
