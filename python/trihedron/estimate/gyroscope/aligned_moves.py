@@ -67,7 +67,8 @@ class _Session:
         if np.any(bridged.clipped_s > 0.0) and not is_word:
             measured = self._measured(is_bridged=False)
             plain = self._aligned(measured)
-            if _denies_cut(plain, bridged, measured):
+            missed = predict(plain, measured, is_held_out=False).angle_deg
+            if denies_cut(np.asarray(plain.fit.gyroscope_scale), missed, bridged, measured):
                 return measured, plain
         return bridged, self._aligned(bridged)
 
@@ -151,11 +152,12 @@ class _Session:
         return other if missed_deg(other, measured) < missed_deg(found, measured) else found
 
 
-def _denies_cut(plain: Aligned, bridged: MoveMeasurements, measured: MoveMeasurements) -> bool:
-    """Whether gravity is carried through the moves that look cut as only whole turns carry it."""
-    S = np.asarray(plain.fit.gyroscope_scale)
+def denies_cut(S: FloatArray, missed_deg: FloatArray, bridged: MoveMeasurements, measured: MoveMeasurements) -> bool:
+    """Whether gravity is carried through the moves that look cut as only whole turns carry it.
+
+    ``missed_deg`` (m,) is by how much the readings as they are (``measured``) miss it, under the scale S.
+    """
     added = (bridged.rate - measured.rate) @ S.T * measured.nominal_step_s
     cut = bridged.clipped_s > 0.0
     short = np.array([np.linalg.norm(np.nansum(added[a:b], axis=0)) for a, b in measured.edges[cut]])
-    missed = np.radians(predict(plain, measured, is_held_out=False).angle_deg[cut])
-    return bool(np.median(missed) < DENIED * np.median(short))
+    return bool(np.median(np.radians(missed_deg[cut])) < DENIED * np.median(short))
