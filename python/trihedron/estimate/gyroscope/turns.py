@@ -123,7 +123,9 @@ def calibrate_turns(
     _require_every_axis(known, used, rate_to_si(recording.gyroscope_unit) is None)
     roughly = np.asarray(np.linalg.inv(nominal), dtype=np.float64)
     sigmas = np.array([turn.sigma_direction_rad for turn in turns])
-    system = TurnSystem(measured, np.array([turn.vector for turn in known]), roughly, sigma_directions=sigmas)
+    faces = np.array([turn.face for turn in turns], dtype=np.int64)
+    vectors = np.array([turn.vector for turn in known])
+    system = TurnSystem(measured, vectors, roughly, sigma_directions=sigmas, faces=faces)
     screened = screen(system, used, sigma_turn_rad)
     system, used = screened.system, screened.used
     fit = solve_zero_first(system, used) if route == "zero-turn-first" else solve(system, used)
