@@ -223,7 +223,10 @@ class NoiseAxis(Frozen):
     def allan_variance(self, tau_s: npt.ArrayLike) -> FloatArray:
         """(k,) Allan variance of the most likely sum of terms, at averaging times ``tau_s`` (docs/noise.md, eq. 7)."""
         tau = np.atleast_1d(np.asarray(tau_s, dtype=np.float64))
-        return np.sum([np.zeros_like(tau), *self.allan_parts(tau).values()], axis=0, dtype=np.float64)
+        total = np.zeros_like(tau)
+        for part in self.allan_parts(tau).values():
+            total += part
+        return total
 
     def allan_parts(self, tau_s: FloatArray) -> dict[str, FloatArray]:
         """What the sum is made of: Allan variance (k,) of every part, by a term's symbol, "Gauss-Markov" or "lines"."""
