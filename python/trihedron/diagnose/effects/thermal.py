@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from trihedron.arrays import FloatArray
@@ -24,62 +26,70 @@ class Thermal(Effect):
         return None
 
 
-class AccelThermalScale(Thermal):
+class ThermalScale(Thermal):
     """Relative scale linear in temperature (about its mean over the holds)."""
 
-    id = "accel-thermal-scale"
     size = 3e-4
     """1/K: 300 ppm."""
+    is_gyro: ClassVar[bool] = False
+
+    def variants(self, context: Context) -> list[Variant]:
+        assert context.temperature is not None
+        t = context.temperature[:, None]
+        if self.is_gyro:
+            distortion = rate_only(context.on_gyros(t * context.axis_rate))
+        else:
+            distortion = force_only(context.on_accelerometers(t * context.axis_force))
+        return [Variant(distortion, per_axis("scale_per_kelvin"), ("1/K",) * 3)]
+
+
+class AccelThermalScale(ThermalScale):
+    """Of the accelerometer."""
+
+    id = "accel-thermal-scale"
     leaves_open = ("accel-zero", "accel-scale")
     drifts_as = "accel-hidden-drift"
 
-    def variants(self, context: Context) -> list[Variant]:
-        assert context.temperature is not None
-        columns = context.on_accelerometers(context.temperature[:, None] * context.axis_force)
-        return [Variant(force_only(columns), per_axis("scale_per_kelvin"), ("1/K",) * 3)]
 
-
-class GyroThermalScale(Thermal):
-    """The same of the gyro."""
+class GyroThermalScale(ThermalScale):
+    """Of the gyro."""
 
     id = "gyro-thermal-scale"
-    size = 3e-4
+    is_gyro = True
     leaves_open = ("gyro-zero", "gyro-scale")
     drifts_as = "gyro-hidden-drift"
 
-    def variants(self, context: Context) -> list[Variant]:
-        assert context.temperature is not None
-        columns = context.on_gyros(context.temperature[:, None] * context.axis_rate)
-        return [Variant(rate_only(columns), per_axis("scale_per_kelvin"), ("1/K",) * 3)]
 
-
-class AccelThermalBias(Thermal):
+class ThermalBias(Thermal):
     """Bias linear, then quadratic in temperature; with its rate of change, or a branch of its own while it cools."""
+
+    per_kelvin: ClassVar[float]
+    """How far parts move, one sigma, SI."""
+    is_gyro: ClassVar[bool] = False
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:
+        return thermal_sizes(context, variant, self.per_kelvin)
+
+    def variants(self, context: Context) -> list[Variant]:
+        if self.is_gyro:
+            return thermal_bias_variants(context, context.on_gyros, rate_only, "rad/s")
+        return thermal_bias_variants(context, context.on_accelerometers, force_only, "m/s^2")
+
+
+class AccelThermalBias(ThermalBias):
+    """Of the accelerometer: half a mg per kelvin."""
 
     id = "accel-thermal-bias"
     leaves_open = ("accel-zero",)
     drifts_as = "accel-hidden-drift"
     per_kelvin = 0.005
-    """m/s²: half a mg."""
-
-    def sizes(self, context: Context, variant: Variant) -> FloatArray:
-        return thermal_sizes(context, variant, self.per_kelvin)
-
-    def variants(self, context: Context) -> list[Variant]:
-        return thermal_bias_variants(context, context.on_accelerometers, force_only, "m/s^2")
 
 
-class GyroThermalBias(Thermal):
-    """The same of the gyro."""
+class GyroThermalBias(ThermalBias):
+    """Of the gyro: 0.02 °/s per kelvin."""
 
     id = "gyro-thermal-bias"
+    is_gyro = True
     leaves_open = ("gyro-zero",)
     drifts_as = "gyro-hidden-drift"
     per_kelvin = 4e-4
-    """rad/s: 0.02 °/s."""
-
-    def sizes(self, context: Context, variant: Variant) -> FloatArray:
-        return thermal_sizes(context, variant, self.per_kelvin)
-
-    def variants(self, context: Context) -> list[Variant]:
-        return thermal_bias_variants(context, context.on_gyros, rate_only, "rad/s")

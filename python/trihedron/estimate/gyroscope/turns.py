@@ -22,15 +22,8 @@ from trihedron.estimate.gyroscope.turn_angles import (
     nominal_matrix,
 )
 from trihedron.estimate.gyroscope.turn_findings import turn_findings
-from trihedron.estimate.gyroscope.turn_system import (
-    FALSE_ALARM,
-    Solution,
-    TurnSystem,
-    left_out,
-    screen,
-    solve,
-    solve_zero_first,
-)
+from trihedron.estimate.gyroscope.turn_screening import FALSE_ALARM, screen
+from trihedron.estimate.gyroscope.turn_system import Solution, TurnSystem, left_out, solve, solve_zero_first
 from trihedron.probability import chdtrc
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
 from trihedron.records.finding import Finding
