@@ -259,3 +259,12 @@ def test_a_rotation_beyond_the_gyros_range_is_not_in_the_figure_of_a_verificatio
     assert judged.moves_left_out == (19,)
     assert 19 not in judged.moves
     assert judged.angle_rms_deg < 0.6
+
+
+def test_faces_of_a_simulated_case_that_are_out_of_flat_cost_neither_turns_nor_honesty(real_data):
+    recording = trihedron.read(real_data / "repro/faces_unflat_180.csv.gz")
+    truth = json.loads((real_data / "repro/faces_unflat_180.truth.json").read_text())
+    found = trihedron.calibrate(recording, method="faces", turns_deg=[180.0, -180.0] * 6, gravity_m_s2=9.81)
+    # Up to 23σ, and the two turns on the first face left out.
+    assert np.abs((found.gyroscope.S - np.array(truth["Sw"])) / found.gyroscope.sigma_S).max() < 3.0
+    assert FindingCode.TURN_NOT_A_MULTIPLE not in {finding.code for finding in found.findings}
