@@ -13,8 +13,9 @@ from confidence.motion import G
 from confidence.sensor import lower
 from confidence.sessions import table
 from trihedron import calibrate
-from trihedron.session.averaging import Averaging, averaging_of, broadening
 from trihedron.records import Recording
+from trihedron.session.averaging import Averaging, averaging_of, broadening
+from trihedron.simulate import scenario_by_name, simulate
 
 
 def calibrated(seed, **levels):
@@ -110,3 +111,17 @@ def test_faces_with_a_pose_left_out_and_faces_of_a_wrong_number_are_answered():
         recorded(made, method="faces", faces=up[:-1])
     with pytest.raises(ValueError, match=r"belongs to method=.separate"):
         recorded(made, loss="huber")
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_turns_on_three_faces_calibrate_the_gyro_and_the_accelerometer_is_not_to_be_trusted(seed):
+    recording, truth = simulate(scenario_by_name("table-turns"), seed)
+    faces = np.repeat([3, 1, 2], 7)
+    turns = np.tile([90.0, -90.0, 180.0, -180.0, 360.0, -360.0], 3)
+    found = calibrate(recording, gravity_m_s2=9.80665, method="faces", faces=faces, turns_deg=turns)
+    # It was refused; by gravity alone it was 27 % off.
+    assert np.abs((found.gyroscope.S - truth.gyroscope_S) / found.gyroscope.sigma_S).max() < 4.0
+    assert np.linalg.norm(found.gyroscope.S @ np.linalg.inv(truth.gyroscope_S) - np.eye(3)) < 5e-3
+    accelerometer = found.accelerometer
+    assert np.abs((accelerometer.S - truth.accelerometer_S) / accelerometer.sigma_S).max() < 4.0
+    assert not found.is_trustworthy

@@ -3,30 +3,7 @@
 import numpy as np
 import pytest
 
-from trihedron.diagnose import diagnose_recording
-from trihedron.estimate.accelerometer import calibrate_norm
-from trihedron.estimate.joint import calibrate_joint
-from trihedron.segment import resegment, segment_recording
-from trihedron.simulate import hand_session, simulate
-from trihedron.simulate.effects import with_effect
-from trihedron.simulate.named import _of
-from trihedron.simulate.profiles import profile_by_name
-
-
-def diagnosed(effect_id=None, seed=1, grade="mpu", **size):
-    scenario = _of(profile_by_name(grade), hand_session(24, layout=seed), "session", seed)
-    if effect_id is not None:
-        scenario = with_effect(scenario, effect_id, **size)
-    recording, truth = simulate(scenario, seed)
-    segments = segment_recording(recording)
-    accelerometer, _ = calibrate_norm(
-        segments.accelerometer_mean,
-        segments.accelerometer_sigma_mean,
-        truth.gravity_m_s2,
-        raw_unit=recording.accelerometer_unit,
-    )
-    calibration = calibrate_joint(recording, segments, accelerometer, truth.gravity_m_s2, "simulated")
-    return diagnose_recording(recording, resegment(recording, segments), calibration)
+from diagnosed_session import diagnosed
 
 
 @pytest.mark.parametrize("grade", ["mpu", "adis", "tactical"])

@@ -193,6 +193,7 @@ TAKEN_OFF = {
     "gyro-g-sensitivity": {"matrix": ((1e-4, 2e-5, 0), (0, -1e-4, 5e-5), (5e-5, 0, 1e-4))},
     "accel-thermal-bias": {"per_k": (0.004, -0.006, 0.01)},
     "gyro-thermal-bias": {"per_k": (2e-4, -3e-4, 2e-4)},
+    "accel-size-effect": {"places_m": ((0, 0, 0), (0.004, 0.001, -0.002), (0.003, -0.004, 0.001))},
 }
 MODELS = {
     "accel-quadratic": ("", lambda size: size["k2"]),
@@ -200,6 +201,7 @@ MODELS = {
     "gyro-g-sensitivity": ("", lambda size: np.ravel(size["matrix"])),
     "accel-thermal-bias": ("linear", lambda size: size["per_k"]),
     "gyro-thermal-bias": ("linear", lambda size: size["per_k"]),
+    "accel-size-effect": ("", lambda size: np.ravel(size["places_m"][1:])),
 }
 
 

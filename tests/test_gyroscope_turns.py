@@ -9,7 +9,7 @@ import pytest
 from trihedron.estimate.gyroscope import Turn, calibrate_turns, turns_from_segments
 from trihedron.estimate.gyroscope.turn_angles import MeasuredTurns
 from trihedron.estimate.gyroscope.turn_system import TurnSystem, solve
-from trihedron.records import FindingCode
+from trihedron.records import FindingCode, Recording
 from trihedron.simulate import Gyroscope, NoiseTerms, Scenario, simulate, table_turns
 from true_segments import segments_from_truth
 
@@ -179,3 +179,43 @@ def test_errors_that_all_turns_share_pull_the_scale_as_a_whole_and_are_not_avera
         skew = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
         np.testing.assert_allclose(pull[:9].reshape(3, 3), S_w @ skew, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(pull[9:], 0.0, atol=1e-12)
+
+
+def turned_on_faces(rng, tilt_deg, faces=(1, -1, 2, -2, 3, -3), angles_deg=(180.0, -180.0), rate_hz=100.0):
+    """Gyro log of turns on faces that are out of flat by ``tilt_deg`` rms each way, the turns and rests between."""
+    S_w = np.linalg.inv(np.array(SCALE))
+    rates, turns, zeros = [np.zeros((400, 3))], [], [(0, 400)]
+    for face in faces:
+        axis, sign = abs(face) - 1, np.sign(face)
+        up = rng.normal(size=3) * tilt_deg * DEG
+        up[axis] = sign
+        up /= np.linalg.norm(up)
+        for angle in angles_deg:
+            start = sum(map(len, rates))
+            n = 300
+            shape = 1.0 - np.cos(2.0 * np.pi * (np.arange(n) + 0.5) / n)
+            rates += [shape[:, None] * up * angle * DEG * rate_hz / n, np.zeros((400, 3))]
+            turns.append(Turn(start - 1, start + n + 1, axis, angle * DEG * sign, face=face))
+            zeros.append((start + n, start + n + 400))
+    omega = np.concatenate(rates)
+    raw = omega @ S_w.T - S_w @ np.array(BIAS) + 2e-3 * rng.normal(size=omega.shape)
+    time_s = np.arange(len(raw)) / rate_hz
+    return Recording(time_s, None, raw, rate_hz, gyroscope_unit="rad/s"), turns, zeros
+
+
+@pytest.mark.parametrize("tilt_deg", [0.02, 0.05, 0.1])
+def test_faces_out_of_flat_are_in_the_error_bars_and_cost_no_turn(tilt_deg):
+    rng = np.random.default_rng(round(1000 * tilt_deg))
+    scores, thrown = [], 0
+    for trial in range(16):
+        both = trial % 2
+        faces = (1, -1, 2, -2, 3, -3) if both else (1, 2, 3)
+        recording, turns, zeros = turned_on_faces(rng, tilt_deg, faces, (180.0, -180.0) if both else (360.0, -360.0))
+        found, findings = calibrate_turns(recording, turns, zeros)
+        thrown += FindingCode.TURN_NOT_A_MULTIPLE in codes(findings)
+        scores.append(((found.S - np.array(SCALE)) / found.sigma_S).ravel())
+    scores = np.abs(scores)
+    # Twelve turns said nothing of what they share: up to 31σ, and right turns were left out.
+    assert np.mean(scores < 1.96) > 0.9
+    assert scores.max() < 5.0
+    assert thrown == 0

@@ -6,7 +6,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 
 from trihedron.diagnose.laws.misfit import misfit_of

@@ -126,6 +126,19 @@ def test_verification_expects_what_it_sees_on_another_session(scenario, result):
     assert stats.chi2.ppf(1e-4, n) < ratio < stats.chi2.ppf(1.0 - 1e-4, n)
 
 
+def test_a_move_beyond_the_gyros_range_is_left_out_of_what_verification_says_of_moves(scenario, result):
+    other, truth = simulate(replace(scenario, motion=hand_session(n_poses=16, hold_s=3.0, move_s=1.5, layout=3)), 12)
+    move = [part for part in truth.segments if part.kind == "move"][4]
+    beyond = np.array(other.gyroscope)
+    beyond[move.start + 40 : move.stop - 40] = [32767.0, -32768.0, 32767.0]
+    judged = trihedron.verify(result, replace(other, gyroscope=beyond)).verification
+    as_it_was = trihedron.verify(result, other).verification
+    assert judged.moves_left_out == (4,)
+    np.testing.assert_array_equal(judged.moves, np.delete(as_it_was.moves, 4))
+    assert judged.angle_rms_deg < 1.5 * as_it_was.angle_rms_deg
+    assert "without move 4" in str(trihedron.verify(result, replace(other, gyroscope=beyond)))
+
+
 def test_verification_notices_a_sensor_that_has_changed(scenario, result):
     changed = replace(scenario, accelerometer=replace(scenario.accelerometer, b=(0.33, -0.3834, 0.1025)))
     other, _ = simulate(changed, 13)

@@ -250,3 +250,21 @@ def test_ctu_turns_give_one_scale_consistent_with_the_reference_angles(real_data
         seen = (gyroscope[turn.start : turn.stop] - rest).sum(axis=0) / 100.0
         # Back through the calibration: the reference angle, within the drift of the zero over 5 s.
         assert abs((found.S @ seen)[turn.axis] - turn.angle_rad) < math.radians(0.5)
+
+
+def test_a_rotation_beyond_the_gyros_range_is_not_in_the_figure_of_a_verification(real_data):
+    first, other = (trihedron.read(real_data / f"mimu4444/exp_{n}.npz", device=7) for n in (2, 3))
+    judged = trihedron.verify(trihedron.calibrate(first, gravity_m_s2=9.8184), other).verification
+    # Seventeen seconds of violent rotation by hand, 3.5 s of them at 32767: 10.5° rms with it.
+    assert judged.moves_left_out == (19,)
+    assert 19 not in judged.moves
+    assert judged.angle_rms_deg < 0.6
+
+
+def test_faces_of_a_simulated_case_that_are_out_of_flat_cost_neither_turns_nor_honesty(real_data):
+    recording = trihedron.read(real_data / "repro/faces_unflat_180.csv.gz")
+    truth = json.loads((real_data / "repro/faces_unflat_180.truth.json").read_text())
+    found = trihedron.calibrate(recording, method="faces", turns_deg=[180.0, -180.0] * 6, gravity_m_s2=9.81)
+    # Up to 23σ, and the two turns on the first face left out.
+    assert np.abs((found.gyroscope.S - np.array(truth["Sw"])) / found.gyroscope.sigma_S).max() < 3.0
+    assert FindingCode.TURN_NOT_A_MULTIPLE not in {finding.code for finding in found.findings}

@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 
 import trihedron
-from trihedron.diagnose import diagnose_recording
+from diagnosed_session import diagnosed, simulated
 from trihedron.diagnose.effects import catalogue
 from trihedron.diagnose.hypothesis import Term, hypothesis
 from trihedron.diagnose.search import search, threshold
 from trihedron.diagnose.session.observations import observe
 from trihedron.diagnose.session.starting_point import start_twin
 from trihedron.diagnose.session.twin import contiguous, core_model, core_state
-from trihedron.estimate.accelerometer import calibrate_norm
-from trihedron.estimate.joint import calibrate_joint
 from trihedron.segment import resegment, segment_recording
 from trihedron.session.coloured_noise import coloured_variance
 from trihedron.session.noise import ANYTHING
@@ -25,29 +23,10 @@ from trihedron.simulate.named import _of
 from trihedron.simulate.profiles import profile_by_name
 
 
-def diagnosed(effect_id, seed, **size):
-    scenario = with_effect(
-        _of(profile_by_name("mpu"), hand_session(20, layout=seed), "session", seed), effect_id, **size
-    )
-    recording, truth = simulate(scenario, seed)
-    segments = segment_recording(recording)
-    accelerometer, _ = calibrate_norm(
-        segments.accelerometer_mean,
-        segments.accelerometer_sigma_mean,
-        truth.gravity_m_s2,
-        raw_unit=recording.accelerometer_unit,
-    )
-    calibration = calibrate_joint(recording, segments, accelerometer, truth.gravity_m_s2, "simulated")
-    return diagnose_recording(recording, resegment(recording, segments), calibration)
-
-
 @cache
 def fitted(effect_id="", seed=3, n_poses=20, **size):
     """A session's hypothesis without effects, all strengths of its noise free."""
-    scenario = _of(profile_by_name("mpu"), hand_session(n_poses, layout=seed), "session", seed)
-    if effect_id:
-        scenario = with_effect(scenario, effect_id, **size)
-    recording, truth = simulate(scenario, seed)
+    recording, truth = simulated(effect_id, seed, n_poses, **size)
     segments = segment_recording(recording)
     calibration = trihedron.calibrate(recording, segments=segments, gravity_m_s2=truth.gravity_m_s2).calibration
     obs = observe(recording, resegment(recording, segments))
@@ -127,7 +106,7 @@ def test_a_drift_among_biases_that_scatter_is_named():
 
 @pytest.mark.parametrize("delay_s", [0.04, -0.025])
 def test_a_long_delay_is_a_delay_of_that_length(delay_s):
-    d = diagnosed("accel-gyro-time-offset", 4, offset_s=delay_s)
+    d = diagnosed("accel-gyro-time-offset", 4, 20, offset_s=delay_s)
     first = d.effects[0]
     assert first.id == "accel-gyro-time-offset"
     # 40 ms were called 26 ms and a lag of -14 ms; half a millisecond is a twentieth of a sample.
@@ -156,10 +135,7 @@ def test_white_noise_has_no_colour_and_a_zero_that_jumps_in_some_poses_is_bounde
 
 def scattering(effect_id, seed, gyro_deg_s, **size):
     """A session with an effect whose gyro's zero is another in every pose, and gravity there."""
-    scenario = with_effect(
-        _of(profile_by_name("mpu"), hand_session(24, layout=seed), "session", seed), effect_id, **size
-    )
-    recording, truth = simulate(scenario, seed)
+    recording, truth = simulated(effect_id, seed, **size)
     rng, zero = np.random.default_rng(seed), np.zeros_like(recording.gyroscope)
     starts = [part.start for part in truth.segments if part.kind == "hold"]
     for start, stop in zip(starts, [*starts[1:], len(zero)], strict=True):

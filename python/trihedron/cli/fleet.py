@@ -10,7 +10,7 @@ import typer
 from trihedron.cli.options import GravitySource, Json, progress, with_options
 from trihedron.cli.output import check_outputs, say, write_json
 
-NONE_CALIBRATED = 2
+NOT_TO_BE_TRUSTED = 2
 
 
 @with_options(place=GravitySource)
@@ -81,5 +81,5 @@ def fleet(
         typer.echo(to_text(document, sections=len(shown)), nl=False)
     write_json({"rows": list(result.rows)}, json, force=force)
     say(f"table: {out / 'fleet.parquet'}, {out / 'fleet.csv'}; page: {out / 'fleet.html'}")
-    if result.n_done == 0:
-        raise typer.Exit(NONE_CALIBRATED)
+    if not document.is_trustworthy:
+        raise typer.Exit(NOT_TO_BE_TRUSTED)

@@ -73,6 +73,12 @@ class SampleContext(Context):
         out: FloatArray = self.gyro_S * np.linalg.norm(np.linalg.inv(self.gyro_S), axis=1)
         return out
 
+    @cached_property
+    def angular_acceleration(self) -> FloatArray:
+        if self.obs.raw_rate is None:
+            raise SignalMissing("this recording has no gyroscope")
+        return self.derivative(self.rate)
+
     def at_points(self, samples: FloatArray) -> FloatArray:
         return samples
 

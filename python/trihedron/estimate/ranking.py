@@ -115,7 +115,11 @@ class _Tilt:
     def rms_deg(self, calibration: Calibration, S: FloatArray) -> float:
         """Root mean square of the tilt errors [deg]."""
         accel = calibration.accelerometer
-        return _rms(carried(self._time_s, self._measured, self._anchors_s, accel.S, accel.b, S).angle_deg)
+        return _rms(
+            carried(self._time_s, self._measured, self._anchors_s, accel.S, accel.b, S).angle_deg[
+                ~self._measured.is_lost
+            ]
+        )
 
 
 def _rms(values: FloatArray) -> float:

@@ -3,14 +3,15 @@ moves."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trihedron import probability
-from trihedron.arrays import FloatArray
-from trihedron.estimate.gyroscope.measurements import measure_moves
-from trihedron.estimate.session.carried import carried
+from trihedron.arrays import FloatArray, IntArray
+from trihedron.estimate.gyroscope.aligned_moves import denies_cut
+from trihedron.estimate.gyroscope.measurements import MoveMeasurements, measure_moves
+from trihedron.estimate.session.carried import Carried, carried
 from trihedron.estimate.verified_parameters import judge_parameters, shift_findings, uncalibrated
 from trihedron.records import (
     Calibration,
@@ -58,16 +59,16 @@ def verify_calibration(
     noise = _variance(segments.norm_sigma, segments.n_holds)
     error, error_noise, error_sigma = norm_error(accelerometer, segments.accelerometer_mean, noise, gravity_m_s2)
     empty = np.zeros(0)
-    angle, angle_noise, angle_sigma = empty, empty, empty
+    moves = Carriage(empty, empty, empty, np.zeros(0, dtype=np.int64), ())
     rest = np.zeros((0, 3))
     gyroscope = calibration.gyroscope
     if gyroscope is not None and segments.gyroscope_mean is not None:
         rest = segments.gyroscope_mean @ gyroscope.S.T + gyroscope.b
         if any(move.stop - move.start >= 2 for move in segments.moves):
-            angle, angle_noise, angle_sigma = _carried(calibration, gyroscope, recording, segments)
+            moves = _carried(calibration, gyroscope, recording, segments)
     parameters = judge_parameters(calibration, own, segments)
     without = uncalibrated(calibration, own, recording)
-    worse = _worse_than_none(calibration, without, recording, segments, gravity_m_s2, (error, angle))
+    worse = _worse_than_none(calibration, without, recording, segments, gravity_m_s2, (error, moves.angle_deg))
     return Verification(
         source=recording.source,
         sha256=recording.sha256,
@@ -76,14 +77,16 @@ def verify_calibration(
         norm_error=error,
         norm_noise=error_noise,
         norm_sigma=error_sigma,
-        angle_deg=angle,
-        angle_noise_deg=angle_noise,
-        angle_sigma_deg=angle_sigma,
+        angle_deg=moves.angle_deg,
+        angle_noise_deg=moves.noise_deg,
+        angle_sigma_deg=moves.sigma_deg,
         rest_rate=rest,
+        moves=moves.which,
+        moves_left_out=moves.left_out,
         parameters=parameters,
         findings=(
             *_norm_findings(error, error_sigma),
-            *_angle_findings(angle, angle_sigma),
+            *_angle_findings(moves),
             *worse,
             *_bias_findings(calibration.gyroscope, rest),
             *shift_findings(parameters),
@@ -125,7 +128,7 @@ def _worse_than_none(
     gyroscope = without.gyroscope
     if gyroscope is not None and len(angle):
         with_it = replace(calibration, gyroscope=gyroscope)
-        pairs["moves"] = (angle, _carried(with_it, gyroscope, recording, segments)[0])
+        pairs["moves"] = (angle, _carried(with_it, gyroscope, recording, segments).angle_deg)
     return [
         Finding.of(FindingCode.WORSE_THAN_UNCALIBRATED, f"verify-{case}", rms=_rms(with_it), rms_without=_rms(bare))
         for case, (with_it, bare) in pairs.items()
@@ -167,26 +170,46 @@ def _variance(sigma: FloatArray | None, n: int) -> FloatArray:
     return np.zeros((n, 3)) if sigma is None else np.asarray(sigma) ** 2
 
 
+@dataclass(frozen=True, eq=False)
+class Carriage:
+    """Angles (m,) [deg] between gravity carried through moves and gravity measured after them, the noise of that, and
+    the same with the calibration's uncertainty; ``which`` (m,) moves these are and which were left out."""
+
+    angle_deg: FloatArray
+    noise_deg: FloatArray
+    sigma_deg: FloatArray
+    which: IntArray
+    left_out: tuple[int, ...]
+
+
 def _carried(
     calibration: Calibration, gyroscope: SensorCalibration, recording: Recording, segments: Segments
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Angles [deg] between gravity carried through each move and gravity measured after it, and their sigmas.
-
-    The figure that a calibration publishes of its own session (docs/model-session.md), with a zero per pose, here with
-    S and b held at the calibration's.
-    """
+) -> Carriage:
+    """The figure that a calibration publishes of its own session (docs/model-session.md), with a zero per pose, here
+    with S and b held at the calibration's; of the same moves: not of those that were at the gyro's limit for long."""
     accelerometer = calibration.accelerometer
+
+    def seen_in(measured: MoveMeasurements) -> Carried:
+        if calibration.averaging:
+            rate = measured.rate + calibration.averaging * broadening(measured.rate, recording.time_s)
+            measured = measured.of_rate(recording, segments, rate, measured.reading_variance, 3)
+        return carried(
+            recording.time_s, measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b,
+            gyroscope.S, gyroscope.covariance[:9, :9],
+        )  # fmt: skip
+
     measured = measure_moves(recording, segments, accelerometer, 3)
-    if calibration.averaging:
-        rate = measured.rate + calibration.averaging * broadening(measured.rate, recording.time_s)
-        measured = measured.of_rate(recording, segments, rate, measured.reading_variance, 3)
-    seen = carried(
-        recording.time_s, measured, segments.time_mid_s[measured.links], accelerometer.S, accelerometer.b,
-        gyroscope.S, gyroscope.covariance[:9, :9],
-    )  # fmt: skip
+    seen = seen_in(measured)
+    if np.any(measured.is_lost) and not any(limit.is_word for limit in recording.facts.of("gyroscope").limits):
+        plain = measure_moves(recording, segments, accelerometer, 3, is_bridged=False)
+        as_read = seen_in(plain)
+        if denies_cut(gyroscope.S, as_read.angle_deg, measured, plain):
+            measured, seen = plain, as_read
+    told = np.flatnonzero(~measured.is_lost)
     g = calibration.gravity_m_s2
-    noise, total = np.sqrt(seen.floor2) / g, np.sqrt(seen.floor2 + seen.model2) / g
-    return seen.angle_deg, np.degrees(noise), np.degrees(total)
+    noise, total = np.sqrt(seen.floor2[told]) / g, np.sqrt((seen.floor2 + seen.model2)[told]) / g
+    left_out = tuple(np.flatnonzero(measured.is_lost).tolist())
+    return Carriage(seen.angle_deg[told], np.degrees(noise), np.degrees(total), told, left_out)
 
 
 def _norm_findings(error: FloatArray, sigma: FloatArray) -> list[Finding]:
@@ -207,7 +230,8 @@ def _norm_findings(error: FloatArray, sigma: FloatArray) -> list[Finding]:
     ]
 
 
-def _angle_findings(angle_deg: FloatArray, sigma_deg: FloatArray) -> list[Finding]:
+def _angle_findings(moves: Carriage) -> list[Finding]:
+    angle_deg, sigma_deg = moves.angle_deg, moves.sigma_deg
     if not len(angle_deg):
         return []
     # Two components per move share the variance sigma², so the squared ratio has mean one and two degrees of freedom.
@@ -223,7 +247,7 @@ def _angle_findings(angle_deg: FloatArray, sigma_deg: FloatArray) -> list[Findin
             "verify-moves",
             severity=Severity.SERIOUS if times > FAR_BEYOND else Severity.WARNING,
             angle_rms_deg=rms,
-            worst_move=worst,
+            worst_move=int(moves.which[worst]),
             worst_deg=angle_deg[worst],
             times_expected=times,
         )

@@ -75,7 +75,7 @@ def find_jobs(
     jobs: list[Job] = []
     for path in paths:
         digest = _digest(path)
-        n = devices_of(path)
+        n = devices_of(path) if path.is_file() else 1
         for device in [None] if n == 1 else range(1, n + 1):
             name = _serial(path, device, pattern, root)
             jobs.append(Job(str(path), device, name, _key(digest, device, options)))
@@ -99,14 +99,20 @@ def _paths(source: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
         why = getattr(error, "strerror", None) or error
         raise RefusedError(f"{source}: this cannot be opened ({why}); check the name.") from None
     if path.is_dir():
-        found = (p for p in path.rglob("*") if p.suffix.lower() in ENDINGS and not p.name.startswith("."))
-        return sorted(p for p in found if p.is_file())
+        below = [p for p in path.rglob("*") if not p.name.startswith(".")]
+        files = [p for p in below if not p.is_dir()]
+        logs = [p for p in files if p.suffix.lower() in ENDINGS]
+        # A folder that is named like a log holds logs, or is one that cannot be read: none is passed over unsaid.
+        empty = [
+            p for p in below if p.is_dir() and p.suffix.lower() in ENDINGS and not any(p in q.parents for q in logs)
+        ]
+        return sorted([*logs, *empty])
     if path.exists():
         return [path]
     matched = sorted(Path(name) for name in glob.glob(str(source), recursive=True))
     if not matched and not glob.has_magic(str(source)):
         raise RefusedError(f"{source}: there is no such file or folder; check the name.")
-    return [one for one in matched if one.is_file()]
+    return [path for one in matched for path in (_paths(one) if one.is_dir() else [one]) or [one]]
 
 
 def _serial(path: Path, device: int | None, pattern: re.Pattern[str] | None, root: str) -> str:
@@ -123,6 +129,9 @@ def _serial(path: Path, device: int | None, pattern: re.Pattern[str] | None, roo
 
 def _digest(path: Path) -> str:
     digest = hashlib.sha256()
+    if path.exists() and not path.is_file():
+        # Of a pipe that is opened nothing may ever come.
+        return f"not a file {path}"
     try:
         with path.open("rb") as stream:
             while block := stream.read(BLOCK):

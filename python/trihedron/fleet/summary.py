@@ -5,21 +5,26 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from trihedron.arrays import FloatArray
 from trihedron.estimate.sessions import changes_among, repeated_parameters
 from trihedron.fleet.table import frame_of
-from trihedron.probability import betaincinv, fdtrc
-from trihedron.records.fleet import FleetLog, FleetSummary, Outlier, SharedEffect
+from trihedron.probability import betaincinv, fdtrc, ndtr
+from trihedron.records.fleet import FleetLog, FleetSummary, MixedLogs, Outlier, SharedEffect
 from trihedron.records.sessions import PARAMETERS, Session
 
 ALPHA = 0.01
 """Chance that a sound fleet is told to have any outlier, or any device that changed."""
-FEWEST = 5
-"""Devices below which none is called an outlier: the spread of the others would rest on three."""
+FEWEST = 4
+"""Devices below which none is called an outlier: the spread of the others would rest on two."""
+ONE_UNIT = 0.01
+"""Relative scale, or angle [rad], by which two logs of one unit can differ: 0.03 %/K over 30 K; units differ by several
+per cent (data sheets of consumer parts: 3 %)."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,6 +60,13 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
     comparable, passed_over = _comparable(rows)
     sessions = [_session(row) for row in comparable]
     by_device = _by_device(sessions)
+    mixed = _not_one_unit(by_device)
+    if mixed:
+        for one in mixed:
+            del by_device[one.serial]
+        sessions = [session for group in by_device.values() for session in group]
+        more = f"{sum(one.n_logs for one in mixed)} of which it is not known which device they are of"
+        passed_over = f"{passed_over} and {more}" if passed_over else more
     repeated = repeated_parameters(sessions) if len(sessions) > 1 else ()
     changes = changes_among(list(by_device.values()), alpha=ALPHA)
     diagnosed = [row for row in rows if row.get("diagnosis")]
@@ -68,6 +80,7 @@ def summarise(rows: Sequence[dict[str, Any]], folder: Path, n_before: int = 0) -
         _outliers(by_device),
         _shared(diagnosed),
         passed_over,
+        mixed,
     )
     return FleetResult(folder, tuple(rows), summary)
 
@@ -133,7 +146,7 @@ def _by_device(sessions: Sequence[Session]) -> dict[str, list[Session]]:
 
 
 def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
-    """Devices whose mean lies beyond the others': Student's deleted residual, by Bonferroni over devices and numbers.
+    """Devices whose mean lies beyond the others': moderated deleted residual, by Bonferroni over devices and numbers.
 
     One at a time, the farthest first, each left out before the next is looked at: two strays do not hide each other.
     """
@@ -141,17 +154,23 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
         return ()
     names = list(by_device)
     means = np.array([np.mean([s.numbers for s in by_device[name]], axis=0) for name in names])
+    own = np.array([np.mean([np.diag(s.covariance) for s in group], axis=0) for group in by_device.values()])
+    prior, prior_dof = _spread_of_axes(means)
     n_tests = means.size
     found: list[Outlier] = []
     for k in range(means.shape[1]):
         kept = list(range(len(names)))
         while len(kept) >= FEWEST:
             column = means[kept, k]
-            worst = int(np.argmax(np.abs(column - np.median(column))))
+            worst = _farthest(column)
             others = np.delete(column, worst)
-            spread = float(others.std(ddof=1)) * np.sqrt(1.0 + 1.0 / len(others))
+            dof = len(others) - 1
+            variance = (prior_dof * prior[k] + dof * float(others.var(ddof=1))) / (prior_dof + dof)
+            # A device that was measured worse than the others may lie farther away.
+            worse = max(own[kept[worst], k] - float(np.delete(own[kept, k], worst).mean()), 0.0)
+            spread = float(np.sqrt(variance * (1.0 + 1.0 / len(others)) + worse))
             sigmas = float(column[worst] - others.mean()) / max(spread, 1e-300)
-            p = min(1.0, fdtrc(1, len(others) - 1, sigmas**2) * n_tests)
+            p = min(1.0, fdtrc(1, prior_dof + dof, sigmas**2) * n_tests)
             if p >= ALPHA:
                 break
             serial = names[kept[worst]]
@@ -159,6 +178,59 @@ def _outliers(by_device: dict[str, list[Session]]) -> tuple[Outlier, ...]:
             found.append(Outlier(serial, PARAMETERS[k], float(column[worst]), away, sigmas, p))
             kept.pop(worst)
     return tuple(sorted(found, key=lambda one: one.p_adjusted))
+
+
+def _farthest(column: FloatArray) -> int:
+    return int(np.argmax(np.abs(column - np.median(column))))
+
+
+def _spread_of_axes(means: FloatArray) -> tuple[FloatArray, float]:
+    """What the other axes of its kind say of each number's variance (k,), and the degrees of freedom of that.
+
+    Few devices say little of one axis' spread; that three axes of a triad are made alike says more. How much alike they
+    are is told by how far their variances differ, over all kinds of numbers (after Smyth 2004, moderated t).
+    """
+    n, k = means.shape
+    log = (np.log(np.maximum(means.var(axis=0, ddof=1), 1e-300)) + _log_bias(n - 1)).reshape(-1, 3)
+    # The median, for a stray device is in one of the kinds; of χ² with two degrees of freedom it is ln 2 of the mean.
+    of_axes = float(np.median(log.var(axis=1, ddof=1))) / np.log(2.0)
+    apart = max(of_axes - _log_variance(n - 1), 0.0)
+    # A mean of two others, each with its own error and both unlike this one.
+    variance = 0.5 * _log_variance(n - 1) + 1.5 * apart
+    dof = (1.0 + np.sqrt(1.0 + 2.0 * variance)) / variance
+    others = (log.sum(axis=1, keepdims=True) - log) / 2.0
+    return np.exp(others.reshape(k) - _log_bias(dof)), float(dof)
+
+
+def _log_variance(dof: float) -> float:
+    """Variance of the logarithm of a variance estimate: trigamma(d/2)."""
+    return 2.0 / dof + 2.0 / dof**2 + 4.0 / (3.0 * dof**3)
+
+
+def _log_bias(dof: float) -> float:
+    """By how much the mean logarithm of a variance estimate is too small: log(d/2) less digamma(d/2)."""
+    return 1.0 / dof + 1.0 / (3.0 * dof**2)
+
+
+def _not_one_unit(by_device: dict[str, list[Session]]) -> tuple[MixedLogs, ...]:
+    """Groups of logs whose scales or directions of axes differ by more than one unit's ever do, beyond their errors."""
+    fixed = [k for k, parameter in enumerate(PARAMETERS) if not parameter.id.endswith("zero")]
+    found = []
+    for serial, sessions in by_device.items():
+        pairs = list(combinations(sessions, 2))
+        n_tests = max(len(pairs) * sum(k < len(sessions[0].numbers) for k in fixed), 1)
+        worst: tuple[float, int] = (0.0, 0)
+        for a, b in pairs:
+            for k in fixed:
+                if k >= len(a.numbers):
+                    continue
+                away = float(abs(a.numbers[k] - b.numbers[k]))
+                sigma = float(np.sqrt(max(a.covariance[k, k] + b.covariance[k, k], 1e-300)))
+                if ndtr(-(away - ONE_UNIT) / sigma) * n_tests < ALPHA and away > worst[0]:
+                    worst = away, k
+        if worst[0] > 0.0:
+            found.append(MixedLogs(serial, len(sessions), PARAMETERS[worst[1]], worst[0]))
+    return tuple(found)
 
 
 def _shared(diagnosed: Sequence[dict[str, Any]]) -> tuple[SharedEffect, ...]:

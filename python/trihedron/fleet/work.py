@@ -49,6 +49,9 @@ def _calibrated(path: str, device: int | None, options: Mapping[str, Any]) -> Ro
         key: options[key] for key in ("columns", "rate_hz", "accelerometer_unit", "gyroscope_unit") if options.get(key)
     }
     place: dict[str, Any] = {key: options.get(key) for key in ("gravity_m_s2", "latitude_deg", "height_m")}
+    if os.path.exists(path) and not os.path.isfile(path):
+        kind = "a folder without logs" if os.path.isdir(path) else "a pipe or a device"
+        raise RefusedError(f"{path}: this is {kind}, not a file.")
     recording = pipeline.read(path, device=device, **reading)
     diagnosis = None
     if options.get("diagnose", True):

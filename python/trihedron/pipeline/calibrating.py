@@ -12,6 +12,7 @@ import numpy as np
 from trihedron.estimate.accelerometer import calibrate_faces, calibrate_norm, shared_rounding
 from trihedron.estimate.accelerometer.bending import with_bending
 from trihedron.estimate.accelerometer.face_poses import faces_up
+from trihedron.estimate.accelerometer.few_faces import calibrate_few_faces
 from trihedron.estimate.accelerometer.shapes import with_shapes
 from trihedron.estimate.gyroscope import (
     MoveOptions,
@@ -279,9 +280,15 @@ def _by_faces(
     up = faces_up(mean, unit, faces)
     shared = shared_rounding(segments, recording.facts.of("accelerometer").step)
     opposite = opposite_on_faces(recording, segments, up, turns_deg)
-    accelerometer, found = calibrate_faces(
-        mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared, opposite=opposite
-    )
+    try:
+        accelerometer, found = calibrate_faces(
+            mean, sigma_mean, gravity, up=faces, raw_unit=unit, shared=shared, opposite=opposite
+        )
+    except REFUSALS:
+        if recording.gyroscope is None or turns_deg is None or segments.norm_sigma is None:
+            raise
+        # Stated turns about stated faces tell the gyro whatever was seen of the accelerometer.
+        accelerometer, found = calibrate_few_faces(mean, segments.norm_sigma, gravity, unit)
     alone = _alone(accelerometer, found, "case", gravity, source, recording)
     if recording.gyroscope is None:
         return alone

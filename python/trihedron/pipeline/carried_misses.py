@@ -31,4 +31,5 @@ def carried_misses(own: Calibration, recording: Recording, segments: Segments) -
     cut = np.asarray(recording.facts.of("gyroscope").at_limits(len(t)).any(axis=1))
     sound = np.array([not cut[a.stop : b.start].any() for a, b in pairwise(segments.holds)], dtype=np.bool_)
     lasts = [float(t[min(b.start, len(t) - 1)] - t[a.stop - 1]) for a, b in pairwise(segments.holds)]
-    return CarriedMisses(radians_from_degrees(1.0) * checked.angle_deg[sound], np.array(lasts)[sound])
+    told = sound[checked.moves]
+    return CarriedMisses(radians_from_degrees(1.0) * checked.angle_deg[told], np.array(lasts)[checked.moves][told])

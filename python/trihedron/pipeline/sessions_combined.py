@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from trihedron.estimate.sessions import changes_among, repeated_parameters, thermal_model
+from trihedron.estimate.sessions import changes_among, next_session, repeated_parameters, spread_of_next, thermal_model
 from trihedron.invariants import Anchor, anchor_of, model_jacobian, model_vector
 from trihedron.pipeline.session_findings import findings_about
 from trihedron.records import Calibration, Frame, SensorCalibration
@@ -34,14 +34,15 @@ def combine(
     first = in_frame(reference, "lower")
     anchor = anchor_of(first.accelerometer.S, None if first.gyroscope is None else first.gyroscope.S)
     plain = [replace(session, group=session.name) for session in sessions]
-    repeated = repeated_parameters(sessions if by in ("date", "device") else plain)
+    grouped = sessions if by in ("date", "device") else plain
+    repeated = repeated_parameters(grouped)
     thermal = thermal_model(sessions) if by == "temperature" else None
     if by == "device":
         units = [[s for s in sessions if s.group == name] for name in dict.fromkeys(s.group for s in sessions)]
     else:
         units = [] if by == "temperature" else [list(sessions)]
     changes = changes_among(units, alpha=alpha)
-    calibration = _common(sessions, repeated, thermal, first, anchor)
+    calibration = _common(grouped, repeated, thermal, first, anchor)
     model = SessionsModel(by, tuple(sessions), repeated, changes, thermal, calibration, left_out)
     findings = findings_about(model)
     calibration = replace(
@@ -61,14 +62,13 @@ def _common(
 ) -> Calibration:
     """The common numbers as S and b, with the covariance of the next session."""
     value = np.array([one.value for one in repeated])
-    error = np.array([one.std for one in repeated])
-    spread = np.array([math.hypot(_sd(one.within), _sd(one.between)) for one in repeated])
+    spread, error = next_session(sessions, repeated)
     if thermal is not None:
         for term in thermal.terms:
             picked = [k for k, parameter in enumerate(PARAMETERS) if parameter.id == term.id]
             value[picked] = term.coefficients[0]
             error[picked] = np.sqrt(term.covariance[:, 0, 0])
-            spread[picked] = [one.sd for one in term.remaining]
+            spread[picked] = [spread_of_next(one) for one in term.remaining]
     total = sum(session.covariance for session in sessions) + len(sessions) * np.diag(spread**2)
     root = np.sqrt(np.maximum(np.diag(total), 1e-300))
     covariance = total / np.outer(root, root) * np.outer(error, error) + np.diag(spread**2)
@@ -105,10 +105,6 @@ def _common(
         recording_source=", ".join(session.name for session in sessions),
         recording_sha256="",
     )
-
-
-def _sd(spread: Any) -> float:
-    return 0.0 if spread is None else float(spread.sd)
 
 
 def _extensions(model: SessionsModel, anchor: Anchor, kept: Mapping[str, object]) -> dict[str, Any]:

@@ -41,7 +41,7 @@ def turns_on_faces(
     """The moves that begin and end on the same face, as turns about the axis that points up."""
     moves = _moves_on_faces(segments, up)
     if turns_deg is None:
-        return [Turn(move.start, move.stop) for move in moves]
+        return [Turn(move.start, move.stop, face=int(up[move.hold_before])) for move in moves]
     if len(turns_deg) != len(moves):
         raise RefusedError(
             f"{len(turns_deg)} turns were given and {len(moves)} were found between poses on the same face: "
@@ -53,6 +53,7 @@ def turns_on_faces(
             move.stop,
             abs(int(up[move.hold_before])) - 1,
             math.radians(angle) * np.sign(up[move.hold_before]),
+            face=int(up[move.hold_before]),
         )
         for move, angle in zip(moves, turns_deg, strict=True)
         if angle != 0.0

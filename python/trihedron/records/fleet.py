@@ -43,6 +43,16 @@ class Outlier:
 
 
 @dataclass(frozen=True)
+class MixedLogs:
+    """Logs taken for one device that are not: ``parameter`` differs between two of them by ``difference``."""
+
+    serial: str
+    n_logs: int
+    parameter: Parameter
+    difference: float
+
+
+@dataclass(frozen=True)
 class SharedEffect:
     """An effect of the catalogue: in how many logs and devices it was found, and the 95 % interval of the share of
     devices that have it."""
@@ -68,3 +78,4 @@ class FleetSummary:
     outliers: tuple[Outlier, ...]
     effects: tuple[SharedEffect, ...]
     passed_over: str = ""
+    mixed: tuple[MixedLogs, ...] = ()

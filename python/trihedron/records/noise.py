@@ -223,14 +223,29 @@ class NoiseAxis(Frozen):
     def allan_variance(self, tau_s: npt.ArrayLike) -> FloatArray:
         """(k,) Allan variance of the most likely sum of terms, at averaging times ``tau_s`` (docs/noise.md, eq. 7)."""
         tau = np.atleast_1d(np.asarray(tau_s, dtype=np.float64))
-        Q, N, B, K, R = (self.fitted(term) for term in TermName)
-        total = 3 * (Q / tau) ** 2 + N**2 / tau + 2 * math.log(2) / math.pi * B**2 + K**2 * tau / 3 + (R * tau) ** 2 / 2
+        total = np.zeros_like(tau)
+        for part in self.allan_parts(tau).values():
+            total += part
+        return total
+
+    def allan_parts(self, tau_s: FloatArray) -> dict[str, FloatArray]:
+        """What the sum is made of: Allan variance (k,) of every part, by a term's symbol, "Gauss-Markov" or "lines"."""
+        tau = tau_s
+        of_one = {
+            TermName.QUANTISATION: 3.0 / tau**2,
+            TermName.WHITE: 1.0 / tau,
+            TermName.BIAS_INSTABILITY: np.full_like(tau, 2.0 * math.log(2.0) / math.pi),
+            TermName.RATE_RANDOM_WALK: tau / 3.0,
+            TermName.RATE_RAMP: 0.5 * tau**2,
+        }
+        parts = {term.value: self.fitted(term) ** 2 * one for term, one in of_one.items() if self.fitted(term) > 0.0}
         if self.gauss_markov is not None:
-            total = total + _gauss_markov_allan(self.gauss_markov, tau)
-        for line in self.lines:
-            x = math.pi * line.frequency_hz * tau
-            total = total + (line.amplitude * np.sin(x) ** 2 / x) ** 2
-        return np.asarray(total, dtype=np.float64)
+            parts["Gauss-Markov"] = _gauss_markov_allan(self.gauss_markov, tau)
+        if self.lines:
+            x = [math.pi * line.frequency_hz * tau for line in self.lines]
+            each = [(line.amplitude * np.sin(v) ** 2 / v) ** 2 for line, v in zip(self.lines, x, strict=True)]
+            parts["lines"] = np.sum(each, axis=0)
+        return parts
 
     def variance_of_mean(self, window_s: float, session_s: float | None = None) -> float:
         """Variance of the mean of ``window_s`` seconds (docs/noise.md, eq. 11).

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trihedron.arrays import FloatArray
+from trihedron.arrays import FloatArray, IntArray
 from trihedron.printable import one_line
 from trihedron.records.finding import Finding, Severity
 from trihedron.records.presented import Presented
@@ -43,9 +43,10 @@ class Verification(Presented):
     ``norm_error`` (n,) is ``|S a' + b| - |g|`` of every still pose [m/s²], ``norm_noise`` (n,) what the noise of the
     mean allows, ``norm_sigma`` (n,) that and the calibration's own uncertainty. ``angle_deg`` (m,) is the angle between
     gravity carried through a move by the gyro and gravity measured after it; ``angle_noise_deg`` and
-    ``angle_sigma_deg`` (m,) the same two predictions for it. ``rest_rate`` (n, 3) is the calibrated rate in every
-    still pose [rad/s], where the truth is zero: how far the gyro's bias has moved. ``parameters`` says the same of
-    every parameter that the log can judge, and names those that it cannot.
+    ``angle_sigma_deg`` (m,) the same two predictions for it, ``moves`` (m,) which moves these are: one whose readings
+    stood at the gyro's limit for long carries nothing, and is in ``moves_left_out``. ``rest_rate`` (n, 3) is the
+    calibrated rate in every still pose [rad/s], where the truth is zero: how far the gyro's bias has moved.
+    ``parameters`` says the same of every parameter that the log can judge, and names those that it cannot.
     """
 
     source: str
@@ -59,6 +60,8 @@ class Verification(Presented):
     angle_noise_deg: FloatArray
     angle_sigma_deg: FloatArray
     rest_rate: FloatArray
+    moves: IntArray
+    moves_left_out: tuple[int, ...]
     parameters: tuple[JudgedParameter, ...] = ()
     findings: tuple[Finding, ...] = ()
 
@@ -71,6 +74,11 @@ class Verification(Presented):
     def angle_rms_deg(self) -> float:
         """Root mean square of the gravity prediction [deg]; NaN without moves."""
         return float(np.sqrt(np.mean(self.angle_deg**2))) if len(self.angle_deg) else float("nan")
+
+    @property
+    def angle_expected_deg(self) -> float:
+        """Root mean square of what noise and the calibration's uncertainty allow it to be [deg]; NaN without moves."""
+        return float(np.sqrt(np.mean(self.angle_sigma_deg**2))) if len(self.angle_deg) else float("nan")
 
     @property
     def is_passed(self) -> bool:

@@ -88,13 +88,12 @@ def _verified(verification: Verification, before: float) -> tuple[Block, ...]:
         ("to be expected", f"{_acceleration(expected)} rms from noise and the calibration's error bars"),
     ]
     if len(verification.angle_deg):
-        expected = float(np.sqrt(np.mean(verification.angle_sigma_deg**2)))
         rows += [
             (
                 "gravity carried",
                 f"to {plain_number(verification.angle_rms_deg)}° rms through {len(verification.angle_deg)} moves",
             ),
-            ("to be expected", f"{plain_number(expected)}° rms"),
+            ("to be expected", f"{plain_number(verification.angle_expected_deg)}° rms"),
         ]
     return (Facts(tuple(rows)), *_warnings(verification.findings))
 

@@ -224,7 +224,7 @@ def draw_verification(verification: Verification) -> Figure:
     axes[0].set_xlabel("still pose")
     axes[0].set_ylabel("|f| − |g|  [mm/s²]")
     if has_moves:
-        move = np.arange(len(verification.angle_deg))
+        move = verification.moves
         axes[1].bar(move, verification.angle_deg, 0.7, color=AXIS_COLOURS[0], label="missed by")
         axes[1].plot(move, verification.angle_sigma_deg, "_", markersize=14, color=ACCENT, label="to be expected (rms)")
         axes[1].set_xlabel("move")

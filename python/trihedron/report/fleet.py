@@ -27,10 +27,13 @@ def fleet_report(summary: FleetSummary) -> Document:
     n = len(summary.logs)
     bad = [log for log in summary.logs if log.status != "done"]
     n_done = n - len(bad)
-    devices = {log.serial for log in summary.logs if log.status == "done"}
+    mixed = {one.serial for one in summary.mixed}
+    devices = {log.serial for log in summary.logs if log.status == "done" and log.serial not in mixed}
     sections = [Section("Result", (Facts(_facts(summary)),))]
     if bad:
         sections.append(Section("Logs that were not calibrated", (_bad(bad),)))
+    if mixed:
+        sections.append(Section("Logs taken for one device that are not", tuple(_mixed(summary))))
     if summary.n_diagnosed:
         sections.append(Section("Physics that devices share", tuple(_physics(summary))))
     if summary.repeated:
@@ -53,6 +56,8 @@ def fleet_report(summary: FleetSummary) -> Document:
         verdict = f"All {how_many(n, 'log')} of {how_many(len(devices), 'device')} were calibrated."
     if n_done == 0:
         verdict = "NONE of the logs could be calibrated; the reasons are below."
+    for one in summary.mixed:
+        verdict += f" The {how_many(one.n_logs, 'log')} of {one.serial} are of SEVERAL devices."
     strays = {one.serial for one in summary.outliers}
     moved = {change.group for change in summary.changes if change.significant}
     if strays:
@@ -63,7 +68,7 @@ def fleet_report(summary: FleetSummary) -> Document:
         title="Fleet",
         subtitle=f"{how_many(n, 'log')}, {how_many(len(devices), 'device')}",
         verdict=verdict,
-        is_trustworthy=n_done > 0,
+        is_trustworthy=n_done > 0 and not mixed,
         sections=tuple(sections),
     )
 
@@ -95,6 +100,19 @@ def _facts(summary: FleetSummary) -> tuple[tuple[str, str], ...]:
 
 def _bad(logs: list[FleetLog]) -> Facts:
     return Facts(tuple((f"{log.serial}: {log.name}", f"{log.status}: {log.reason}") for log in logs))
+
+
+def _mixed(summary: FleetSummary) -> list[Block]:
+    rows = []
+    for one in summary.mixed:
+        factor, unit = shown(one.parameter.unit)
+        by = f"{plain_number(one.difference * factor, 2)} {unit}"
+        rows.append((one.serial, str(one.n_logs), f"{one.parameter.id} {one.parameter.name}", by))
+    said = (
+        "Scales and directions of axes of one unit repeat within 1 %. Name devices with --serial, or give each a "
+        "folder; until then these logs are compared with nothing."
+    )
+    return [Paragraph(said), Table(("taken for one device", "logs", "number", "differs by"), tuple(rows))]
 
 
 def _physics(summary: FleetSummary) -> list[Block]:

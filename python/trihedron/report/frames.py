@@ -107,11 +107,12 @@ def verification_columns(verification: Verification) -> Columns:
     """A row per still pose [m/s²] and per move [deg]: error, what noise allows, that and the calibration's own."""
     v = verification
     rows = []
-    for kind, unit, triples in (
-        ("pose", "m/s^2", zip(v.norm_error, v.norm_noise, v.norm_sigma, strict=True)),
-        ("move", "deg", zip(v.angle_deg, v.angle_noise_deg, v.angle_sigma_deg, strict=True)),
+    poses = range(len(v.norm_error))
+    for kind, unit, told in (
+        ("pose", "m/s^2", zip(poses, v.norm_error, v.norm_noise, v.norm_sigma, strict=True)),
+        ("move", "deg", zip(v.moves.tolist(), v.angle_deg, v.angle_noise_deg, v.angle_sigma_deg, strict=True)),
     ):
-        for k, (error, noise, sigma) in enumerate(triples):
+        for k, error, noise, sigma in told:
             row = {"kind": kind, "index": k, "error": float(error), "noise": float(noise), "sigma": float(sigma)}
             rows.append({**row, "unit": unit})
     return of_rows(rows, ("kind", "index", "error", "noise", "sigma", "unit"))

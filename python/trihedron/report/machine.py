@@ -119,6 +119,8 @@ def verification_record(verification: Verification) -> dict[str, Any]:
         "angle_deg": v.angle_deg,
         "angle_noise_deg": v.angle_noise_deg,
         "angle_sigma_deg": v.angle_sigma_deg,
+        "moves": v.moves,
+        "moves_left_out": list(v.moves_left_out),
         "rest_rate_rad_s": v.rest_rate,
         "parameters": [vars(one) for one in v.parameters],
         "findings": [finding.to_dict() for finding in v.findings],

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from trihedron.records import AllanCurve, NoiseAxis, TermName
+from trihedron.records import AllanCurve, NoiseAxis
 from trihedron.report.figures import ACCENT, AXIS_COLOURS, INK, SHADE, panels
+from trihedron.report.noise_parts import parts_of, room_for
 from trihedron.report.numbers import plain_number, unit_in_print
-
-_SLOPES = {
-    TermName.QUANTISATION: (math.sqrt(3.0), -1.0),
-    TermName.WHITE: (1.0, -0.5),
-    TermName.BIAS_INSTABILITY: (math.sqrt(2.0 * math.log(2.0) / math.pi), 0.0),
-    TermName.RATE_RANDOM_WALK: (math.sqrt(1.0 / 3.0), 0.5),
-    TermName.RATE_RAMP: (math.sqrt(0.5), 1.0),
-}
 
 
 def draw_allan(curve: AllanCurve, sensors: Sequence[tuple[str, Sequence[NoiseAxis]]]) -> Figure:
-    """Curves of each sensor in a row on the same scales: interval, fitted terms, their sum, its minimum."""
+    """Curves of each sensor in a row on the same scales: interval, parts of the fitted sum, the sum, its minimum."""
     columns = max(len(axes) for _, axes in sensors)
     figure, places = panels(len(sensors), columns, (3.6 * columns + 0.8, 4.2 * len(sensors)))
     for row, (unit, axes) in enumerate(sensors):
@@ -58,8 +50,7 @@ def draw_curve(curve: AllanCurve) -> Figure:
 
 def _row(places: Sequence[Axes], curve: AllanCurve, axes: Sequence[NoiseAxis]) -> None:
     chosen = [curve.names.index(axis.name) for axis in axes]
-    low = float(np.nanmin(curve.deviation[:, chosen]))
-    high = float(np.nanmax(curve.deviation[:, chosen]))
+    limits = room_for(curve, list(zip(axes, chosen, strict=True)), np.geomspace(curve.tau_s[0], curve.tau_s[-1], 400))
     for k, (axis, place, c) in enumerate(zip(axes, places, chosen, strict=False)):
         place.set_xscale("log")
         place.set_yscale("log")
@@ -67,8 +58,8 @@ def _row(places: Sequence[Axes], curve: AllanCurve, axes: Sequence[NoiseAxis]) -
         if axis.sample_sigma > 0:
             _terms(place, curve, axis)
         place.set_title(axis.name, fontsize=10, loc="left")
-        if high > low > 0:
-            place.set_ylim(low / 2.5, high * 2.0)
+        if limits is not None:
+            place.set_ylim(*limits)
         place.set_xlim(curve.tau_s[0] / 1.5, curve.tau_s[-1] * 1.5)
         place.set_xlabel("averaging time τ [s]")
         place.grid(which="major", color="#E3E7EA", linewidth=0.6)
@@ -86,18 +77,18 @@ def _curve(place: Axes, curve: AllanCurve, c: int, colour: str) -> None:
 
 def _terms(place: Axes, curve: AllanCurve, axis: NoiseAxis) -> None:
     tau = np.geomspace(curve.tau_s[0], curve.tau_s[-1], 400)
-    for term, (factor, slope) in _SLOPES.items():
-        found = axis.terms[term]
-        if not found.is_present:
-            continue
-        values = factor * found.value * tau**slope
-        place.plot(tau, values, color="#8A949C", linewidth=0.8, zorder=2)
-        # The letter stands where the term is the largest part of the sum.
-        share = values**2 / axis.allan_variance(tau)
-        at = int(np.argmax(share)) if slope not in (-1.0, -0.5) else int(0.06 * len(tau))
-        at = min(max(at, 12), len(tau) - 30)
+    for part in parts_of(axis, tau):
+        place.plot(tau, part.deviation, color="#8A949C", linewidth=0.8, zorder=2)
+        is_left = part.x < np.sqrt(tau[0] * tau[-1])
         place.annotate(
-            term.value, (tau[at], values[at]), xytext=(0, -11), textcoords="offset points", fontsize=9, color=INK
+            part.name,
+            (part.x, part.y),
+            xytext=(4 if is_left else -4, -3),
+            textcoords="offset points",
+            ha="left" if is_left else "right",
+            va="top" if is_left else "bottom",
+            fontsize=8.5,
+            color=INK,
         )
     total = np.sqrt(axis.allan_variance(tau))
     place.plot(tau, total, color=INK, linewidth=0.9, linestyle="--", zorder=4)

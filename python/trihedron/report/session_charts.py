@@ -72,11 +72,13 @@ def verification_chart(verification: Verification) -> Chart:
     )
     if not len(v.angle_deg):
         return Chart((norm,))
-    move = np.arange(len(v.angle_deg), dtype=np.float64)
-    told = [said(f"move {k}", "", a, "°") for k, a in enumerate(v.angle_deg)]
-    expected = [said(f"move {k}, to be expected", "", a, "° rms") for k, a in enumerate(v.angle_sigma_deg)]
+    move = v.moves.astype(np.float64)
+    told = [said(f"move {k}", "", a, "°") for k, a in zip(v.moves, v.angle_deg, strict=True)]
+    expected = [
+        said(f"move {k}, to be expected", "", a, "° rms") for k, a in zip(v.moves, v.angle_sigma_deg, strict=True)
+    ]
     moves = Panel(
-        Scale("move", limits=(-0.7, len(move) - 0.3), whole=True),
+        Scale("move", limits=(-0.7, move[-1] + 0.7), whole=True),
         Scale("gravity missed by  [°]", "°", includes=(0.0,)),
         (
             Bars(move, v.angle_deg, 0.7, told, "missed after the move", "c3"),

@@ -50,7 +50,7 @@ def _headlines(v: Verification) -> list[Headline]:
     beside = f"rms over {how_many(len(v.norm_error), 'pose')}; to be expected {expected}"
     out = [Headline("gravity at rest missed by", norm, "mm/s²", beside)]
     if len(v.angle_deg):
-        expected = plain_number(float(np.sqrt(np.mean(v.angle_sigma_deg**2))))
+        expected = plain_number(v.angle_expected_deg)
         beside = f"rms over {how_many(len(v.angle_deg), 'move')}; to be expected {expected}"
         out.append(Headline("gravity after a move missed by", plain_number(v.angle_rms_deg), "°", beside))
     return out
@@ -71,14 +71,13 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
     ]
     if len(v.angle_deg):
         worst = int(np.argmax(v.angle_deg))
-        expected = float(np.sqrt(np.mean(v.angle_sigma_deg**2)))
         facts += [
             (
                 "gravity predicted",
                 f"to {plain_number(v.angle_rms_deg)}° rms over {len(v.angle_deg)} moves, worst "
-                f"{plain_number(float(v.angle_deg[worst]))}° in move {worst}",
+                f"{plain_number(float(v.angle_deg[worst]))}° in move {v.moves[worst]}{_without(v)}",
             ),
-            ("to be expected", f"{plain_number(expected)}° rms"),
+            ("to be expected", f"{plain_number(v.angle_expected_deg)}° rms"),
         ]
     if len(v.rest_rate):
         shift = [plain_number(degrees_from_radians(float(r)), 2) for r in np.mean(v.rest_rate, axis=0)]
@@ -86,6 +85,12 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
             ("gyro's zero", f"moved by {', '.join(shift)} °/s since the calibration (taken from each still pose)")
         )
     return tuple(facts)
+
+
+def _without(v: Verification) -> str:
+    if not v.moves_left_out:
+        return ""
+    return f"; without move {', '.join(map(str, v.moves_left_out))}, where the gyro was at its limit"
 
 
 def parameters_table(v: Verification) -> Table:
@@ -136,7 +141,7 @@ def _tables(verification: Verification, segments: Segments | None) -> list[Block
     if len(v.angle_deg):
         rows = tuple(
             (
-                str(k),
+                str(v.moves[k]),
                 plain_number(float(v.angle_deg[k]), 2),
                 plain_number(float(v.angle_noise_deg[k]), 2),
                 plain_number(float(v.angle_sigma_deg[k]), 2),

@@ -9,6 +9,9 @@ from trihedron.capture.protocols.contract import Frame
 MORE = -1
 """The bytes so far begin a frame; how long it is, or whether it is one, needs more of them."""
 
+LONGEST_LINE = 4096
+"""Bytes without a line feed, after which they are no line."""
+
 
 class FramedDecoder(ABC):
     """Looks for ``sync``, asks the protocol for length and content, and starts again one byte later where it is none.
@@ -126,3 +129,35 @@ def _begun(buffer: bytearray, sync: bytes, at: int) -> int:
         if buffer.endswith(sync[:length]):
             return length
     return 0
+
+
+class LineFedDecoder(ABC):
+    """One message per line feed, at most one frame from each; what a subclass makes of a line is its protocol."""
+
+    clock_modulus = 0
+    counter_modulus = 0
+
+    def __init__(self) -> None:
+        self.corrupt = 0
+        self.skipped_bytes = 0
+        self._buffer = bytearray()
+
+    @abstractmethod
+    def frame_of(self, line: bytes) -> Frame | None:
+        """The frame that a line without its end completes, if it does."""
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Frames of the lines that are complete with these bytes."""
+        self._buffer += data
+        *lines, rest = self._buffer.split(b"\n")
+        self._buffer = rest
+        if len(rest) > LONGEST_LINE:
+            self.skipped_bytes += len(rest)
+            self._buffer = bytearray()
+        return [frame for line in lines if (frame := self.frame_of(bytes(line))) is not None]
+
+    def finish(self) -> list[Frame]:
+        """A line without its end is none."""
+        self.skipped_bytes += len(self._buffer)
+        self._buffer.clear()
+        return []

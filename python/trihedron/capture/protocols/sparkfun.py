@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 
 from trihedron.capture.protocols.contract import Frame
-from trihedron.capture.protocols.framing import MORE, FramedDecoder
+from trihedron.capture.protocols.framing import MORE, FramedDecoder, LineFedDecoder
 
 _LENGTH = 16
 _FRAME = struct.Struct(">x7Hx")
@@ -49,19 +49,15 @@ class SixDofDecoder(FramedDecoder):
         return Frame(numbers[0] % _COUNT_MODULUS, None, numbers[1:], ",".join(map(str, numbers[1:])))
 
 
-class RazorDecoder:
+class RazorDecoder(LineFedDecoder):
     """Tagged lines of one sample: A (acceleration), M (magnetometer, optional), G (rates); R raw or C corrected."""
 
     name = "razor"
-    counter_modulus = 0
-    clock_modulus = 0
     tick_s = 0.0
 
     def __init__(self) -> None:
+        super().__init__()
         self.columns: tuple[str, ...] = ()
-        self.corrupt = 0
-        self.skipped_bytes = 0
-        self._buffer = bytearray()
         self._parts: dict[str, list[str]] = {}
         self._order: tuple[str, ...] = ()
 
@@ -69,23 +65,8 @@ class RazorDecoder:
         """Go on with the columns of the connection before."""
         self.columns, self._order = other.columns, other._order
 
-    def feed(self, data: bytes) -> list[Frame]:
-        """Samples whose last line is complete."""
-        self._buffer += data
-        *lines, rest = self._buffer.split(b"\n")
-        self._buffer = rest
-        if len(rest) > 4096:
-            self.skipped_bytes += len(rest)
-            self._buffer = bytearray()
-        return [frame for line in lines if (frame := self._line(bytes(line))) is not None]
-
-    def finish(self) -> list[Frame]:
-        """An incomplete line is no sample."""
-        self.skipped_bytes += len(self._buffer)
-        self._buffer.clear()
-        return []
-
-    def _line(self, line: bytes) -> Frame | None:
+    def frame_of(self, line: bytes) -> Frame | None:
+        """A sample whose last line this is."""
         line = line.strip(b"\r\x00 ")
         tag = line[:5]
         fields = line[5:].split(b",")

@@ -10,6 +10,7 @@ import math
 import struct
 
 from trihedron.capture.protocols.contract import Frame
+from trihedron.capture.protocols.framing import LineFedDecoder
 
 _INERTIAL = 0x80 + ord("I")
 _BODY = struct.Struct("<xQ6f")
@@ -23,53 +24,31 @@ _LARGEST = 1e5
 """deg/s or g: no such sensor goes there, but a bit that flipped in the exponent of a float does."""
 
 
-class XioDecoder:
+class XioDecoder(LineFedDecoder):
     """Inertial messages; all other kinds pass by."""
 
     name = "xio"
     columns: tuple[str, ...] = _COLUMNS
-    counter_modulus = 0
-    clock_modulus = 0
     tick_s = 1e-6
 
-    def __init__(self) -> None:
-        self.corrupt = 0
-        self.skipped_bytes = 0
-        self._buffer = bytearray()
-
-    def feed(self, data: bytes) -> list[Frame]:
-        """Messages that are complete with these bytes."""
-        self._buffer += data
-        *messages, rest = self._buffer.split(b"\n")
-        self._buffer = rest
-        if len(rest) > 4096:
-            self.skipped_bytes += len(rest)
-            self._buffer = bytearray()
-        return [frame for message in messages if (frame := self._message(bytes(message))) is not None]
-
-    def finish(self) -> list[Frame]:
-        """A message without its end is none."""
-        self.skipped_bytes += len(self._buffer)
-        self._buffer.clear()
-        return []
-
-    def _message(self, message: bytes) -> Frame | None:
-        if not message:
+    def frame_of(self, line: bytes) -> Frame | None:
+        """The readings of an inertial message."""
+        if not line:
             return None
-        first = message[0]
+        first = line[0]
         if first == _INERTIAL:
-            frame = self._binary(message)
-        elif first == 0x49 and message[1:2] == b",":
-            frame = self._text(message)
+            frame = self._binary(line)
+        elif first == 0x49 and line[1:2] == b",":
+            frame = self._text(line)
         else:
             # Another kind is a letter (or 0x80 and a letter); anything else is what is left of a message.
             if not 0x41 <= first & 0x7F <= 0x5A:
                 self.corrupt += 1
-                self.skipped_bytes += len(message) + 1
+                self.skipped_bytes += len(line) + 1
             return None
         if frame is None:
             self.corrupt += 1
-            self.skipped_bytes += len(message) + 1
+            self.skipped_bytes += len(line) + 1
         return frame
 
     def _binary(self, message: bytes) -> Frame | None:

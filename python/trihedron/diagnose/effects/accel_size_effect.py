@@ -13,6 +13,7 @@ class AccelSizeEffect(Effect):
     """Accelerometers 2 and 3 displaced from accelerometer 1: each reads its own α×r + ω×(ω×r)."""
 
     id = "accel-size-effect"
+    applies_elsewhere = True
     size = 5e-3
     """m: dies of one package."""
 

@@ -35,7 +35,8 @@ class Turn:
     """Samples ``[start, stop)`` of a turn; ``axis`` 0, 1, 2 of the case and the signed ``angle_rad`` where known.
 
     ``direction`` (3,) is the turn's axis in the body where it is no axis of the case, ``sigma_direction_rad`` the
-    standard error of each of its two components.
+    standard error of each of its two components. ``face`` (±1, ±2, ±3) is the axis of the case that pointed up, 0 where
+    that is not known: a face that is not flat tilts every turn on it alike.
     """
 
     start: int
@@ -44,6 +45,7 @@ class Turn:
     angle_rad: float | None = None
     direction: tuple[float, float, float] | None = None
     sigma_direction_rad: float = 0.0
+    face: int = 0
 
     def __post_init__(self) -> None:
         if not 0 <= self.start < self.stop - 1:

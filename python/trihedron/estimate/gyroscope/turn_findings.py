@@ -9,7 +9,7 @@ import numpy as np
 
 from trihedron.arrays import FloatArray
 from trihedron.estimate.gyroscope.turn_angles import KnownTurn
-from trihedron.estimate.gyroscope.turn_system import FALSE_ALARM, Screened
+from trihedron.estimate.gyroscope.turn_screening import FALSE_ALARM, Screened
 from trihedron.probability import chdtrc
 from trihedron.records.finding import Finding, FindingCode
 

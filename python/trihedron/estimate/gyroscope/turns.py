@@ -22,15 +22,8 @@ from trihedron.estimate.gyroscope.turn_angles import (
     nominal_matrix,
 )
 from trihedron.estimate.gyroscope.turn_findings import turn_findings
-from trihedron.estimate.gyroscope.turn_system import (
-    FALSE_ALARM,
-    Solution,
-    TurnSystem,
-    left_out,
-    screen,
-    solve,
-    solve_zero_first,
-)
+from trihedron.estimate.gyroscope.turn_screening import FALSE_ALARM, screen
+from trihedron.estimate.gyroscope.turn_system import Solution, TurnSystem, left_out, solve, solve_zero_first
 from trihedron.probability import chdtrc
 from trihedron.records.calibration import FitQuality, Observability, SensorCalibration
 from trihedron.records.finding import Finding
@@ -123,7 +116,9 @@ def calibrate_turns(
     _require_every_axis(known, used, rate_to_si(recording.gyroscope_unit) is None)
     roughly = np.asarray(np.linalg.inv(nominal), dtype=np.float64)
     sigmas = np.array([turn.sigma_direction_rad for turn in turns])
-    system = TurnSystem(measured, np.array([turn.vector for turn in known]), roughly, sigma_directions=sigmas)
+    faces = np.array([turn.face for turn in turns], dtype=np.int64)
+    vectors = np.array([turn.vector for turn in known])
+    system = TurnSystem(measured, vectors, roughly, sigma_directions=sigmas, faces=faces)
     screened = screen(system, used, sigma_turn_rad)
     system, used = screened.system, screened.used
     fit = solve_zero_first(system, used) if route == "zero-turn-first" else solve(system, used)

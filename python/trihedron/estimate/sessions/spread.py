@@ -19,7 +19,7 @@ from functools import cache
 import numpy as np
 
 from trihedron.arrays import BoolArray, FloatArray, IntArray
-from trihedron.probability import chdtri, stdtrit
+from trihedron.probability import chdtri, ndtri, stdtrit
 from trihedron.records.sessions import Spread
 
 LEVEL = 0.95
@@ -75,6 +75,20 @@ def spread_between(values: FloatArray, variances: FloatArray, groups: Sequence[o
     if ends[1] == 0.0:
         ends[1] = _spread(means, variance, one_group, dof).high
     return Spread(float(np.clip(point, ends[0], ends[1])), float(ends[0]), float(ends[1]), dof)
+
+
+def spread_of_next(spread: Spread | None) -> float:
+    """Standard deviation of which ±1.96 hold another session, about the mean, in 95 %.
+
+    The likeliest spread of few sessions is often zero, and never certain: what (1) leaves possible is a χ² law of the
+    variance through its upper end, and a value drawn with a variance of that law is Student's. Without errors of the
+    sessions' own that is exact.
+    """
+    if spread is None:
+        return 0.0
+    tail = 0.5 - LEVEL / 2.0
+    variance = spread.high**2 * _exceeded(1.0 - tail, spread.dof) / spread.dof
+    return float(np.sqrt(variance) * stdtrit(spread.dof, tail) / ndtri(tail))
 
 
 def common_mean(

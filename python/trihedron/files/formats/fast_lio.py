@@ -6,24 +6,14 @@ the bias.
 
 from __future__ import annotations
 
-from trihedron.files.formats.contract import (
-    ExportOptions,
-    Format,
-    heading,
-    lost_without_intrinsics,
-    number,
-    of_si_readings,
-)
-from trihedron.files.formats.noise_keys import required
+from trihedron.files.formats.contract import ExportOptions, Format, number
+from trihedron.files.formats.without_intrinsics import noise_alone
 from trihedron.records import Calibration
 
 
 def to_fast_lio(calibration: Calibration, options: ExportOptions) -> str:
     """Keys of the IMU for its configuration's ``mapping``."""
-    known = of_si_readings(calibration, "FAST-LIO", options)
-    figures = required(known, options, "FAST-LIO")
-    lines = [f"# {line}" for line in heading(known, "FAST-LIO has no intrinsics of the IMU: variances of one sample.")]
-    lines += [f"# {line}" for line in lost_without_intrinsics(known)]
+    _, figures, lines = noise_alone(calibration, options, "FAST-LIO", ": variances of one sample")
     lines += [
         f"# {name} is an upper limit: it was not seen in the rest log." for name, one in figures.named() if one.is_limit
     ]

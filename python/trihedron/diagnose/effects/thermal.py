@@ -1,0 +1,95 @@
+"""What follows a logged temperature: one effect, of either sensor, of its bias or of its scale."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from trihedron.arrays import FloatArray
+from trihedron.diagnose.context import LEAST_SWING_K, Context
+from trihedron.diagnose.effects.contract import Effect, Variant, force_only, per_axis, rate_only
+from trihedron.diagnose.effects.thermal_shapes import thermal_bias_variants, thermal_sizes
+from trihedron.records.words import why_not
+
+
+class Thermal(Effect):
+    """Seen where a temperature was logged and moved."""
+
+    applies_elsewhere = True
+
+    def unavailable(self, context: Context) -> str | None:
+        if context.temperature is None:
+            return why_not("no-temperature")
+        if np.ptp(context.temperature) < LEAST_SWING_K:
+            return why_not("steady-temperature", least_k=LEAST_SWING_K)
+        return None
+
+
+class ThermalScale(Thermal):
+    """Relative scale linear in temperature (about its mean over the holds)."""
+
+    size = 3e-4
+    """1/K: 300 ppm."""
+    is_gyro: ClassVar[bool] = False
+
+    def variants(self, context: Context) -> list[Variant]:
+        assert context.temperature is not None
+        t = context.temperature[:, None]
+        if self.is_gyro:
+            distortion = rate_only(context.on_gyros(t * context.axis_rate))
+        else:
+            distortion = force_only(context.on_accelerometers(t * context.axis_force))
+        return [Variant(distortion, per_axis("scale_per_kelvin"), ("1/K",) * 3)]
+
+
+class AccelThermalScale(ThermalScale):
+    """Of the accelerometer."""
+
+    id = "accel-thermal-scale"
+    leaves_open = ("accel-zero", "accel-scale")
+    drifts_as = "accel-hidden-drift"
+
+
+class GyroThermalScale(ThermalScale):
+    """Of the gyro."""
+
+    id = "gyro-thermal-scale"
+    is_gyro = True
+    leaves_open = ("gyro-zero", "gyro-scale")
+    drifts_as = "gyro-hidden-drift"
+
+
+class ThermalBias(Thermal):
+    """Bias linear, then quadratic in temperature; with its rate of change, or a branch of its own while it cools."""
+
+    per_kelvin: ClassVar[float]
+    """How far parts move, one sigma, SI."""
+    is_gyro: ClassVar[bool] = False
+
+    def sizes(self, context: Context, variant: Variant) -> FloatArray:
+        return thermal_sizes(context, variant, self.per_kelvin)
+
+    def variants(self, context: Context) -> list[Variant]:
+        if self.is_gyro:
+            return thermal_bias_variants(context, context.on_gyros, rate_only, "rad/s")
+        return thermal_bias_variants(context, context.on_accelerometers, force_only, "m/s^2")
+
+
+class AccelThermalBias(ThermalBias):
+    """Of the accelerometer: half a mg per kelvin."""
+
+    id = "accel-thermal-bias"
+    leaves_open = ("accel-zero",)
+    drifts_as = "accel-hidden-drift"
+    per_kelvin = 0.005
+
+
+class GyroThermalBias(ThermalBias):
+    """Of the gyro: 0.02 °/s per kelvin."""
+
+    id = "gyro-thermal-bias"
+    is_gyro = True
+    leaves_open = ("gyro-zero",)
+    drifts_as = "gyro-hidden-drift"
+    per_kelvin = 4e-4

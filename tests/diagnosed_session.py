@@ -1,0 +1,29 @@
+"""A simulated session of a named part, as short as a diagnosis allows."""
+
+from trihedron.diagnose import diagnose_recording
+from trihedron.estimate.accelerometer import calibrate_norm
+from trihedron.estimate.joint import calibrate_joint
+from trihedron.segment import resegment, segment_recording
+from trihedron.simulate import hand_session, simulate
+from trihedron.simulate.effects import with_effect
+from trihedron.simulate.named import _of
+from trihedron.simulate.profiles import profile_by_name
+
+
+def simulated(effect_id="", seed=1, n_poses=24, grade="mpu", **size):
+    """Recording and truth of a hand session with an effect of a stated size, or healthy."""
+    scenario = _of(profile_by_name(grade), hand_session(n_poses, layout=seed), "session", seed)
+    return simulate(with_effect(scenario, effect_id, **size) if effect_id else scenario, seed)
+
+
+def diagnosed(effect_id="", seed=1, n_poses=24, grade="mpu", **size):
+    recording, truth = simulated(effect_id, seed, n_poses, grade, **size)
+    segments = segment_recording(recording)
+    accelerometer, _ = calibrate_norm(
+        segments.accelerometer_mean,
+        segments.accelerometer_sigma_mean,
+        truth.gravity_m_s2,
+        raw_unit=recording.accelerometer_unit,
+    )
+    calibration = calibrate_joint(recording, segments, accelerometer, truth.gravity_m_s2, "simulated")
+    return diagnose_recording(recording, resegment(recording, segments), calibration)
