@@ -87,7 +87,7 @@ def calibrate(
     full: Full = False,
     force: Force = False,
 ) -> None:
-    """Calibrate both sensors from a log of still poses and moves.
+    """Calibrate both sensors from a log of poses and moves.
 
     With several logs of one unit: one model, and how far every parameter repeats.
     """

@@ -63,7 +63,7 @@ def diagnose(
     full: Full = False,
     force: Force = False,
 ) -> None:
-    """Where a log and its model differ, which physics was left out, and does adding it help. Status 0 if it ran."""
+    """Where a log and its model differ, which physics was excluded, and does adding it help. Status 0 if it ran."""
     if calibration is not None and against is not None:
         raise typer.BadParameter("give either --calibration or --against: each is the model")
     if not 0.0 < alpha < 0.5:

@@ -43,7 +43,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ),
     ),
     "kalman": (
-        ("With the noise of a rest log:", "trihedron kalman log.csv --noise rest.csv --report kalman.html"),
+        ("With the noise of a static log:", "trihedron kalman log.csv --noise rest.csv --report kalman.html"),
         (
             "Poses of a dividing head, its angles known to 0.01°:",
             "trihedron kalman log.csv --reference poses.csv --angle-sigma 0.01",
@@ -59,7 +59,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("A log larger than the memory:", "trihedron allan rest.npy --stream --columns gx,gy,gz --rate 1000"),
     ),
     "verify": (
-        ("Does it still hold?", "trihedron verify cal.json today.csv"),
+        ("Is the calibration still valid?", "trihedron verify cal.json today.csv"),
         ("Status 2 beyond 2 mg, for a script:", "trihedron verify cal.json today.csv --limit-mg 2"),
         ("Is the vendor's right? Which is best?", "trihedron verify today.csv cal.json camera.json imu-result.yaml"),
     ),

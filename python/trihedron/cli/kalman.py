@@ -32,7 +32,7 @@ def kalman(
         Optional[Path],  # noqa: UP045
         typer.Option(
             metavar="FILE",
-            help="A log of rest to identify the noise from, or its terms (JSON).",
+            help="A static log to identify the noise from, or its terms (JSON).",
         ),
     ] = None,
     frame: Annotated[

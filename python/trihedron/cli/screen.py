@@ -107,11 +107,11 @@ def _to_go(known: Examination) -> str:
 
 
 def _parameters(known: Examination | None, *, tall: bool) -> Text:
-    """Error bars now, after the next pose and as wanted: all of them where there is room, else the worst of each."""
+    """Uncertainties now, after the next pose and as wanted: all of them where there is room, else the worst of each."""
     if known is None:
-        return Text("error bars come with the first poses", style=DIM)
+        return Text("uncertainties come with the first poses", style=DIM)
     room = 32 if tall else 14
-    out = Text(f"{'error bar, %':{room}s}{'now':>6}{'next':>7}{'goal':>6}\n", style=DIM)
+    out = Text(f"{'uncertainty, %':{room}s}{'now':>6}{'next':>7}{'goal':>6}\n", style=DIM)
     rows = list(known.uncertain) if tall else _groups(known.uncertain)
     for one in rows:
         name = f"{'acc' if one.sensor == 'accelerometer' else 'gyro'} {one.name}"[: room - 1]

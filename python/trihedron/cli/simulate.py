@@ -144,5 +144,5 @@ def _scenario(name: str, diagnosis: Path | None) -> Any:
 
     made = with_effects(name, read_diagnosis(diagnosis)["effects"])
     for effect_id, why in made.left_out.items():
-        say(f"effect {effect_id} was left out: {why}.")
+        say(f"effect {effect_id} was excluded: {why}.")
     return made.scenario

@@ -82,7 +82,7 @@ def _headlines(calibration: Calibration) -> list[Headline]:
     for name, sensor in _sensors(calibration):
         relative = sensor.sigma_S.diagonal() / np.abs(sensor.S.diagonal())
         words = f"{plain_number(1e6 * float(relative.max()), 2)}"
-        out.append(Headline(f"{name} scale known to", words, "ppm", "of the worst axis, one standard error"))
+        out.append(Headline(f"{name} scale known to", words, "ppm", "of the worst axis, 1 σ"))
     return out
 
 
@@ -107,7 +107,7 @@ def _result(calibration: Calibration, segments: Segments | None, recording: Reco
     if recording is not None:
         facts.append(("recording", f"{duration(recording.duration_s)} at {plain_number(recording.rate_hz, 4)} Hz"))
     if segments is not None:
-        facts.append(("motion", f"{how_many(segments.n_holds, 'still pose')}, {how_many(len(segments.moves), 'move')}"))
+        facts.append(("motion", f"{how_many(segments.n_holds, 'pose')}, {how_many(len(segments.moves), 'move')}"))
     facts.append(("gravity", f"{calibration.gravity_m_s2:.5f} m/s², {calibration.gravity_source}"))
     facts.append(("frame", calibration.frame))
     blocks: list[Block] = [Facts(tuple(facts))]
@@ -240,7 +240,7 @@ def _axes_table(name: str, sensor: SensorCalibration, axes: Axes) -> Table:
         for k, pair in enumerate(("1-2", "1-3", "2-3"))
     ]
     return Table(
-        ("", f"sensitivity{unit}", "σ/value", f"zero reading [{raw}]"),
+        ("", f"sensitivity{unit}", "σ/value", f"bias [{raw}]"),
         tuple(rows),
         f"{name.capitalize()}: angles between axes exceed 90° by {', '.join(skew)}",
     )
@@ -311,7 +311,7 @@ def _residual_picture(calibration: Calibration) -> Picture | None:
 
     return Picture(
         "residuals",
-        "Norm of gravity minus its true value in every still pose, against three standard errors of noise alone; "
+        "Norm of gravity minus its true value in every pose, against three standard errors of noise alone; "
         "circles: predicted by a fit that did not see that pose.",
         later("figures", "draw_residuals", quality),
         partial(residual_chart, quality),

@@ -41,7 +41,7 @@ def residual_chart(quality: FitQuality, names: Sequence[str] | None = None) -> C
         )
     told = [said(name, "", v, "mm/s²", s) for name, v, s in zip(label, residual, sigma, strict=True)]
     marks.append(Points(pose - 0.17, residual, told, None, "in sample", "c1"))
-    x = Scale("still pose", limits=(-0.7, len(pose) - 0.3), whole=True)
+    x = Scale("pose", limits=(-0.7, len(pose) - 0.3), whole=True)
     return Chart((Panel(x, Scale("|f| − |g|  [mm/s²]", "mm/s²"), tuple(marks)),))
 
 
@@ -83,7 +83,7 @@ def move_chart(quality: FitQuality, segments: Segments | None = None) -> Chart:
     marks.append(Points(move, noise, told_noise, None, "noise alone (rms)", "ink"))
     shown = np.concatenate([quality.angle_deg[~is_out], [] if held is None else held[~is_out]])
     shown = shown[np.isfinite(shown)]
-    # A move that was left out may be a hundred times as wrong: the rest must stay readable.
+    # A move that was excluded may be a hundred times as wrong: the rest must stay readable.
     top = 1.1 * float(max(shown.max(initial=0.0), np.nanmax(noise, initial=0.0))) or 1.0
     y = Scale("gravity missed by  [°]", "°", limits=(0.0, top))
     return Chart((Panel(Scale("move", limits=(-0.7, n - 0.3), whole=True), y, tuple(marks), height_px=200),))

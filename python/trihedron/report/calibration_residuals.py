@@ -40,7 +40,7 @@ def _pose_table(sensor: SensorCalibration, quality: FitQuality, segments: Segmen
         row.append(_held_out_cell(quality, k))
         rows.append(tuple(row))
     head = ("pose", *(("mid [s]", "hold [s]", "up, in Mz") if is_known else ()), "residual [mm/s²]", "held out [mm/s²]")
-    return Table(head, tuple(rows), "Accelerometer: |f| − |g| of every still pose ± what noise alone allows")
+    return Table(head, tuple(rows), "Accelerometer: |f| − |g| of every pose ± what noise alone allows")
 
 
 def _held_out_cell(quality: FitQuality, k: int) -> str:

@@ -17,7 +17,7 @@ from trihedron.units import mrad_from_radians
 def check_report(
     recording: Recording, segments: Segments, calibration: Calibration | None, findings: tuple[Finding, ...]
 ) -> Document:
-    """Lay out the audit; ``calibration`` gives the error bars to expect."""
+    """Lay out the audit; ``calibration`` gives the uncertainties to expect."""
     blocks: list[Block] = [channels_table(recording)]
     if calibration is not None:
         blocks.append(_expected(calibration))
@@ -46,7 +46,7 @@ def _headlines(segments: Segments, calibration: Calibration | None) -> list[Head
             continue
         scale = _expected_cells(sensor)[0]
         out.append(Headline(f"{name} scale to expect to", scale, "", "standard error of the worst axis"))
-    out.append(Headline("still poses", str(segments.n_holds), "", how_many(len(segments.moves), "move")))
+    out.append(Headline("poses", str(segments.n_holds), "", how_many(len(segments.moves), "move")))
     return out
 
 
@@ -58,7 +58,7 @@ def _expected(calibration: Calibration) -> Table:
             continue
         rows.append((name, *_expected_cells(sensor)))
     head = ("", "scale", "zero", "angles between axes")
-    return Table(head, tuple(rows), "Error bars to expect: standard error, the largest of the axes")
+    return Table(head, tuple(rows), "Uncertainties to expect: standard error, the largest of the axes")
 
 
 def _expected_cells(sensor: SensorCalibration) -> tuple[str, str, str]:

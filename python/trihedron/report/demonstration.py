@@ -61,7 +61,7 @@ def _session(segments: Segments, recording: Recording) -> str:
         "of its case "
         f"and some tilts between, and never looks at an angle. After {duration(recording.duration_s)} the log holds "
         f"{recording.n_samples} rows of raw counts at {plain_number(recording.rate_hz, 4)} Hz; the sensor's own "
-        f"noise tells {segments.n_holds} still poses ({duration(still)} in all) from {len(segments.moves)} "
+        f"noise tells {segments.n_holds} poses ({duration(still)} in all) from {len(segments.moves)} "
         "moves. Nothing was set."
     )
 
@@ -69,7 +69,7 @@ def _session(segments: Segments, recording: Recording) -> str:
 def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, ...]:
     said = (
         f"Only gravity had to be said: latitude {latitude_deg:g}° gives {calibration.gravity_m_s2:.5f} m/s². In "
-        "every still pose the calibrated accelerometer must read that much, whatever the pose; through "
+        "every pose the calibrated accelerometer must read that much, whatever the pose; through "
         "every move the "
         "calibrated gyro "
         "must carry gravity from one pose into the next. One fit of both gives:"
@@ -84,8 +84,8 @@ def _verified(verification: Verification, before: float) -> tuple[Block, ...]:
     expected = float(np.sqrt(np.mean(verification.norm_sigma**2)))
     rows = [
         ("before", f"{_acceleration(before)} rms norm error with the data sheet's scale"),
-        ("after", f"{_acceleration(verification.norm_rms)} rms over {len(verification.norm_error)} still poses"),
-        ("to be expected", f"{_acceleration(expected)} rms from noise and the calibration's error bars"),
+        ("after", f"{_acceleration(verification.norm_rms)} rms over {len(verification.norm_error)} poses"),
+        ("to be expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainties"),
     ]
     if len(verification.angle_deg):
         expected = float(np.sqrt(np.mean(verification.angle_sigma_deg**2)))
@@ -134,7 +134,7 @@ def _coverage(comparison: Comparison) -> str:
     z = np.abs(comparison.z)
     n = len(z)
     return (
-        f"Within 1σ: {int(np.sum(z < 1.0))} of {n} (honest error bars: about {round(0.683 * n)}); within 2σ: "
+        f"Within 1σ: {int(np.sum(z < 1.0))} of {n} (honest uncertainties: about {round(0.683 * n)}); within 2σ: "
         f"{int(np.sum(z < 2.0))} of {n} (about {round(0.954 * n)}). With all correlations χ² is "
         f"{plain_number(comparison.chi2)} for {n} parameters. One session proves little: the same count over 200 "
         "sessions is benches/confidence. (The zeros of a real sensor wander; truth is their mean in this session.)"

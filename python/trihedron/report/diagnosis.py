@@ -1,4 +1,4 @@
-"""A diagnosis as a report: what disagrees, what was left out, how the fit improves, what remains."""
+"""A diagnosis as a report: what disagrees, what was excluded, how the fit improves, what remains."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ from trihedron.report.numbers import (
 from trihedron.report.reference import reference_blocks
 
 _CAPTIONS = {
-    "static-accel": "Length of gravity in every still pose.",
-    "static-gyro": "Rate that the gyro reads in every still pose, about its mean.",
+    "static-accel": "Length of gravity in every pose.",
+    "static-gyro": "Rate that the gyro reads in every pose, about its mean.",
     "moves": "Angle between gravity carried through a move by the gyro and gravity measured after it.",
     "dynamics": "Velocity over a move that the two poses at its ends do not allow.",
 }
@@ -61,7 +61,7 @@ MOST_PARAMETERS = 9
 
 
 def first_screen(diagnosis: Diagnosis) -> int:
-    """Sections that fit one screen: where it disagrees, numbers of a given model, what was left out, what remains."""
+    """Sections that fit one screen: where it disagrees, numbers of a given model, what was excluded, what remains."""
     return 4 if diagnosis.parameters else 3
 
 
@@ -73,7 +73,7 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         words = tuple(("", word) for word in numbers) or (("", "None of the given numbers differs."),)
         sections.append(Section("Numbers that differ (recording minus model)", (Facts(words),)))
     sections += [
-        Section("What was left out", effects_blocks(diagnosis)),
+        Section("What was excluded", effects_blocks(diagnosis)),
         Section("What remains", (Paragraph(_remaining(diagnosis)), *laws_blocks(diagnosis))),
         Section("Held out: before and after", _held_out(diagnosis)),
         Section("Candidates", (_candidates(diagnosis),)),
@@ -121,7 +121,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         )
         for d in diagnosis.domains
     )
-    head: tuple[str, ...] = ("what", "domain", "residual, a zero per pose", "χ²/dof", "p", "model", "with the effects")
+    head: tuple[str, ...] = ("what", "domain", "residual, a bias per pose", "χ²/dof", "p", "model", "with the effects")
     if not diagnosis.effects:
         head, rows = head[:-1], tuple(row[:-1] for row in rows)
     blocks: list[Block] = [Table(head, rows)]
@@ -168,7 +168,7 @@ def effects_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
 
 
 def _without_strongest(statement: str) -> str:
-    """The sentence without its strongest term, which stands below it with the digits that its error bar allows."""
+    """The sentence without its strongest term, which stands below it with the digits that its uncertainty allows."""
     return _capital(re.sub(r"\s*\(strongest term [^:]*: [^;]*?\)(?=\.|$|;)", "", statement))
 
 

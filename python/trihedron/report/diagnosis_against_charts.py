@@ -1,4 +1,4 @@
-"""A given simulation beside the recording in pictures: stage by stage, spectra of the holds, their Allan curves."""
+"""A given simulation beside the recording in pictures: stage by stage, spectra of the poses, their Allan curves."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def noise_pictures(diagnosis: Diagnosis) -> tuple[Block, ...]:
     seen = _spectra(diagnosis.noise_compared)
     if not seen:
         return ()
-    first = "Noise inside still poses, model (dashed) and recording, in octaves that both logs show."
+    first = "Noise inside poses, model (dashed) and recording, in octaves that both logs show."
     second = "Allan deviation of that noise, model (dashed) and recording: what the octaves above make of it."
     spectra = _picture("spectra-both", first, partial(spectra_chart, diagnosis))
     if not any(len(_without_gaps(*one)[0]) >= FEWEST_OCTAVES for one in seen.values()):

@@ -20,10 +20,10 @@ _WORDS = {
     "gravity": "gravity (or all three accelerometer scales)",
 }
 _GROUPS = {
-    "accel-zero": "accelerometer zeros",
+    "accel-zero": "accelerometer biases",
     "accel-scale": "accelerometer scales",
     "accel-misalignment": "accelerometer angles",
-    "gyro-zero": "gyro zeros",
+    "gyro-zero": "gyro biases",
     "gyro-scale": "gyro scales",
     "gyro-misalignment": "gyro angles",
     "triad-alignment": "the gyro triad's alignment",

@@ -14,7 +14,7 @@ MEANING = {
     "static-gyro": "gyro at rest",
     "moves": "gravity after a move",
     "dynamics": "velocity over a move",
-    "within-static": "inside still poses",
+    "within-static": "inside poses",
     "timing": "sampling instants",
     "numbers": "numbers of the model",
     "noise": "noise and sampling",
@@ -60,7 +60,7 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     )
     said = []
     if missing:
-        said.append(f"{listed(missing)} {'was' if len(missing) == 1 else 'were'} left out of the model")
+        said.append(f"{listed(missing)} {'was' if len(missing) == 1 else 'were'} excluded from the model")
     if surplus:
         said.append(f"the model has {listed(surplus)}, which the recording lacks")
     if numbers:

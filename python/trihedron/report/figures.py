@@ -48,7 +48,7 @@ def draw_signals(recording: Recording, segments: Segments | None = None) -> Figu
 
 
 def draw_holds(segments: Segments) -> Figure:
-    """Mean readings of every still pose over time, in the unit of the log."""
+    """Mean readings of every pose over time, in the unit of the log."""
     pairs = [("accelerometer", segments.accelerometer_mean), ("gyroscope", segments.gyroscope_mean)]
     present = [(name, means) for name, means in pairs if means is not None]
     figure, axes = panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
@@ -88,7 +88,7 @@ def draw_residuals(quality: FitQuality) -> Figure:
         elinewidth=1.0,
         label="in sample",
     )
-    axis.set_xlabel("still pose")
+    axis.set_xlabel("pose")
     axis.set_ylabel("|f| − |g|  [mm/s²]")
     axis.set_xlim(-0.8, len(pose) - 0.2)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
@@ -221,7 +221,7 @@ def draw_verification(verification: Verification) -> Figure:
         color=AXIS_COLOURS[0],
         elinewidth=1.0,
     )
-    axes[0].set_xlabel("still pose")
+    axes[0].set_xlabel("pose")
     axes[0].set_ylabel("|f| − |g|  [mm/s²]")
     if has_moves:
         move = np.arange(len(verification.angle_deg))

@@ -42,7 +42,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         sections = _with_references(outcome, calibration)
     else:
         sections = _without_references(outcome, calibration)
-    # What decides whether the error bars hold stands beside the verdict; the rest of the pictures below.
+    # What decides whether the uncertainties hold stands beside the verdict; the rest of the pictures below.
     pictures = [b for section in sections for b in section.blocks if isinstance(b, Picture)]
     lead = next(picture for picture in pictures if picture.name == "innovations")
     sections = [Section(s.heading, tuple(b for b in s.blocks if b is not lead)) for s in sections]

@@ -47,7 +47,7 @@ def convergence_chart(axis: AxisKalmanResult, raw_unit: str) -> Chart:
 
 
 def norm_convergence_chart(outcome: NormKalmanCalibration) -> Chart:
-    """S and b after every pose with their 3σ bands; what the frame fixes at zero is left out."""
+    """S and b after every pose with their 3σ bands; what the frame fixes at zero is excluded."""
     n = len(outcome.parameters)
     pose = np.arange(1, n + 1, dtype=np.float64)
     panels = []

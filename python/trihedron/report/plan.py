@@ -74,7 +74,7 @@ def _turns(plan: ExperimentPlan) -> Table:
         ("zero turn first, then the turns", turns.scale_zero_first, turns.zero_zero_first),
     )
     return Table(
-        ("standard error", "gyro scale", "gyro zero"),
+        ("standard error", "gyro scale", "gyro bias"),
         tuple(
             (name, _percent(scale), f"{plain_number(degrees_from_radians(zero), 2)} °/s") for name, scale, zero in rows
         ),

@@ -14,7 +14,7 @@ from trihedron.report.numbers import unit_in_print
 def signals_chart(recording: Recording, segments: Segments) -> Chart:
     """Both sensors over time, holds shaded, bumps marked."""
     time_s = recording.time_s
-    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "still pose") for h in segments.holds]
+    spans = [Span(float(time_s[h.start]), float(time_s[h.stop - 1]), "pose") for h in segments.holds]
     last = recording.n_samples - 1
     bumps = [
         Span(float(time_s[a]), float(time_s[min(b, last)]), "disturbed, left out", "warn")
@@ -62,7 +62,7 @@ def verification_chart(verification: Verification) -> Chart:
         for k, (e, s) in enumerate(zip(error, sigma, strict=True))
     ]
     norm = Panel(
-        Scale("still pose", limits=(-0.7, len(pose) - 0.3), whole=True),
+        Scale("pose", limits=(-0.7, len(pose) - 0.3), whole=True),
         Scale("|f| − |g|  [mm/s²]", "mm/s²"),
         (
             Band(edge, -limit, limit, "3σ of noise and of the calibration's own error"),

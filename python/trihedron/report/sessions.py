@@ -73,7 +73,7 @@ def _facts(model: SessionsModel) -> tuple[tuple[str, str], ...]:
     if model.thermal is not None:
         facts.append(("valid", f"{_range(model.thermal)}, counted from {model.thermal.reference_degc:.1f} °C"))
     facts.append(
-        ("calibration", "the common numbers; its error bars are those of the next recording, repeatability included")
+        ("calibration", "the common numbers; its uncertainties are those of the next recording, repeatability included")
     )
     return tuple(facts)
 
@@ -133,7 +133,7 @@ def _changes(model: SessionsModel) -> list[Block]:
     return [
         Paragraph(
             "Each number of all recordings against one common value, by each recording's own error and the wander of "
-            "its zeros; p after Holm's procedure over all lines."
+            "its biases; p after Holm's procedure over all lines."
         ),
         Table(head, tuple(rows)),
     ]

@@ -41,15 +41,15 @@ def recording_summary(recording: Recording) -> Document:
 
 def segments_summary(segments: Segments) -> Document:
     """Holds and moves without the recording: how many, how long, their mean readings."""
-    found = f"{how_many(segments.n_holds, 'still pose')}, {how_many(len(segments.moves), 'move')}."
+    found = f"{how_many(segments.n_holds, 'pose')}, {how_many(len(segments.moves), 'move')}."
     still_s = float(np.sum(segments.duration_s)) if segments.n_holds else 0.0
     return Document(
-        title="Still poses and moves",
+        title="Poses and moves",
         subtitle=f"{duration(still_s)} still in all",
         verdict=verdict_of(segments.findings, found, found.removesuffix("."), "NOT FIT"),
         is_trustworthy=not any(finding.severity is Severity.SERIOUS for finding in segments.findings),
         sections=(
-            Section("Still poses", (_holds(segments),)),
+            Section("Poses", (_holds(segments),)),
             Section("Findings", (findings_block(segments.findings),)),
             Section("Figures", (Picture("holds", "Mean readings.", later("figures", "draw_holds", segments)),)),
         ),

@@ -33,7 +33,7 @@ def verification_report(
         subtitle=verification.source,
         verdict=verdict_of(
             verification.findings,
-            "The calibration holds here: errors are what noise and its own error bars allow.",
+            "The calibration holds here: errors are what noise and its own uncertainties allow.",
             "The calibration was tested",
             "NOT PASSED",
         ),
@@ -64,10 +64,10 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
         ("gravity", f"{v.gravity_m_s2:.5f} m/s², {v.gravity_source}"),
         (
             "norm error",
-            f"{_acceleration(v.norm_rms)} rms over {len(v.norm_error)} still poses, worst "
+            f"{_acceleration(v.norm_rms)} rms over {len(v.norm_error)} poses, worst "
             f"{_acceleration(float(v.norm_error[worst]))} in pose {worst}",
         ),
-        ("to be expected", f"{_acceleration(expected)} rms from noise and the calibration's own error bars"),
+        ("to be expected", f"{_acceleration(expected)} rms from noise and the calibration's own uncertainties"),
     ]
     if len(v.angle_deg):
         worst = int(np.argmax(v.angle_deg))
@@ -83,7 +83,7 @@ def _facts(verification: Verification) -> tuple[tuple[str, str], ...]:
     if len(v.rest_rate):
         shift = [plain_number(degrees_from_radians(float(r)), 2) for r in np.mean(v.rest_rate, axis=0)]
         facts.append(
-            ("gyro's zero", f"moved by {', '.join(shift)} °/s since the calibration (taken from each still pose)")
+            ("gyro's bias", f"moved by {', '.join(shift)} °/s since the calibration (taken from each pose)")
         )
     return tuple(facts)
 
@@ -152,7 +152,7 @@ def _errors_picture(verification: Verification) -> Picture:
     draw = later("figures", "draw_verification", verification)
     return Picture(
         "errors",
-        "Error in every still pose and after every move, with what was to be expected.",
+        "Error in every pose and after every move, with what was to be expected.",
         draw,
         partial(verification_chart, verification),
     )

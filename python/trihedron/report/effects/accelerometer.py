@@ -62,11 +62,11 @@ ENTRIES = (
     ),
     EffectWords(
         "accel-zero-scatter",
-        "the accelerometer's zero is another in every pose",
+        "the accelerometer's bias is another in every pose",
         COME_BACK,
         MappingProxyType(
             {
-                "scatter": "The accelerometer's zero is another in every pose, by {sigma:.2g mm/s²} per axis (one "
+                "scatter": "The accelerometer's bias is another in every pose, by {sigma:.2g mm/s²} per axis (one "
                 "standard deviation), beyond noise and drift; no pose or temperature accounts for it."
             }
         ),

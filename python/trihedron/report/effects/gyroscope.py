@@ -45,11 +45,11 @@ ENTRIES = (
     ),
     EffectWords(
         "gyro-zero-scatter",
-        "the gyro's zero is another in every pose",
+        "the gyro's bias is another in every pose",
         COME_BACK,
         MappingProxyType(
             {
-                "scatter": "The gyro's zero is another in every pose, by {sigma:all .2g °/s} (x, y, z; one standard "
+                "scatter": "The gyro's bias is another in every pose, by {sigma:all .2g °/s} (x, y, z; one standard "
                 "deviation), beyond noise and drift; it follows neither gravity nor a logged temperature."
             }
         ),

@@ -10,7 +10,7 @@ from trihedron.report.effects.shared import SHAKE
 ENTRIES = (
     EffectWords(
         "accel-gyro-time-offset",
-        "accelerometer and gyro samples with the same time stamp belong to different instants",
+        "accelerometer and gyro samples with the same timestamp belong to different instants",
         SHAKE,
     ),
     EffectWords(
@@ -44,7 +44,7 @@ ENTRIES = (
     ),
     EffectWords(
         "quantisation",
-        "the resolution is too coarse for the noise: means of still poses sit on steps",
+        "the resolution is too coarse for the noise: means of poses sit on steps",
         "choose a finer range, or add a little motion or noise (dither) while averaging",
         MappingProxyType(
             {
@@ -64,22 +64,22 @@ ENTRIES = (
     ),
     EffectWords(
         "dropped-samples",
-        "samples are missing though the time stamps run on evenly",
+        "samples are missing though the timestamps run on evenly",
         "log the sensor's own sample counter",
         MappingProxyType(
-            {"losses": "Samples are missing though the time stamps run on: {losses:each}{has_more:? and {more} more|}."}
+            {"losses": "Samples are missing though the timestamps run on: {losses:each}{has_more:? and {more} more|}."}
         ),
         lines=MappingProxyType({"losses": "{v0} at {v1:.2f} s"}),
     ),
     EffectWords(
         "timing-jitter",
-        "samples are taken at other instants than their time stamps say",
+        "samples are taken at other instants than their timestamps say",
         "let the sensor's own clock trigger the sampling, or log its data-ready times",
         MappingProxyType(
             {
-                "stamps": "The time stamps scatter by {rms_s:.2g ms} about an even clock, but the readings do not "
+                "stamps": "The timestamps scatter by {rms_s:.2g ms} about an even clock, but the readings do not "
                 "follow them (share {followed:.2f} ± {sigma:.1g}): the samples were taken evenly.",
-                "samples": "Every sample is off its time stamp by about {jitter_s:.2g ms}: both sensors' steps scatter "
+                "samples": "Every sample is off its timestamp by about {jitter_s:.2g ms}: both sensors' steps scatter "
                 "together, with the slope of the signal.",
             }
         ),

@@ -49,7 +49,7 @@ def _thermal(sensor: str, unit: str) -> str:
         "{has_rate:?, and its rate of change|}{has_branches:?, on two branches|}: it runs through "
         f"{swing} (x, y, z); {left} rms stay of {raw}."
         f"{{has_gap:? At one temperature heating and cooling differ by {gap}: hysteresis, or a drift in time, which "
-        "one cycle does not tell.|}{is_one_pose:? One orientation does not tell zero from scale, nor the fixture's own "
+        "one cycle does not tell.|}{is_one_pose:? One orientation does not tell bias from scale, nor the fixture's own "
         "tilt across gravity.|}"
     )
 
@@ -64,7 +64,7 @@ def saturates(effect_id: str, sensor: str) -> EffectWords:
         MappingProxyType(
             {
                 "plateaus": f"T{end[1:]}: {{plateaus}} plateaus, {{samples}} samples, in {{touched}} of {{moves}} "
-                "moves; what those moves read is false and is left out of the fit."
+                "moves; what those moves read is false and is excluded from the fit."
             }
         ),
     )

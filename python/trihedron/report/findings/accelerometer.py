@@ -7,16 +7,16 @@ from trihedron.records.finding import Severity
 from trihedron.report.findings.entry import Entry
 
 NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
-_UNQUIET = "Poses not quite still, a zero that drifts between poses, nonlinearity, or noise of the means underrated."
+_UNQUIET = "Poses not quite still, a bias that drifts between poses, nonlinearity, or noise of the means underrated."
 _LOOK = "Look at the residual per pose; `trihedron diagnose` names the effect."
-_ADD_POSES = "Add still poses with {advice:numbered}."
+_ADD_POSES = "Add poses with {advice:numbered}."
 
 ENTRIES = (
     Entry(
         Code.RESIDUAL_ABOVE_NOISE,
         "poses",
         WARNING,
-        "The residual of the still poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
+        "The residual of the poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
         "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); all standard errors "
         "of the accelerometer are multiplied by {widening:.3g}.",
         _UNQUIET,
@@ -26,7 +26,7 @@ ENTRIES = (
         Code.RESIDUAL_ABOVE_NOISE,
         "poses-joint",
         WARNING,
-        "The residual of the still poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
+        "The residual of the poses is {rms_m_s2:.3g mm/s²} rms, the noise of their means explains only "
         "{floor_m_s2:.3g mm/s²} (χ² per degree of freedom {chi2_per_dof:.3g}, {dof:.0f} degrees); the fit lets the "
         "zero differ from pose to pose, here by {zero_scatter_m_s2:.2g mm/s²} rms, and the standard errors contain "
         "that.",
@@ -37,7 +37,7 @@ ENTRIES = (
         Code.NOT_OBSERVABLE,
         "poses-rank",
         SERIOUS,
-        "The still poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; unseen is the "
+        "The poses determine {rank:.0f} of the {n_parameters:.0f} parameters of the accelerometer; unseen is the "
         "{unseen:&, the }, held within {anchor:.0f %} of a perfect triad.",
         "Too few different orientations: six faces alone are six equations for nine parameters.",
         _ADD_POSES,
@@ -46,7 +46,7 @@ ENTRIES = (
         Code.NOT_OBSERVABLE,
         "poses-weak",
         SERIOUS,
-        "The still poses determine the accelerometer so weakly that some pose could be wrong by {at_worst:.2g %} of "
+        "The poses determine the accelerometer so weakly that some pose could be wrong by {at_worst:.2g %} of "
         "gravity; worst is {weakest}. All parameters were held within {anchor:.0f %} of a perfect triad.",
         "The orientations are too much alike.",
         _ADD_POSES,
@@ -65,7 +65,7 @@ ENTRIES = (
         Code.OUTLIER_POSE,
         "",
         WARNING,
-        "Still pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
+        "Pose {pose} differs from what all other poses predict by {held_out_m_s2:.3g mm/s²} ({z:abs .1f} "
         "standard errors, limit {limit:.1f}).",
         "The sensor was touched or not still in this pose, or a reading clipped.",
         "Leave the pose out, or use a robust loss.",
@@ -82,7 +82,7 @@ ENTRIES = (
         Code.NONLINEAR_RESIDUAL,
         "poses",
         SERIOUS,
-        "What the still poses miss of |g| has the shape of {is_cubic:?an axis whose reading bends with the cube of the "
+        "What the poses miss of |g| has the shape of {is_cubic:?an axis whose reading bends with the cube of the "
         "force|{is_quadratic:?an axis whose reading bends with the square of the force|an axis with another scale in "
         "each direction}} (p = {p:.1g} by chance): S and b are off by up to {shift_m_s2:.2g mm/s²} at 1 g from it, "
         "{shift_sigma:.2g} of the standard errors that scatter alone would leave.",
@@ -113,7 +113,7 @@ ENTRIES = (
         "accelerometer-signs-asked",
         WARNING,
         "The accelerometer's axes form a left-handed triad: det S < 0 (signs of the diagonal {signs}).",
-        "The documented direction of one axis (or of all three) is wrong, or two axes are swapped. Still poses alone "
+        "The documented direction of one axis (or of all three) is wrong, or two axes are swapped. Poses alone "
         "cannot tell signs; these are the ones asked for.",
         "Check the axis directions printed on the board against a pose with one axis up.",
         numbers=("det_S_sign",),
@@ -138,7 +138,7 @@ ENTRIES = (
         Code.POSE_NOT_A_FACE,
         "",
         NOTE,
-        "{n_left_out} of {n_poses} still poses have no axis within {largest_tilt_deg:.0f}° of the vertical and are not "
+        "{n_left_out} of {n_poses} poses have no axis within {largest_tilt_deg:.0f}° of the vertical and are not "
         "used by method 1 (poses {poses:&, }).",
         "They are edges, corners or leaning poses.",
         "Method 2 uses them all.",
@@ -149,7 +149,7 @@ ENTRIES = (
         WARNING,
         "The faces contradict each other (χ² per degree of freedom {chi2_per_dof:.3g}) as if each pose were tilted by "
         "{tilt_deg:.2g}° rms; most in pose {pose} ({face}). The standard errors include this tilt.",
-        "The table is not level, the case is not square or did not lie flat; a drifting zero looks the same.",
+        "The table is not level, the case is not square or did not lie flat; a drifting bias looks the same.",
         "Level the table, press the case flat, or use method 2, which needs neither.",
     ),
     Entry(

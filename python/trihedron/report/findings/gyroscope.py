@@ -12,7 +12,7 @@ _LOOK_AT_MOVES = "Look at the residual per move; give the nominal scale."
 _OUTSIDE_THE_MODEL = (
     "an effect outside the linear model: g-sensitivity, a time offset between the sensors, nonlinearity"
 )
-_ZERO_MOVES = "warm-up, slow noise, or a zero reading that depends on attitude (g-sensitivity)"
+_ZERO_MOVES = "warm-up, slow noise, or a bias that depends on attitude (g-sensitivity)"
 _SAME_GRAVITY = "turns about the vertical leave gravity where it was, and a whole turn brings it back"
 
 _MOVES = (
@@ -37,7 +37,7 @@ _MOVES = (
         "moves",
         WARNING,
         "gravity after the moves is missed by more than the noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} "
-        "degrees of freedom; the error bars are widened by its root.",
+        "degrees of freedom; the uncertainties are widened by its root.",
         _OUTSIDE_THE_MODEL,
         "Run trihedron diagnose to see which.",
         or_severity=SERIOUS,
@@ -88,16 +88,16 @@ _MOVES = (
         Code.OUTLIER_MOVE,
         "",
         WARNING,
-        "move {move} (hold {before} to hold {after}) misses gravity by {residual_m_s2:.3g} m/s², {times:.0f} times its "
-        "noise, and is left out.",
-        "one of its holds was not still, samples were lost, or the gyro was driven beyond its range",
+        "move {move} (pose {before} to pose {after}) misses gravity by {residual_m_s2:.3g} m/s², {times:.0f} times its "
+        "noise, and is excluded.",
+        "one of its poses was not still, samples were lost, or the gyro was driven beyond its range",
         "Look at this move; repeat it.",
     ),
     Entry(
         Code.HELD_OUT_WORSE,
         "moves",
         WARNING,
-        "moves that the fit did not see are predicted {times:.1f} times worse than the error bars say.",
+        "moves that the fit did not see are predicted {times:.1f} times worse than the uncertainties say.",
         "too few moves for the number of parameters, or an effect that differs from move to move",
         "Record more moves, about all axes, both ways.",
         numbers=("chi2_per_dof",),
@@ -106,8 +106,8 @@ _MOVES = (
         Code.GYRO_G_SENSITIVITY,
         "",
         NOTE,
-        "the gyro's zero reading follows gravity, by up to {per_g_rad_s:.2g deg/s} per g (axis {rate_axis} for force "
-        "along axis {force_axis}), {scatter_left:.0f %} of its scatter between holds is left without it. The moves "
+        "the gyro's bias follows gravity, by up to {per_g_rad_s:.2g deg/s} per g (axis {rate_axis} for force "
+        "along axis {force_axis}), {scatter_left:.0f %} of its scatter between poses is left without it. The moves "
         "were fitted without it, but S and b alone cannot correct it.",
         "g-sensitivity of the gyro",
         "Run trihedron diagnose for the extended model.",
@@ -118,10 +118,10 @@ _MOVES = (
         Code.GYRO_BIAS_DRIFT,
         "holds",
         NOTE,
-        "the gyro's zero reading differs between holds by up to {change_rad_s:.2g deg/s} (axis {axis}), {times:.1f} "
-        "times its noise; each move uses the holds next to it.",
+        "the gyro's bias differs between poses by up to {change_rad_s:.2g deg/s} (axis {axis}), {times:.1f} "
+        "times its noise; each move uses the poses next to it.",
         _ZERO_MOVES,
-        "Let the sensor warm up; use the stated zero only near this temperature.",
+        "Let the sensor warm up; use the stated bias only near this temperature.",
     ),
     Entry(
         Code.NOT_OBSERVABLE,
@@ -151,11 +151,11 @@ _MOVES = (
         Code.SAMPLES_LOST,
         "seen-in-motion",
         WARNING,
-        "Samples are missing though the stamps run on evenly: {long_steps} of {steps} steps in motion are one sample "
+        "Samples are missing though the timestamps run on evenly: {long_steps} of {steps} steps in motion are one sample "
         "too long, {short_steps} too short (first at {first_s:.2f} s): about {lost_share:.2g !%} ± "
         "{sigma_lost_share:.1g %} of the samples, and of every turn, are lost. The gyro's scale factors are too large "
         "by about that.",
-        "A link or a logger that drops samples and stamps, or numbers, what is left anew.",
+        "A link or a logger that drops samples and timestamps, or numbers, what is left anew.",
         "Do not use this gyro calibration: log the sensor's own sample counter or time and record again; "
         "`trihedron diagnose` puts single losses back.",
         or_severity=SERIOUS,
@@ -164,10 +164,10 @@ _MOVES = (
         Code.SAMPLES_LOST,
         "possible",
         SERIOUS,
-        "Gravity after the moves is missed by more than noise, and the stamps are so even that they may have been "
+        "Gravity after the moves is missed by more than noise, and the timestamps are so even that they may have been "
         "made anew: {lost_share:.2g %} of the samples could be missing without a trace. Every turn, and the gyro's "
         "scale factors, would be wrong by as much; its standard error without that is {sigma_scale:.2g %}.",
-        "A link or a logger that drops samples and stamps, or numbers, what is left anew; or another cause of "
+        "A link or a logger that drops samples and timestamps, or numbers, what is left anew; or another cause of "
         "the misses.",
         "Log the sensor's own sample counter or time, and record again; `trihedron diagnose` looks for other causes.",
     ),
@@ -207,7 +207,7 @@ _TURNS = (
         "left-out",
         WARNING,
         "turn {turn}, taken for {angle_rad:.0f deg} about axis {axis}, is off by {deviation_rad:.2g deg} against the "
-        "others; it is left out.",
+        "others; it is excluded.",
         "the case was not pushed home against the wall, or the turn was another one",
         "Repeat this turn.",
     ),
@@ -224,7 +224,7 @@ _TURNS = (
         Code.TURN_NOT_A_MULTIPLE,
         "scatter",
         WARNING,
-        "the turns scatter by {sigma_turn_rad:.2g deg} about the multiples they were taken for; the error bars contain "
+        "the turns scatter by {sigma_turn_rad:.2g deg} about the multiples they were taken for; the uncertainties contain "
         "it.",
         "turned by eye, without a wall",
         "Push the case against a wall before and after each turn.",
@@ -260,7 +260,7 @@ _TURNS = (
         "turns",
         WARNING,
         "the turns are missed by more than their noise explains: χ²/dof = {chi2_per_dof:.1f} with {dof:.0f} degrees of "
-        "freedom; the error bars are widened by its root.",
+        "freedom; the uncertainties are widened by its root.",
         "turns that were not the stated angle, a table that is not level, or a drifting zero",
         "Repeat the turns against a wall.",
     ),
@@ -268,7 +268,7 @@ _TURNS = (
         Code.GYRO_BIAS_DRIFT,
         "turns",
         NOTE,
-        "the gyro's zero reading differs between still stretches by {times:.1f} times its noise (axis {axis}).",
+        "the gyro's bias differs between still stretches by {times:.1f} times its noise (axis {axis}).",
         _ZERO_MOVES,
         "Let the sensor warm up; keep still before and after every turn.",
         numbers=("chi2_per_dof",),

@@ -34,7 +34,7 @@ _LOG = (
         NOTE,
         "{n_knocks:# short excursion} of up to {knock:abs .3g} {unit}, the largest at {time_s:.1f} s.",
         "a knock at the table, a door, a lost or damaged reading",
-        "They raise N and Q; these stretches are left out.",
+        "They raise N and Q; these stretches are excluded.",
     ),
     Entry(
         Code.LOG_MOTION,
@@ -43,13 +43,13 @@ _LOG = (
         "For {shaken_s:.3g} s the readings scatter up to {times:.2g} times as much as in the rest, first at "
         "{first_s:.1f} s.",
         "motion, vibration or handling during a log that should be still",
-        "It raises N; these stretches are left out.",
+        "It raises N; these stretches are excluded.",
     ),
     Entry(
         Code.LOG_MOTION,
         "throughout",
         SERIOUS,
-        "Events cover {share:.0f %} of the log: it is disturbed throughout, and nothing was left out.",
+        "Events cover {share:.0f %} of the log: it is disturbed throughout, and nothing was excluded.",
         "the sensor was not at rest",
         "The terms describe the disturbance as much as the sensor; record at rest.",
     ),
@@ -87,7 +87,7 @@ _SPECTRUM = (
         NOTE,
         "{n_lines:# periodic line}: {strongest:each}{has_more:? and {n_more} more|}.",
         "mains, a fan, vibration of the building, or a clock inside the sensor",
-        "A line makes waves in the Allan curve near half its period; its frequencies were left out of the fit.",
+        "A line makes waves in the Allan curve near half its period; its frequencies were excluded from the fit.",
         numbers=("frequency_hz", "amplitude"),
         lines=MappingProxyType({"strongest": "{v0:.4g} Hz ({v1:.2g} {v2})"}),
     ),
@@ -125,7 +125,7 @@ _SPECTRUM = (
         WARNING,
         "Below {first_s:.3g} s the curve is not a sum of noise terms.",
         "a low-pass filter in the sensor or the logger, resampling, or a periodic disturbance",
-        "All terms are quoted from longer averaging times; a Q may be the tail of what was left out.",
+        "All terms are quoted from longer averaging times; a Q may be the tail of what was excluded.",
     ),
     Entry(
         Code.SPECTRUM_UNEXPLAINED,

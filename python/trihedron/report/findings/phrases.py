@@ -30,7 +30,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "poses-unseen": "{names:together}: not seen at all ({rank} of 9 parameters are determined)",
         "poses-weakest": "{names:together}: seen {times:.3g} times worse than the best",
         "faces-all": "all faces present",
-        "faces-missing": "scale and zero are told apart without {faces:&, }",
+        "faces-missing": "scale and bias are told apart without {faces:&, }",
         # moves and turns of a gyro
         "gyro-scale": "scale of gyro axis {axis} (S{axis}{axis}), known to {share:.2g %} of the scale",
         "gyro-share": "the share of gyro axis {axis} in the rate about axis {rate} (S{rate}{axis}), known to "
@@ -38,13 +38,13 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         "gyro-answer": "answer of gyro axis {axis} to turns about case axis {about}, known to {share:.2g %}",
         "turn-about": "lay body axis {axis} level and turn the sensor about it by 90 to 120 degrees, "
         "{start:?starting with body axis {upright} upright|{is_twice:?twice, starting with each of the two other axes "
-        "upright once|and back}}, with a still pose before and after",
-        "moves-about-all": "add moves about all three body axes held level, each with a still pose before and after",
+        "upright once|and back}}, with a pose before and after",
+        "moves-about-all": "add moves about all three body axes held level, each with a pose before and after",
         # known attitudes
         "sensitivity-to": "sensitivity to {axis}",
-        "zero-reading": "zero reading",
+        "zero-reading": "bias",
         "tilt-towards-vertical": "tilt {axis} towards the vertical",
-        "zero-both-ways": "turn the zero reading's axis both ways up",
+        "zero-both-ways": "turn the bias's axis both ways up",
         # why a fit ended
         "small-step": "converged: the Gauss-Newton step no longer moves the parameters",
         "small-gradient": "converged: the residual is orthogonal to every parameter",
@@ -68,7 +68,7 @@ PHRASES: Mapping[str, str] = MappingProxyType(
         # laws of what stays unexplained
         "law-follows": "The {sensor}'s {is_at_rest:?zero|reading in motion} ({axes:&, }) follows {depends:and}: "
         "{share:.0f %} of the held-out misfit.",
-        "law-follows-room": "The gyro's zero follows a vector fixed in the room, {inclination_deg:.0f}° ± "
+        "law-follows-room": "The gyro's bias follows a vector fixed in the room, {inclination_deg:.0f}° ± "
         "{inclination_sigma_deg:.0f}° from the vertical: {share:.0f %} of the held-out misfit.",
         "law-form": "reading of {axes:&, } grows by {terms:& + }",
         "law-form-room": "zero = K Rᵀ m, m a unit vector fixed in the room",

@@ -16,7 +16,7 @@ _CALIBRATE = (
         "",
         WARNING,
         "Gravity was not given; {gravity_m_s2} m/s² was used. Where people live it lies between {low_m_s2:.3f} and "
-        "{high_m_s2:.3f} m/s², and its error goes into every scale and zero of the accelerometer: up to "
+        "{high_m_s2:.3f} m/s², and its error goes into every scale and bias of the accelerometer: up to "
         "{possible_error_percent:.1f} % that no residual shows and no ± contains.",
         "Neither --gravity nor --latitude was said.",
         "Give --latitude DEG (and --height M), or --gravity M_S2.",
@@ -25,8 +25,8 @@ _CALIBRATE = (
         Code.JOINT_FIT_LEFT,
         "",
         NOTE,
-        "The moves contradict the still poses (one fit of both raises χ² of the poses by {chi2_increase:.3g}; noise "
-        "explains 28); the accelerometer was therefore taken from the still poses alone, and the gyro from the moves "
+        "The moves contradict the poses (one fit of both raises χ² of the poses by {chi2_increase:.3g}; noise "
+        "explains 28); the accelerometer was therefore taken from the poses alone, and the gyro from the moves "
         "by it.",
         "An effect in the moves that the model does not have, which one fit of both would spread over the "
         "accelerometer.",
@@ -48,7 +48,7 @@ _CALIBRATE = (
         WARNING,
         "The gyro was not calibrated: {why}.",
         "The recording does not hold what the gyro needs.",
-        "Turn the sensor about all three axes between still poses; docs/procedure.md shows how.",
+        "Turn the sensor about all three axes between poses; docs/procedure.md shows how.",
     ),
     Entry(
         Code.NOT_FIT,
@@ -113,7 +113,7 @@ _USE = (
         Code.GYROSCOPE_LEFT_OUT,
         "calibration-has-none",
         WARNING,
-        "The gyro was left out: the calibration holds none.",
+        "The gyro was excluded: the calibration holds none.",
         "It was made without gyro readings, or they did not suffice.",
         "Calibrate both sensors in one recording.",
     ),
@@ -121,7 +121,7 @@ _USE = (
         Code.GYROSCOPE_LEFT_OUT,
         "model-has-none",
         WARNING,
-        "The gyro was left out: the model has none.",
+        "The gyro was excluded: the model has none.",
         "It was made without gyro readings, or they did not suffice.",
         "Give a calibration of both sensors.",
     ),
@@ -216,7 +216,7 @@ _DIAGNOSE = (
         Code.EFFECTS_MODELLED,
         "stays-linear",
         WARNING,
-        "The calibration stays linear: with {effects:&, } what was left out is predicted worse ({domain} from "
+        "The calibration stays linear: with {effects:&, } what was excluded is predicted worse ({domain} from "
         "{rms_before:.3g} to {rms_after:.3g} {unit} rms).",
         "The effects belong to this session more than to the sensor, or its poses are too few to tell their size.",
         "`trihedron diagnose` shows them; record another session to see which of them return.",
@@ -260,14 +260,14 @@ _DIAGNOSE = (
         Code.PROTOCOL_DIFFERS,
         "",
         NOTE,
-        "The simulated recording has {n_simulated} still poses and the real one {n_real}.",
+        "The simulated recording has {n_simulated} poses and the real one {n_real}.",
         "They do not follow the same protocol, or a pose was not still.",
-        "Numbers, noise and physics are compared all the same, each from its own poses; only their error bars differ.",
+        "Numbers, noise and physics are compared all the same, each from its own poses; only their uncertainties differ.",
     ),
 )
 
 _CHANGED_CAUSE = {
-    "zero": "Turning on, mounting, temperature or age moved the zero by more than it wanders in a recording.",
+    "zero": "Turning on, mounting, temperature or age moved the bias by more than it wanders in a recording.",
     "scale": "Temperature, stress or the gravity that was given.",
     "misalignment": "Stress in the package or the board, or another unit.",
     "alignment": "One of two parts was remounted, or another unit.",
@@ -285,7 +285,7 @@ _MANY_RECORDINGS = (
         Code.SESSION_LEFT_OUT,
         "",
         WARNING,
-        "{name} was left out: {why}.",
+        "{name} was excluded: {why}.",
         "One recording that cannot be calibrated does not stop the others.",
         "See `trihedron check {path}`.",
     ),
@@ -303,7 +303,7 @@ _MANY_RECORDINGS = (
         WARNING,
         "The recordings were made between {low_degc:.0f} and {high_degc:.0f} °C, and what temperature does is in their "
         "spread.",
-        "Zeros and scales of every part follow temperature.",
+        "Biases and scales of every part follow temperature.",
         "Say --by temperature.",
         numbers=("span_degc",),
     ),

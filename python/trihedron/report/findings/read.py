@@ -225,13 +225,13 @@ _COLUMNS = (
         Code.COLUMN_LEFT_OUT,
         "words",
         NOTE,
-        "Column {column} holds words (such as {example!r}) and was left out.",
+        "Column {column} holds words (such as {example!r}) and was excluded.",
     ),
     Entry(
         Code.COLUMN_LEFT_OUT,
         "type",
         NOTE,
-        "Column '{column}' holds {kind}, not numbers, and was left out.",
+        "Column '{column}' holds {kind}, not numbers, and was excluded.",
     ),
 )
 
@@ -242,7 +242,7 @@ _ROWS = (
         WARNING,
         "{rows_left_out} lines above the first row of {n_columns} numbers were passed over (first: line {line}).",
         "Rows of another layout, damaged rows, or numbers that belong to a preamble.",
-        "Look at these lines; nothing else of the file was left out.",
+        "Look at these lines; nothing else of the file was excluded.",
     ),
     Entry(
         Code.ROWS_LEFT_OUT,
@@ -255,7 +255,7 @@ _ROWS = (
         Code.LINE_INCOMPLETE,
         "",
         NOTE,
-        "The last line ({line}) breaks off in the middle and was left out.",
+        "The last line ({line}) breaks off in the middle and was excluded.",
         "The logger was stopped while it wrote.",
         "Nothing is lost but one sample.",
         numbers=("rows_left_out",),
@@ -274,7 +274,7 @@ _ROWS = (
         Code.REPEATED_ROWS,
         "copies",
         WARNING,
-        "{rows_left_out} rows are copies of the row before, time stamp included (first: {where}); they were left out.",
+        "{rows_left_out} rows are copies of the row before, timestamp included (first: {where}); they were excluded.",
         "A logger that writes a row twice, or a stream joined with itself.",
         numbers=("count", "row"),
     ),
@@ -335,7 +335,7 @@ _DEVICES = (
         "in-turn",
         NOTE,
         "{accelerometer_rows} rows hold the accelerometer and {gyroscope_rows} the gyro, with the other's cells empty: "
-        "they were read as two logs and joined on their stamps.",
+        "they were read as two logs and joined on their timestamps.",
         numbers=("rows_left_out",),
     ),
 )

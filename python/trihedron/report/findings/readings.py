@@ -35,7 +35,7 @@ ENTRIES = (
         WARNING,
         "The {sensor} has {count} rows without a finite reading (first: {where}).",
         "Lost samples, or a logger that writes NaN.",
-        "These rows are left out; nothing is made up in their place.",
+        "These rows are excluded; nothing is made up in their place.",
         numbers=("sample",),
         or_severity=SERIOUS,
     ),
@@ -46,7 +46,7 @@ ENTRIES = (
         "The {sensor} repeats its last reading in {count} rows ({fraction:.3g %}; chance would give {chance:.2g %}); "
         "the longest run is {longest_run} rows from {where}.",
         "The log is faster than the sensor, or the logger repeats a value when it has no new one.",
-        "Noise and error bars count repeated rows as new; log at the sensor's own rate.",
+        "Noise and uncertainties count repeated rows as new; log at the sensor's own rate.",
         numbers=("sample",),
         or_severity=SERIOUS,
     ),

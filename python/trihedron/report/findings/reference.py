@@ -49,7 +49,7 @@ ENTRIES = (
         Code.REFERENCE_OUTLIERS,
         "",
         WARNING,
-        "{left_out} of {rows} rows of the reference were left out as outliers.",
+        "{left_out} of {rows} rows of the reference were excluded as outliers.",
         "Jumps of a tracker that lost its markers, or knocks.",
         "Look at the reference's own quality flags.",
     ),
@@ -85,7 +85,7 @@ ENTRIES = (
         "",
         NOTE,
         "Only the reference was asked: {why}.",
-        "The log holds no still poses to speak of.",
+        "The log holds no poses to speak of.",
     ),
     Entry(
         Code.ACCELEROMETER_NOMINAL,
@@ -93,7 +93,7 @@ ENTRIES = (
         WARNING,
         "The accelerometer was not calibrated: the reference knows no force. Its numbers in the file are nominal.",
         "A rate alone says nothing of gravity.",
-        "Calibrate it from still poses (`trihedron calibrate LOG`); the frame is the reference's body.",
+        "Calibrate it from poses (`trihedron calibrate LOG`); the frame is the reference's body.",
         numbers=("scale",),
     ),
     Entry(

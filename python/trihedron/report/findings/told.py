@@ -13,7 +13,7 @@ from trihedron.report.numbers import how_many, listed
 _ORDER = {Severity.SERIOUS: 0, Severity.WARNING: 1, Severity.NOTE: 2}
 # A number that is a value; one that names a thing (hold 3) is told apart by the word before it.
 _NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-_NAMED = re.compile(r"^(Move|Hold|Still pose|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
+_NAMED = re.compile(r"^(Move|Pose|Turn) (\d+)(?: \([^)]*\))?,? (.*)$", re.DOTALL)
 _AXIS = re.compile(r"^((?:gyro|accel)(?:\s\w+)?|ch\d+|\w+ [xyz123]): (.*)$", re.DOTALL | re.IGNORECASE)
 
 

@@ -5,7 +5,7 @@ A place is a name and, after the colon, how its value becomes words:
 ``.3g`` · ``.3g mm/s²``  a number, in the unit named there (values are SI); ``abs .3g %`` without its sign;
                          ``.3g !%`` without the unit's name
 ``all .2g °/s``          several numbers in one unit, which is named once: ``0.1, 0.2 °/s``
-``# hold``               ``1 hold``, ``3 holds``
+``# pose``               ``1 pose``, ``3 poses``
 ``?drifts|drift``        the first words where the value is 1 or true, else the second; they may hold places
 ``<below|above``         the first words where the value is negative, else the second; they may hold places
 ``&, the ``              several words, joined by what stands after the ``&``; ``and``: ``x, y and z``
