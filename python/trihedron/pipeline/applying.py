@@ -46,7 +46,7 @@ def calibration_of(given: AnyCalibration) -> Calibration:
         return given
     if isinstance(given, str | os.PathLike):
         return read_calibration(given)
-    # A check's is made with a standard gravity, for its error bars alone.
+    # A check's is made with a standard gravity, for its uncertainties alone.
     inside = None if isinstance(given, CheckResult) else getattr(given, "calibration", None)
     if isinstance(inside, Calibration):
         return inside

@@ -58,7 +58,7 @@ def beside(
     segments = segment(recording)
     try:
         if segments.n_holds < FEWEST_POSES:
-            raise RefusedError(f"{segments.n_holds} still poses are too few for a model of their own")
+            raise RefusedError(f"{segments.n_holds} poses are too few for a model of their own")
         result = ordinary()
     except REFUSALS as error:
         if found.kind == ANOTHER_UNIT:

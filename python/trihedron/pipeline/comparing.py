@@ -154,7 +154,7 @@ def _factor(one: CommonFactor) -> NoiseDifference:
 
 
 def _as_given(given: Calibration, recording: Recording, segments: Segments) -> Stage:
-    """The given numbers with one zero for the session, nothing fitted: what the recording looks like to them."""
+    """The given numbers with one bias for the session, nothing fitted: what the recording looks like to them."""
     checked = verify_calibration(given, recording, segments, given.gravity_m_s2, given.gravity_source)
     domains = [
         StageDomain(

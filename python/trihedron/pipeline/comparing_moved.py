@@ -98,10 +98,10 @@ def _row(what: What, squares: list[float | None], seen: float | None, alpha: flo
 
 
 _CAUSE = {
-    ("poses", True): "noise inside the still poses (a tremor, a line) does not go on between them as the model's does",
-    ("poses", False): "the zero is another in every pose by more than the model's noise",
+    ("poses", True): "noise inside the poses (a tremor, a line) does not go on between them as the model's does",
+    ("poses", False): "the bias is another in every pose by more than the model's noise",
     ("moves", True): "the gyro of the model strays more in moves than this one",
-    ("moves", False): "the gyro's zero strays in moves, or motion is faster than the samples",
+    ("moves", False): "the gyro's bias strays in moves, or motion is faster than the samples",
 }
 
 

@@ -53,7 +53,7 @@ GYRO_NAMES = tuple(
 def examine(
     recording: Recording, accuracy: Accuracy, *, gravity_m_s2: float = STANDARD_GRAVITY_M_S2, look_ahead: bool = True
 ) -> Examination:
-    """Poses so far, every parameter's error bar now and after the next pose, and which pose that should be.
+    """Poses so far, every parameter's uncertainty now and after the next pose, and which pose that should be.
 
     ``look_ahead`` also counts the poses that are still needed. Never raises for too few poses: what is unknown is None.
     """

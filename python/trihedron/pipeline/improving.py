@@ -109,7 +109,7 @@ def _unlike(better: Scenario, beside: MovedAlike) -> dict[str, float]:
 
 
 def _of_holds(found: DiagnosisResult) -> dict[str, tuple[NoiseTerms, Smoother]]:
-    """Noise inside the recording's still poses as terms and a low-pass, sensor by sensor: what its octaves show."""
+    """Noise inside the recording's poses as terms and a low-pass, sensor by sensor: what its octaves show."""
     recording = found.recording
     seen = sampled(recording, found.segments.holds, model_of_diagnosis(found)).noise
     out = {}

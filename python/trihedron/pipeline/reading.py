@@ -1,4 +1,4 @@
-"""Log in, audited recording out; recording in, still poses out."""
+"""Log in, audited recording out; recording in, poses out."""
 
 from __future__ import annotations
 

@@ -254,7 +254,7 @@ def _shared(away: FloatArray, noise: FloatArray, alike: FloatArray) -> float:
 
 
 def _temperature(result: CalibrationResult) -> tuple[float, float, float, int]:
-    """Mean, least and largest temperature of the holds, and whether they rise (+1) or fall (-1)."""
+    """Mean, least and largest temperature of the poses, and whether they rise (+1) or fall (-1)."""
     T = result.recording.temperature_degc
     if T is None:
         return math.nan, math.nan, math.nan, 0

@@ -80,7 +80,7 @@ def twin(recording: AnyRecording, calibration: AnyCalibration, seed: int = 0) ->
     Raises
     ------
     ValueError
-        When the recording has no still poses, or lacks a sensor.
+        When the recording has no poses, or lacks a sensor.
     """
     recording, known = recording_of(recording), calibration_of(calibration)
     return run(twin_scenario(recording, segment_recording(recording), known), seed)

@@ -42,7 +42,7 @@ def verify(
     Raises
     ------
     ValueError
-        When units differ, or the recording has no accelerometer or no still pose.
+        When units differ, or the recording has no accelerometer or no pose.
 
     Examples
     --------

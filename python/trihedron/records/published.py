@@ -8,8 +8,8 @@ import numpy as np
 
 from trihedron.records.calibration import Calibration, FitQuality
 
-AT_REST = "with one zero for the session"
-AFTER_MOVES = "with a zero per pose"
+AT_REST = "with one bias for the session"
+AFTER_MOVES = "with a bias per pose"
 """In words: what zero the saved S and b are given before the figure is taken."""
 
 

@@ -29,7 +29,7 @@ def zero_of_poses(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, 
 
 
 def zero_in_moves(labels: tuple[Label, ...], time_s: FloatArray, sigma: Triple, rng: np.random.Generator) -> FloatArray:
-    """(n, 3) by how much the zero leaves, during moves only, the line between its poses (eq. 11.8b).
+    """(n, 3) by how much the bias leaves, during moves only, the line between its poses (eq. 11.8b).
 
     N(0, ``sigma``²) at the first and at the last instant of a move, independently, linear between; nothing at rest.
     """
