@@ -159,7 +159,7 @@ def test_a_scenario_is_driven_compared_and_improved_until_it_cannot_be_told_from
     words = ["diagnose", str(real), "--gravity", "9.80665", "--against"]
     assert main([*words, str(given), "--improved", str(better)]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "accel-quadratic was left out of the model" in said
+    assert "accel-quadratic is missing from the model" in said
     assert "the model has gyro-g-sensitivity, which the recording lacks" in said
     text = better.read_text()
     assert "# the data sheet's noise" in text

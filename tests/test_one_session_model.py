@@ -52,7 +52,7 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
     assert calibration_record(result.calibration, result.segments, result.recording)["figures"] == figures
     assert set(figures) == {"gravity_at_rest", "gravity_after_moves"}
     assert "one zero for the session" in figures["gravity_at_rest"]["definition"]
-    assert "a zero per pose" in figures["gravity_after_moves"]["definition"]
+    assert "bias refitted per pose" in figures["gravity_after_moves"]["definition"]
     words = figures_in_words(result.calibration)
     assert any("held out" in value for _, value in words)
     for text in (str(result), str(diagnosis)):

@@ -47,7 +47,7 @@ def hemispheres(view: GuideView, width: int = 17, height: int = 9) -> list[str]:
     if view.up_now is not None:
         put(view.up_now, HERE)
     rows = ["".join(left) + "  " + "".join(right) for left, right in zip(*discs, strict=True)]
-    return [f"{'axis 3 up':^{width}}  {'axis 3 down':^{width}}", *rows]
+    return [f"{'+Z up':^{width}}  {'-Z up':^{width}}", *rows]
 
 
 def bar(share: float, width: int) -> str:

@@ -333,7 +333,9 @@ def _sampling(model: Sampled, recording: Sampled) -> Iterator[NoiseDifference]:
     larger, smaller = max(model.jitter_steps, recording.jitter_steps), min(model.jitter_steps, recording.jitter_steps)
     is_far = larger > LEAST_JITTER and larger > 2.0 * smaller
     which = "model" if m > r else "recording"
-    remark = f"The timestamps of the {which} scatter by {1e3 * max(m, r):.2g} ms, the other's by {1e3 * min(m, r):.2g} ms."
+    remark = (
+        f"The timestamps of the {which} scatter by {1e3 * max(m, r):.2g} ms, the other's by {1e3 * min(m, r):.2g} ms."
+    )
     if which == "recording" and model.jitter_steps < PERFECT_CLOCK:
         remark = f"The clock of the model is perfect; the timestamps of the recording scatter by {1e3 * r:.2g} ms."
     yield NoiseDifference(

@@ -1,4 +1,4 @@
-"""Bias instability and random walk of a given simulation against the recording's, by what their poses show of biases."""
+"""Bias instability and random walk of a given simulation against the recording's, by the biases in their poses."""
 
 from __future__ import annotations
 

@@ -211,8 +211,8 @@ def _start(
     """The model that the search begins from, and whether it is the recording's own.
 
     A given model is compared with what the recording says of itself. Where its poses are too few to say it, the numbers
-    of a calibration stay, with their uncertainties as knowledge. Those of a simulation are none: its errors say how well
-    its own log shows its numbers, and nothing of how far this unit lies from them.
+    of a calibration stay, with their uncertainties as knowledge. Those of a simulation are none: its errors say how
+    well its own log shows its numbers, and nothing of how far this unit lies from them.
     """
     if known is None:
         return calibrated(), True

@@ -28,8 +28,8 @@ def copied_rows(
     """Samples (k,) whose timestamp and readings are both those of the sample before, where that is no chance.
 
     ``columns`` hold the readings (rows of the table), ``rows`` (n,) where each sample stands. Samples timestamped on
-    arrival share timestamps, and coarse codes of a sensor at rest share readings: both at once are two samples still. How
-    often readings agree by chance is seen where nothing can be a copy: two to five samples back.
+    arrival share timestamps, and coarse codes of a sensor at rest share readings: both at once are two samples still.
+    How often readings agree by chance is seen where nothing can be a copy: two to five samples back.
     """
     again = np.flatnonzero(np.diff(time_s) == 0) + 1
     is_alike = _alike(columns, rows, again, 1)

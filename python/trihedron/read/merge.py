@@ -17,8 +17,8 @@ NEIGHBOUR_STEPS = 1.5
 """Two readings further apart than this have a gap between them, and nothing is made up inside a gap."""
 FASTER = 1.2
 QUIETER, WHOLE = 0.9, 0.99
-"""Interpolation that leaves less of the white noise's variance shows in uncertainties (a tenth), or at least in an Allan
-curve (a hundredth)."""
+"""Interpolation that leaves less of the white noise's variance shows in uncertainties (a tenth), or at least in an
+Allan curve (a hundredth)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,9 +60,7 @@ def read_pose_table(path: str | os.PathLike[str], *, gravity_m_s2: float, sigma_
         numbers = table.columns[found["hold"]]
         hold = np.round(numbers).astype(np.int64) - 1
         if np.any(hold < 0) or np.any(np.abs(numbers - hold - 1) > 1e-9):
-            raise ReadError(
-                f"{file}: column {table.label(found['hold'])} must count poses from 1, in whole numbers."
-            )
+            raise ReadError(f"{file}: column {table.label(found['hold'])} must count poses from 1, in whole numbers.")
     start = table.columns[found["start"]] if "start" in found else None
     stop = table.columns[found["stop"]] if "stop" in found else None
     if (start is None) != (stop is None):

@@ -19,8 +19,8 @@ from trihedron.records.words import Words, words
 class StatedClock:
     """What a format itself says of its clock; what it leaves open is found from the numbers.
 
-    ``time``: column of the timestamps; ``unit``: theirs (``s``, ``ms``, ``us``, ``ns`` or ``100us``); ``counter``: column
-    that counts samples, lost ones included; ``rate_hz``: the nominal rate, used where there are no timestamps.
+    ``time``: column of the timestamps; ``unit``: theirs (``s``, ``ms``, ``us``, ``ns`` or ``100us``); ``counter``:
+    column that counts samples, lost ones included; ``rate_hz``: the nominal rate, used where there are no timestamps.
     """
 
     time: int | None = None

@@ -8,13 +8,13 @@ import numpy as np
 
 from trihedron.records.calibration import Calibration, FitQuality
 
-AT_REST = "with one bias for the session"
-AFTER_MOVES = "with a bias per pose"
-"""In words: what zero the saved S and b are given before the figure is taken."""
+AT_REST = "one bias for the session"
+AFTER_MOVES = "bias refitted per pose"
+"""In words: which bias the saved S and b are given before the figure is taken."""
 
 
 def counted_moves(quality: FitQuality) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(m,) the moves that were not left out."""
+    """(m,) the moves that were not excluded."""
     assert quality.angle_deg is not None
     seen = np.isfinite(quality.angle_deg)
     if quality.weights is not None and len(quality.weights) == len(seen):
@@ -23,7 +23,8 @@ def counted_moves(quality: FitQuality) -> np.ndarray[tuple[int], np.dtype[np.boo
 
 
 def published_figures(calibration: Calibration) -> dict[str, dict[str, Any]]:
-    """Rms of gravity missed at rest [m/s²] and after moves [°], in sample and held out, as plain JSON types.
+    """Gravity error in static poses, rms [m/s²], and tilt error after rotations, rms [°], in sample and
+    held out, as plain JSON types.
 
     ``None`` stands for what could not be held out.
     """

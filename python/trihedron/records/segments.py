@@ -20,8 +20,8 @@ class Hold:
 
     ``[start, stop)`` are the samples that may be averaged: edges trimmed, so that no motion leaks in.
     ``[outer_start, outer_stop)`` is the stretch as detected, before trimming. ``disturbed`` are sub-ranges
-    ``(start, stop)`` inside ``[start, stop)`` that were bumped and are excluded from means. ``is_unsteady`` says that the
-    hold nowhere comes down to the sensor's own noise: held in the hand, or on a support that shakes.
+    ``(start, stop)`` inside ``[start, stop)`` that were bumped and are excluded from means. ``is_unsteady`` says that
+    the hold nowhere comes down to the sensor's own noise: held in the hand, or on a support that shakes.
     """
 
     index: int

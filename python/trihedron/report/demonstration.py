@@ -27,7 +27,7 @@ def demonstration_report(
     """The whole story."""
     return Document(
         title="A complete session, on a simulated sensor",
-        subtitle="Everything below was computed from the CSV log; only section 4 knows the truth.",
+        subtitle="Everything below was computed from the CSV log; only section 4 uses the truth.",
         verdict=_verdict(comparison, verification, uncalibrated_rms_m_s2),
         is_trustworthy=calibration.is_trustworthy,
         sections=(
@@ -48,8 +48,8 @@ def _acceleration(value: float) -> str:
 def _verdict(comparison: Comparison, verification: Verification, before: float) -> str:
     within = int(np.sum(np.abs(comparison.z) < 2.0))
     return (
-        f"Gravity at rest, in a session that the calibration has not seen: {_acceleration(before)} rms wrong before, "
-        f"{_acceleration(verification.norm_rms)} after. {within} of {len(comparison.names)} parameters lie "
+        f"Gravity error in static poses of a session that the calibration has not seen: {_acceleration(before)} rms "
+        f"before, {_acceleration(verification.norm_rms)} after. {within} of {len(comparison.names)} parameters lie "
         "within 2σ of the truth."
     )
 
@@ -85,7 +85,7 @@ def _verified(verification: Verification, before: float) -> tuple[Block, ...]:
     rows = [
         ("before", f"{_acceleration(before)} rms norm error with the data sheet's scale"),
         ("after", f"{_acceleration(verification.norm_rms)} rms over {len(verification.norm_error)} poses"),
-        ("to be expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainties"),
+        ("expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainties"),
     ]
     if len(verification.angle_deg):
         expected = float(np.sqrt(np.mean(verification.angle_sigma_deg**2)))
@@ -134,10 +134,10 @@ def _coverage(comparison: Comparison) -> str:
     z = np.abs(comparison.z)
     n = len(z)
     return (
-        f"Within 1σ: {int(np.sum(z < 1.0))} of {n} (honest uncertainties: about {round(0.683 * n)}); within 2σ: "
+        f"Within 1σ: {int(np.sum(z < 1.0))} of {n} (expected: {round(0.683 * n)}); within 2σ: "
         f"{int(np.sum(z < 2.0))} of {n} (about {round(0.954 * n)}). With all correlations χ² is "
         f"{plain_number(comparison.chi2)} for {n} parameters. One session proves little: the same count over 200 "
-        "sessions is benches/confidence. (The zeros of a real sensor wander; truth is their mean in this session.)"
+        "sessions is benches/confidence. (The biases of a sensor drift; the truth is their mean in this session.)"
     )
 
 

@@ -10,7 +10,7 @@ MOST_COEFFICIENTS = 6
 
 
 def laws_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
-    """One block per law; none where nothing predicts."""
+    """One block per empirical relation; none where nothing predicts."""
     return tuple(Facts(_rows(law)) for law in diagnosis.laws)
 
 
@@ -18,11 +18,14 @@ def _rows(law: Law) -> tuple[tuple[str, str], ...]:
     shown = law.coefficients[:MOST_COEFFICIENTS]
     words = [f"{c.name} {_value(c.value, c.std)} {unit_in_print(c.unit)}" for c in shown]
     more = len(law.coefficients) - len(shown)
-    rows = [("law", law.statement), ("", f"{law.form}: " + ", ".join(words) + (f", {more} more" if more > 0 else ""))]
+    rows = [
+        ("empirical relation", law.statement),
+        ("", f"{law.form}: " + ", ".join(words) + (f", {more} more" if more > 0 else "")),
+    ]
     if law.resembles:
-        rows.append(("", f"It resembles {listed(list(law.resembles))}; that is a likeness, not a proof."))
+        rows.append(("", f"Similar to {listed(list(law.resembles))}; similarity is no proof."))
     if law.experiment:
-        rows.append(("", f"To prove it: {law.experiment}."))
+        rows.append(("", f"To confirm it: {law.experiment}."))
     return tuple(rows)
 
 

@@ -37,7 +37,7 @@ def draw_signals(recording: Recording, segments: Segments | None = None) -> Figu
             _shade_holds(axis, recording, segments)
         for k in range(3):
             time, values = _envelope(recording.time_s, readings[:, k])
-            axis.plot(time, values, color=AXIS_COLOURS[k], linewidth=0.7, label=f"axis {k + 1}")
+            axis.plot(time, values, color=AXIS_COLOURS[k], linewidth=0.7, label="XYZ"[k])
         axis.set_ylabel(label)
         axis.margins(x=0.0)
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
@@ -54,7 +54,7 @@ def draw_holds(segments: Segments) -> Figure:
     figure, axes = panels(len(present), 1, (9.5, 1.0 + 1.9 * len(present)), share_x=True)
     for axis, (name, means) in zip(axes, present, strict=True):
         for k in range(3):
-            axis.plot(segments.time_mid_s, means[:, k], "o", color=AXIS_COLOURS[k], markersize=4, label=f"axis {k + 1}")
+            axis.plot(segments.time_mid_s, means[:, k], "o", color=AXIS_COLOURS[k], markersize=4, label="XYZ"[k])
         axis.set_ylabel(name)
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
     axes[-1].set_xlabel("time [s]")
@@ -105,7 +105,7 @@ def draw_poses(sensor: SensorCalibration, means: FloatArray) -> Figure:
     force = means @ sensor.S.T + sensor.b
     up = force / np.linalg.norm(force, axis=1)[:, None]
     figure, axes = panels(1, 2, (7.6, 4.1))
-    for axis, sign, title in ((axes[0], 1.0, "axis 3 above the horizon"), (axes[1], -1.0, "axis 3 below the horizon")):
+    for axis, sign, title in ((axes[0], 1.0, "+Z above the horizon"), (axes[1], -1.0, "+Z below the horizon")):
         _hemisphere(axis, title)
         for k, direction in enumerate(up):
             # A pose with level axis 3 lies on the rim of both.
@@ -126,7 +126,7 @@ def draw_moves(quality: FitQuality) -> Figure:
     if quality.held_out_angle_deg is not None:
         axis.bar(move + 0.2, quality.held_out_angle_deg, 0.38, color=ACCENT, label="held out")
     axis.set_xlabel("move")
-    axis.set_ylabel("gravity missed by [°]")
+    axis.set_ylabel("tilt error [°]")
     axis.set_xlim(-0.8, len(move) - 0.2)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     return figure
@@ -225,9 +225,9 @@ def draw_verification(verification: Verification) -> Figure:
     axes[0].set_ylabel("|f| − |g|  [mm/s²]")
     if has_moves:
         move = np.arange(len(verification.angle_deg))
-        axes[1].bar(move, verification.angle_deg, 0.7, color=AXIS_COLOURS[0], label="missed by")
+        axes[1].bar(move, verification.angle_deg, 0.7, color=AXIS_COLOURS[0], label="tilt error")
         axes[1].plot(move, verification.angle_sigma_deg, "_", markersize=14, color=ACCENT, label="to be expected (rms)")
         axes[1].set_xlabel("move")
-        axes[1].set_ylabel("gravity missed by [°]")
+        axes[1].set_ylabel("tilt error [°]")
         axes[1].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)
     return figure

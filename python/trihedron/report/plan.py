@@ -38,14 +38,14 @@ def plan_report(plan: ExperimentPlan) -> Document:
                 "Moves between poses (method 2)",
                 (
                     Table(
-                        ("moves", "how many", "of 9 numbers", "scale known to"),
+                        ("moves", "how many", "of 9 parameters", "scale uncertainty (1 σ)"),
                         tuple(
                             (move.name, f"{move.n_moves}", f"{move.rank}", _percent(move.scale)) for move in plan.moves
                         ),
                     ),
                     Paragraph(
-                        "A move shows two numbers, for a turn about the vertical leaves gravity where it was: three "
-                        "turns about level axes show six of nine, and all nine if each stops once on the way."
+                        "A move determines two parameters, for a turn about the vertical leaves gravity where it was: "
+                        "three turns about level axes show six of nine, and all nine if each stops once on the way."
                     ),
                 ),
             ),
@@ -70,8 +70,8 @@ def _plain(value: Any) -> Any:
 def _turns(plan: ExperimentPlan) -> Table:
     turns = plan.turns
     rows = (
-        ("turns and zero turn at once", turns.scale, turns.zero),
-        ("zero turn first, then the turns", turns.scale_zero_first, turns.zero_zero_first),
+        ("turns and bias together", turns.scale, turns.zero),
+        ("bias first, then the turns", turns.scale_zero_first, turns.zero_zero_first),
     )
     return Table(
         ("standard error", "gyro scale", "gyro bias"),
@@ -96,7 +96,7 @@ def _poses(poses: tuple[PosePlan, ...]) -> Table:
                 f"{plain_number(mm_s2_from_m_s2(pose.zero), 2)} mm/s²",
             )
         )
-    return Table(("standard error (largest)", "of 9 numbers", "scale", "angle between axes", "zero"), tuple(rows))
+    return Table(("standard error (largest)", "of 9 parameters", "scale", "angle between axes", "bias"), tuple(rows))
 
 
 def _worth(pose: PosePlan) -> str:

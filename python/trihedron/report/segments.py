@@ -93,7 +93,7 @@ def hold_table(recording: Recording, segments: Segments) -> Table:
         )
         for k, hold in enumerate(segments.holds)
     )
-    return Table(tuple(head), rows, "Mean readings ± their standard error; disturbed stretches left out")
+    return Table(tuple(head), rows, "Mean readings ± their standard error; disturbed stretches excluded")
 
 
 def signals_picture(recording: Recording, segments: Segments) -> Picture:
@@ -101,7 +101,7 @@ def signals_picture(recording: Recording, segments: Segments) -> Picture:
     draw = later("figures", "draw_signals", recording, segments)
     return Picture(
         "signals",
-        "The recording; shaded where the sensor stood still, orange where a pose was bumped.",
+        "The recording; shaded where the sensor stood still, orange where a pose was disturbed.",
         draw,
         partial(signals_chart, recording, segments),
     )

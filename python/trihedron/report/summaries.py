@@ -29,7 +29,7 @@ def recording_summary(recording: Recording) -> Document:
     return Document(
         title="Recording",
         subtitle=recording.source,
-        verdict=verdict_of(recording.findings, "Nothing was noticed that speaks against it.", "Read", "DOUBTFUL"),
+        verdict=verdict_of(recording.findings, "OK: no problems found.", "Read", "DOUBTFUL"),
         is_trustworthy=not any(finding.severity is Severity.SERIOUS for finding in recording.findings),
         sections=(
             Section("Recording", (Facts(tuple(facts)),)),

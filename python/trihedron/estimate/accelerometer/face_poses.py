@@ -20,7 +20,7 @@ FACES: tuple[int, ...] = (1, -1, 2, -2, 3, -3)
 
 
 def face_in_words(face: int) -> Words:
-    """``axis 2 down`` for -2."""
+    """``-Y up`` for -2."""
     return words("face", axis=abs(face), is_up=face > 0)
 
 

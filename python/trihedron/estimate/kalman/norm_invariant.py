@@ -310,7 +310,7 @@ def _observability(live: LiveNormCalibration) -> tuple[Observability, list[Findi
     singular = 1.0 / np.sqrt(np.maximum(values, 1e-300))
     condition = float(singular[0] / singular[-1])
     direction = np.linalg.eigh(scale[:, None] * covariance * scale)[1][:, -1]
-    names = (*(f"S{i + 1}{j + 1}" for i, j in ENTRIES), "b1", "b2", "b3")
+    names = (*(f"S_{'xyz'[i]}{'xyz'[j]}" for i, j in ENTRIES), "b_x", "b_y", "b_z")
     weakest = names[int(np.argmax(np.abs(direction)))]
     findings: list[Finding] = []
     if condition > 100.0:

@@ -25,7 +25,9 @@ def to_fast_lio(calibration: Calibration, options: ExportOptions) -> str:
     lines = [f"# {line}" for line in heading(known, "FAST-LIO has no intrinsics of the IMU: variances of one sample.")]
     lines += [f"# {line}" for line in lost_without_intrinsics(known)]
     lines += [
-        f"# {name} is an upper limit: it was not seen in the static log." for name, one in figures.named() if one.is_limit
+        f"# {name} is an upper limit: it was not seen in the static log."
+        for name, one in figures.named()
+        if one.is_limit
     ]
     lines += ["common:", f'  imu_topic: "{options.topic}"', "mapping:"]
     for key, one in (

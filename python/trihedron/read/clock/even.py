@@ -1,4 +1,4 @@
-"""The even clock behind a log's timestamps, if there is one, and the samples lost on it (docs/reading.md, section 4)."""
+"""The even clock behind a log's timestamps, if any, and the samples lost on it (docs/reading.md, section 4)."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ CLOSE_PIECES = 60
 @dataclass(frozen=True, eq=False)
 class EvenClock:
     """``tick`` (n,) number of each sample, lost ones counted; ``even_s`` (n,) when the even clock took it, relative to
-    the timestamps; ``kind``; ``counts_losses``: whether ``tick`` says what was lost; ``pauses`` (m,) rows behind which the
-    logger paused; ``wanders``: the rate changes over the log."""
+    the timestamps; ``kind``; ``counts_losses``: whether ``tick`` says what was lost; ``pauses`` (m,) rows behind which
+    the logger paused; ``wanders``: the rate changes over the log."""
 
     kind: StampKind
     period_s: float
@@ -130,7 +130,7 @@ def _error(time_s: FloatArray, even: FloatArray) -> FloatArray:
 
 
 def _long_run(time_s: FloatArray, tick: IntArray) -> float:
-    """Period from timestamps and their numbers: a line through the earliest timestamps of some hundred blocks, thrice."""
+    """Period from timestamps and their numbers: a line through the earliest of some hundred blocks, thrice."""
     period = float((time_s[-1] - time_s[0]) / max(tick[-1] - tick[0], 1))
     width = max(len(time_s) // 300, 8)
     for _ in range(3):

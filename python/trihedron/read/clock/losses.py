@@ -1,4 +1,4 @@
-"""Samples lost on a clock of known period, by which the earliest timestamps move and stay moved (docs/reading.md, 4)."""
+"""Samples lost on a clock of known period, by which the earliest timestamps shift (docs/reading.md, 4)."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def track(
 ) -> tuple[float, IntArray, IntArray, float]:
     """Period, tick of every row, pauses, and the share of blocks that moved back by a period; works in ``room`` (n,).
 
-    The earliest timestamp of every block, a stall of the link looked past, moves by whole periods where samples are lost
-    and by a little where the period is not quite right; a period that was not seen comes from first and last stamp.
+    The earliest timestamp of every block, a stall of the link looked past, moves by whole periods where samples are
+    lost and by a little where the period is not quite right; a period not seen comes from first and last timestamp.
     """
     n = len(time_s)
     pauses = _core.steps_above(time_s, PAUSE_STEPS * period)
@@ -155,9 +155,9 @@ def _behind_last(late: FloatArray, at: int, level: float, is_sharp: bool, lost: 
 
 
 def _settle(first: FloatArray, count: IntArray) -> None:
-    """Correct ``count`` (m - 1,) where the level of the earliest timestamps (m,), losses taken off, stays a period away.
+    """Correct ``count`` (m - 1,) where the level of the earliest timestamps (m,), losses removed, stays a period off.
 
-    A block without an early timestamp hides the move to the next level in two halves; a chance early one invents a move.
+    A block without an early timestamp hides the move to the next level in two halves; a chance early one makes one up.
     """
     m = SETTLED_OVER
     for _ in range(3):

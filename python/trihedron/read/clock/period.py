@@ -1,4 +1,4 @@
-"""The sampling period from timestamps alone, before any loss is counted: the peak of a phase sum (docs/reading.md, 4)."""
+"""The sampling period from timestamps alone, before losses are counted: a peak of a phase sum (docs/reading.md, 4)."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ PAUSE_STEPS = 50.0
 
 @dataclass(frozen=True)
 class Period:
-    """``period_s``; ``coherence`` the length of its phase sum (1: timestamps exactly even, 0: none seen); ``grid_s`` the
-    step on whose multiples all timestamps lie, or 0. ``is_seen``: the period stands out, so that losses can be counted."""
+    """``period_s``; ``coherence`` the length of its phase sum (1: timestamps exactly even, 0: none seen); ``grid_s``
+    the step on whose multiples all timestamps lie, or 0. ``is_seen``: the period stands out: losses can be counted."""
 
     period_s: float
     coherence: float
@@ -60,8 +60,8 @@ def find_period(time_s: FloatArray) -> Period:
     """Period of timestamps (n,) in order; at least 64 rows.
 
     ``|mean exp(2πi t/T)|²`` is averaged over windows of 2048 rows. Samples lost by whole periods leave its peak where
-    it is; a delay d lowers it to ``|E exp(2πi d/T)|²``. Where several periods explain the timestamps alike (batches, coarse
-    grids) the one that loses fewest samples is taken.
+    it is; a delay d lowers it to ``|E exp(2πi d/T)|²``. Where several periods explain the timestamps alike (batches,
+    coarse grids) the one that loses fewest samples is taken.
     """
     windows, mean_step = _windows(time_s)
     cell = mean_step / (2.0 * GRID_HIGHEST)

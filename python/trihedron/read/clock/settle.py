@@ -43,8 +43,8 @@ def settle_clock(
 ) -> Settled:
     """The clock of samples with timestamps (n,) and readings (n, 3) in every one of ``triads``.
 
-    Timestamps that two samples share, and those that are an even clock's but for rounding, give way to it; others if motion
-    says that the samples were taken evenly. A ``counter`` (n,) that counts samples tells which were lost.
+    Timestamps that two samples share, and those that are an even clock's but for rounding, give way to it; others if
+    motion says that the samples were taken evenly. A ``counter`` (n,) that counts samples tells which were lost.
     """
     clock = find_even_clock(time_s)
     numbers = None if counter is None else sample_numbers(counter)

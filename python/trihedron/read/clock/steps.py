@@ -1,4 +1,4 @@
-"""What the steps from timestamp to timestamp are, in one pass: most logs have no odd one, and need not be looked at again."""
+"""What the steps from timestamp to timestamp are, in one pass: most logs have no odd one and are done."""
 
 from __future__ import annotations
 

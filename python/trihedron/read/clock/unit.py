@@ -90,7 +90,7 @@ def seconds_of(unit: str) -> float:
 def time_unit(
     raw: FloatArray, named: str, given: str | None, wraps: bool, witness: Witness, findings: list[Finding]
 ) -> str:
-    """Unit of timestamps (n,) in order: as given, as named, by their date, or the likeliest; a doubt becomes a finding."""
+    """Unit of timestamps (n,) in order: given, named, by their date, or the likeliest; a doubt becomes a finding."""
     if given is not None:
         return parse_time_unit(given)
     if named and named != TICKS:

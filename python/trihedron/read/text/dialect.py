@@ -17,7 +17,8 @@ NEARLY_ALL = 0.9
 _SAMPLE_LINES = 400
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _CLOCK = r"\d{1,2}:\d\d:\d\d[.,]\d{1,6}"
-# Arduino IDE and PlatformIO's time filter; dated timestamps of CoolTerm and others; minicom's and Tera Term's in brackets.
+# Arduino IDE and PlatformIO's time filter; dated timestamps of CoolTerm and others; minicom's and Tera Term's in
+# brackets.
 _PREFIXES = (
     re.compile(rf"({_CLOCK}) ?(?:->|>)[ \t]*"),
     re.compile(rf"(\d{{4}}-\d\d-\d\d {_CLOCK})(?: ?(?:->|>|:))[ \t]*"),

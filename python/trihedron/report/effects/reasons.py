@@ -17,6 +17,6 @@ REASONS: Mapping[str, str] = MappingProxyType(
         "even-vibration": "no pose vibrates more than the others",
         "no-table-turns": "the session has no turns on a table against a wall",
         "six-poses": "fewer than six poses",
-        "few-orientations": "the log holds too few orientations",
+        "few-orientations": "the log has too few orientations",
     }
 )

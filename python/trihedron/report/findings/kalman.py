@@ -11,7 +11,7 @@ NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 _OF_AXES = tuple(
     entry
     for case, name, error in (
-        ("axis", "Axis {axis}", "a reference attitude is wrong"),
+        ("axis", "Accelerometer {axis:axis}", "a reference attitude is wrong"),
         ("norm", "Norm of gravity", "the axes are not linear"),
     )
     for entry in (
@@ -70,17 +70,17 @@ ENTRIES = (
         Code.WEAKLY_OBSERVABLE,
         "kalman-sensitivity",
         WARNING,
-        "The attitudes determine the sensitivity to {axis} {condition:.0f} times worse than the best-seen constant.",
+        "The attitudes determine the sensitivity to {axis:axis} {condition:.0f} times worse than the best one.",
         "The poses do not turn every axis towards the vertical, both ways up.",
-        "Add poses that tilt {axis} towards the vertical.",
+        "Add poses that tilt {axis:axis} towards the vertical.",
     ),
     Entry(
         Code.WEAKLY_OBSERVABLE,
         "kalman-zero",
         WARNING,
-        "The attitudes determine the bias {condition:.0f} times worse than the best-seen constant.",
+        "The attitudes determine the bias {condition:.0f} times worse than the best one.",
         "The poses do not turn every axis towards the vertical, both ways up.",
-        "Add poses that turn the bias's axis both ways up.",
+        "Add poses with the axis of this bias up and down.",
         numbers=("axis",),
     ),
     Entry(
@@ -89,6 +89,6 @@ ENTRIES = (
         NOTE,
         "Noise was taken from the scatter inside the poses; slow noise from pose to pose is not known.",
         "No noise description was given.",
-        "Identify the noise from a static log of an hour and give it, or heed what the innovations say.",
+        "Identify the noise from a static log of an hour and give it, or check the innovations.",
     ),
 )

@@ -47,8 +47,8 @@ _UNITS = (
         Code.UNIT_ASSUMED,
         "never-whole",
         WARNING,
-        "The accelerometer has no stretch without missing readings to tell its unit by; taken as raw counts.",
-        "A raw reading of unknown scale, a log that never rests, or wrong columns.",
+        "The accelerometer has no stretch without missing readings to determine its unit; taken as raw counts.",
+        "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
         numbers=("rest_norm",),
     ),
@@ -58,7 +58,7 @@ _UNITS = (
         WARNING,
         "The accelerometer reads {rest_norm:.4g} in its quietest stretches, which is gravity in no known unit; taken "
         "as raw counts.",
-        "A raw reading of unknown scale, a log that never rests, or wrong columns.",
+        "A raw reading of unknown scale, a log without static poses, or wrong columns.",
         _SAY_ACCEL_UNIT,
     ),
     Entry(
@@ -75,7 +75,7 @@ _UNITS = (
         SERIOUS,
         f"The accelerometer is in {{unit}} {_SOURCE}, but at rest it reads {{rest_norm:.4g}} {{unit}}, "
         "{gravities:.3g} times gravity.",
-        "A wrong unit, wrong columns, or a log that never rests.",
+        "A wrong unit, wrong columns, or a log without static poses.",
         _SAY_ACCEL_UNIT,
     ),
     Entry(Code.UNIT_DETECTED, "stated", NOTE, f"The {{sensor}} is in {{unit}} {_SOURCE}."),
@@ -108,7 +108,7 @@ _UNITS = (
         WARNING,
         "Nothing states the gyro's unit; it reads {rest:.3g} at rest and {largest:.4g} at most, so it was taken as "
         "{unit}.",
-        "No unit in the header, and no turns between rests to settle it.",
+        "No unit in the header, and no turns between static poses to determine it.",
         _SAY_GYRO_UNIT,
     ),
 )
@@ -117,7 +117,7 @@ _WHY_FIRST = {
     "poses": "its quiet readings differ from pose to pose",
     "level": "its steady reading stands far above its noise, as gravity does",
 }
-_WHY_UNKNOWN = {"short": "the log is too short to tell", "alike": "both triads look alike"}
+_WHY_UNKNOWN = {"short": "the log is too short", "alike": "both triads look alike"}
 _NAME_THEM = "Name them with --columns, for example --columns ax,ay,az,gx,gy,gz."
 _COLUMNS = (
     Entry(
@@ -176,7 +176,7 @@ _COLUMNS = (
         Code.COLUMNS_ASSUMED,
         "header-ignored",
         WARNING,
-        "The line '{line}' above the numbers does not name their {n_columns} columns, so it was passed over.",
+        "The line '{line}' above the numbers does not name their {n_columns} columns, so it was skipped.",
         "A header with another number of names than there are columns.",
         "Name the columns with --columns.",
     ),
@@ -240,7 +240,7 @@ _ROWS = (
         Code.ROWS_LEFT_OUT,
         "above",
         WARNING,
-        "{rows_left_out} lines above the first row of {n_columns} numbers were passed over (first: line {line}).",
+        "{rows_left_out} lines above the first row of {n_columns} numbers were skipped (first: line {line}).",
         "Rows of another layout, damaged rows, or numbers that belong to a preamble.",
         "Look at these lines; nothing else of the file was excluded.",
     ),
@@ -248,7 +248,7 @@ _ROWS = (
         Code.ROWS_LEFT_OUT,
         "remarks",
         NOTE,
-        "{rows_left_out} lines between the rows begin like remarks and were passed over (first: line {line}).",
+        "{rows_left_out} lines between the rows begin like remarks and were skipped (first: line {line}).",
         "Remarks of the logger, or rows that somebody took out.",
     ),
     Entry(
@@ -265,7 +265,7 @@ _ROWS = (
         Code.ROWS_UNACCOUNTED,
         "",
         SERIOUS,
-        "The file holds {in_file} rows, {read} were read and {reported} reported as left out: {count} are not "
+        "The file holds {in_file} rows, {read} were read and {reported} reported as excluded: {count} are not "
         "accounted for.",
         "A fault of the reader.",
         "Report it with the file; until then convert the log to CSV with another program.",

@@ -15,7 +15,7 @@ ENTRIES = (
         Code.DEVICES_INTERLEAVED,
         "",
         SERIOUS,
-        "Rows alternate between the readings of {n} devices, and no column tells them apart.",
+        "Rows alternate between the readings of {n} devices, and no column identifies them.",
         "Several sensors written into one log, row by row.",
         "Log whose row it is, and read with --columns device=COLUMN --instance N; or split the log.",
     ),

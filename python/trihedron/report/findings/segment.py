@@ -14,7 +14,7 @@ ENTRIES = (
         "",
         WARNING,
         "{holds:# pose} {holds:?drifts|drift} while still: in pose {worst_hold} at {worst_s:.1f} s the second half "
-        "reads {worst_sigmas:.1f} standard errors from the first (pose {which:first 8}).",
+        "differs by {worst_sigmas:.1f} σ from the first (pose {which:first 8}).",
         "The support gives way, the case settles after being let go, or the sensor warms up.",
         "Wait until the case has settled, hold for less time, or put it on a firmer support.",
         or_severity=SERIOUS,
@@ -26,7 +26,7 @@ ENTRIES = (
         "{disturbances:# disturbance} inside {holds:# pose} (pose {which:first 8}), {left_out_s:.1f} s in all, the "
         "first at {first_s:.1f} s, excluded from the means.",
         "The table or the cable was touched, or samples are missing there.",
-        "Nothing needs to be done; keep hands off the table during a pose.",
+        "Nothing needs to be done; keep hands off the table while the sensor is in a pose.",
     ),
     Entry(
         Code.HOLD_UNSTEADY,
@@ -35,16 +35,16 @@ ENTRIES = (
         "{holds:# pose} never {holds:?comes|come} down to the sensor's own noise (pose {which:first 8}; first at "
         "{first_s:.1f} s).",
         "The sensor was held in the hand or stood on a support that shakes.",
-        "Their means weigh less, by their own scatter; rest the case on something firm for a better result.",
+        "Their means weigh less, by their own scatter; put the case on a firm support for a better result.",
     ),
     Entry(
         Code.HOLD_AT_LIMIT,
         "",
         WARNING,
-        "{holds:# pose} {holds:?reads|read} the end of the accelerometer's range (first at {first_s:.1f} s, a "
-        "reading of {reading:.6g}) and {holds:?is|are} left out: only a bound of gravity is known there.",
-        "The range ends below 1 g plus the bias of that axis.",
-        "Set a wider range; the poses that remain calibrate what they show.",
+        "{holds:# pose} {holds:?reaches|reach} the accelerometer's range limit (first at {first_s:.1f} s, a "
+        "reading of {reading:.6g}) and {holds:?is|are} excluded: clipped readings only bound gravity.",
+        "The range limit is below 1 g plus the bias of that axis.",
+        "Set a wider range; the remaining poses are used.",
     ),
     Entry(
         Code.NOT_STATIC,
@@ -59,8 +59,8 @@ ENTRIES = (
         Code.SLOW_TURN,
         "",
         NOTE,
-        "{turning_s:.1f} s look still to the accelerometer but turn: the gyro reads away from its bias, first at "
-        "{first_s:.1f} s; taken as moving.",
+        "{turning_s:.1f} s are still to the accelerometer while the gyro shows a slow turn, first at {first_s:.1f} s; "
+        "taken as moving.",
         "A slow steady turn about the vertical.",
         "Nothing needs to be done.",
     ),
