@@ -136,7 +136,7 @@ def test_a_log_in_g_called_m_s2_is_questioned():
         (np.eye(3), np.zeros(3), G, "positive"),
         (np.eye(3), np.ones((2, 3)), G, "shape"),
         (np.eye(3), 1e-3, 0.981, "m/s²"),
-        (np.zeros((0, 3)), 1e-3, G, "no still poses"),
+        (np.zeros((0, 3)), 1e-3, G, "no pose was found"),
     ],
 )
 def test_malformed_questions_are_answered_in_words(means, sigma, gravity, words):

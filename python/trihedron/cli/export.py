@@ -10,7 +10,7 @@ import typer
 from trihedron.cli.options import Force
 from trihedron.cli.output import check_outputs, leave, say
 
-LOSSES = ("lost", "Left out, since", "upper limit", "NOT TO BE TRUSTED")
+LOSSES = ("lost", "Not in this file", "upper limit", "NOT TO BE TRUSTED")
 """Words by which a file says what it cannot hold."""
 
 

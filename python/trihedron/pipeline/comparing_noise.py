@@ -176,7 +176,7 @@ def _hidden(sensor: Sensor, axis: str, m: HoldNoise, r: HoldNoise, unit: str) ->
     assert loud.white is not None
     would_show = loud.reading_sigma > SHOWS * quiet.step
     name = "accelerometer" if sensor == "accelerometer" else "gyro"
-    remark = f"The converter of the {side} hides the noise of its {name}."
+    remark = f"The resolution (LSB) of the {side} hides the noise of its {name}."
     if would_show:
         remark = f"The {side} has no noise on the {name}; the {other} has."
     values = _value(m.white), _value(r.white)
@@ -252,7 +252,7 @@ def _step(
         coarse = m if m_shows else r
         matters = coarse.step > coarse.reading_sigma
         side = "recording" if m_shows else "model"
-        remark = f"The {side} has no converter steps on the {name}." if matters else ""
+        remark = f"The {side} has no resolution (LSB) on the {name}." if matters else ""
         yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, None, None, unit, None, matters, remark)
         return
     ratio = m.step / r.step
@@ -260,7 +260,7 @@ def _step(
     # Steps far below the noise are as likely the digits of a file as a converter's.
     is_seen = not levels or max(m.step, r.step) > DIGITS * min(levels)
     is_far = max(ratio, 1.0 / ratio) > LEAST_STEP_RATIO and is_seen
-    remark = f"The converter steps of the {name} are {ratio:.3g} times the recording's." if is_far else ""
+    remark = f"The resolution (LSB) of the {name} is {ratio:.3g} times the recording's." if is_far else ""
     yield NoiseDifference(sensor, axis, "resolution", m.step, r.step, ratio, None, unit, None, is_far, remark)
 
 

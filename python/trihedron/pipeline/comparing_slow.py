@@ -194,4 +194,4 @@ def _remark(sensor: Sensor, found: SlowDifference, common: float, rate_hz: float
 def _unseen(term: str, model: Measured, recording: Measured) -> str:
     unseen = [(side, one) for side, one in (("the model", model), ("the recording", recording)) if not one.lower > 0.0]
     bounds = " and ".join(f"{side} below {one.upper:.2g}" for side, one in unseen)
-    return f"Not long enough to show {term}: zero is not excluded, 97.5 % of {bounds}; the figure is a median."
+    return f"Not long enough to show {term}: 0 is not excluded, 97.5 % of {bounds}; the figure is a median."

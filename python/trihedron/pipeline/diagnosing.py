@@ -131,7 +131,7 @@ def _of_poses(
     calibrated = cache(lambda: calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration)
     resting = None if against is not None else at_rest(recording, segments, known, gravity, calibrated)
     if resting is not None:
-        tell(0.1, "looking at zeros and lines")
+        tell(0.1, "looking at biases and spectral lines")
         return diagnosed_at_rest(recording, segments, resting, (gravity, source), tuple(findings), alpha, known)
     simulated: _Free | None = None
     if against is not None:
@@ -239,7 +239,7 @@ def _simulated_log(
         against = read_scenario(Path(against))
     if recording.gyroscope is None:
         raise RefusedError(
-            "a scenario is moved as the recording was, and this recording has no gyro to tell how: log both sensors, "
+            "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "
             "or simulate a log of your own and hold that against it"
         )
     own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration

@@ -46,7 +46,7 @@ HOLDS_PER_GOAL = 2.5
 """A pose's own error may be so many times the accuracy wanted: a dozen poses average the rest away."""
 
 GYRO_NAMES = tuple(
-    f"scale of axis {i + 1}" if i == j else f"axis {j + 1} into {i + 1}" for i in range(3) for j in range(3)
+    f"scale of {'XYZ'[i]}" if i == j else f"{'XYZ'[j]} into {'XYZ'[i]}" for i in range(3) for j in range(3)
 )
 
 
@@ -286,7 +286,7 @@ def _why(uncertain: tuple[Uncertain, ...]) -> str:
     if worst.now is None:
         open_ones = [one for one in uncertain if one.now is None]
         after = max(open_ones, key=lambda one: (one.after_next or 0.0) / one.wanted)
-        return f"Not known yet: {len(open_ones)} of {len(uncertain)} numbers; among them {after.sensor} {after.name}."
+        return f"Not yet accurate enough: {len(open_ones)} of {len(uncertain)} parameters; among them {after.sensor} {after.name}."
     then = "" if worst.after_next is None else f"; this pose brings it to {100 * worst.after_next:.2g} %"
     return f"Worst is {worst.sensor} {worst.name}: {100 * worst.now:.2g} %, wanted {100 * worst.wanted:.2g} %{then}."
 

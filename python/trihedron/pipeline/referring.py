@@ -105,7 +105,7 @@ def calibration_by(
     if recording.accelerometer is None:
         raise RefusedError(
             f"{recording.source}: a calibration holds an accelerometer too, and this log has none; "
-            "`trihedron diagnose LOG --reference MOTION --json FILE` writes the gyro's numbers."
+            "`trihedron diagnose LOG --reference MOTION --json FILE` writes the gyro's parameters."
         )
     gyro = found.gyroscope
     method = f"reference ({found.kind})"

@@ -34,7 +34,7 @@ from trihedron.records import Finding, FindingCode, Recording
 from trihedron.records.progress import Progress
 from trihedron.units import AccelerationUnit, RateUnit
 
-STAMPS = "stamps as logged [s]"
+STAMPS = "timestamps as logged [s]"
 """Name under which timestamps that gave way to an even clock are kept."""
 
 

@@ -121,7 +121,7 @@ class SensorCalibration(Frozen):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Presented):
-    """Both sensors in one instrument trihedron, with what they were determined from.
+    """Both sensors in one body frame (instrument frame), with what they were determined from.
 
     ``covariance`` (24, 24): accelerometer's 12 parameters, then the gyro's, with cross terms; (12, 12) without.
     """

@@ -172,7 +172,7 @@ TACTICAL = Profile(
 )
 
 # A perfect instrument, to which effects can be added one at a time.
-IDEAL = Profile("ideal", "no noise, no converter, SI output, 100 Hz", Accelerometer(), Gyroscope(), Clock(100.0))
+IDEAL = Profile("ideal", "no noise, no quantisation, SI output, 100 Hz", Accelerometer(), Gyroscope(), Clock(100.0))
 
 PROFILES: dict[str, Profile] = {p.name: p for p in (ANALOG_6DOF, MPU, ADIS, TACTICAL, IDEAL)}
 

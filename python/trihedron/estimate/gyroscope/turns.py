@@ -136,7 +136,7 @@ def calibrate_turns(
         covariance=_covariance(fit, inflation, shared),
         raw_unit=recording.gyroscope_unit.value,
         si_unit="rad/s",
-        method="turns" if route == "least-squares" else "turns, zero turn first",
+        method="turns" if route == "least-squares" else "turns, bias first",
         quality=_quality(system, used, fit, S),
         observability=_observability(system, used, fit),
     )

@@ -277,7 +277,7 @@ def _mean_readings(readings: npt.ArrayLike) -> FloatArray:
         raise RefusedError(f"readings must have shape (n, 3), got {a.shape}")
     n = len(a)
     if n < N_PARAMETERS:
-        raise RefusedError(f"{n} poses give {n} equations for nine unknowns: hold at least nine, better eighteen")
+        raise RefusedError(f"{n} poses give {n} equations for nine unknowns: record at least nine, better eighteen")
     if not np.all(np.isfinite(a)):
         raise RefusedError(f"pose {int(np.flatnonzero(~np.isfinite(a).all(axis=1))[0]) + 1}: the reading is not finite")
     return a

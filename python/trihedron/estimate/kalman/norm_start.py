@@ -13,7 +13,7 @@ from trihedron.refused import RefusedError
 
 @dataclass(frozen=True, eq=False)
 class NormStart:
-    """Where the filter starts: ``f = S (raw − zero)`` with S (3, 3) and zero (3,).
+    """Where the filter starts: ``f = S (raw − zero)`` with S (3, 3) and bias (3,).
 
     S is good to ``sigma_relative`` of its size, the zero reading to ``sigma_zero_m_s2``. The signs of S decide
     the signs of the result: the length of a vector cannot.
@@ -27,7 +27,7 @@ class NormStart:
     def __post_init__(self) -> None:
         S, zero = np.array(self.S, dtype=np.float64), np.array(self.zero, dtype=np.float64)
         if S.shape != (3, 3) or zero.shape != (3,) or not (np.all(np.isfinite(S)) and np.all(np.isfinite(zero))):
-            raise RefusedError(f"a start needs finite S (3, 3) and zero (3,), got shapes {S.shape} and {zero.shape}")
+            raise RefusedError(f"a start needs finite S (3, 3) and bias (3,), got shapes {S.shape} and {zero.shape}")
         if np.linalg.matrix_rank(S) < 3:
             raise RefusedError(
                 "a start needs three independent axes: S = 0 is no calibration, but the filter would stay there"

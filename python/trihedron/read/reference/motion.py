@@ -48,7 +48,7 @@ def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> 
     used = [role for role in roles if role.what != "time"]
     whole = np.all([np.isfinite(table.columns[role.column][rows]) for role in used], axis=0) if used else None
     if whole is None or whole.sum() < 2:
-        raise ReadError(f"{table.path}: this reference tells neither attitude nor rate: its columns are {WAYS}.")
+        raise ReadError(f"{table.path}: this reference has neither attitude nor rate: its columns are {WAYS}.")
     if not np.all(whole):
         rows = rows[whole]
     time_s = clock.time_s[whole]
@@ -56,7 +56,7 @@ def read_reference(path: str | os.PathLike[str], columns: str | None = None) -> 
     rate = None if attitude is not None else _triad(table, used, "w", rows, "rate")
     position = None if attitude is None else _triad(table, used, "p", rows, "position")
     if attitude is None and rate is None:
-        raise ReadError(f"{table.path}: this reference tells neither attitude nor rate: its columns are {WAYS}.")
+        raise ReadError(f"{table.path}: this reference has neither attitude nor rate: its columns are {WAYS}.")
     return _settled(table, time_s, clock.start_s, attitude, rate, position, (*table.findings, *clock.findings))
 
 

@@ -172,7 +172,7 @@ def supply(
 def handedness(scenario: Scenario, sensor: Sensor, axis: int) -> Scenario:
     """``axis`` 1, 2 or 3 points against its documentation."""
     if axis not in (1, 2, 3):
-        raise RefusedError(f"axis is 1, 2 or 3, got {axis}")
+        raise RefusedError(f"axis is 1, 2 or 3 (X, Y, Z), got {axis}")
     part = getattr(scenario, checked(sensor))
     S = np.array(part.S)
     S[:, axis - 1] *= -1.0
