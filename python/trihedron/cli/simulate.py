@@ -76,7 +76,7 @@ def simulate(
     report: Report = None,
     force: Force = False,
 ) -> None:
-    """Simulate an instrument: a scenario, or the twin of a recording; the truth is kept apart from the log."""
+    """Simulate an instrument: a scenario, or the digital twin of a recording; the truth is kept apart from the log."""
     from trihedron.simulate import list_scenarios
 
     if list_them:

@@ -24,7 +24,8 @@ def verify(
     limit_mg: Annotated[
         Optional[float],  # noqa: UP045 -- typer evaluates it at run time
         typer.Option(
-            metavar="MG", help="Largest rms gravity error in static poses that you accept; beyond it the exit status is 2."
+            metavar="MG",
+            help="Largest rms gravity error in static poses that you accept; beyond it the exit status is 2.",
         ),
     ] = None,
     limit_deg: Annotated[

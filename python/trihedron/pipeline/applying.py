@@ -70,7 +70,7 @@ def write_calibration(calibration: AnyCalibration, path: str | os.PathLike[str],
 def apply(calibration: AnyCalibration, recording: AnyRecording) -> Recording:
     """The recording in SI, in the calibration's body frame: ``S raw + b`` for every row.
 
-    Where the calibration is extended, its effects are taken off first; a finding names those that cannot be. Where it
+    Where the calibration is extended, its effects are compensated first; a finding names those that cannot be. Where it
     follows temperature, S and b are those of each sample's temperature; outside the range for which it was made the
     ends are held and a serious finding says so.
 

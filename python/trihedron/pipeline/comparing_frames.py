@@ -23,8 +23,8 @@ def rates_of_world(recording: Recording, segments: Segments) -> NoiseDifference 
     body, world = degrees_from_radians(seen.body_rad), degrees_from_radians(seen.world_rad)
     remark = (
         f"The gyro of the model reads rates along the axes of the world, not of the body: the tilt error "
-        f"after rotations is {body:.0f}° if they are the body's and {world:.1f}° if they are the world's. Turn them by the "
-        "transpose of the attitude; until then only its accelerometer is compared."
+        f"after rotations is {body:.0f}° if they are the body's and {world:.1f}° if they are the world's. Turn them by "
+        "the transpose of the attitude; until then only its accelerometer is compared."
     )
     return NoiseDifference("gyroscope", "", "frame", None, None, None, None, "1", None, True, remark)
 

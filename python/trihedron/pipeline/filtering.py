@@ -95,7 +95,7 @@ def kalman(
         Noise of the raw readings: as written down (a JSON file), as identified, or a static log to identify it from.
         Without it, what is seen inside the poses.
     frame : "lower" or "symmetric"
-        Instrument trihedron where there is no reference; with one it is the frame of the reference.
+        Body frame where there is no reference; with one it is the frame of the reference.
 
     Returns
     -------

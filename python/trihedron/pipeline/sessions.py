@@ -85,7 +85,7 @@ def calibrate_sessions(
     gravity_m_s2 or latitude_deg, height_m : float
         As for :func:`calibrate`.
     frame : "lower" or "symmetric"
-        Instrument trihedron of the common calibration.
+        Body frame of the common calibration.
     alpha : float
         Chance that any number of a unit that did not change is called changed.
 

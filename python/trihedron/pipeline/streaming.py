@@ -282,7 +282,9 @@ def apply_file(
     if target.exists() and not overwrite:
         raise RefusedError(f"{target}: this exists and was left alone; choose another name or add --force.")
     if known.extensions.get("effects") or known.extensions.get("thermal"):
-        raise RefusedError("this calibration follows temperature or compensates effects: apply it to the log as a whole.")
+        raise RefusedError(
+            "this calibration follows temperature or compensates effects: apply it to the log as a whole."
+        )
     check_units(known, cast("Recording", log))
     sensors = [(log.accelerometer, known.accelerometer), (log.gyroscope, known.gyroscope)]
     used = [(triad, sensor) for triad, sensor in sensors if triad is not None and sensor is not None]

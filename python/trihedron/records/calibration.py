@@ -17,7 +17,7 @@ from trihedron.records.presented import Presented
 from trihedron.refused import RefusedError
 
 Frame = Literal["lower", "symmetric", "case"]
-"""Instrument trihedron Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
+"""Body frame Mz: ``lower`` (S_f lower triangular), ``symmetric`` (S_f symmetric), ``case`` (S_f full)."""
 
 PARAMETER_NAMES: tuple[str, ...] = (*(f"S_{i}{j}" for i in "xyz" for j in "xyz"), "b_x", "b_y", "b_z")
 """Order of a sensor's 12 parameters in every covariance: S row by row, then b."""

@@ -191,14 +191,14 @@ def _matrix(name: str, symbol: str, unit: str, fit: FitToReference) -> Table:
     raw = "w" if symbol == "ω" else "a"
     rows = tuple(
         (
-            f"{symbol}{i + 1} =",
+            f"{symbol}_{'xyz'[i]} =",
             *(with_sigma(scale * fit.S[i, j], scale * sigma[3 * i + j]) for j in range(3)),
             with_sigma(fit.b[i], sigma[9 + i]),
         )
         for i in range(3)
     )
     return Table(
-        ("", *(f"{raw}′{j}{times}" for j in (1, 2, 3)), f"b [{unit}]"), rows,
+        ("", *(f"{raw}′_{j}{times}" for j in "xyz"), f"b [{unit}]"), rows,
         f"{name} in the reference's body   {symbol} = S {raw}′ + b",
     )  # fmt: skip
 

@@ -82,7 +82,7 @@ def hold_table(recording: Recording, segments: Segments) -> Table:
                 with_sigma(float(mean[k, axis]), float("nan") if sigma is None else float(sigma[k, axis]))
                 for k in range(segments.n_holds)
             ]
-            columns.append((cells, f"{label}{axis + 1} [{unit_in_print(unit)}]"))
+            columns.append((cells, f"{label}_{'xyz'[axis]} [{unit_in_print(unit)}]"))
     head += [title for _, title in columns]
     rows = tuple(
         (

@@ -57,13 +57,13 @@ def segments_summary(segments: Segments) -> Document:
 
 
 def _holds(segments: Segments) -> Table:
-    head, columns = ["pose", "middle [s]", "held [s]"], []
+    head, columns = ["pose", "middle [s]", "length [s]"], []
     for letter, mean, sigma in (
         ("a", segments.accelerometer_mean, segments.accelerometer_sigma_mean),
         ("w", segments.gyroscope_mean, segments.gyroscope_sigma_mean),
     ):
         if mean is not None and sigma is not None:
-            head += [f"{letter}′{axis}" for axis in (1, 2, 3)]
+            head += [f"{letter}′_{axis}" for axis in "xyz"]
             columns += [
                 [with_sigma(float(m), float(s)) for m, s in zip(mean[:, k], sigma[:, k], strict=True)] for k in range(3)
             ]

@@ -62,7 +62,7 @@ def calibrate_norm(
     raw_unit : AccelerationUnit
         Unit of ``means``; only kept in the result and used to question implausible scales.
     frame : "lower" or "symmetric"
-        Instrument trihedron. (``case`` needs method 1: still poses do not know the case.)
+        Body frame. (``case`` needs method 1: still poses do not know the case.)
     loss, loss_scale
         Robust loss and its scale in standard errors; the default scales keep 95 % efficiency on Gaussian noise.
     objective : "norm" or "squared"

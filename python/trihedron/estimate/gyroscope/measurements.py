@@ -211,8 +211,7 @@ def _moves_of(recording: Recording, segments: Segments) -> list[Move]:
     moves = [move for move in segments.moves if move.stop - move.start >= 2]
     if not moves:
         raise RefusedError(
-            "no move between two poses was found: turn the sensor by hand between poses and keep each for some "
-            "seconds"
+            "no move between two poses was found: turn the sensor by hand between poses and keep each for some seconds"
         )
     if moves[-1].stop > recording.n_samples or segments.holds[-1].stop > recording.n_samples:
         raise RefusedError("the segments reach beyond the recording: they belong to another log")

@@ -172,8 +172,8 @@ def check_same_converter(
         if step > COARSER * noise.resolution and step > fast > 0.0:
             raise RefusedError(
                 f"the static log is of another ADC than {source}: accelerometer {axis} has a resolution of {step:.3g} "
-                f"there, and the noise of the static log, {fast:.3g} a sample at a resolution of {noise.resolution:.3g}, would have "
-                f"shown them; {remedy}"
+                f"there, and the noise of the static log, {fast:.3g} a sample at a resolution of "
+                f"{noise.resolution:.3g}, would have shown it; {remedy}"
             )
         ratios = [
             (octave.density.lower / expected, octave.density.upper / expected, octave.density.value / expected)
