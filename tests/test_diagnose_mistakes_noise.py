@@ -140,8 +140,8 @@ def test_one_time_constant_for_both_sensors_is_named_with_all_four_times():
 def test_a_bias_that_was_drawn_and_never_added_is_named_and_a_drawn_one_is_not():
     real = numbers((0.05, -0.03, 0.08), (0.01, -0.02, 0.005))
     rows = compare_numbers(numbers(), real, alpha=0.01).parameters
-    assert {(p.id, bool(p.remark)) for p in rows if p.significant} == {("accel-zero", True), ("gyro-zero", True)}
-    assert "drawn and never added" in next(p.remark for p in rows if p.id == "gyro-zero")
+    assert {(p.id, bool(p.remark)) for p in rows if p.significant} == {("accel-bias", True), ("gyro-bias", True)}
+    assert "drawn and never added" in next(p.remark for p in rows if p.id == "gyro-bias")
     other = numbers((-0.02, 0.06, 0.01), (0.02, 0.01, -0.01))
     assert not any(p.remark for p in compare_numbers(other, real, alpha=0.01).parameters)
     # A recording whose zeros are as good as none refutes nothing.

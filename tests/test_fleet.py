@@ -54,7 +54,7 @@ def test_every_log_has_its_row_and_the_bad_one_its_reason(done):
 def test_the_page_names_the_device_that_changed(done):
     result, out = done
     moved = [(c.group, c.id) for c in result.summary.changes if c.significant]
-    assert moved == [("unit_1", "gyro-zero")]
+    assert moved == [("unit_1", "gyro-bias")]
     page = (out / "fleet.html").read_text()
     assert "unit_1" in page
     assert "notes.txt" in page

@@ -79,6 +79,6 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "simulate": (
         ("What there is ready-made:", "trihedron simulate --list"),
         ("A log with its truth beside it:", "trihedron simulate hand-session -o log.csv --truth truth.json --seed 3"),
-        ("The digital twin of a recording:", "trihedron simulate --like log.csv --calibration cal.json -o twin.csv"),
+        ("The digital twin of a recording:", "trihedron simulate --like log.csv --calibration cal.json -o copy.csv"),
     ),
 }

@@ -125,13 +125,13 @@ def _groups(all_of_them: tuple[Uncertain, ...]) -> list[Uncertain]:
     """The worst of every kind, seven lines at most."""
     groups: dict[tuple[str, str], list[Uncertain]] = {}
     for one in all_of_them:
-        kind = "scale" if one.name.startswith("scale") else "zero" if one.name.startswith("zero") else "axes"
+        kind = "scale" if one.name.startswith("scale") else "bias" if one.name.startswith("bias") else "axes"
         groups.setdefault((one.sensor, kind), []).append(one)
     out = []
     for (sensor, kind), members in groups.items():
         worst = max(members, key=lambda one: math.inf if one.now is None else one.now)
         after = [one.after_next for one in members if one.after_next is not None]
-        words = {"scale": "scales", "zero": "zeros", "axes": "angles"}[kind]
+        words = {"scale": "scales", "bias": "biases", "axes": "angles"}[kind]
         out.append(Uncertain(sensor, words, worst.now, max(after) if after else None, worst.wanted))
     return out
 

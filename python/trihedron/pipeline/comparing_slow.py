@@ -27,7 +27,7 @@ RESEMBLES_SLOW = 1.5
 """A session tells a walk to some 30 %: a ratio this near to the root of the rate is taken for it."""
 TESTS = 24.0
 """Shares of alpha: a twelfth is spent on slow noise, half of it on either sensor."""
-NO_SHAPE = frozenset({"gyro-zero-scatter", "accel-zero-scatter", "disturbed-pose", "periodic-interference"})
+NO_SHAPE = frozenset({"gyro-bias-repeatability", "accel-bias-repeatability", "disturbed-pose", "periodic-interference"})
 """Effects that leave the course of a bias from pose to pose as it is."""
 DOMAINS: Mapping[str, Domain] = MappingProxyType({"gyroscope": "static-gyro", "accelerometer": "static-accel"})
 AXES = ("x", "y", "z")
@@ -98,7 +98,7 @@ def _drifts(found: Diagnosis, sensor: Sensor, *, but_curve: bool = False) -> boo
 
 def _has_curve(found: Diagnosis, sensor: Sensor = "gyroscope") -> bool:
     """Whether the one effect on a sensor's biases, beside their scatter, is a drift along a curve of any shape."""
-    domain, drift = DOMAINS[sensor], f"{'gyro' if sensor == 'gyroscope' else 'accel'}-hidden-drift"
+    domain, drift = DOMAINS[sensor], f"{'gyro' if sensor == 'gyroscope' else 'accel'}-bias-drift"
     of_zeros = [e for e in found.effects if any(h.domain == domain for h in e.held_out) and e.id not in NO_SHAPE]
     return len(of_zeros) == 1 and of_zeros[0].id == drift and of_zeros[0].model.get("variant") in FREE_CURVES
 

@@ -67,7 +67,7 @@ FLAWS: dict[str, Draw] = {
     "accel-size-effect": lambda rng: {"places_m": ((0.0, 0.0, 0.0), _signed(rng, 6e-3), _signed(rng, 6e-3))},
     "gyro-g-sensitivity": lambda rng: {"matrix": tuple(_signed(rng, 1.8e-4) for _ in range(3))},
     "accel-gyro-time-offset": lambda rng: {"offset_s": float(rng.choice((-1, 1)) * rng.uniform(3e-3, 6e-3))},
-    "gyro-hidden-drift": lambda rng: {"amplitude": _signed(rng, 3e-3), "tau_s": float(rng.uniform(40.0, 90.0))},
+    "gyro-bias-drift": lambda rng: {"amplitude": _signed(rng, 3e-3), "tau_s": float(rng.uniform(40.0, 90.0))},
 }
 
 

@@ -286,7 +286,8 @@ def _why(uncertain: tuple[Uncertain, ...]) -> str:
     if worst.now is None:
         open_ones = [one for one in uncertain if one.now is None]
         after = max(open_ones, key=lambda one: (one.after_next or 0.0) / one.wanted)
-        return f"Not yet determined: {len(open_ones)} of {len(uncertain)} parameters, {after.sensor} {after.name} the worst."
+        count = f"{len(open_ones)} of {len(uncertain)} parameters"
+        return f"Not yet determined: {count}, {after.sensor} {after.name} the worst."
     then = "" if worst.after_next is None else f"; this pose brings it to {100 * worst.after_next:.2g} %"
     return f"Worst is {worst.sensor} {worst.name}: {100 * worst.now:.2g} %, wanted {100 * worst.wanted:.2g} %{then}."
 

@@ -183,7 +183,7 @@ def _numbers(tables: dict[str, dict[str, Any]], given: Scenario, found: Diagnosi
     moved = {p.id for p in found.parameters if p.significant}
     fits = (("accelerometer", "accel", found.extended.accelerometer), ("gyroscope", "gyro", found.extended.gyroscope))
     for name, prefix, fit in fits:
-        groups = {f"{prefix}-zero", f"{prefix}-scale", f"{prefix}-misalignment", "triad-alignment"}
+        groups = {f"{prefix}-bias", f"{prefix}-scale", f"{prefix}-misalignment", "triad-alignment"}
         # S and b of both sensors are in one frame: where one of them is replaced, both are.
         scaled = {n.sensor for n in found.noise_compared if n.term in ("range", "unit") and n.significant}
         if fit is None or not (moved & (groups | {"accel-misalignment", "gravity"}) or scaled):

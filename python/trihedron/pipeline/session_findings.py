@@ -18,7 +18,7 @@ WIDE_RANGE_DEGC = 10.0
 """Temperatures further apart than this move the zeros of parts by more than their other repeatability (0.1 to 1 mg and
 0.01 to 0.05 °/s per °C)."""
 
-_KINDS = ("zero", "scale", "misalignment", "alignment")
+_KINDS = ("bias", "scale", "misalignment", "alignment")
 """Parameters whose change has a likely cause of its own, by the end of their names."""
 
 

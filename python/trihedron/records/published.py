@@ -31,7 +31,7 @@ def published_figures(calibration: Calibration) -> dict[str, dict[str, Any]]:
     out: dict[str, dict[str, Any]] = {}
     at_rest = calibration.accelerometer.quality
     if at_rest is not None:
-        out["gravity_at_rest"] = {
+        out["gravity_error_in_static_poses"] = {
             "definition": f"| |S a' + b| - |g| | of the means of the poses, {AT_REST}",
             "unit": "m/s^2",
             "rms": float(at_rest.rms),
@@ -41,7 +41,7 @@ def published_figures(calibration: Calibration) -> dict[str, dict[str, Any]]:
     if moved is not None and moved.angle_deg is not None:
         counted = counted_moves(moved)
         held = moved.held_out_angle_deg
-        out["gravity_after_moves"] = {
+        out["tilt_error_after_rotations"] = {
             "definition": f"angle between gravity carried by the gyro and gravity measured after a move, {AFTER_MOVES}",
             "unit": "deg",
             "rms": _rms(moved.angle_deg[counted]),

@@ -21,7 +21,7 @@ session has its own."""
 
 @dataclass(frozen=True)
 class Parameter:
-    """One of the numbers that do not depend on a frame: ``id`` of the contract (``gyro-zero``), axis or pair ``name``,
+    """One of the numbers that do not depend on a frame: ``id`` of the contract (``gyro-bias``), axis or pair ``name``,
     ``unit`` of its value, ``sensor``."""
 
     id: str
@@ -36,7 +36,7 @@ _AXES, _PAIRS = ("x", "y", "z"), ("xy", "xz", "yz")
 def _of(prefix: Literal["accel", "gyro"], unit: str) -> tuple[Parameter, ...]:
     sensor: Literal["accelerometer", "gyroscope"] = "accelerometer" if prefix == "accel" else "gyroscope"
     return (
-        *(Parameter(f"{prefix}-zero", axis, unit, sensor) for axis in _AXES),
+        *(Parameter(f"{prefix}-bias", axis, unit, sensor) for axis in _AXES),
         *(Parameter(f"{prefix}-scale", axis, "1", sensor) for axis in _AXES),
         *(Parameter(f"{prefix}-misalignment", pair, "rad", sensor) for pair in _PAIRS),
     )

@@ -12,7 +12,6 @@ from trihedron.records.domains import DomainResiduals, DomainTest, HeldOut
 from trihedron.report.calibration import figures_in_words
 from trihedron.report.diagnosis_against_charts import noise_pictures, stages_pictures
 from trihedron.report.diagnosis_charts import before_after_chart, effect_chart
-from trihedron.report.diagnosis_laws import laws_blocks
 from trihedron.report.diagnosis_models import models_blocks
 from trihedron.report.diagnosis_numbers import (
     differing_noise,
@@ -21,6 +20,7 @@ from trihedron.report.diagnosis_numbers import (
     numbers_blocks,
     stages_blocks,
 )
+from trihedron.report.diagnosis_relations import relations_blocks
 from trihedron.report.diagnosis_words import (
     MEANING,
     p_in_words,
@@ -74,7 +74,7 @@ def diagnosis_report(diagnosis: Diagnosis) -> Document:
         sections.append(Section("Parameters that differ (recording minus model)", (Facts(words),)))
     sections += [
         Section("Missing effects", effects_blocks(diagnosis)),
-        Section("Unexplained", (Paragraph(_remaining(diagnosis)), *laws_blocks(diagnosis))),
+        Section("Unexplained", (Paragraph(_remaining(diagnosis)), *relations_blocks(diagnosis))),
         Section("Cross-validation: before and after", _held_out(diagnosis)),
         Section("Candidates", (_candidates(diagnosis),)),
         Section("Calibration and noise", models_blocks(diagnosis)),
@@ -302,7 +302,7 @@ def _picture(diagnosis: Diagnosis, residuals: DomainResiduals) -> Picture:
 
     draw = later("diagnosis_figures", "draw_before_after", residuals, has_effects=has_effects)
     n = len(residuals.before)
-    caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'hold' else 'move')}; "
+    caption = f"{_CAPTIONS[residuals.domain]} {how_many(n, 'pose' if residuals.kind == 'pose' else 'move')}; "
     caption += "error bars: ± 2 σ of the predicted noise."
     if residuals.domain == "dynamics":
         caption += " Velocity and angle of one move share most of their noise: χ² compares what is left of it."

@@ -71,7 +71,7 @@ def _domain_marks(
     residuals: DomainResiduals, time_s: FloatArray, value: FloatArray, sigma: FloatArray, unit: str
 ) -> tuple[Mark, ...]:
     is_angle = residuals.channels == ("angle",)
-    kind = "pose" if residuals.kind == "hold" else "move"
+    kind = "pose" if residuals.kind == "pose" else "move"
     marks: list[Mark] = [Level(y=0.0), _bars_of_noise(time_s, sigma, is_angle=is_angle)]
     for k, channel in enumerate(residuals.channels):
         colour: Colour = AXIS_COLOURS[k] if len(residuals.channels) > 1 else "accent"
@@ -147,7 +147,7 @@ def _drivers(
                 fastest_rate(seen.time_before_s, recording, segments, calibration),
             )
         ]
-    if effect_id in _FORCE and seen.kind == "hold" and recording.accelerometer is not None:
+    if effect_id in _FORCE and seen.kind == "pose" and recording.accelerometer is not None:
         force = force_at(seen.time_before_s, recording, calibration)
         return [(f"f_{'xyz'[j]} [m/s²]", "m/s²", force[:, j]) for j in range(3)]
     return [("time [s]", "s", seen.time_before_s)]
@@ -186,7 +186,7 @@ def fastest_rate(time_s: FloatArray, recording: Recording, segments: Segments, c
 def _against(seen: DomainResiduals, label: str, unit_x: str, x: FloatArray) -> Panel:
     """Residuals without the effects as dots; explained by the effects as circles, where poses are the same."""
     factor, unit = PRINTED[seen.unit]
-    kind = "pose" if seen.kind == "hold" else "move"
+    kind = "pose" if seen.kind == "pose" else "move"
     marks: list[Mark] = [Level(y=0.0)]
     is_same = seen.before.shape == seen.after.shape and np.allclose(seen.time_before_s, seen.time_after_s, atol=1e-6)
     for k, channel in enumerate(seen.channels):

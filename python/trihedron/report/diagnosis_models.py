@@ -49,7 +49,7 @@ def models_blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
             if corner is not None:
                 words += f"; bias random walk beyond {plain_number(float(corner))} s"
             facts.append((f"{name} noise", words))
-        hidden = diagnosis.noise.get(f"{name}_zero")
+        hidden = diagnosis.noise.get(f"{name}_bias")
         if hidden:
             unit = "m/s^2" if name == "accelerometer" else "rad/s"
             bound = ", at its upper bound" if hidden["is_at_edge"] else ""

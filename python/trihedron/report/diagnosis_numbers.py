@@ -10,20 +10,20 @@ from trihedron.units import degrees_from_radians, mm_s2_from_m_s2, mrad_from_rad
 NAMED_SIGMAS = 3.0
 """Components of a group that differs are named from here on; the largest always is."""
 _WORDS = {
-    "accel-zero": "accelerometer {} bias",
+    "accel-bias": "accelerometer {} bias",
     "accel-scale": "accelerometer {} scale",
     "accel-misalignment": "accelerometer angle {}",
-    "gyro-zero": "gyro {} bias",
+    "gyro-bias": "gyro {} bias",
     "gyro-scale": "gyro {} scale",
     "gyro-misalignment": "gyro angle {}",
     "triad-alignment": "gyro triad turned about {}",
     "gravity": "gravity (or all three accelerometer scales)",
 }
 _GROUPS = {
-    "accel-zero": "accelerometer biases",
+    "accel-bias": "accelerometer biases",
     "accel-scale": "accelerometer scales",
     "accel-misalignment": "accelerometer angles",
-    "gyro-zero": "gyro biases",
+    "gyro-bias": "gyro biases",
     "gyro-scale": "gyro scales",
     "gyro-misalignment": "gyro angles",
     "triad-alignment": "the gyro triad's alignment",

@@ -111,7 +111,7 @@ def where_in_words(test: DomainTest) -> str:
     if where.channels:
         parts.append("channel " + ", ".join(where.channels))
     if where.segments:
-        segments = [name.replace("hold ", "pose ") for name in where.segments]
+        segments = list(where.segments)
         spans = [f"{plain_number(a, 4)}–{plain_number(b, 4)} s" for a, b in where.times_s]
         named = [
             f"{name} ({span})" for name, span in zip(segments, spans + [""] * len(segments), strict=False) if span

@@ -179,7 +179,7 @@ def _thermal(thermal: ThermalModel) -> list[Block]:
 
 
 def _unit(name: str) -> str:
-    return {"accel-zero": "m/s^2", "gyro-zero": "rad/s"}.get(name, "rad")
+    return {"accel-bias": "m/s^2", "gyro-bias": "rad/s"}.get(name, "rad")
 
 
 def _sessions(model: SessionsModel) -> Table:

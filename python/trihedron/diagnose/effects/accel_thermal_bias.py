@@ -18,8 +18,8 @@ class AccelThermalBias(Effect):
     """Bias linear, then quadratic in temperature; with its rate of change, or a branch of its own while it cools."""
 
     id = "accel-thermal-bias"
-    leaves_open = ("accel-zero",)
-    drifts_as = "accel-hidden-drift"
+    leaves_open = ("accel-bias",)
+    drifts_as = "accel-bias-drift"
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:

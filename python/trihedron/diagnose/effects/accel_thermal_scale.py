@@ -15,8 +15,8 @@ class AccelThermalScale(Effect):
     id = "accel-thermal-scale"
     size = 3e-4
     """1/K: 300 ppm."""
-    leaves_open = ("accel-zero", "accel-scale")
-    drifts_as = "accel-hidden-drift"
+    leaves_open = ("accel-bias", "accel-scale")
+    drifts_as = "accel-bias-drift"
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:

@@ -18,8 +18,8 @@ class GyroThermalBias(Effect):
     """Bias linear, then quadratic in temperature; with its rate of change, or a branch of its own while it cools."""
 
     id = "gyro-thermal-bias"
-    leaves_open = ("gyro-zero",)
-    drifts_as = "gyro-hidden-drift"
+    leaves_open = ("gyro-bias",)
+    drifts_as = "gyro-bias-drift"
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:

@@ -15,8 +15,8 @@ class GyroThermalScale(Effect):
     id = "gyro-thermal-scale"
     size = 3e-4
     """1/K: 300 ppm."""
-    leaves_open = ("gyro-zero", "gyro-scale")
-    drifts_as = "gyro-hidden-drift"
+    leaves_open = ("gyro-bias", "gyro-scale")
+    drifts_as = "gyro-bias-drift"
     applies_elsewhere = True
 
     def unavailable(self, context: Context) -> str | None:

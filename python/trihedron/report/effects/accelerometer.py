@@ -55,13 +55,13 @@ ENTRIES = (
         TWO_TEMPERATURES,
     ),
     EffectWords(
-        "accel-hidden-drift",
+        "accel-bias-drift",
         "the accelerometer bias drifts smoothly in time; no logged channel explains it",
         LOG_TEMPERATURE,
         drifts("accelerometer", "mm/s²", "as a random walk", " A settling support has the same effect across gravity."),
     ),
     EffectWords(
-        "accel-zero-scatter",
+        "accel-bias-repeatability",
         "the accelerometer bias changes from pose to pose",
         COME_BACK,
         MappingProxyType(

@@ -38,13 +38,13 @@ ENTRIES = (
         TWO_TEMPERATURES,
     ),
     EffectWords(
-        "gyro-hidden-drift",
+        "gyro-bias-drift",
         "the gyro bias drifts smoothly in time; no logged channel explains it",
         LOG_TEMPERATURE,
         drifts("gyro", "°/s", "as a random walk, beyond its noise"),
     ),
     EffectWords(
-        "gyro-zero-scatter",
+        "gyro-bias-repeatability",
         "the gyro bias changes from pose to pose",
         COME_BACK,
         MappingProxyType(

@@ -269,7 +269,7 @@ _DIAGNOSE = (
 )
 
 _CHANGED_CAUSE = {
-    "zero": "A calibration shift between sessions (turn-on, mounting, temperature, age).",
+    "bias": "A calibration shift between sessions (turn-on, mounting, temperature, age).",
     "scale": "Temperature, stress or the gravity that was given.",
     "misalignment": "Stress in the package or the board, or another unit.",
     "alignment": "One of two parts was remounted, or another unit.",
