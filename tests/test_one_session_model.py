@@ -51,7 +51,7 @@ def test_calibrate_and_diagnose_publish_the_same_figures_in_print_and_in_json(he
     assert diagnosis.to_dict()["figures"] == figures
     assert calibration_record(result.calibration, result.segments, result.recording)["figures"] == figures
     assert set(figures) == {"gravity_error_in_static_poses", "tilt_error_after_rotations"}
-    assert "one zero for the session" in figures["gravity_error_in_static_poses"]["definition"]
+    assert "one bias for the session" in figures["gravity_error_in_static_poses"]["definition"]
     assert "bias refitted per pose" in figures["tilt_error_after_rotations"]["definition"]
     words = figures_in_words(result.calibration)
     assert any("held out" in value for _, value in words)

@@ -109,7 +109,7 @@ def _to_go(known: Examination) -> str:
 def _parameters(known: Examination | None, *, tall: bool) -> Text:
     """Uncertainties now, after the next pose and as wanted: all of them where there is room, else the worst of each."""
     if known is None:
-        return Text("uncertainties come with the first poses", style=DIM)
+        return Text("after the first poses", style=DIM)
     room = 32 if tall else 14
     out = Text(f"{'uncertainty, %':{room}s}{'now':>6}{'next':>7}{'goal':>6}\n", style=DIM)
     rows = list(known.uncertain) if tall else _groups(known.uncertain)

@@ -183,7 +183,7 @@ def _si(value: float, unit: str) -> str:
 
 
 def _named(p: ParameterDifference) -> str:
-    return _WORDS[p.id].format(p.name) if p.id in _WORDS else f"{p.id} {p.name}"
+    return _WORDS[p.id].format(p.name.upper()) if p.id in _WORDS else f"{p.id} {p.name}"
 
 
 def _difference(p: ParameterDifference) -> str:

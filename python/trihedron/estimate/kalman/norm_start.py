@@ -54,8 +54,6 @@ class NormStart:
         a = np.asarray(readings, dtype=np.float64)
         half = (a.max(axis=0) - a.min(axis=0)) / 2.0
         if np.any(half <= 0):
-            raise RefusedError(
-                f"axis {'xyz'[int(np.argmin(half))]} never changed: turn it both ways up, or give a start"
-            )
+            raise RefusedError(f"{'XYZ'[int(np.argmin(half))]} never changed: turn it both ways up, or give a start")
         zero = (a.max(axis=0) + a.min(axis=0)) / 2.0
         return cls(np.diag(gravity_m_s2 / half), zero, sigma_relative=0.3, sigma_zero_m_s2=3.0)
