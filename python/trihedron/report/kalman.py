@@ -51,7 +51,7 @@ def kalman_report(outcome: KalmanCalibration | NormKalmanCalibration, calibratio
         subtitle=calibration.recording_source or "no recording named",
         verdict=verdict_of(
             calibration.findings,
-            "Good: the innovations are as large and as white as the noise model says.",
+            "OK: the innovations are as large and as white as the noise model predicts.",
             "Usable",
             "NOT TO BE TRUSTED",
         ),

@@ -45,7 +45,7 @@ def noise_report(
         subtitle=noise.source,
         verdict=verdict_of(
             findings,
-            "Good: the spectrum is a sum of noise terms from end to end.",
+            "OK: a sum of noise terms fits the whole spectrum.",
             "Usable",
             "NOT TO BE TRUSTED",
         ),
@@ -211,7 +211,7 @@ def _answers_table(axes: list[NoiseAxis], unit: str) -> Table:
     printed = unit_in_print(unit)
     rows = (
         ("best averaging time [s]", *(best(axis, 0) for axis in axes)),
-        (f"bias known then to [{printed}]", *(best(axis, 1) for axis in axes)),
+        (f"bias uncertainty then [{printed}]", *(best(axis, 1) for axis in axes)),
         *(
             (
                 f"σ of a mean of {window:g} s [{printed}]",

@@ -287,7 +287,7 @@ _MANY_RECORDINGS = (
         Code.SESSION_LEFT_OUT,
         "",
         WARNING,
-        "{name} was excluded: {why}.",
+        "Recording {name} was excluded: {why}.",
         "One recording that cannot be calibrated does not stop the others.",
         "See `trihedron check {path}`.",
     ),
