@@ -215,7 +215,7 @@ def test_xsens_trackers_were_sampled_when_they_say(real_data):
     recording = read_recording(real_data / "dual_xsens" / "imu_a_45_1.csv")
     assert not recording.sampling.is_even
     assert recording.sampling.followed == pytest.approx(1.0, abs=0.15)
-    assert FindingCode.STAMPS_KEPT in codes(recording)
+    assert FindingCode.TIMESTAMPS_KEPT in codes(recording)
     assert set(np.round(1e3 * np.diff(recording.time_s), 3)) == {7.5, 10.0}
 
 

@@ -24,9 +24,9 @@ from trihedron.simulate import (
     table_turns,
     with_effect,
 )
+from trihedron.simulate.bias_repeatability import bias_of_poses
 from trihedron.simulate.motion import attitude_with_up
 from trihedron.simulate.motion.plan import Label
-from trihedron.simulate.zero_scatter import zero_of_poses
 
 IDEAL = Scenario(hand_session(8, hold_s=1.0, first_hold_s=2.0, arm_m=0.1), "ideal")
 
@@ -354,7 +354,7 @@ def test_a_pushed_pose_keeps_its_zero():
     labels = [Label(s.kind, s.name, s.start_s, s.stop_s, s.axis, s.turn_rad) for s in truth.segments]
     pushed = next(k for k, label in enumerate(labels) if label.kind == "disturbance")
     t = np.array([labels[pushed].start_s - 0.1, labels[pushed].stop_s + 0.1])
-    before, after = zero_of_poses(tuple(labels), t, (1.0, 1.0, 1.0), np.random.default_rng(1))
+    before, after = bias_of_poses(tuple(labels), t, (1.0, 1.0, 1.0), np.random.default_rng(1))
     assert np.array_equal(before, after)
 
 

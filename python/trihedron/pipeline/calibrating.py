@@ -183,7 +183,7 @@ def _as_they_weigh(segments: Segments) -> Found:
     """Findings of the segmentation; that holds creep is serious for a calibration where it is no exception."""
     return tuple(
         replace(finding, severity=Severity.SERIOUS)
-        if finding.code is FindingCode.HOLD_CREEPS and finding.numbers["holds"] > MOST_CREEPING * segments.n_holds
+        if finding.code is FindingCode.POSE_SETTLING and finding.numbers["holds"] > MOST_CREEPING * segments.n_holds
         else finding
         for finding in segments.findings
     )

@@ -300,7 +300,7 @@ def _hold_s(known: Known, accuracy: Accuracy, segments: Segments) -> float:
 
 
 def _warnings(recording: Recording, segments: Segments) -> tuple[str, ...]:
-    quiet = {"few-poses", "unit-detected", "no-initial-rest"}
+    quiet = {"few-poses", "unit-detected", "no-initial-pose"}
     found = [*recording.findings, *segments.findings]
     return tuple(f.seen for f in found if f.severity is not Severity.NOTE and f.code.value not in quiet)[:4]
 

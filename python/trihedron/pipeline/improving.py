@@ -18,7 +18,7 @@ from trihedron.pipeline.comparing_moved import AIMED_AT
 from trihedron.pipeline.comparing_noise import Sampled, sampled
 from trihedron.pipeline.comparing_quantisation import white_and_quantisation
 from trihedron.pipeline.comparing_ranges import SENSOR
-from trihedron.pipeline.driving import MovedAlike, flicker_of_poses, zero_in_moves, zero_of_poses
+from trihedron.pipeline.driving import MovedAlike, bias_in_moves, bias_of_poses, flicker_of_poses
 from trihedron.pipeline.results import DiagnosisResult
 from trihedron.records.diagnosis import AcceptedEffect
 from trihedron.records.hold_noise import HoldNoise
@@ -89,8 +89,8 @@ def improve(
         # pose also turns the gravity that moves are judged by.
         for sensor, table, key, of in (
             ("accelerometer", "noise", "B", flicker_of_poses),
-            ("accelerometer", "electronics", "zero_scatter", zero_of_poses),
-            ("gyroscope", "electronics", "zero_in_moves", zero_in_moves),
+            ("accelerometer", "electronics", "bias_repeatability", bias_of_poses),
+            ("gyroscope", "electronics", "bias_in_moves", bias_in_moves),
         ):
             found_value = of(scenario_from_table(tomllib.loads(text)), beside)
             if found_value is not None:

@@ -50,7 +50,7 @@ def _changed(change: Change, model: SessionsModel) -> Finding:
     parameter = change.id.rsplit("-", 1)[-1]
     case = f"{parameter if parameter in _KINDS else 'other'}-{change.kind}"
     return Finding.of(
-        FindingCode.NUMBERS_CHANGED,
+        FindingCode.PARAMETERS_CHANGED,
         case,
         what=[change.id, change.group] if model.by == "device" else [change.id],
         amount=_amount(change),

@@ -96,7 +96,9 @@ def _poses(poses: tuple[PosePlan, ...]) -> Table:
                 f"{plain_number(mm_s2_from_m_s2(pose.zero), 2)} mm/s²",
             )
         )
-    return Table(("largest standard uncertainty (1 σ)", "of 9 parameters", "scale", "angle between axes", "bias"), tuple(rows))
+    return Table(
+        ("largest standard uncertainty (1 σ)", "of 9 parameters", "scale", "angle between axes", "bias"), tuple(rows)
+    )
 
 
 def _worth(pose: PosePlan) -> str:

@@ -90,8 +90,8 @@ def _repeatability(model: SessionsModel) -> list[Block]:
             tuple(head),
             tuple(rows),
             "Standard deviation from one recording to the next, beyond each one's own uncertainty. Biases are raw "
-            "readings at zero input (−S⁻¹ b) in SI units; scales are raw counts per unit, relative to the common value; "
-            "misalignments are departures from 90°.",
+            "readings at zero input (−S⁻¹ b) in SI units; scales are raw counts per unit, relative to the common "
+            "value; misalignments are departures from 90°.",
         )
     ]
 

@@ -115,7 +115,7 @@ def _findings(sampling: Sampling, clock: EvenClock, shared: float) -> tuple[Find
         Finding.of(
             FindingCode.EVEN_CLOCK
             if sampling.is_even
-            else FindingCode.STAMPS_KEPT
+            else FindingCode.TIMESTAMPS_KEPT
             if follows_wholly
             else FindingCode.CLOCK_UNDECIDED,
             period_s=sampling.period_s,

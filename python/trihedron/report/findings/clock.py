@@ -176,7 +176,7 @@ _CLOCKS = (
         numbers=_WITH_THEM,
     ),
     Entry(
-        Code.STAMPS_KEPT,
+        Code.TIMESTAMPS_KEPT,
         "",
         NOTE,
         f"The timestamps differ from an even clock ({_EVEN}) by {{stamp_error_s:.2g ms}} rms, {_BY_MOTION}: kept.",

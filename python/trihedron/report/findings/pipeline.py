@@ -311,7 +311,7 @@ _MANY_RECORDINGS = (
     ),
     *(
         Entry(
-            Code.NUMBERS_CHANGED,
+            Code.PARAMETERS_CHANGED,
             f"{parameter}-{kind}",
             WARNING,
             f"{{what:& of }} {seen}.",

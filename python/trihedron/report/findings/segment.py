@@ -10,7 +10,7 @@ NOTE, WARNING, SERIOUS = Severity.NOTE, Severity.WARNING, Severity.SERIOUS
 
 ENTRIES = (
     Entry(
-        Code.HOLD_CREEPS,
+        Code.POSE_SETTLING,
         "",
         WARNING,
         "{holds:# pose} {holds:?drifts|drift} while still: in pose {worst_hold} at {worst_s:.1f} s the second half "
@@ -20,7 +20,7 @@ ENTRIES = (
         or_severity=SERIOUS,
     ),
     Entry(
-        Code.HOLD_BUMPED,
+        Code.POSE_DISTURBED,
         "",
         NOTE,
         "{disturbances:# disturbance} inside {holds:# pose} (pose {which:first 8}), {left_out_s:.1f} s in all, the "
@@ -29,7 +29,7 @@ ENTRIES = (
         "Nothing needs to be done; keep hands off the table while the sensor is in a pose.",
     ),
     Entry(
-        Code.HOLD_UNSTEADY,
+        Code.POSE_UNSTEADY,
         "",
         WARNING,
         "{holds:# pose} never {holds:?comes|come} down to the sensor's own noise (pose {which:first 8}; first at "
@@ -38,7 +38,7 @@ ENTRIES = (
         "Their means weigh less, by their own scatter; put the case on a firm support for a better result.",
     ),
     Entry(
-        Code.HOLD_AT_LIMIT,
+        Code.POSE_AT_RANGE_LIMIT,
         "",
         WARNING,
         "{holds:# pose} {holds:?reaches|reach} the accelerometer's range limit (first at {first_s:.1f} s, a "
@@ -65,7 +65,7 @@ ENTRIES = (
         "Nothing needs to be done.",
     ),
     Entry(
-        Code.NO_INITIAL_REST,
+        Code.NO_INITIAL_POSE,
         "",
         NOTE,
         "The log does not begin at rest: the first pose starts at {first_hold_s:.1f} s.",

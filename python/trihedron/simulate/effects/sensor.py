@@ -58,9 +58,9 @@ def _warmed(scenario: Scenario, warm_up_k: float, warm_up_tau_s: float, logged: 
     return replace(scenario, environment=replace(scenario.environment, temperature=temperature))
 
 
-def zero_scatter(sensor: Sensor) -> Change:
+def bias_repeatability(sensor: Sensor) -> Change:
     def change(scenario: Scenario, sigma: Values) -> Scenario:
-        return electronics(scenario, sensor, zero_scatter=triple(sigma))
+        return electronics(scenario, sensor, bias_repeatability=triple(sigma))
 
     return change
 
