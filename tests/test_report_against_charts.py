@@ -66,6 +66,6 @@ def test_stages_are_drawn_domain_by_domain():
     ]
     chart = stages_chart(SimpleNamespace(stages=stages))
     assert [panel.title for panel in chart.panels] == ["tilt error after rotations", "noise, octave by octave"]
-    assert chart.panels[0].x.names == ("as given", "numbers", "noise", "effects")
+    assert chart.panels[0].x.names == ("as given", "parameters", "noise", "effects")
     assert len(stages_pictures(SimpleNamespace(stages=stages))) == 1
     assert stages_pictures(SimpleNamespace(stages=())) == ()

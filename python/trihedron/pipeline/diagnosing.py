@@ -240,7 +240,7 @@ def _simulated_log(
     if recording.gyroscope is None:
         raise RefusedError(
             "a scenario is moved as the recording was, and this recording has no gyro to show how: log both sensors, "
-            "or simulate a log of your own and hold that against it"
+            "or compare with a simulated log of your own"
         )
     own = calibrate(recording, segments=segments, gravity_m_s2=gravity).calibration
     return driven(against, recording, segments, own), against
