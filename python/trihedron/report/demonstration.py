@@ -57,22 +57,19 @@ def _verdict(comparison: Comparison, verification: Verification, before: float) 
 def _session(segments: Segments, recording: Recording) -> str:
     still = float(np.sum(segments.duration_s))
     return (
-        "A person picks up a 16-bit MEMS IMU, sets it down in one pose after another by hand, faces and edges "
-        "of its case "
-        f"and some tilts between, and never looks at an angle. After {duration(recording.duration_s)} the log holds "
+        "A person picks up a 16-bit MEMS IMU and sets it down by hand in one pose after another: faces and edges of "
+        f"its case and some tilts between, no angle measured. After {duration(recording.duration_s)} the log holds "
         f"{recording.n_samples} rows of raw counts at {plain_number(recording.rate_hz, 4)} Hz; the sensor's own "
-        f"noise tells {segments.n_holds} poses ({duration(still)} in all) from {len(segments.moves)} "
-        "moves. Nothing was set."
+        f"noise separates {segments.n_holds} poses ({duration(still)} in all) from {len(segments.moves)} moves; no "
+        "threshold was set."
     )
 
 
 def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, ...]:
     said = (
-        f"Only gravity had to be said: latitude {latitude_deg:g}° gives {calibration.gravity_m_s2:.5f} m/s². In "
-        "every pose the calibrated accelerometer must read that much, whatever the pose; through "
-        "every move the "
-        "calibrated gyro "
-        "must carry gravity from one pose into the next. One fit of both gives:"
+        f"Only gravity had to be given: latitude {latitude_deg:g}° means {calibration.gravity_m_s2:.5f} m/s². The "
+        "calibrated accelerometer must read that length in every pose, and the calibrated gyro must predict the "
+        "direction of gravity after every rotation. One fit of both gives:"
     )
     blocks: list[Block] = [Paragraph(said), parameter_table("accelerometer", calibration.accelerometer)]
     if calibration.gyroscope is not None:
@@ -83,18 +80,21 @@ def _calibrated(calibration: Calibration, latitude_deg: float) -> tuple[Block, .
 def _verified(verification: Verification, before: float) -> tuple[Block, ...]:
     expected = float(np.sqrt(np.mean(verification.norm_sigma**2)))
     rows = [
-        ("before", f"{_acceleration(before)} rms norm error with the data sheet's scale"),
-        ("after", f"{_acceleration(verification.norm_rms)} rms over {len(verification.norm_error)} poses"),
-        ("expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainties"),
+        ("gravity error before", f"{_acceleration(before)} rms with the data sheet's scale"),
+        (
+            "gravity error after",
+            f"{_acceleration(verification.norm_rms)} rms over {len(verification.norm_error)} poses",
+        ),
+        ("  expected", f"{_acceleration(expected)} rms from noise and the calibration's uncertainty"),
     ]
     if len(verification.angle_deg):
         expected = float(np.sqrt(np.mean(verification.angle_sigma_deg**2)))
         rows += [
             (
-                "gravity carried",
-                f"to {plain_number(verification.angle_rms_deg)}° rms through {len(verification.angle_deg)} moves",
+                "tilt error after a rotation",
+                f"{plain_number(verification.angle_rms_deg)}° rms over {len(verification.angle_deg)} moves",
             ),
-            ("to be expected", f"{plain_number(expected)}° rms"),
+            ("  expected", f"{plain_number(expected)}° rms"),
         ]
     return (Facts(tuple(rows)), *_warnings(verification.findings))
 

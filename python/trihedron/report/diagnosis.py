@@ -124,7 +124,7 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
     head: tuple[str, ...] = (
         "what",
         "domain",
-        "residual, bias refitted per pose",
+        "residual of the session fit",
         "χ²/dof",
         "p",
         "model",
@@ -143,7 +143,9 @@ def _located(diagnosis: Diagnosis) -> tuple[Block, ...]:
         blocks.append(Facts(places))
     own = getattr(diagnosis, "calibration", None)
     if own is not None and not getattr(diagnosis, "model_is_given", False):
-        blocks.append(Facts(figures_in_words(own)))
+        figures = figures_in_words(own)
+        named = ((("saved S and b" if not k else ""), f"{name} {said}") for k, (name, said) in enumerate(figures))
+        blocks.append(Facts(tuple(named)))
     return tuple(blocks)
 
 
